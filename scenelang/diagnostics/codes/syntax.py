@@ -1,0 +1,3 @@
+"""E01xx, W01xx: syntax."""
+
+CODES: dict[str, str] = {}

@@ -1,0 +1,205 @@
+"""The Scene: concrete, validated, frozen. What text evaluates to and what Python or JSON callers build.
+
+Angles are radians, lengths world units, colours numbers in [0, 1] as written (sRGB in 2D). Spans do not
+live here: the evaluator returns a `SpanMap` beside the Scene, keyed by `id()` of the node.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Rgb = tuple[Finite, Finite, Finite]
+Row = tuple[Finite, Finite, Finite, Finite]
+Combine = Literal["union", "smooth", "subtract", "intersect"]
+
+
+class _Node(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+# ---------------------------------------------------------------- transforms
+
+
+class Translate(_Node):
+    kind: Literal["translate"] = "translate"
+    x: float
+    y: float
+    z: float = 0.0
+
+
+class Rotate(_Node):
+    """A turn by ``angle`` radians, counter-clockwise, about ``axis`` (any length but 0)."""
+
+    kind: Literal["rotate"] = "rotate"
+    angle: float
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+
+class Scale(_Node):
+    kind: Literal["scale"] = "scale"
+    x: float
+    y: float
+    z: float
+
+
+class Shear(_Node):
+    """``xy``: x += k y, and so on."""
+
+    kind: Literal["shear"] = "shear"
+    axes: Literal["xy", "xz", "yx", "yz", "zx", "zy"]
+    k: float
+
+
+class Matrix(_Node):
+    """A 4 x 4 affine, rows, for column vectors; the last row is 0 0 0 1."""
+
+    kind: Literal["matrix"] = "matrix"
+    rows: tuple[Row, Row, Row, Row]
+
+
+class Twirl(_Node):
+    kind: Literal["twirl"] = "twirl"
+    k: float
+
+
+class Bend(_Node):
+    kind: Literal["bend"] = "bend"
+    k: float
+
+
+class Twist(_Node):
+    kind: Literal["twist"] = "twist"
+    k: float
+
+
+class Displace(_Node):
+    kind: Literal["displace"] = "displace"
+    amount: float
+    frequency: float
+
+
+Transform = Annotated[
+    Translate | Rotate | Scale | Shear | Matrix | Twirl | Bend | Twist | Displace,
+    Field(discriminator="kind"),
+]
+
+# ---------------------------------------------------------------- materials
+
+
+class Flip(_Node):
+    kind: Literal["flip"] = "flip"
+
+
+class Color(_Node):
+    """Multiplies by ``rgb``."""
+
+    kind: Literal["color"] = "color"
+    rgb: Rgb
+
+
+class Grayscale(_Node):
+    kind: Literal["grayscale"] = "grayscale"
+    amount: float
+
+
+class Hue(_Node):
+    """An HSV hue shift by ``angle`` radians."""
+
+    kind: Literal["hue"] = "hue"
+    angle: float
+
+
+MaterialOp = Annotated[
+    Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue,
+    Field(discriminator="kind"),
+]
+
+
+class Material(_Node):
+    """A material of the model, with its texture and colour operations in order."""
+
+    name: str
+    ops: tuple[MaterialOp, ...] = ()
+
+
+# ---------------------------------------------------------------- nodes
+
+
+class Object(_Node):
+    """A leaf geometry, its transforms nearest the leaf first, and its material."""
+
+    kind: Literal["object"] = "object"
+    geometry: str
+    transforms: tuple[Transform, ...] = ()
+    material: Material | None = None
+
+
+class Group(_Node):
+    """Children as a union in order, then transforms that apply to all of them."""
+
+    kind: Literal["group"] = "group"
+    children: tuple[SceneNode, ...] = ()
+    transforms: tuple[Transform, ...] = ()
+    material: Material | None = None
+
+
+class Boolean(_Node):
+    """A boolean node over its children, folded left."""
+
+    kind: Literal["boolean"] = "boolean"
+    op: Combine
+    children: tuple[SceneNode, ...] = ()
+    transforms: tuple[Transform, ...] = ()
+    material: Material | None = None
+
+
+class Link(_Node):
+    """One child of a chain with the word that joins it to what came before (first: union)."""
+
+    op: Combine = "union"
+    node: SceneNode
+
+
+class Chain(_Node):
+    """The streamed form: children in order, each with its boolean word."""
+
+    kind: Literal["chain"] = "chain"
+    children: tuple[Link, ...] = ()
+    transforms: tuple[Transform, ...] = ()
+    material: Material | None = None
+
+
+SceneNode = Annotated[Object | Group | Boolean | Chain, Field(discriminator="kind")]
+
+
+class Animation(_Node):
+    """``animate(seconds, fps, loop)``."""
+
+    seconds: Annotated[float, Field(gt=0)]
+    fps: Annotated[float, Field(gt=0)]
+    loop: bool = True
+
+    @property
+    def frames(self) -> int:
+        """Number of frames, at least 1."""
+        return max(1, round(self.seconds * self.fps))
+
+
+class Scene(_Node):
+    """A whole scene: settings and top-level nodes, which form a union in file order."""
+
+    version: Literal[1] = 1
+    model: str | None = None
+    canvas: tuple[
+        Annotated[int, Field(ge=1, le=8192)], Annotated[int, Field(ge=1, le=8192)]
+    ] = (256, 256)
+    background: Rgb | None = (1.0, 1.0, 1.0)
+    animation: Animation | None = None
+    nodes: tuple[SceneNode, ...] = ()
+
+
+for _model in (Group, Boolean, Link, Chain, Scene):
+    _model.model_rebuild()
