@@ -6,9 +6,11 @@ live here: the evaluator returns a `SpanMap` beside the Scene, keyed by `id()` o
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Rgb = tuple[Finite, Finite, Finite]
@@ -17,7 +19,22 @@ Combine = Literal["union", "smooth", "subtract", "intersect"]
 
 
 class _Node(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    # Validators are built when first used: a scene evaluated from text needs none.
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+
+
+def singular(rows: Sequence[Sequence[float]]) -> bool:
+    """Whether the 3 x 3 linear block of an affine has no inverse.
+
+    A determinant below 1e-14 of the product of the rows' lengths counts as 0: float64 cannot tell.
+    """
+    lengths = [math.hypot(*row[:3]) for row in rows[:3]]
+    if not all(lengths) or not all(map(math.isfinite, lengths)):
+        return True
+    unit = [[x / n for x in row[:3]] for row, n in zip(rows, lengths, strict=False)]
+    (a, b, c), (d, e, f), (g, h, i) = unit
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    return abs(determinant) < 1e-14
 
 
 # ---------------------------------------------------------------- transforms
@@ -37,12 +54,31 @@ class Rotate(_Node):
     angle: float
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
+    @field_validator("axis")
+    @classmethod
+    def _has_direction(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
+        if not any(axis):
+            raise ValueError("an axis of length 0")
+        return axis
+
 
 class Scale(_Node):
     kind: Literal["scale"] = "scale"
     x: float
     y: float
     z: float
+
+    @field_validator("x", "y", "z")
+    @classmethod
+    def _is_regular(cls, factor: float) -> float:
+        if factor == 0.0:
+            raise ValueError("a scale by 0")
+        return factor
+
+    @classmethod
+    def uniform(cls, s: float) -> Scale:
+        """``scale(s)``: the same factor along each axis."""
+        return cls(x=s, y=s, z=s)
 
 
 class Shear(_Node):
@@ -58,6 +94,15 @@ class Matrix(_Node):
 
     kind: Literal["matrix"] = "matrix"
     rows: tuple[Row, Row, Row, Row]
+
+    @field_validator("rows")
+    @classmethod
+    def _is_affine(cls, rows: tuple[Row, Row, Row, Row]) -> tuple[Row, Row, Row, Row]:
+        if rows[3] != (0.0, 0.0, 0.0, 1.0):
+            raise ValueError("the last row of a matrix is not 0, 0, 0, 1")
+        if singular(rows):
+            raise ValueError("a singular matrix")
+        return rows
 
 
 class Twirl(_Node):
@@ -193,13 +238,7 @@ class Scene(_Node):
 
     version: Literal[1] = 1
     model: str | None = None
-    canvas: tuple[
-        Annotated[int, Field(ge=1, le=8192)], Annotated[int, Field(ge=1, le=8192)]
-    ] = (256, 256)
+    canvas: tuple[Annotated[int, Field(ge=1, le=8192)], Annotated[int, Field(ge=1, le=8192)]] = (256, 256)
     background: Rgb | None = (1.0, 1.0, 1.0)
     animation: Animation | None = None
     nodes: tuple[SceneNode, ...] = ()
-
-
-for _model in (Group, Boolean, Link, Chain, Scene):
-    _model.model_rebuild()

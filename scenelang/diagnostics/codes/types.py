@@ -1,3 +1,30 @@
 """E03xx, W03xx: types and values."""
 
-CODES: dict[str, str] = {}
+CODES: dict[str, str] = {
+    "E0301": "value of another type",
+    "E0302": "bare number where an angle is wanted",
+    "E0303": "operator between values that do not combine",
+    "E0304": "division by zero",
+    "E0305": "value outside the domain of a function",
+    "E0306": "number too large",
+    "E0307": "index or length that does not fit",
+    "E0308": "missing or surplus argument",
+    "E0309": "param outside its range",
+    "E0310": "parameter value that is no literal",
+    "E0311": "value outside what is allowed",
+    "E0312": "singular transform",
+    "E0320": "too many objects",
+    "E0321": "recursion too deep",
+    "E0322": "too many evaluation steps",
+    "E0323": "vector too long or too deep",
+    "E0324": "file too large or nested too deep",
+    "E0330": "statement in the wrong place",
+    "E0331": "child after a transform",
+    "E0332": "second material in one block",
+    "E0333": "setting given twice",
+    "E0334": "language version not first or not supported",
+    "E0335": "boolean word with nothing before it",
+    "E0336": "background of a model that has its own",
+    "E0337": "frame outside the animation",
+    "W0301": "component outside 0 to 1",
+}

@@ -1,0 +1,104 @@
+"""Statements headed by a name: what the name stands for decides what they are."""
+
+from __future__ import annotations
+
+from scenelang.diagnostics.diagnostic import Label
+from scenelang.scene.expressions import prepare
+from scenelang.scene.functions import FUNCTIONS
+from scenelang.scene.materials import prepare_value_use
+from scenelang.scene.moves import prepare_move
+from scenelang.scene.objects import prepare_module_call, prepare_object
+from scenelang.scene.references import VALUES, lookup, unknown_member, wrong_kind
+from scenelang.scene.scope import Scope
+from scenelang.scene.settings import prepare_setting
+from scenelang.scene.statements import Action, Place, inner, prepare_block, states
+from scenelang.scene.suggest import did_you_mean, listing
+from scenelang.scene.transforms import GEOMETRY, TEXTURE
+from scenelang.scene.vocabulary import SETTINGS
+from scenelang.syntax import nodes
+
+NODE_WORDS = ("group", "union", "smooth", "subtract", "intersect", "chain")
+
+
+@states(nodes.Call)
+def _call(stmt: nodes.Call, place: Place) -> Action | None:
+    name = stmt.name.text
+    if name in SETTINGS:
+        return prepare_setting(stmt, place)
+    if name in GEOMETRY or name in TEXTURE:
+        return prepare_move(stmt, place)
+    binding = lookup(stmt.name, place.unit, place.scope)
+    if binding is None:
+        words = place.unit.session.vocabulary
+        if name in words.geometries():
+            return prepare_object(stmt, place)
+        _skim(stmt, place)
+        _unknown(stmt, place)
+        return None
+    if binding.kind == "module":
+        return prepare_module_call(stmt, binding.value, place)
+    if binding.kind in VALUES:
+        return prepare_value_use(stmt, binding, place)
+    _skim(stmt, place)
+    if binding.kind != "poison":
+        wrong_kind(stmt.name, binding, place.unit, "an object or a module")
+    return None
+
+
+def _skim(stmt: nodes.Call, place: Place) -> None:
+    """Look for mistakes in the arguments and the block of something that will not run."""
+    for arg in stmt.args or ():
+        prepare(arg.value, place.unit, place.scope)
+    if stmt.body is not None:
+        prepare_block(stmt.body.statements, inner(place, "unknown"), stmt.body.span)
+
+
+def _unknown(stmt: nodes.Call, place: Place) -> None:
+    """Report a statement whose name stands for nothing."""
+    unit, scope, name = place.unit, place.scope, stmt.name
+    session, words = unit.session, unit.session.vocabulary
+    if name.text in unit.lost:
+        return
+    if "." in name.text:
+        alias = scope.find(name.text.partition(".")[0])
+        if alias is not None and alias.kind == "import":
+            unknown_member(name, unit, alias.value)
+            return
+    later = scope.defined_later(name.text)
+    if later is not None:
+        help = f"move the definition of '{name.text}' above this line"
+        labels = (Label(later, "defined here"),)
+        session.error("E0203", f"'{name.text}' is used before its line", name.span, labels=labels, help=help)
+        return
+    owner = words.owner(name.text)
+    if owner is not None and words.chosen is not None:
+        message = f"geometry '{name.text}' belongs to model '{owner}', not '{words.chosen.name}'"
+        help = f"model '{words.chosen.name}' draws {listing(words.geometries())}"
+        session.error("E0205", message, name.span, help=help)
+        return
+    if name.text in FUNCTIONS:
+        message = f"'{name.text}' is a function, not an object or a module"
+        session.error("E0213", message, name.span)
+        return
+    what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
+    hint, fix = did_you_mean(name.text, _candidates(stmt, place, scope), name.span)
+    if hint is None and place.kind in ("file", "group", "chain") and words.geometries():
+        hint = f"the model draws {listing(words.geometries())}"
+    session.error("E0204", f"unknown {what} '{name.text}'", name.span, help=hint, fix=fix)
+
+
+def _candidates(stmt: nodes.Call, place: Place, scope: Scope) -> set[str]:
+    """Names that could have been meant, given where the statement stands and how it looks."""
+    words = place.unit.session.vocabulary
+    modules = {n for n, b in scope.visible() if b.kind == "module"}
+    values = {n for n, b in scope.visible() if b.kind in VALUES}
+    if place.kind == "material":
+        return words.material_ops()
+    if place.kind == "object":
+        return words.transforms() if stmt.args is not None else {*values, "material"}
+    found = words.geometries() | modules
+    if stmt.args is None and stmt.body is not None:
+        found.update(NODE_WORDS)
+    if stmt.args is not None and stmt.body is None:
+        found.update(words.transforms() if place.kind != "file" else SETTINGS)
+    return found

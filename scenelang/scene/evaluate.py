@@ -1,0 +1,171 @@
+"""From the syntax tree to a concrete Scene.
+
+A file is prepared (names resolved, expressions made into closures), then run once; both steps report
+what they find and go on. A Scene comes out only where nothing is wrong.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.models.manifest import Manifest
+from scenelang.scene import calls, params  # noqa: F401  (they register their statements)
+from scenelang.scene.build import Builder, make
+from scenelang.scene.imports import Loader, Unreadable, prepare_file, read_source
+from scenelang.scene.params import Defines
+from scenelang.scene.schema import Scene
+from scenelang.scene.session import Halt, Session, deep_stack
+from scenelang.scene.spans import SpanMap
+from scenelang.scene.suggest import listing
+from scenelang.scene.unit import Unit
+from scenelang.scene.vocabulary import Vocabulary, vocabulary
+from scenelang.syntax import nodes, parse
+
+
+def evaluate(
+    file: nodes.File,
+    *,
+    diagnostics: Diagnostics,
+    defines: Mapping[str, Any] | None = None,
+    models: Iterable[Manifest] | None = None,
+    model: str | None = None,
+    root: Path | None = None,
+    path: Path | None = None,
+    frame: int = 0,
+) -> tuple[Scene | None, SpanMap]:
+    """Evaluate a syntax tree.
+
+    Args:
+        file: the tree.
+        diagnostics: where mistakes go.
+        defines: values for params: text as after ``-D NAME=``, or Python values.
+        models: manifests that names are taken from; by default those of all shipped models.
+        model: name of the model to use, instead of the one that the file names.
+        root: folder that imports cannot leave; by default that of ``path``.
+        path: file that the tree was read from.
+        frame: frame of the animation, from 0.
+
+    Returns:
+        The Scene, or None if anything is wrong, and where its nodes were written.
+    """
+    before = len(diagnostics.errors)
+    words = _choose(file, vocabulary(models), model, diagnostics)
+    session = Session(diagnostics, words, frame)
+    resolved = path.resolve() if path is not None else None
+    folder = root.resolve() if root is not None else resolved.parent if resolved is not None else None
+    loader = Loader(folder, [resolved] if resolved is not None else [])
+    inputs = Defines(defines or {})
+    unit = Unit(file.span.source, session, loader, inputs, resolved)
+    if not _animates(file):
+        session.animated[:] = [0.0, 0.0, 0.0, 1.0]
+        if frame != 0:
+            diagnostics.add("E0337", f"frame {frame} of a scene without animate(…)", None)
+    out = Builder()
+    with deep_stack():
+        try:
+            body = prepare_file(unit, file)
+            inputs.report_unused(diagnostics, unit.lost)
+            session.tick(body.weight, file.span)
+            for act in body.actions:
+                act(unit.root_env, out)
+        except Halt:
+            pass
+    if len(diagnostics.errors) > before:
+        return None, session.spans
+    settings = session.settings
+    scene = make(
+        Scene,
+        {
+            "version": 1,
+            "model": words.chosen.name if words.chosen else None,
+            "canvas": settings.canvas,
+            "background": settings.background,
+            "animation": settings.animation,
+            "nodes": tuple(out.children),
+        },
+    )
+    return scene, session.spans
+
+
+def _choose(file: nodes.File, words: Vocabulary, model: str | None, diagnostics: Diagnostics) -> Vocabulary:
+    """The vocabulary of the model from outside, or of the one that the file names."""
+    if model is not None:
+        chosen = words.choose(model)
+        if chosen is None:
+            help = f"there is {listing(m.name for m in words.models)}"
+            diagnostics.add("E0210", f"unknown model '{model}'", None, help=help)
+        return chosen or words
+    for stmt in file.statements:
+        if isinstance(stmt, nodes.Model) and isinstance(stmt.name, nodes.String):
+            return words.choose(stmt.name.value) or words  # an unknown one is reported when it is met
+    return words
+
+
+def _animates(file: nodes.File) -> bool:
+    return any(isinstance(s, nodes.Call) and s.name.text == "animate" for s in file.statements)
+
+
+def load_scene(
+    path: str | os.PathLike[str],
+    *,
+    diagnostics: Diagnostics,
+    defines: Mapping[str, Any] | None = None,
+    root: str | os.PathLike[str] | None = None,
+    model: str | None = None,
+    models: Iterable[Manifest] | None = None,
+    frame: int = 0,
+) -> tuple[Scene | None, SpanMap]:
+    """Read, parse and evaluate a scene file; arguments as for `evaluate`.
+
+    Raises:
+        OSError: the file cannot be opened.
+    """
+    where = Path(path)
+    try:
+        source = read_source(where, os.fspath(path))
+    except Unreadable as error:
+        empty = SourceFile(os.fspath(path), "")
+        diagnostics.add(error.code, f"cannot read '{where.name}': {error}", Span(empty, 0, 0))
+        return None, SpanMap()
+    return load_source(
+        source,
+        diagnostics=diagnostics,
+        defines=defines,
+        root=Path(root) if root is not None else None,
+        path=where,
+        model=model,
+        models=models,
+        frame=frame,
+    )
+
+
+def load_source(
+    source: SourceFile,
+    *,
+    diagnostics: Diagnostics,
+    defines: Mapping[str, Any] | None = None,
+    root: Path | None = None,
+    path: Path | None = None,
+    model: str | None = None,
+    models: Iterable[Manifest] | None = None,
+    frame: int = 0,
+) -> tuple[Scene | None, SpanMap]:
+    """Parse and evaluate scene text; arguments as for `evaluate`."""
+    before = len(diagnostics.errors)
+    file = parse(source, diagnostics)
+    scene, spans = evaluate(
+        file,
+        diagnostics=diagnostics,
+        defines=defines,
+        models=models,
+        model=model,
+        root=root,
+        path=path,
+        frame=frame,
+    )
+    return (scene if len(diagnostics.errors) == before else None), spans

@@ -1,0 +1,99 @@
+"""Expressions: each is prepared once into a closure over its slots, then run as often as needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple, TypeVar
+
+from scenelang.diagnostics.span import Span
+from scenelang.scene.scope import Env, Scope
+from scenelang.scene.session import MAX_NESTING
+from scenelang.scene.unit import Unit
+from scenelang.scene.values import POISON, Problem, Vec
+from scenelang.syntax import nodes
+
+Run = Callable[[Env], Any]
+
+
+class Varies:
+    """Marks an expression whose value is known only when it runs."""
+
+    __slots__ = ()
+
+
+VARIES: Final = Varies()
+
+
+class Code(NamedTuple):
+    """A prepared expression: how to run it, and its value where that never changes."""
+
+    run: Run
+    value: Any = VARIES
+
+
+def constant(value: Any) -> Code:
+    """An expression that always has ``value``."""
+    return Code(lambda env: value, value)
+
+
+POISONED: Final = constant(POISON)
+
+Prepare = Callable[[Any, Unit, Scope], Code]
+E_ = TypeVar("E_", bound=Prepare)
+_PREPARE: Final[dict[type, Prepare]] = {}
+
+
+def prepares(node: type) -> Callable[[E_], E_]:
+    """Register how expressions of class ``node`` are prepared."""
+
+    def register(function: E_) -> E_:
+        _PREPARE[node] = function
+        return function
+
+    return register
+
+
+def prepare(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
+    """Resolve the names of ``expr`` and make it runnable; reports what is wrong in any case."""
+    unit.weight += 1
+    unit.nesting += 1
+    if unit.nesting > MAX_NESTING:
+        unit.nesting -= 1
+        message = f"blocks and parentheses nested deeper than {MAX_NESTING}"
+        raise unit.session.halt("E0324", message, expr.span)
+    try:
+        return _PREPARE[expr.__class__](expr, unit, scope)
+    finally:
+        unit.nesting -= 1
+
+
+def folded(unit: Unit, codes: list[Code], function: Callable[..., Any], run: Run) -> Code:
+    """``run``, or its value where all inputs are constant and nothing is wrong with it."""
+    values = [code.value for code in codes]
+    if VARIES in values or POISON in values:
+        return Code(run)
+    try:
+        return constant(function(*values))
+    except Problem:
+        return Code(run)  # reported when and if it runs
+
+
+def guarded(
+    unit: Unit, function: Callable[..., Any], span: Span, operands: tuple[nodes.Expr | None, ...]
+) -> Callable[..., Any]:
+    """``function`` on values: silent on poison, problems reported, work on vectors counted."""
+    session = unit.session
+
+    def run(*values: Any) -> Any:
+        for value in values:
+            if value is POISON:
+                return POISON
+            if value.__class__ is Vec:
+                session.tick(1 + value.count // 8, span)
+        try:
+            return function(*values)
+        except Problem as problem:
+            session.problem(problem, span, operands)
+            return POISON
+
+    return run

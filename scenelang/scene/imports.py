@@ -1,0 +1,161 @@
+"""Reading files, and ``import``: which files a scene may read, and each of them once at a time."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path, PureWindowsPath
+from typing import Final
+
+from scenelang.diagnostics.span import SourceFile
+from scenelang.scene.build import Builder
+from scenelang.scene.scope import Binding, Env
+from scenelang.scene.session import MAX_BYTES
+from scenelang.scene.settings import at_top_level
+from scenelang.scene.statements import Action, Body, Place, define, prepare_block, states
+from scenelang.scene.unit import Unit
+from scenelang.syntax import nodes, parse
+
+MAX_IMPORTS: Final = 1000
+MAX_IMPORT_DEPTH: Final = 100
+
+_BROUGHT = (nodes.Param, nodes.Let, nodes.Fn, nodes.Module, nodes.Import, nodes.Version)
+
+
+class Unreadable(Exception):
+    """A file that is no scene text; the message says why."""
+
+    def __init__(self, code: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def read_source(path: Path, name: str) -> SourceFile:
+    """The text of a file.
+
+    Raises:
+        Unreadable: no regular file, too large, or not UTF-8.
+        OSError: as the system says.
+    """
+    with path.open("rb") as stream:
+        if not path.is_file():
+            raise Unreadable("E0214", "it is not a regular file")
+        data = stream.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise Unreadable("E0324", f"a file of more than {MAX_BYTES // 1_000_000} MB")
+    try:
+        return SourceFile(name, data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise Unreadable("E0214", f"it is not UTF-8 text: byte {error.start}") from None
+
+
+@dataclass(slots=True)
+class Loader:
+    """Finds imported files inside the import root.
+
+    Args:
+        root: the folder that imports cannot leave, resolved; None where there is none.
+    """
+
+    root: Path | None
+    chain: list[Path] = field(default_factory=list)
+    parsed: dict[Path, nodes.File] = field(default_factory=dict)
+    count: int = 0
+
+    def find(self, stmt: nodes.Import, unit: Unit) -> Path | None:
+        """The file that an import means; None after a report."""
+        session, span, text = unit.session, stmt.path.span, stmt.path.value
+        folder = unit.path.parent if unit.path is not None else self.root
+        if folder is None or self.root is None:
+            help = "load the scene from a file, or give a root"
+            session.error("E0214", "text without a folder cannot import", span, help=help)
+            return None
+        if not text or "\0" in text:
+            session.error("E0214", "an import path without a file name", span)
+            return None
+        if os.path.isabs(text) or PureWindowsPath(text).drive or text[0] in "/\\":
+            help = "paths are relative to the importing file"
+            session.error("E0215", f"'{text}' is an absolute path", span, help=help)
+            return None
+        try:
+            path = (folder / text).resolve()
+        except (OSError, RuntimeError, ValueError) as error:
+            session.error("E0214", f"cannot read '{text}': {_reason(error)}", span)
+            return None
+        if not path.is_relative_to(self.root):
+            help = f"imports stay inside {self.root}; --root sets another folder"
+            session.error("E0215", f"'{text}' lies outside the import root", span, help=help)
+            return None
+        if path in self.chain:
+            names = " → ".join(p.name for p in [*self.chain[self.chain.index(path) :], path])
+            session.error("E0216", f"import cycle: {names}", span)
+            return None
+        self.count += 1
+        if self.count > MAX_IMPORTS:
+            raise session.halt("E0324", f"more than {MAX_IMPORTS:,} imports", span)
+        if len(self.chain) > MAX_IMPORT_DEPTH:
+            raise session.halt("E0324", f"imports nested deeper than {MAX_IMPORT_DEPTH}", span)
+        return path
+
+    def read(self, path: Path, stmt: nodes.Import, unit: Unit) -> nodes.File | None:
+        """The parsed file; None after a report."""
+        if path in self.parsed:
+            return self.parsed[path]
+        name = os.path.normpath(os.path.join(os.path.dirname(unit.source.name), stmt.path.value))
+        text, span, session = stmt.path.value, stmt.path.span, unit.session
+        try:
+            if not path.is_file() and path.exists():  # opening a pipe would wait for a writer
+                raise Unreadable("E0214", "it is not a regular file")
+            source = read_source(path, name)
+        except Unreadable as error:
+            session.error(error.code, f"cannot read '{text}': {error}", span)
+            return None
+        except OSError as error:
+            session.error("E0214", f"cannot read '{text}': {_reason(error)}", span)
+            return None
+        file = parse(source, session.diagnostics)
+        self.parsed[path] = file
+        return file
+
+
+def _reason(error: BaseException) -> str:
+    """What the system says, lower case."""
+    return (getattr(error, "strerror", None) or str(error) or "unreadable").lower()
+
+
+@states(nodes.Import)
+def _import(stmt: nodes.Import, place: Place) -> Action | None:
+    unit = place.unit
+    if not at_top_level(place, stmt.span, "an import"):
+        define(stmt.alias, Binding("poison", stmt.alias.span), place)
+        return None
+    loader = unit.loader
+    binding = Binding("import", stmt.alias.span)
+    good = define(stmt.alias, binding, place)
+    path = loader.find(stmt, unit)
+    file = loader.read(path, stmt, unit) if path is not None else None
+    if path is None or file is None or not good:
+        return None
+    prefix = f"{unit.prefix}{stmt.alias.text}."
+    brought = Unit(file.span.source, unit.session, loader, unit.defines, path, prefix)
+    loader.chain.append(path)
+    try:
+        body = prepare_file(brought, file, imported=True)
+    finally:
+        loader.chain.pop()
+    binding.value = brought
+    env = brought.root_env
+
+    def action(_: Env, out: Builder) -> None:
+        for act in body.actions:
+            act(env, Builder())
+
+    return action
+
+
+def prepare_file(unit: Unit, file: nodes.File, *, imported: bool = False) -> Body:
+    """Prepare a file's statements; of an imported one only what it brings."""
+    unit.find_lost(file)
+    unit.first = file.statements[0] if file.statements else None
+    statements = [s for s in file.statements if not imported or isinstance(s, _BROUGHT)]
+    return prepare_block(statements, Place(unit, unit.scope, "file"), file.span)

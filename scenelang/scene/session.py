@@ -1,0 +1,174 @@
+"""What one evaluation shares: diagnostics, spans, limits and counters."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix, Label
+from scenelang.diagnostics.span import Span
+from scenelang.scene.schema import Animation
+from scenelang.scene.spans import Calls, SpanMap
+from scenelang.scene.values import Problem
+from scenelang.scene.vocabulary import Vocabulary
+from scenelang.syntax import nodes
+
+MAX_OBJECTS: Final = 100_000
+MAX_PARTS: Final = 1_000_000  # nodes, transforms and texture operations together; bounds memory
+MAX_DEPTH: Final = 200  # calls within calls
+MAX_NODE_DEPTH: Final = 400  # scene nodes within scene nodes
+MAX_NESTING: Final = 200  # blocks and parentheses within each other in one file
+MAX_STEPS: Final = 10_000_000
+MAX_BYTES: Final = 10_000_000
+
+_STACK_FRAMES: Final = 200_000  # calls x nesting x frames per level, with room
+_stack_lock = threading.Lock()
+_stack_users = 0
+_stack_before = 0
+
+
+class Halt(Exception):
+    """A limit was met and reported; the evaluation ends."""
+
+
+class Unbound:
+    """What a slot holds before its ``let``, ``param`` or ``animate`` has run."""
+
+    __slots__ = ()
+
+
+UNBOUND: Final = Unbound()
+
+
+@contextmanager
+def deep_stack() -> Iterator[None]:
+    """Allow deep recursion of Python code, which costs no C stack from Python 3.11 on.
+
+    The interpreter's limit is one for all threads: the last user puts it back.
+    """
+    global _stack_users, _stack_before
+    with _stack_lock:
+        if _stack_users == 0:
+            _stack_before = sys.getrecursionlimit()
+            sys.setrecursionlimit(max(_stack_before, _STACK_FRAMES))
+        _stack_users += 1
+    try:
+        yield
+    finally:
+        with _stack_lock:
+            _stack_users -= 1
+            if _stack_users == 0:
+                sys.setrecursionlimit(_stack_before)
+
+
+@dataclass(slots=True)
+class Settings:
+    """What the top level sets, and where each was given.
+
+    Args:
+        canvas: width and height in pixels.
+        background: colour as written, or None for transparency.
+        animation: the scene's animation, if it has one.
+        given: the place of each setting, by its word.
+    """
+
+    canvas: tuple[int, int] = (256, 256)
+    background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
+    animation: Animation | None = None
+    given: dict[str, Span] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class Session:
+    """The state of one evaluation over all its files.
+
+    Args:
+        diagnostics: where mistakes go.
+        vocabulary: names that models offer.
+        frame: number of the frame to evaluate.
+    """
+
+    diagnostics: Diagnostics
+    vocabulary: Vocabulary
+    frame: int = 0
+    spans: SpanMap = field(default_factory=SpanMap)
+    steps: int = 0
+    objects: int = 0
+    parts: int = 0
+    depth: int = 0
+    node_depth: int = 0
+    calls: Calls | None = None
+    animated: list[Any] = field(default_factory=lambda: [UNBOUND] * 4)
+    settings: Settings = field(default_factory=Settings)
+
+    def call_labels(self) -> list[Label]:
+        """Labels for the innermost calls that are running."""
+        labels: list[Label] = []
+        calls = self.calls
+        while calls is not None and len(labels) < 2:
+            labels.append(Label(calls.span, "in this call"))
+            calls = calls.outer
+        return labels
+
+    def error(
+        self,
+        code: str,
+        message: str,
+        span: Span,
+        *,
+        help: str | None = None,
+        fix: Fix | None = None,
+        labels: tuple[Label, ...] = (),
+    ) -> None:
+        """Report a mistake with the calls that led to it."""
+        self.diagnostics.add(code, message, span, labels=[*labels, *self.call_labels()], help=help, fix=fix)
+
+    def problem(self, problem: Problem, span: Span, operands: tuple[nodes.Expr | None, ...] = ()) -> None:
+        """Report a `Problem` at the operand it blames, or else at ``span``."""
+        operand = None
+        if problem.operand is not None and problem.operand < len(operands):
+            operand = operands[problem.operand]
+        fix = angle_fix(operand) if problem.fix == "angle" and operand is not None else None
+        self.error(
+            problem.code, problem.message, operand.span if operand else span, help=problem.help, fix=fix
+        )
+
+    def halt(self, code: str, message: str, span: Span, help: str | None = None) -> Halt:
+        """Report a limit that was met; the caller raises what this returns."""
+        self.error(code, message, span, help=help)
+        return Halt()
+
+    def tick(self, steps: int, span: Span) -> None:
+        """Count evaluation steps."""
+        self.steps += steps
+        if self.steps > MAX_STEPS:
+            raise self.halt("E0322", f"more than {MAX_STEPS:,} evaluation steps", span)
+
+    def count_parts(self, parts: int, span: Span) -> None:
+        """Count nodes, transforms and operations that a Scene will hold."""
+        self.parts += parts
+        if self.parts > MAX_PARTS:
+            raise self.halt("E0320", f"more than {MAX_PARTS:,} nodes and transforms in one scene", span)
+
+    def count_object(self, span: Span) -> None:
+        """Count one object."""
+        self.objects += 1
+        if self.objects > MAX_OBJECTS:
+            raise self.halt("E0320", f"more than {MAX_OBJECTS:,} objects in one scene", span)
+
+
+def angle_fix(expr: nodes.Expr) -> Fix:
+    """Give a bare number the unit it most likely had: degrees, or radians for a small fraction."""
+    inner = expr.operand if isinstance(expr, nodes.Unary) else expr
+    if isinstance(inner, nodes.Number):
+        small = abs(inner.value) <= 6.2832 and not inner.value.is_integer()
+        unit = "rad" if small else "deg"
+        return Fix(f"add '{unit}'", (Edit(Span(inner.span.source, inner.span.end, inner.span.end), unit),))
+    text = expr.span.text
+    if not isinstance(expr, nodes.NameRef | nodes.CallExpr | nodes.Member | nodes.Index):
+        text = f"({text})"
+    return Fix("multiply by '1deg'", (Edit(expr.span, f"{text} * 1deg"),))

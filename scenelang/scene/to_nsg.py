@@ -1,0 +1,141 @@
+"""A Scene as canonical text that evaluates back to an equal Scene."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from scenelang.scene.schema import (
+    Boolean,
+    Chain,
+    Material,
+    MaterialOp,
+    Object,
+    Rgb,
+    Scene,
+    SceneNode,
+    Transform,
+)
+
+_INDENT: Final = "  "
+_AXES: Final = {(1.0, 0.0, 0.0): "X", (0.0, 1.0, 0.0): "Y", (0.0, 0.0, 1.0): "Z"}
+
+
+def to_nsg(scene: Scene) -> str:
+    """The text of ``scene``: settings that differ from the defaults, then its nodes in order."""
+    lines = ["nsg 1;"]
+    if scene.model is not None:
+        lines.append(f'model "{scene.model}";')
+    if scene.canvas != (256, 256):
+        lines.append(f"canvas({scene.canvas[0]}, {scene.canvas[1]});")
+    if scene.background is None:
+        lines.append("background(none);")
+    elif scene.background != (1.0, 1.0, 1.0):
+        lines.append(f"background({rgb(scene.background)});")
+    if scene.animation is not None:
+        loop = "" if scene.animation.loop else ", loop = false"
+        lines.append(f"animate({number(scene.animation.seconds)}s, {number(scene.animation.fps)}{loop});")
+    # Nodes nest deeper than Python likes to recurse: a stack of lines and nodes still to print.
+    todo: list[str | tuple[str, SceneNode, int]] = [("", node, 0) for node in reversed(scene.nodes)]
+    while todo:
+        entry = todo.pop()
+        if isinstance(entry, str):
+            lines.append(entry)
+        else:
+            word, node, depth = entry
+            todo.extend(reversed(_node(word, node, depth)))
+    return "\n".join(lines) + "\n"
+
+
+def _node(word: str, node: SceneNode, depth: int) -> list[str | tuple[str, SceneNode, int]]:
+    """The lines of one node, with its children still to be printed."""
+    margin = _INDENT * depth
+    inside = margin + _INDENT
+    head = node.geometry if isinstance(node, Object) else node.op if isinstance(node, Boolean) else node.kind
+    statements = [material(node.material)] if node.material is not None else []
+    statements += [transform(t) for t in node.transforms]
+    if isinstance(node, Object):
+        return [
+            f"{margin}{word}{head} {{ {' '.join(statements)} }}"
+            if statements
+            else f"{margin}{word}{head} {{}}"
+        ]
+    parts: list[str | tuple[str, SceneNode, int]] = [f"{margin}{word}{head} {{"]
+    if isinstance(node, Chain):
+        words = ["" if link.op == "union" else link.op + " " for link in node.children]
+        parts.extend([(w, link.node, depth + 1) for w, link in zip(words, node.children, strict=True)])
+    else:
+        parts.extend([("", child, depth + 1) for child in node.children])
+    parts.extend([inside + statement for statement in statements])
+    parts.append(margin + "}")
+    return parts
+
+
+def number(value: float) -> str:
+    """The shortest text that reads back as the same float64."""
+    if value.is_integer() and abs(value) < 1e15 and not (value == 0.0 and math.copysign(1.0, value) < 0):
+        return str(int(value))
+    return repr(value)
+
+
+def angle(rad: float) -> str:
+    """An angle in degrees where few digits say it exactly, else in radians."""
+    if rad == 0.0:
+        return "0"
+    degrees = round(math.degrees(rad), 9)
+    return f"{number(degrees)}deg" if math.radians(degrees) == rad else f"{number(rad)}rad"
+
+
+def rgb(color: Rgb) -> str:
+    """A colour as ``#rrggbb`` where that is exact, else as a vector."""
+    levels = [round(c * 255) if 0.0 <= c <= 1.0 else -1 for c in color]
+    if all(level >= 0 and level / 255 == c for level, c in zip(levels, color, strict=True)):
+        return "#" + "".join(f"{level:02x}" for level in levels)
+    return _vector(color)
+
+
+def _vector(values: tuple[float, ...]) -> str:
+    return f"[{', '.join(map(number, values))}]"
+
+
+def material(value: Material) -> str:
+    """A material statement."""
+    ops = " ".join(operation(op) for op in value.ops)
+    return f"material {value.name} {{ {ops} }}" if ops else f"material {value.name};"
+
+
+def operation(op: MaterialOp) -> str:
+    """A statement in a material's block."""
+    match op.kind:
+        case "flip":
+            return "flip();"
+        case "color":
+            return f"color({rgb(op.rgb)});"
+        case "grayscale":
+            return f"grayscale({number(op.amount)});"
+        case "hue":
+            return f"hue({angle(op.angle)});"
+        case _:
+            return transform(op)
+
+
+def transform(t: Transform) -> str:
+    """A transform statement."""
+    match t.kind:
+        case "translate":
+            return f"translate({number(t.x)}, {number(t.y)}{f', {number(t.z)}' if t.z else ''});"
+        case "rotate":
+            axis = "" if t.axis == (0.0, 0.0, 1.0) else f", axis = {_AXES.get(t.axis) or _vector(t.axis)}"
+            return f"rotate({angle(t.angle)}{axis});"
+        case "scale":
+            if t.x == t.y == t.z:
+                return f"scale({number(t.x)});"
+            return f"scale({number(t.x)}, {number(t.y)}{f', {number(t.z)}' if t.z != 1.0 else ''});"
+        case "shear":
+            return f"shear({t.axes} = {number(t.k)});"
+        case "matrix":
+            return f"matrix([{', '.join(map(_vector, t.rows))}]);"
+        case "displace":
+            return f"displace({number(t.amount)}, {number(t.frequency)});"
+        case _:
+            return f"{t.kind}({number(t.k)});"

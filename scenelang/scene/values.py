@@ -1,0 +1,220 @@
+"""Values that expressions have: numbers, angles, times, vectors, ranges, materials and the rest.
+
+Numbers are Python floats, booleans and strings Python's own, ``none`` is None. A colour is a vector of
+three numbers. `POISON` stands for a value whose mistake has been reported; whatever meets it stays quiet.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final
+
+from scenelang.scene.schema import Material
+
+MAX_VECTOR: Final = 1_000_000  # numbers in one vector, nested ones counted
+MAX_VECTOR_DEPTH: Final = 16
+
+
+class Problem(Exception):
+    """What is wrong with an operation; the caller knows the place.
+
+    Args:
+        code: diagnostic code.
+        message: the fact.
+        help: advice.
+        operand: which operand or argument is to blame, from 0; None for all of it.
+        fix: what to do about that operand, see `FIXES`.
+    """
+
+    def __init__(
+        self, code: str, message: str, help: str | None = None, operand: int | None = None, fix: str = ""
+    ) -> None:
+        super().__init__(message)
+        self.code = code
+        self.message = message
+        self.help = help
+        self.operand = operand
+        self.fix = fix
+
+
+class Poison:
+    """The one value of an expression that has a reported mistake."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return "POISON"
+
+
+POISON: Final = Poison()
+
+
+class Angle:
+    """An angle in radians."""
+
+    __slots__ = ("rad",)
+
+    def __init__(self, rad: float) -> None:
+        self.rad = rad
+
+    def __repr__(self) -> str:
+        return f"Angle({self.rad!r})"
+
+
+class Time:
+    """A time in seconds."""
+
+    __slots__ = ("s",)
+
+    def __init__(self, s: float) -> None:
+        self.s = s
+
+    def __repr__(self) -> str:
+        return f"Time({self.s!r})"
+
+
+class Vec:
+    """A vector of values.
+
+    Args:
+        items: the values.
+
+    Raises:
+        Problem: more than `MAX_VECTOR` numbers, or nested deeper than `MAX_VECTOR_DEPTH`.
+    """
+
+    __slots__ = ("count", "depth", "items")
+
+    count: int
+    depth: int
+
+    def __init__(self, items: tuple[Any, ...]) -> None:
+        self.items = items
+        count, depth = 0, 0
+        for item in items:
+            if item.__class__ is Vec:
+                count += item.count
+                depth = max(depth, item.depth)
+            else:
+                count += 1
+        if count > MAX_VECTOR:
+            raise Problem("E0323", f"a vector of more than {MAX_VECTOR:,} numbers")
+        if depth >= MAX_VECTOR_DEPTH:
+            raise Problem("E0323", f"vectors nested deeper than {MAX_VECTOR_DEPTH}")
+        self.count = count
+        self.depth = depth + 1
+
+    def __repr__(self) -> str:
+        return f"Vec({self.items!r})"
+
+
+class RangeValue:
+    """Numbers, angles or times from ``start`` towards ``stop``, made one at a time.
+
+    Args:
+        start: first value, in base units.
+        stop: bound, in base units.
+        exclusive: whether ``stop`` itself is left out.
+        step: distance of neighbours, not 0; None where none was written, which steps by 1.
+        unit: ``number``, ``angle`` or ``time``.
+    """
+
+    __slots__ = ("exclusive", "start", "step", "stop", "unit")
+
+    def __init__(self, start: float, stop: float, exclusive: bool, step: float | None, unit: str) -> None:
+        self.start = start
+        self.stop = stop
+        self.exclusive = exclusive
+        self.step = step
+        self.unit = unit
+
+    def count(self) -> int:
+        """How many values there are; 0 when descending."""
+        step = 1.0 if self.step is None else self.step
+        quotient = (self.stop - self.start) / step
+        if not math.isfinite(quotient):
+            raise Problem("E0306", "the range has too many steps to count")
+        # The tolerance lets 0..0.3 step 0.1 reach 0.3, which 0.3 / 0.1 < 3 would cut off.
+        count = math.ceil(quotient - 1e-9) if self.exclusive else math.floor(quotient + 1e-9) + 1
+        return max(0, count)
+
+    def at(self, index: int) -> float:
+        """The value number ``index`` in base units; never past ``stop``."""
+        step = 1.0 if self.step is None else self.step
+        value = self.start + index * step
+        return min(value, self.stop) if step > 0 else max(value, self.stop)
+
+    def item(self, index: int) -> Any:
+        """The value number ``index``."""
+        return pack(self.at(index), self.unit)
+
+    def __iter__(self) -> Iterator[Any]:
+        return map(self.item, range(self.count()))
+
+    def contains(self, value: float) -> bool:
+        """Whether ``value`` lies between the bounds and, where a step was written, on it."""
+        low, high = (self.start, self.stop) if (self.step or 1.0) > 0 else (self.stop, self.start)
+        if not low <= value <= high or (self.exclusive and value == self.stop):
+            return False
+        if self.step is None:
+            return True
+        steps = (value - self.start) / self.step
+        return abs(steps - round(steps)) <= 1e-9
+
+
+class MaterialValue:
+    """A material that an expression made, with the node it stands for."""
+
+    __slots__ = ("material",)
+
+    def __init__(self, material: Material) -> None:
+        self.material = material
+
+
+Scalar = float | Angle | Time
+Value = float | bool | str | Angle | Time | Vec | RangeValue | MaterialValue | Poison | None
+
+UNITS: Final[dict[type, str]] = {float: "number", Angle: "angle", Time: "time"}
+
+
+def unpack(value: Any) -> tuple[float, str]:
+    """A scalar as a number in base units (radians, seconds) and its unit's name."""
+    if value.__class__ is float:
+        return value, "number"
+    if value.__class__ is Angle:
+        return value.rad, "angle"
+    return value.s, "time"
+
+
+def pack(number: float, unit: str) -> Any:
+    """The inverse of `unpack`."""
+    if unit == "number":
+        return number
+    return Angle(number) if unit == "angle" else Time(number)
+
+
+def describe(value: Any) -> str:
+    """What kind of value it is, for messages."""
+    cls = value.__class__
+    if cls is Vec:
+        count = len(value.items)
+        return f"a vector of {count} item{'' if count == 1 else 's'}"
+    names = {
+        float: "a number",
+        Angle: "an angle",
+        Time: "a time",
+        bool: "a boolean",
+        str: "a string",
+        RangeValue: "a range",
+        MaterialValue: "a material",
+        type(None): "none",
+    }
+    return names.get(cls, "another value")
+
+
+def show(number: float) -> str:
+    """A number for messages: short, integers without a point."""
+    if number.is_integer() and abs(number) < 1e15:
+        return str(int(number))
+    return f"{number:.6g}"

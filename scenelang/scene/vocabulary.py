@@ -1,0 +1,85 @@
+"""Names that models offer: geometries, materials, transforms and texture operations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from scenelang.models.manifest import Manifest, available, load_manifest
+
+TRANSFORMS: Final = (
+    "translate",
+    "rotate",
+    "scale",
+    "shear",
+    "matrix",
+    "twirl",
+    "bend",
+    "twist",
+    "displace",
+)
+MATERIAL_OPS: Final = ("translate", "rotate", "scale", "shear", "flip", "color", "grayscale", "hue")
+SETTINGS: Final = ("canvas", "background", "animate")
+LANGUAGE: Final = frozenset((*TRANSFORMS, *MATERIAL_OPS, *SETTINGS))
+"""Words that head a statement of the language; no module, material or geometry can have such a name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """What a scene may name: the chosen model's words, or those of all models.
+
+    Args:
+        models: all models that are at hand.
+        chosen: the scene's model; None where the compiler picks one later.
+    """
+
+    models: tuple[Manifest, ...]
+    chosen: Manifest | None = None
+
+    @property
+    def in_use(self) -> tuple[Manifest, ...]:
+        """The models whose names are accepted."""
+        return (self.chosen,) if self.chosen else self.models
+
+    def choose(self, name: str) -> Vocabulary | None:
+        """The same with model ``name`` chosen; None if there is no such model."""
+        for manifest in self.models:
+            if manifest.name == name:
+                return Vocabulary(self.models, manifest)
+        return None
+
+    def geometries(self) -> set[str]:
+        return {name for m in self.in_use for name in m.geometries}
+
+    def materials(self) -> set[str]:
+        return {name for m in self.in_use for name in m.materials}
+
+    def transforms(self) -> set[str]:
+        return {name for m in self.in_use for name in m.transforms}
+
+    def material_ops(self) -> set[str]:
+        return {name for m in self.in_use for name in m.material_ops}
+
+    def owner(self, name: str) -> str | None:
+        """The first model at hand that has a geometry, material or operation ``name``."""
+        for m in self.models:
+            if name in (*m.geometries, *m.materials, *m.transforms, *m.material_ops):
+                return m.name
+        return None
+
+    @property
+    def dimension(self) -> int | None:
+        """2 or 3 where the model is chosen or all agree."""
+        dimensions = {m.dimension for m in self.in_use}
+        return dimensions.pop() if len(dimensions) == 1 else None
+
+
+def shipped() -> tuple[Manifest, ...]:
+    """Manifests of all shipped models."""
+    return tuple(load_manifest(name) for name in available())
+
+
+def vocabulary(models: Iterable[Manifest] | None = None) -> Vocabulary:
+    """The words of ``models``, by default of all shipped ones."""
+    return Vocabulary(tuple(shipped() if models is None else models))
