@@ -1,0 +1,57 @@
+"""Codes and digest of a model's weights, read without torch."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from scenelang.models.manifest import ROOT, load_manifest
+
+
+@dataclass(frozen=True, slots=True)
+class Codes:
+    """The learned codes that a Program carries, and which weights they belong to.
+
+    Args:
+        geometry: leaf name to code, 4 numbers.
+        material: material name to code, 12 numbers.
+        digest: SHA-256 of the weights file, hex.
+    """
+
+    geometry: dict[str, tuple[float, ...]]
+    material: dict[str, tuple[float, ...]]
+    digest: str
+
+
+def weights_path(name: str) -> Path:
+    """Where a shipped model's weights lie."""
+    return ROOT / name / "weights.safetensors"
+
+
+@lru_cache(maxsize=8)
+def load_codes(name: str) -> Codes:
+    """Read the codes of a shipped model.
+
+    Raises:
+        KeyError: there is no such model.
+        FileNotFoundError: it has no weights.
+    """
+    from safetensors.numpy import load
+
+    manifest = load_manifest(name)
+    data = weights_path(name).read_bytes()
+    tensors = load(data)
+    return Codes(
+        geometry=_rows(manifest.geometries, tensors["codes"]),
+        material=_rows(manifest.materials, tensors["material_codes"]),
+        digest=hashlib.sha256(data).hexdigest(),
+    )
+
+
+def _rows(names: tuple[str, ...], table: object) -> dict[str, tuple[float, ...]]:
+    rows = table.tolist()  # type: ignore[attr-defined]
+    if len(rows) != len(names):
+        raise ValueError(f"{len(rows)} codes for {len(names)} names")
+    return {name: tuple(row) for name, row in zip(names, rows, strict=True)}

@@ -1,0 +1,67 @@
+"""Checkpoints and weights: safetensors with a JSON header, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import safe_open
+from safetensors.torch import save
+from torch import Tensor, nn
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Write to a temporary file beside ``path``, then rename it over ``path``."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        temporary.write_bytes(data)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def save_tensors(path: Path, tensors: dict[str, Tensor], header: dict[str, Any]) -> None:
+    """Write tensors with a JSON header under the key ``scenelang``."""
+    plain = {k: v.detach().cpu().contiguous() for k, v in sorted(tensors.items())}
+    write_file(path, save(plain, {"scenelang": json.dumps(header, sort_keys=True)}))
+
+
+def load_tensors(path: Path, device: str = "cpu") -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Tensors and header of a file that `save_tensors` wrote."""
+    with safe_open(path, "pt", device=device) as file:
+        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (not a dict)
+        header = json.loads((file.metadata() or {}).get("scenelang", "{}"))
+    return tensors, header
+
+
+def pack_training(
+    network: nn.Module, optimiser: torch.optim.Adam, scenes: torch.Generator
+) -> dict[str, Tensor]:
+    """Everything a training needs to go on exactly where it was."""
+    out = {f"network.{k}": v for k, v in network.state_dict().items()}
+    for i, state in enumerate(optimiser.state[p] for g in optimiser.param_groups for p in g["params"]):
+        out |= {f"adam.{i}.{k}": v for k, v in state.items()}
+    out["random"] = scenes.get_state()
+    return out
+
+
+def unpack_training(
+    tensors: dict[str, Tensor], network: nn.Module, optimiser: torch.optim.Adam, scenes: torch.Generator
+) -> None:
+    """The inverse of `pack_training`, in place."""
+    network.load_state_dict(
+        {k.removeprefix("network."): v for k, v in tensors.items() if k.startswith("network.")}
+    )
+    parameters = [p for g in optimiser.param_groups for p in g["params"]]
+    for i, parameter in enumerate(parameters):
+        state = {
+            k: tensors[f"adam.{i}.{k}"]
+            for k in ("step", "exp_avg", "exp_avg_sq")
+            if f"adam.{i}.{k}" in tensors
+        }
+        if state:
+            optimiser.state[parameter].update(state)
+    scenes.set_state(tensors["random"].cpu())

@@ -1,0 +1,73 @@
+"""Training configurations: typed, frozen, read from JSON, saved with the weights."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+from pydantic.dataclasses import dataclass as checked
+
+from scenelang.renderers.framed import FramedConfig
+from scenelang.training.scenes import SceneConfig
+
+CONFIGS = Path(__file__).parent / "configs"
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """A stretch of training with its own streams.
+
+    Args:
+        iterations: optimiser steps.
+        streams: streams B of a batch.
+        objects: most objects of a stream.
+        decoder_rate: the decoder's learning rate as a share of the cell's.
+    """
+
+    iterations: int
+    streams: int
+    objects: int
+    decoder_rate: float = 1.0
+
+
+@checked(frozen=True, config={"extra": "forbid"})
+class TrainConfig:
+    """Everything that decides what a training yields, besides the code.
+
+    Args:
+        model: name of the model that the weights are for.
+        seed: seeds parameters and scenes.
+        rate: highest learning rate; every phase warms up over 200 steps and falls by a cosine.
+        phases: run one after the other.
+        network: sizes of the renderer.
+        scenes: the training distribution.
+    """
+
+    model: str
+    seed: int
+    rate: float
+    phases: tuple[Phase, ...]
+    network: FramedConfig
+    scenes: SceneConfig
+
+    @property
+    def iterations(self) -> int:
+        return sum(phase.iterations for phase in self.phases)
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def read_config(name: str) -> TrainConfig:
+    """Read a configuration by path or by the name of a shipped one.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        pydantic.ValidationError: a key is unknown or a value has the wrong type.
+    """
+    path = Path(name)
+    if not path.suffix and (CONFIGS / f"{name}.json").exists():
+        path = CONFIGS / f"{name}.json"
+    return TypeAdapter(TrainConfig).validate_json(path.read_text("utf-8"))

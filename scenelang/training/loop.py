@@ -1,0 +1,147 @@
+"""The training loop: resumes, survives being killed, stops at a time budget."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from scenelang.renderers.framed import Framed
+from scenelang.training.checkpoint import load_tensors, pack_training, save_tensors, unpack_training
+from scenelang.training.config import TrainConfig
+from scenelang.training.losses import image_loss
+from scenelang.training.scenes import GEOMETRIES, random_batch
+
+WARM_UP = 200
+Report = Callable[[int, int, float, dict[str, float]], None]
+
+
+def train(
+    config: TrainConfig,
+    folder: Path,
+    *,
+    budget_s: float = math.inf,
+    device: str = "cpu",
+    report: Report | None = None,
+    save_every_s: float = 60.0,
+    report_every: int = 500,
+) -> bool:
+    """Train, or go on from the checkpoint in ``folder``.
+
+    Args:
+        config: what to train; must equal the checkpoint's.
+        folder: gets ``checkpoint.safetensors``, ``log.jsonl`` and, at the end, ``weights.safetensors``.
+        budget_s: stop after so many seconds of this call, with a checkpoint.
+        device: torch device; scenes are made there.
+        report: called with iteration, iterations, seconds spent and mean loss parts.
+        save_every_s: seconds between checkpoints.
+        report_every: iterations between reports.
+
+    Returns:
+        True when all iterations are done.
+
+    Raises:
+        ValueError: the checkpoint belongs to another configuration.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    torch.manual_seed(config.seed)
+    network = Framed(config.network, len(GEOMETRIES), 1).to(device)
+    decoder, cell = network.parts()
+    optimiser = torch.optim.Adam(
+        [{"params": cell}, {"params": decoder}], lr=config.rate, betas=(0.9, 0.99), fused=True
+    )
+    scenes = torch.Generator(device).manual_seed(config.seed)
+    done, spent_s = 0, 0.0
+    checkpoint = folder / "checkpoint.safetensors"
+    if checkpoint.exists():
+        tensors, header = load_tensors(checkpoint, device)
+        if header["config"] != json.loads(json.dumps(config.to_json())):
+            raise ValueError(f"{checkpoint} was trained with another configuration")
+        unpack_training(tensors, network, optimiser, scenes)
+        done, spent_s = header["iteration"], header["seconds"]
+
+    def save(name: str, tensors: dict[str, torch.Tensor]) -> None:
+        seconds = spent_s + time.perf_counter() - started
+        save_tensors(folder / name, tensors, _header(config, done, seconds, device))
+
+    started = saved = time.perf_counter()
+    sums: dict[str, float] = {}
+    while done < config.iterations:
+        phase, into = _phase_at(config, done)
+        share = config.rate * _schedule(into, phase.iterations)
+        optimiser.param_groups[0]["lr"] = share
+        optimiser.param_groups[1]["lr"] = share * phase.decoder_rate
+        batch = random_batch(phase.streams, phase.objects, config.scenes, scenes)
+        loss, parts = image_loss(network, batch)
+        optimiser.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimiser.step()
+        done += 1
+        sums = {k: sums.get(k, 0.0) + v / report_every for k, v in parts.items()}
+        now = time.perf_counter()
+        if done % report_every == 0:
+            with (folder / "log.jsonl").open("a") as log:
+                log.write(json.dumps({"iteration": done, "seconds": spent_s + now - started, **sums}) + "\n")
+            if report:
+                report(done, config.iterations, spent_s + now - started, sums)
+            sums = {}
+        out_of_time = now - started > budget_s
+        if now - saved > save_every_s or out_of_time or done == config.iterations:
+            save("checkpoint.safetensors", pack_training(network, optimiser, scenes))
+            saved = now
+        if out_of_time:
+            break
+    if done < config.iterations:
+        return False
+    save("weights.safetensors", dict(network.state_dict()))
+    return True
+
+
+def _phase_at(config: TrainConfig, iteration: int) -> tuple[Any, int]:
+    for phase in config.phases:
+        if iteration < phase.iterations:
+            return phase, iteration
+        iteration -= phase.iterations
+    raise IndexError(iteration)
+
+
+def _schedule(iteration: int, iterations: int) -> float:
+    """Warm-up, then half a cosine down to one hundredth."""
+    warm = min(1.0, (iteration + 1) / WARM_UP)
+    return warm * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * iteration / iterations)))
+
+
+def _header(config: TrainConfig, iteration: int, seconds: float, device: str) -> dict[str, Any]:
+    return {
+        "format": 1,
+        "model": config.model,
+        "config": config.to_json(),
+        "iteration": iteration,
+        "seconds": round(seconds, 1),
+        "device": device,
+        "threads": torch.get_num_threads(),
+        "torch": torch.__version__.split("+")[0],
+        "revision": _revision(),
+    }
+
+
+def _revision() -> str:
+    """The git revision of the source, or 'unknown' outside a checkout."""
+    try:
+        out = subprocess.run(
+            ["git", "rev-parse", "HEAD"],
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return out.stdout.strip()

@@ -1,0 +1,230 @@
+"""Random streams of 2D objects and points on them, made on the training device.
+
+The exact reference defines what a point shows. Points are drawn where pictures are hard: near the
+boundary of an object at all scales, within reach of its blend, and evenly over the canvas.
+
+Letters: B streams, N objects, P points.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from scenelang.reference.distance import SECTORS, carry_back_affine, carry_back_warp, sector_distance
+from scenelang.reference.fold import fold
+
+GEOMETRIES = ("square", "triangle", "star", "pentagon")
+FAR = 1e3  # translation of the objects that pad a stream: off every point
+
+
+@dataclass(frozen=True, slots=True)
+class SceneConfig:
+    """The training distribution.
+
+    Args:
+        points: points P of a stream.
+        union, smooth: shares of streams of unions only and of unions and smooth unions only; the others
+            draw each token evenly.
+        edge: share of points on the edge of one object.
+        blend_focus: world units; other points are drawn with a weight of 1 / (|D| + blend_focus).
+        tiny, large: shares of objects of 0.02 to 0.12 and of 0.8 to 1.8 world units.
+        extent: points and objects lie in [-extent, extent].
+        warp: largest twirl and bend.
+    """
+
+    points: int = 256
+    union: float = 0.25
+    smooth: float = 0.3
+    edge: float = 0.5
+    blend_focus: float = 0.01
+    tiny: float = 0.15
+    large: float = 0.1
+    extent: float = 1.3
+    warp: float = 1.2
+
+
+@dataclass(slots=True)
+class Batch:
+    """Streams at points, with what the exact picture shows after every object.
+
+    Args:
+        q: leaf coordinates (B, N, P, 2).
+        scale: distance scale (B, N).
+        leaf: geometry index (B, N).
+        rgb: colours (B, N, 3).
+        tokens: (B, N) int64.
+        count: (B,) objects in use; the rest is padding far off every point.
+        inside: object alone covers the point (B, N, P), 0 or 1.
+        covered: stream up to the object covers the point (B, N, P), 0 or 1.
+        colour: exact colour after the object (B, N, P, 3).
+    """
+
+    q: Tensor
+    scale: Tensor
+    leaf: Tensor
+    rgb: Tensor
+    tokens: Tensor
+    count: Tensor
+    inside: Tensor
+    covered: Tensor
+    colour: Tensor
+
+
+def _uniform(shape: tuple[int, ...], low: float, high: float, g: torch.Generator) -> Tensor:
+    return torch.rand(shape, generator=g, device=g.device) * (high - low) + low
+
+
+def _affine(shape: tuple[int, ...], config: SceneConfig, g: torch.Generator) -> Tensor:
+    """World-from-leaf maps (…, 2, 3): any rotation, scale per axis, shear, translation."""
+    kind = torch.rand(shape, generator=g, device=g.device)
+    size = torch.exp(_uniform(shape, math.log(0.15), math.log(0.8), g))
+    tiny = torch.exp(_uniform(shape, math.log(0.02), math.log(0.12), g))
+    size = torch.where(kind < config.tiny, tiny, size)
+    size = torch.where(kind > 1 - config.large, _uniform(shape, 0.8, 1.8, g), size)
+    ratio = torch.exp(
+        _uniform(shape, 0.0, math.log(3.0), g) * torch.randint(0, 2, shape, generator=g, device=g.device)
+    )
+    a, b = _uniform(shape, -math.pi, math.pi, g), _uniform(shape, -math.pi, math.pi, g)
+    ca, sa, cb, sb = a.cos(), a.sin(), b.cos(), b.sin()
+    u, v = size, size / ratio
+    # R(a) diag(u, v) R(b), mirrored half of the time through the sign of v
+    v = torch.where(torch.rand(shape, generator=g, device=g.device) < 0.25, -v, v)
+    linear = torch.stack(
+        [
+            torch.stack([ca * u * cb - sa * v * sb, -ca * u * sb - sa * v * cb], -1),
+            torch.stack([sa * u * cb + ca * v * sb, -sa * u * sb + ca * v * cb], -1),
+        ],
+        -2,
+    )
+    return torch.cat([linear, _uniform((*shape, 2, 1), -0.9, 0.9, g)], -1)
+
+
+def _inverse(m: Tensor) -> Tensor:
+    """Inverse (…, 2, 3) of affine maps (…, 2, 3)."""
+    linear = torch.linalg.inv(m[..., :2])
+    return torch.cat([linear, -linear @ m[..., 2:]], -1)
+
+
+def _boundary(leaf: Tensor, g: torch.Generator) -> Tensor:
+    """Points (B, P, 2) on the boundaries of leaves (B, P)."""
+    n, phase, outer, inner = _sectors(g.device)[leaf].unbind(-1)
+    half = math.pi / n
+    t = torch.rand(leaf.shape, generator=g, device=g.device)
+    side = torch.where(torch.rand(leaf.shape, generator=g, device=g.device) < 0.5, 1.0, -1.0)
+    turn = phase + 2 * half * torch.floor(torch.rand(leaf.shape, generator=g, device=g.device) * n)
+    u, v = outer + t * (inner * half.cos() - outer), side * t * inner * half.sin()
+    return torch.stack([turn.cos() * u - turn.sin() * v, turn.sin() * u + turn.cos() * v], -1)
+
+
+def _forward_warp(q: Tensor, twirl: Tensor, bend: Tensor) -> Tensor:
+    """The point that a warp carries back to q, by Newton steps on the angle (approximate)."""
+    radius = torch.linalg.vector_norm(q, dim=-1)
+    angle = twirl * radius
+    for _ in range(5):
+        c, s = angle.cos(), angle.sin()
+        x, y = c * q[..., 0] - s * q[..., 1], s * q[..., 0] + c * q[..., 1]
+        value = angle - twirl * radius - bend * x
+        slope = 1 + bend * y
+        angle = angle - (value / torch.where(slope.abs() < 0.2, 0.2, slope)).clamp(-0.5, 0.5)
+    c, s = angle.cos(), angle.sin()
+    return torch.stack([c * q[..., 0] - s * q[..., 1], s * q[..., 0] + c * q[..., 1]], -1)
+
+
+def _sectors(device: torch.device) -> Tensor:
+    return torch.tensor([SECTORS[name] for name in GEOMETRIES], device=device)
+
+
+def _edges(config: SceneConfig) -> int:
+    """How many points of a stream lie on the edge of one object."""
+    return int(config.points * config.edge)
+
+
+def _points(
+    world: Tensor,
+    leaf: Tensor,
+    count: Tensor,
+    twirl: Tensor,
+    bend: Tensor,
+    singular: Tensor,
+    config: SceneConfig,
+    g: torch.Generator,
+) -> Tensor:
+    """World points (B, pool, 2): first those on edges, then a pool around objects and over the canvas."""
+    b, edges = leaf.shape[0], _edges(config)
+    pool = edges + 3 * (config.points - edges)
+    pick = (torch.rand((b, pool), generator=g, device=g.device) * count[:, None]).long()
+    edge = _boundary(leaf.gather(1, pick[:, :edges]), g)
+    offset = 10 ** _uniform((b, edges, 1), -3.7, -0.3, g)
+    edge = edge + torch.randn((b, edges, 2), generator=g, device=g.device) * offset
+    reach = 1 + 0.25 / singular.gather(1, pick[:, edges:])[..., None]
+    around = torch.randn((b, pool - edges, 2), generator=g, device=g.device)
+    around = around / torch.linalg.vector_norm(around, dim=-1, keepdim=True) * reach
+    around = around * torch.rand((b, pool - edges, 1), generator=g, device=g.device).sqrt()
+    local = torch.cat([edge, around], 1)
+    local = _forward_warp(local, twirl.gather(1, pick), bend.gather(1, pick))
+    place = world[torch.arange(b, device=g.device)[:, None], pick]  # (B, pool, 2, 3)
+    points = (place[..., :2] @ local[..., None])[..., 0] + place[..., 2]
+    even = _uniform((b, pool, 2), -config.extent, config.extent, g)
+    chosen = torch.rand((b, pool, 1), generator=g, device=g.device) < 0.3
+    chosen[:, :edges] = False
+    return torch.where(chosen, even, points)
+
+
+def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Batch:
+    """Draw B streams of 1 to N objects with P points each."""
+    p = config.points
+    device = g.device
+    leaf = torch.randint(0, 4, (b, n), generator=g, device=device)
+    count = torch.randint(1, n + 1, (b,), generator=g, device=device)
+    tokens = torch.randint(0, 4, (b, n), generator=g, device=device)
+    style = torch.rand(b, generator=g, device=device)
+    tokens = torch.where((style > 1 - config.smooth)[:, None], tokens % 2, tokens)
+    tokens[style < config.union] = 0
+    tokens[:, 0] = 0
+    rgb = torch.rand((b, n, 3), generator=g, device=device)
+    world = _affine((b, n), config, g)
+    gather = torch.rand((b, 1), generator=g, device=device) < 0.3  # some streams stand close together
+    size = world[..., :2].flatten(-2).abs().amax(-1, keepdim=True)
+    near = world[:, :1, :, 2] + _uniform((b, n, 2), -1.0, 1.0, g) * size
+    world[..., 2] = torch.where(gather[..., None], near, world[..., 2])
+    used = torch.arange(n, device=device) < count[:, None]
+    world[..., 2] = torch.where(used[..., None], world[..., 2], torch.full_like(world[..., 2], FAR))
+    twirl, bend = _uniform((2, b, n), -config.warp, config.warp, g) * torch.randint(
+        0, 2, (2, b, n), generator=g, device=device
+    )
+    frame = _inverse(world)
+    singular = torch.linalg.svdvals(world[..., :2])[..., 1]
+
+    points = _points(world, leaf, count, twirl, bend, singular, config, g)
+    x, y = points[:, None, :, 0], points[:, None, :, 1]  # (B, 1, pool)
+    qx, qy = carry_back_affine(frame[..., None].permute(2, 3, 0, 1, 4), x, y)
+    qx, qy = carry_back_warp(twirl[..., None], bend[..., None], torch.zeros((), device=device), qx, qy)
+    sectors = _sectors(device)[leaf]
+    d = sector_distance(qx, qy, *(v[..., None] for v in sectors.unbind(-1))) * singular[..., None]
+    steps = list(fold(d.unbind(1), rgb[:, :, None].unbind(1), tokens.T[..., None]))
+    # of the points that are not on an edge keep those near the boundary of the whole stream
+    gumbel = -torch.log(
+        -torch.log(torch.rand(steps[-1][0].shape, generator=g, device=device).clamp(1e-9, 1 - 1e-7))
+    )
+    order = gumbel - torch.log(steps[-1][0].abs() + config.blend_focus)
+    order[:, : _edges(config)] = math.inf
+    keep = order.topk(p, dim=1).indices  # (B, P)
+    keep_n = keep[:, None].expand(b, n, p)
+    q = torch.stack([qx, qy], -1).gather(2, keep_n[..., None].expand(b, n, p, 2))
+    colour = torch.stack([c.expand(*big_d.shape, 3) for big_d, c in steps], 1)
+    covered = torch.stack([big_d < 0 for big_d, _ in steps], 1)
+    return Batch(
+        q=q,
+        scale=singular,
+        leaf=leaf,
+        rgb=rgb,
+        tokens=tokens,
+        count=count,
+        inside=(d < 0).float().gather(2, keep_n),
+        covered=covered.float().gather(2, keep_n),
+        colour=colour.gather(2, keep_n[..., None].expand(b, n, p, 3)),
+    )
