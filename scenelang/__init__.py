@@ -1,0 +1,111 @@
+"""A language for scene graphs and a compiler from it to neural render calls.
+
+The pipeline, in order: ``syntax`` reads text into a tree, ``scene`` evaluates it to concrete nodes,
+``graph`` lowers those, ``passes`` rewrite them, ``program`` makes vectors and tokens, ``renderers`` draw.
+
+Importing this package imports nothing else; each name below is fetched when it is first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
+    from scenelang.diagnostics.diagnostic import Diagnostics as Diagnostics
+    from scenelang.diagnostics.diagnostic import SceneError as SceneError
+    from scenelang.scene.load import load as load
+    from scenelang.scene.load import loads as loads
+    from scenelang.scene.schema import Animation as Animation
+    from scenelang.scene.schema import Bend as Bend
+    from scenelang.scene.schema import Boolean as Boolean
+    from scenelang.scene.schema import Chain as Chain
+    from scenelang.scene.schema import Color as Color
+    from scenelang.scene.schema import Displace as Displace
+    from scenelang.scene.schema import Flip as Flip
+    from scenelang.scene.schema import Grayscale as Grayscale
+    from scenelang.scene.schema import Group as Group
+    from scenelang.scene.schema import Hue as Hue
+    from scenelang.scene.schema import Link as Link
+    from scenelang.scene.schema import Material as Material
+    from scenelang.scene.schema import Matrix as Matrix
+    from scenelang.scene.schema import Object as Object
+    from scenelang.scene.schema import Rotate as Rotate
+    from scenelang.scene.schema import Scale as Scale
+    from scenelang.scene.schema import Scene as Scene
+    from scenelang.scene.schema import Shear as Shear
+    from scenelang.scene.schema import Translate as Translate
+    from scenelang.scene.schema import Twirl as Twirl
+    from scenelang.scene.schema import Twist as Twist
+
+# Module -> public names it defines. A new public name is added here, above, and to __all__.
+_HOME: Final = {
+    "scenelang.diagnostics.diagnostic": ("Diagnostic", "Diagnostics", "SceneError"),
+    "scenelang.scene.load": ("load", "loads"),
+    "scenelang.scene.schema": (
+        "Animation",
+        "Bend",
+        "Boolean",
+        "Chain",
+        "Color",
+        "Displace",
+        "Flip",
+        "Grayscale",
+        "Group",
+        "Hue",
+        "Link",
+        "Material",
+        "Matrix",
+        "Object",
+        "Rotate",
+        "Scale",
+        "Scene",
+        "Shear",
+        "Translate",
+        "Twirl",
+        "Twist",
+    ),
+}
+_MODULE: Final = {name: module for module, names in _HOME.items() for name in names}
+
+__all__ = [
+    "Animation",
+    "Bend",
+    "Boolean",
+    "Chain",
+    "Color",
+    "Diagnostic",
+    "Diagnostics",
+    "Displace",
+    "Flip",
+    "Grayscale",
+    "Group",
+    "Hue",
+    "Link",
+    "Material",
+    "Matrix",
+    "Object",
+    "Rotate",
+    "Scale",
+    "Scene",
+    "SceneError",
+    "Shear",
+    "Translate",
+    "Twirl",
+    "Twist",
+    "load",
+    "loads",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE:
+        raise AttributeError(f"module 'scenelang' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_MODULE[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -12,6 +12,7 @@ from scenelang.scene.schema import Combine, Link, Material
 M = TypeVar("M", bound=BaseModel)
 
 _set = object.__setattr__
+_fields_set: dict[type[BaseModel], set[str]] = {}
 
 
 def make(cls: type[M], fields: dict[str, Any]) -> M:
@@ -21,7 +22,10 @@ def make(cls: type[M], fields: dict[str, Any]) -> M:
     """
     node = cls.__new__(cls)
     _set(node, "__dict__", fields)
-    _set(node, "__pydantic_fields_set__", set(fields))
+    given = _fields_set.get(cls)
+    if given is None:
+        given = _fields_set[cls] = set(fields)
+    _set(node, "__pydantic_fields_set__", given)  # shared: frozen models never change it
     _set(node, "__pydantic_extra__", None)
     _set(node, "__pydantic_private__", None)
     return node

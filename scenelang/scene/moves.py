@@ -101,6 +101,13 @@ def _action(
         _warn(node, unit, one.span if one else span)
         return node
 
+    def append(node: Any, out: Builder) -> None:
+        if out.moved is None:
+            out.moved = span  # even by a transform with a mistake: children have their order all the same
+        if node is not None:
+            session.count_parts(1, span)
+            out.transforms.append(node)
+
     getters = [None if code is None else code.run for code in inputs]
     if all(code is None or code.value is not VARIES for code in inputs):
         constants = [None if code is None else code.value for code in inputs]
@@ -111,9 +118,7 @@ def _action(
                 made.append(construct(constants))
                 if made[0] is not None:
                     session.spans.record(made[0], place)
-            if made[0] is not None:
-                _append(made[0], out, span)
-                session.count_parts(1, span)
+            append(made[0], out)
 
         return repeat
 
@@ -121,16 +126,9 @@ def _action(
         node = construct([None if get is None else get(env) for get in getters])
         if node is not None:
             session.spans.record(node, place)
-            _append(node, out, span)
-            session.count_parts(1, span)
+        append(node, out)
 
     return action
-
-
-def _append(node: Any, out: Builder, span: Span) -> None:
-    if out.moved is None:
-        out.moved = span
-    out.transforms.append(node)
 
 
 def _warn(node: Any, unit: Unit, span: Span) -> None:

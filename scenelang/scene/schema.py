@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Rgb = tuple[Finite, Finite, Finite]
 Row = tuple[Finite, Finite, Finite, Finite]
+Word = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+"""A name that text can spell."""
 Combine = Literal["union", "smooth", "subtract", "intersect"]
 
 
@@ -53,6 +55,11 @@ class Rotate(_Node):
     kind: Literal["rotate"] = "rotate"
     angle: float
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    @classmethod
+    def degrees(cls, angle_deg: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Rotate:
+        """A turn by ``angle_deg`` degrees."""
+        return cls(angle=math.radians(angle_deg), axis=axis)
 
     @field_validator("axis")
     @classmethod
@@ -166,7 +173,7 @@ MaterialOp = Annotated[
 class Material(_Node):
     """A material of the model, with its texture and colour operations in order."""
 
-    name: str
+    name: Word
     ops: tuple[MaterialOp, ...] = ()
 
 
@@ -177,9 +184,13 @@ class Object(_Node):
     """A leaf geometry, its transforms nearest the leaf first, and its material."""
 
     kind: Literal["object"] = "object"
-    geometry: str
+    geometry: Word
     transforms: tuple[Transform, ...] = ()
     material: Material | None = None
+
+    def __init__(self, geometry: str | None = None, /, **data: Any) -> None:
+        """An object; its geometry may be given without its name: ``Object("star")``."""
+        super().__init__(**(data if geometry is None else {"geometry": geometry, **data}))
 
 
 class Group(_Node):
@@ -216,6 +227,13 @@ class Chain(_Node):
     transforms: tuple[Transform, ...] = ()
     material: Material | None = None
 
+    @field_validator("children")
+    @classmethod
+    def _starts_with_union(cls, children: tuple[Link, ...]) -> tuple[Link, ...]:
+        if children and children[0].op != "union":
+            raise ValueError(f"the first child of a chain is joined by union, not {children[0].op}")
+        return children
+
 
 SceneNode = Annotated[Object | Group | Boolean | Chain, Field(discriminator="kind")]
 
@@ -237,8 +255,31 @@ class Scene(_Node):
     """A whole scene: settings and top-level nodes, which form a union in file order."""
 
     version: Literal[1] = 1
-    model: str | None = None
+    model: Annotated[str, Field(pattern=r'^[^"\\\x00-\x1f]+$')] | None = None
     canvas: tuple[Annotated[int, Field(ge=1, le=8192)], Annotated[int, Field(ge=1, le=8192)]] = (256, 256)
     background: Rgb | None = (1.0, 1.0, 1.0)
     animation: Animation | None = None
     nodes: tuple[SceneNode, ...] = ()
+
+    def to_nsg(self) -> str:
+        """Canonical text that evaluates back to an equal Scene."""
+        from scenelang.scene.to_nsg import to_nsg
+
+        return to_nsg(self)
+
+    def to_json(self) -> str:
+        """JSON that `from_json` reads back; like `model_dump_json`, and for scenes of any depth."""
+        from scenelang.scene.data import to_json
+
+        return to_json(self)
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> Scene:
+        """Read JSON; like `model_validate_json`, and for scenes of any depth.
+
+        Raises:
+            SceneError: text that is no JSON, or no Scene; it names each place.
+        """
+        from scenelang.scene.data import from_json
+
+        return from_json(text)

@@ -120,6 +120,8 @@ def _canvas(session: Session, span: Span, width: Any, height: Any) -> None:
         if len(width.items) != 2:
             raise Problem("E0301", f"expected a vector of 2 numbers, found {describe(width)}", operand=0)
         width, height = width.items
+    if height is LEFT_OUT:
+        raise Problem("E0308", "'canvas' needs 'w' and 'h'", "it is called canvas(w, h)")
     sides = []
     for operand, value in enumerate((width, height)):
         side = number(value, operand)

@@ -159,11 +159,17 @@ def spread(values: Sequence[Any], spec: Spec) -> list[Any]:
     """Arguments in full: the items of one vector, or the values as they are.
 
     Raises:
-        Problem: a vector of a length that does not fit.
+        Problem: a vector of a length that does not fit, or one number alone.
     """
     first = values[0]
-    if not spec.spread or first.__class__ is not Vec or any(v is not None for v in values[1:]):
+    if any(v is not None for v in values[1:]):
         return list(values)
+    if first.__class__ is float:
+        missing = " and ".join(f"'{name}'" for name in spec.params[1 : spec.required])
+        raise Problem("E0308", f"{missing} is missing, or a vector of all components")
+    if first.__class__ is not Vec:
+        message = f"expected a vector or its components, found {describe(first)}"
+        raise Problem("E0301", message, operand=0)
     count = len(first.items)
     if not spec.required <= count <= len(spec.params):
         message = (
@@ -174,9 +180,11 @@ def spread(values: Sequence[Any], spec: Spec) -> list[Any]:
 
 
 def outside_unit(node: Any) -> float | None:
-    """A component of a colour or an amount that lies outside 0 to 1."""
-    components = getattr(node, "rgb", None) or (getattr(node, "amount", 0.0),)  # a displacement has no bounds
-    for component in components:
+    """A component of a colour or an amount of grey that lies outside 0 to 1."""
+    cls = node.__class__
+    if cls is not Color and cls is not Grayscale:
+        return None
+    for component in node.rgb if cls is Color else (node.amount,):
         if not 0.0 <= component <= 1.0:
             return float(component)
     return None

@@ -13,6 +13,7 @@ CODES: dict[str, str] = {
     "E0310": "parameter value that is no literal",
     "E0311": "value outside what is allowed",
     "E0312": "singular transform",
+    "E0313": "data that is no scene",
     "E0320": "too many objects",
     "E0321": "recursion too deep",
     "E0322": "too many evaluation steps",

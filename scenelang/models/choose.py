@@ -1,0 +1,65 @@
+"""The model for a scene that names none: the smallest that fits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from scenelang.models.manifest import Manifest
+from scenelang.scene.schema import Chain, Object, Scene, SceneNode
+
+
+def choose_model(scene: Scene, models: Iterable[Manifest]) -> Manifest | None:
+    """The smallest of ``models`` that has every name the scene uses.
+
+    Args:
+        scene: a scene; if it names a model, only that one fits.
+        models: manifests to choose from.
+
+    Returns:
+        The fitting manifest with the fewest geometries, then the fewest other words, then the first by
+        name; None if none fits.
+    """
+    geometries, materials, transforms, operations = _names(scene)
+    fitting = [
+        m
+        for m in models
+        if scene.model in (None, m.name)
+        and geometries.issubset(m.geometries)
+        and materials.issubset(m.materials)
+        and transforms.issubset(m.transforms)
+        and operations.issubset(m.material_ops)
+    ]
+    return min(fitting, key=_size, default=None)
+
+
+def _size(model: Manifest) -> tuple[int, int, str]:
+    others = len(model.materials) + len(model.transforms) + len(model.material_ops)
+    return len(model.geometries), others, model.name
+
+
+def _names(scene: Scene) -> tuple[set[str], set[str], set[str], set[str]]:
+    """Names of geometries, materials, transforms and texture operations in a scene."""
+    geometries: set[str] = set()
+    materials: set[str] = set()
+    transforms: set[str] = set()
+    operations: set[str] = set()
+    for node in walk(scene.nodes):
+        if isinstance(node, Object):
+            geometries.add(node.geometry)
+        transforms.update(t.kind for t in node.transforms)
+        if node.material is not None:
+            materials.add(node.material.name)
+            operations.update(op.kind for op in node.material.ops)
+    return geometries, materials, transforms, operations
+
+
+def walk(nodes: Iterable[SceneNode]) -> Iterator[SceneNode]:
+    """All nodes, without recursion, in no particular order."""
+    stack = list(nodes)
+    while stack:
+        node = stack.pop()
+        yield node
+        if isinstance(node, Chain):
+            stack.extend(link.node for link in node.children)
+        elif not isinstance(node, Object):
+            stack.extend(node.children)

@@ -1,0 +1,104 @@
+"""What the tests of evaluation share: a second model, and a way to run text."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.span import SourceFile
+from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.scene.evaluate import load_source
+from scenelang.scene.schema import Scene
+from scenelang.scene.spans import SpanMap
+
+SOLIDS = Manifest(
+    name="solids3d",
+    summary="sphere and torus under a point light",
+    dimension=3,
+    renderer="framed",
+    lifting="exact",
+    geometries=("sphere", "torus"),
+    materials=("diffuse", "volumetric"),
+    default_material="diffuse",
+    transforms=("translate", "rotate", "scale", "shear", "matrix", "twist", "displace"),
+    material_ops=("color", "grayscale", "hue"),
+    limits={},
+    trained={},
+    measured={},
+)
+MODELS = (load_manifest("shapes2d"), SOLIDS)
+
+
+@dataclass
+class Outcome:
+    """A run's scene and what was found."""
+
+    scene: Scene | None
+    spans: SpanMap
+    diagnostics: Diagnostics
+
+    @property
+    def codes(self) -> list[str]:
+        return [d.code for d in self.diagnostics]
+
+    def good(self) -> Scene:
+        assert self.scene is not None, [(d.code, d.message, d.span and d.span.text) for d in self.diagnostics]
+        return self.scene
+
+    def only(self) -> Diagnostic:
+        assert len(self.diagnostics) == 1, [(d.code, d.message) for d in self.diagnostics]
+        return self.diagnostics.items[0]
+
+
+def run_text(text: str, *, name: str = "test.nsg", **options: Any) -> Outcome:
+    """Evaluate text with both models at hand."""
+    found = Diagnostics()
+    scene, spans = load_source(SourceFile(name, text), diagnostics=found, **{"models": MODELS, **options})
+    return Outcome(scene, spans, found)
+
+
+def value(expression: str) -> float:
+    """The number that an expression has, from the x of a translation."""
+    scene = run_text(f"square {{ translate({expression}, 0); }}").good()
+    return transform(scene).x  # type: ignore[no-any-return]
+
+
+def transform(scene: Scene, node: int = 0, index: int = 0) -> Any:
+    """A transform of a top-level node."""
+    return scene.nodes[node].transforms[index]
+
+
+_MARK = re.compile(r"//! (.*)$")
+_ONE = re.compile(r"([EW]\d{4})(?: `([^`]*)`)?")
+
+
+def expected(text: str) -> list[tuple[int, str, str | None]]:
+    """Line, code and underlined text of each ``//! E0201 `name` `` comment."""
+    found = []
+    for number, line in enumerate(text.splitlines(), 1):
+        mark = _MARK.search(line)
+        if mark:
+            found += [(number, code, words or None) for code, words in _ONE.findall(mark.group(1))]
+    return found
+
+
+def mismatch(text: str, diagnostics: Diagnostics) -> str:
+    """How what was found differs from the marks in ``text``; empty if it does not."""
+    wanted = expected(text)
+    problems = []
+    for d in diagnostics:
+        line = d.span.locate()[0][0] if d.span else 0
+        words = d.span.text if d.span else ""
+        match = next((w for w in wanted if w[:2] == (line, d.code) and w[2] in (None, words)), None)
+        if match is None:
+            problems.append(f"unexpected at line {line}: {d.code} `{words}` {d.message}")
+        else:
+            wanted.remove(match)
+    problems += [f"missing at line {line}: {code} `{words}`" for line, code, words in wanted]
+    return "\n".join(problems)
+
+
+HERE = Path(__file__).parent

@@ -1,0 +1,102 @@
+"""Mistakes: each is reported once, with its code, at its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from scene_cases import HERE, mismatch, run_text
+
+from scenelang.diagnostics.codes import CODES
+from scenelang.diagnostics.codes.names import CODES as NAMES
+from scenelang.diagnostics.codes.types import CODES as TYPES
+
+CASES = [case.partition("\n")[::2] for case in (HERE / "errors.nsgs").read_text("utf-8").split("=== ")[1:]]
+MALFORMED = sorted((HERE / "malformed").glob("*.nsg"))
+
+
+@pytest.mark.parametrize(("title", "text"), CASES, ids=[title for title, _ in CASES])
+def test_one_mistake(title: str, text: str) -> None:
+    outcome = run_text(text)
+    assert mismatch(text, outcome.diagnostics) == ""
+    assert (outcome.scene is None) == bool(outcome.diagnostics.errors)
+
+
+@pytest.mark.parametrize("path", MALFORMED, ids=lambda p: p.stem)
+def test_many_mistakes(path: Path) -> None:
+    text = path.read_text("utf-8")
+    assert len([line for line in text.splitlines() if "//!" in line]) >= 3
+    assert mismatch(text, run_text(text).diagnostics) == ""
+
+
+def test_ten_malformed_scenes() -> None:
+    assert len(MALFORMED) >= 10
+
+
+def test_messages_keep_the_house_style() -> None:
+    for title, text in CASES:
+        for d in run_text(text).diagnostics:
+            assert d.code in CODES, title
+            assert not d.message.endswith("."), d.message
+            assert d.message[0] == d.message[0].lower(), d.message
+            assert d.help is None or not d.help.endswith("."), d.help
+
+
+def test_codes_have_titles() -> None:
+    assert all(code.startswith(("E02", "W02")) for code in NAMES)
+    assert all(code.startswith(("E03", "W03")) for code in TYPES)
+
+
+def apply_fix(text: str) -> str:
+    """The text with the fix of its only diagnostic applied."""
+    fix = run_text(text).only().fix
+    assert fix is not None
+    for edit in sorted(fix.edits, key=lambda e: -e.span.start):
+        text = text[: edit.span.start] + edit.replacement + text[edit.span.end :]
+    return text
+
+
+@pytest.mark.parametrize(
+    ("bad", "good"),
+    [
+        ("square { rotate(45); }", "square { rotate(45deg); }"),
+        ("square { rotate(-45); }", "square { rotate(-45deg); }"),
+        ("square { rotate(1.5); }", "square { rotate(1.5rad); }"),
+        (
+            "let k = 45; square { rotate(k); }",
+            "let k = 45; square { rotate(k * 1deg); }",
+        ),
+        (
+            "for (i in [1]) { square { rotate(i * 45); } }",
+            "for (i in [1]) { square { rotate((i * 45) * 1deg); } }",
+        ),
+        ("squar { scale(2); }", "square { scale(2); }"),
+        ("square { rotat(45deg); }", "square { rotate(45deg); }"),
+        ("let size = 1; square { scale(sise); }", "let size = 1; square { scale(size); }"),
+        ("square { material falt; }", "square { material flat; }"),
+        ("square { rotate(angel = 45deg); }", "square { rotate(angle = 45deg); }"),
+        ('model "shapes2";', 'model "shapes2d";'),
+        ("chain { smooth square {} star {} }", "chain { square {} star {} }"),
+        ("let m = material flat; square { material m; }", "let m = material flat; square { m; }"),
+    ],
+)
+def test_fixes_mend(bad: str, good: str) -> None:
+    mended = apply_fix(bad)
+    assert mended.replace("  ", " ") == good
+    run_text(mended).good()
+
+
+def test_labels_show_both_places() -> None:
+    label = run_text("let a = 1;\nlet a = 2;").only().labels[0]
+    assert (label.span.locate()[0], label.message) == ((1, 5), "first defined here")
+    label = run_text("square { material flat; material flat; }").only().labels[0]
+    assert label.span.text == "material flat"
+    inside = run_text("module m(a) { square { scale(1 / a); } }\nm(0);").only()
+    assert [x.span.locate()[0] for x in inside.labels] == [(2, 1)]
+
+
+def test_diagnostics_of_what_recovery_skipped_stay_single() -> None:
+    """A definition lost to a syntax error is no second mistake where it is used."""
+    outcome = run_text("let size 5;\nsquare { scale(size); }")
+    assert outcome.scene is None
+    assert [code[:3] for code in outcome.codes] == ["E01"]
