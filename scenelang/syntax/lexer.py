@@ -1,0 +1,196 @@
+"""Text to tokens, without ever failing.
+
+One regular expression, made from the terminals of the grammar and the shapes of common slips, eats
+white space and comments and then one token. A slip is reported here once and stands in the token list as
+what was meant, so that the parser meets a sound text.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import cache
+
+from scenelang.diagnostics.diagnostic import Edit, Fix
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.syntax.tables import END, tables
+from scenelang.syntax.tokens import Report, Tokens
+
+UNITS = ("deg", "rad", "turn", "ms", "s")
+UNIT_ALIASES = {
+    "degree": "deg",
+    "degrees": "deg",
+    "°": "deg",
+    "radian": "rad",
+    "radians": "rad",
+    "turns": "turn",
+    "sec": "s",
+    "second": "s",
+    "seconds": "s",
+    "msec": "ms",
+}
+FOREIGN = {
+    "**": "^",
+    "&": "&&",
+    "|": "||",
+    "−": "-",
+    "–": "-",
+    "×": "*",
+    "·": "*",
+    "÷": "/",
+    "≤": "<=",
+    "≥": ">=",
+    "≠": "!=",
+    "；": ";",
+    "，": ",",
+    "（": "(",
+    "）": ")",
+    "：": ":",
+}
+"""Operators and punctuation of other languages and keyboards: what is written here instead."""
+
+# Possessive throughout: a text that matches nothing must not be tried in every way of splitting it.
+_SKIP = r"(?:[\s\ufeff]+|//[^\n]*+|/\*[\s\S]*?\*/)*+"
+_SLIPS = {
+    "open_comment": r"/\*",
+    "close_comment": r"\*/",
+    "open_string": r'"(?:\\[^\n]|[^\s;,(){}\[\]"\\])*+',
+    "quotes": r"'[^'\n]*+'|[“”][^“”\n]*+[“”]",
+    "number": r"\.?[0-9](?:[\w°]|\.(?!\.))*+",
+    "colour": r"#\w*+",
+    "name": r"[^\W\d]\w*+",
+    "foreign": r"&(?!&)|\|(?!\|)|" + "|".join(re.escape(text) for text in FOREIGN if text not in "&|"),
+}
+_ILLEGAL = r"[^\s\w\x21-\x7e]+|[@$\\~`]+|[\s\S]"
+
+
+@cache
+def _master() -> tuple[re.Pattern[str], list[int], list[str]]:
+    """The expression; the kind of each of its groups, or -1; the name of each slip's group."""
+    language = tables()
+    words = [text for text in language.literals if text[0].isalpha()]
+    signs = sorted((text for text in language.literals if text not in words), key=len, reverse=True)
+    names = ["", *language.patterns, *_SLIPS]
+    slips = [*_SLIPS.values()]
+    groups = [*language.patterns.values(), *slips, "|".join(map(re.escape, signs)), _ILLEGAL]
+    kinds = [-1, *(language.kind(name) for name in language.patterns), *[-1] * (len(slips) + 2)]
+    pattern = _SKIP + "(?:" + "|".join(f"({group})" for group in groups) + r"|\Z)"
+    return re.compile(pattern), kinds, [*names, "sign", "illegal"]
+
+
+def scan(source: SourceFile, report: Report) -> Tokens:
+    """All tokens of a text; slips go to ``report``."""
+    pattern, group_kinds, names = _master()
+    literals = tables().literals
+    name_group, sign_group = names.index("NAME"), names.index("sign")
+    name_kind = group_kinds[name_group]
+    tokens = Tokens(source)
+    kinds, starts, ends = tokens.kinds, tokens.starts, tokens.ends
+    text = source.text
+    keyword = literals.get
+    slips = _Slips(tokens, report)
+    for match in pattern.finditer(text):
+        group = match.lastindex
+        if group is None:
+            break
+        start, end = match.span(group)
+        if group == name_group:
+            kind = keyword(text[start:end], name_kind)
+        elif group == sign_group:
+            kind = literals[text[start:end]]
+        else:
+            kind = group_kinds[group]
+            if kind < 0:
+                slips.read(names[group], start, end)
+                if tokens.cut:
+                    break
+                continue
+        kinds.append(kind)
+        starts.append(start)
+        ends.append(end)
+    tokens.append(END, len(text), len(text))
+    return tokens
+
+
+class _Slips:
+    """Reports each slip and stands something sound in its place."""
+
+    def __init__(self, tokens: Tokens, report: Report) -> None:
+        self.tokens = tokens
+        self.report = report
+        self.kind = tables().kind
+
+    def read(self, name: str, start: int, end: int) -> None:
+        handler: Callable[[int, int, str], None] = getattr(self, f"_{name}")
+        handler(start, end, self.tokens.source.text[start:end])
+
+    def _keep(self, kind: str, start: int, end: int) -> None:
+        self.tokens.append(self.kind(kind), start, end)
+        self.tokens.reported.add(start)
+
+    def _fix(self, start: int, end: int, text: str) -> Fix:
+        message = f"write `{text}`" if text else "remove it"
+        return Fix(message, (Edit(Span(self.tokens.source, start, end), text),))
+
+    def _open_comment(self, start: int, end: int, text: str) -> None:
+        self.tokens.cut = True
+        self.report.add(
+            "E0115", "comment is never closed", start, end, help="a comment ends with `*/`; the rest is skipped"
+        )
+
+    def _close_comment(self, start: int, end: int, text: str) -> None:
+        self.report.add(
+            "E0115", "end of a comment that was never opened", start, end, fix=self._fix(start, end, "")
+        )
+
+    def _open_string(self, start: int, end: int, text: str) -> None:
+        self._keep("STRING", start, end)
+        fix = Fix('insert `"`', (Edit(Span(self.tokens.source, end, end), '"'),)) if end - start > 1 else None
+        self.report.add(
+            "E0114", "string is never closed", start, end, help='a string ends with `"` on its line', fix=fix
+        )
+
+    def _quotes(self, start: int, end: int, text: str) -> None:
+        self._keep("STRING", start, end)
+        safe = '"' not in text and "\\" not in text
+        fix = self._fix(start, end, f'"{text[1:-1]}"') if safe else None
+        self.report.add("E0123", "string in the wrong quotes", start, end, help='strings stand in `"`', fix=fix)
+
+    def _number(self, start: int, end: int, text: str) -> None:
+        self._keep("NUMBER", start, end)
+        digits = re.match(r"[0-9]*\.?[0-9]*", text)
+        value = digits[0] if digits else ""
+        rest = text[len(value) :]
+        fix = None
+        help = "numbers look like `1`, `0.5` or `1e-3`"
+        if rest in UNIT_ALIASES:
+            message = f"`{rest}` is not a unit"
+            fix = self._fix(start, end, value + UNIT_ALIASES[rest])
+        elif rest and not rest.startswith((".", "e", "E")):
+            message = f"`{rest}` is not a unit"
+            help = f"units are {', '.join(f'`{unit}`' for unit in UNITS)}; a product is written with `*`"
+        else:
+            message = f"`{text}` is not a number"
+        self.report.add("E0116", message, start, end, help=help, fix=fix)
+
+    def _colour(self, start: int, end: int, text: str) -> None:
+        self._keep("COLOR", start, end)
+        message = f"`{text}` is not a colour"
+        self.report.add("E0118", message, start, end, help="a colour is `#` and 3 or 6 hexadecimal digits")
+
+    def _name(self, start: int, end: int, text: str) -> None:
+        self._keep("NAME", start, end)
+        help = "names are made of the letters a to z and A to Z, digits and `_`"
+        self.report.add("E0124", f"`{text}` is not a name", start, end, help=help)
+
+    def _foreign(self, start: int, end: int, text: str) -> None:
+        instead = FOREIGN[text]
+        self._keep(instead, start, end)
+        fix = self._fix(start, end, instead)
+        self.report.add(
+            "E0127", f"`{text}` is not used here", start, end, help=f"`{instead}` is the sign for it", fix=fix
+        )
+
+    def _illegal(self, start: int, end: int, text: str) -> None:
+        shown = text if text.isprintable() else " ".join(f"U+{ord(c):04X}" for c in text[:8])
+        self.report.add("E0113", f"illegal character `{shown}`", start, end, fix=self._fix(start, end, ""))

@@ -1,0 +1,97 @@
+"""The LALR loop: tokens to a tree, with recovery where a token does not fit.
+
+Lark's own loop feeds token objects through several layers and cannot resume; this one works on the same
+tables, keeps token indices on its stack and hands over to `syntax.recover` at a mistake.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.syntax import nodes
+from scenelang.syntax.braces import balance
+from scenelang.syntax.build import Builder
+from scenelang.syntax.lexer import scan
+from scenelang.syntax.nesting import limit_nesting
+from scenelang.syntax.recover import Recovery
+from scenelang.syntax.tables import tables
+from scenelang.syntax.tokens import Report, Tokens
+
+
+def parse(source: SourceFile, diagnostics: Diagnostics) -> nodes.File:
+    """The tree of a text; never raises.
+
+    Args:
+        source: the text.
+        diagnostics: takes every syntax mistake, in the order of the text.
+
+    Returns:
+        A tree of the whole text. Where there are mistakes it holds `BadStmt` and `BadExpr` nodes.
+    """
+    report = Report(source)
+    tokens = scan(source, report)
+    balance(tokens, report)
+    limit_nesting(tokens, report)
+    file = _run(tokens, report)
+    report.flush(diagnostics)
+    return file
+
+
+def _run(tokens: Tokens, report: Report) -> nodes.File:
+    language = tables()
+    actions, gotos, final = language.actions, language.gotos, language.final
+    callbacks = Builder(tokens, report).callbacks()
+    rules = [(length, origin, call) for (length, origin, _), call in zip(language.rules, callbacks, strict=True)]
+    recovery: Recovery | None = None
+    kinds = tokens.kinds
+    states = [language.start]
+    values: list[Any] = []
+    state = language.start
+    at = 0
+    kind = kinds[0]
+    while True:
+        action = actions[state].get(kind)
+        if action is None:
+            if recovery is None:
+                recovery = Recovery(tokens, report)
+            resumed = recovery.resume(states, values, at)
+            if resumed is None:
+                return _abandoned(tokens, values)
+            at = resumed
+            kind = kinds[at]
+            state = states[-1]
+        elif action >= 0:
+            states.append(action)
+            values.append(at)
+            state = action
+            at += 1
+            kind = kinds[at]
+        else:
+            length, origin, call = rules[~action]
+            if call is None:
+                states.pop()
+            elif length == 1:
+                states.pop()
+                values[-1] = call(values[-1])
+            elif length:
+                parts = values[-length:]
+                del values[-length:], states[-length:]
+                values.append(call(*parts))
+            else:
+                values.append(call())
+            state = gotos[states[-1]][origin]
+            states.append(state)
+            if state == final:
+                file: nodes.File = values[0]
+                return file
+
+
+def _abandoned(tokens: Tokens, values: list[Any]) -> nodes.File:
+    """The tree of what came before the mistakes became too many."""
+    statements = values[0] if values and isinstance(values[0], list) else []
+    end = tokens.ends[-1]
+    start = statements[-1].span.end if statements else 0
+    rest = nodes.BadStmt(Span(tokens.source, start, end))
+    return nodes.File((*statements, rest), Span(tokens.source, 0, end))

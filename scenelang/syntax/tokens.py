@@ -1,0 +1,116 @@
+"""What lexing gives and recovery edits: three parallel lists, and the mistakes found so far."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Fix, Label
+from scenelang.diagnostics.span import SourceFile, Span
+
+MAX_MISTAKES = 200
+"""After so many the rest of a file is not reported: it is no scene."""
+
+
+class Report:
+    """The mistakes of one file, in the order of finding; at most `MAX_MISTAKES`.
+
+    Args:
+        source: the file they are in.
+    """
+
+    def __init__(self, source: SourceFile) -> None:
+        self.source = source
+        self.found: list[Diagnostic] = []
+        self.full = False
+
+    def add(
+        self,
+        code: str,
+        message: str,
+        start: int,
+        end: int,
+        *,
+        labels: Iterable[Label] = (),
+        help: str | None = None,
+        fix: Fix | None = None,
+    ) -> None:
+        """Record a mistake at ``[start, end)``."""
+        if self.full:
+            return
+        if len(self.found) == MAX_MISTAKES:
+            self.full = True
+            self.found.append(
+                Diagnostic(
+                    "E0121",
+                    f"more than {MAX_MISTAKES} syntax mistakes",
+                    Span(self.source, start, end),
+                    help="the rest of the file was not checked",
+                )
+            )
+            return
+        self.found.append(Diagnostic(code, message, Span(self.source, start, end), tuple(labels), help, fix))
+
+    def flush(self, diagnostics: Diagnostics) -> None:
+        """Hand everything over, in the order of the text."""
+        for d in sorted(self.found, key=_place):
+            diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
+
+
+def _place(diagnostic: Diagnostic) -> int:
+    return diagnostic.span.start if diagnostic.span is not None else 0
+
+
+class Tokens:
+    """Tokens as parallel lists of kinds, starts and ends; the last one is the end of the text.
+
+    A token that recovery put in is empty (``start == end``).
+
+    Args:
+        source: the file.
+        kinds: kind of each token, an index into `Tables.kinds`.
+        starts: offset of its first code point.
+        ends: offset after its last one.
+        reported: starts of the tokens that a mistake has been reported for.
+        cut: the text ends inside a comment, so what is missing at its end is no further mistake.
+    """
+
+    __slots__ = ("cut", "ends", "kinds", "reported", "source", "starts")
+
+    def __init__(self, source: SourceFile) -> None:
+        self.source = source
+        self.kinds: list[int] = []
+        self.starts: list[int] = []
+        self.ends: list[int] = []
+        self.reported: set[int] = set()
+        self.cut = False
+
+    def append(self, kind: int, start: int, end: int) -> None:
+        self.kinds.append(kind)
+        self.starts.append(start)
+        self.ends.append(end)
+
+    def text(self, index: int) -> str:
+        """The text of one token."""
+        return self.source.text[self.starts[index] : self.ends[index]]
+
+    def end_before(self, index: int) -> int:
+        """Where the token before ``index`` ends: where something missing belongs."""
+        return self.ends[index - 1] if index else 0
+
+    def on_new_line(self, index: int) -> bool:
+        """Whether a token is the first of its line."""
+        return index == 0 or "\n" in self.source.text[self.ends[index - 1] : self.starts[index]]
+
+    def replace(self, index: int, count: int, kinds: Sequence[int]) -> None:
+        """Put tokens of other kinds in the place of ``count`` tokens.
+
+        One for one they keep the places of the old tokens; otherwise new ones are empty and stand where
+        the first old one began, or at the end of the token before where none goes.
+        """
+        if len(kinds) == count:
+            self.kinds[index : index + count] = kinds
+            return
+        at = self.starts[index] if count else self.end_before(index)
+        self.kinds[index : index + count] = kinds
+        self.starts[index : index + count] = [at] * len(kinds)
+        self.ends[index : index + count] = [at] * len(kinds)
