@@ -59,7 +59,7 @@ def prepare(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
     unit.nesting += 1
     if unit.nesting > MAX_NESTING:
         unit.nesting -= 1
-        message = f"blocks and parentheses nested deeper than {MAX_NESTING}"
+        message = f"a tree of more than {MAX_NESTING} levels"
         raise unit.session.halt("E0324", message, expr.span)
     try:
         return _PREPARE[expr.__class__](expr, unit, scope)

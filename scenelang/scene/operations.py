@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from scenelang.scene import operators
-from scenelang.scene.expressions import VARIES, Code, Run, folded, guarded, prepare, prepares
+from scenelang.scene.expressions import Code, Run, folded, guarded, prepare, prepares
 from scenelang.scene.scope import Env, Scope
 from scenelang.scene.unit import Unit
 from scenelang.scene.values import POISON, Problem, describe
@@ -71,38 +71,10 @@ def _join(left: Run, right: Run, op: str, slow: Callable[[Any, Any], Any]) -> Ru
 def _binary(expr: nodes.Binary, unit: Unit, scope: Scope) -> Code:
     if expr.op in ("&&", "||"):
         return _logic(expr, unit, scope)
-    # A long sum leans left; it is taken apart without recursion and run in a loop.
-    spine: list[nodes.Binary] = []
-    at: nodes.Expr = expr
-    while isinstance(at, nodes.Binary) and at.op not in ("&&", "||"):
-        spine.append(at)
-        at = at.left
-    unit.weight += len(spine) - 1
-    code = prepare(at, unit, scope)
-    tail: list[tuple[Run, Callable[[Any, Any], Any]]] = []
-    for node in reversed(spine):
-        right = prepare(node.right, unit, scope)
-        meaning = _meaning(node.op)
-        slow = guarded(unit, meaning, node.op_span, (node.left, node.right))
-        if tail:
-            tail.append((right.run, slow))
-            continue
-        joined = folded(unit, [code, right], meaning, _join(code.run, right.run, node.op, slow))
-        if len(spine) > 40 and joined.value is VARIES:
-            tail.append((right.run, slow))
-            continue
-        code = joined
-    if not tail:
-        return code
-    first = code.run
-
-    def run(env: Env) -> Any:
-        value = first(env)
-        for get, apply in tail:
-            value = apply(value, get(env))
-        return value
-
-    return Code(run)
+    left, right = prepare(expr.left, unit, scope), prepare(expr.right, unit, scope)
+    meaning = _meaning(expr.op)
+    slow = guarded(unit, meaning, expr.op_span, (expr.left, expr.right))
+    return folded(unit, [left, right], meaning, _join(left.run, right.run, expr.op, slow))
 
 
 def _truth(value: Any, operand: int = 0) -> bool:

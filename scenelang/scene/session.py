@@ -21,7 +21,7 @@ MAX_OBJECTS: Final = 100_000
 MAX_PARTS: Final = 1_000_000  # nodes, transforms and texture operations together; bounds memory
 MAX_DEPTH: Final = 200  # calls within calls
 MAX_NODE_DEPTH: Final = 400  # scene nodes within scene nodes
-MAX_NESTING: Final = 200  # blocks and parentheses within each other in one file
+MAX_NESTING: Final = 250  # tree levels; text never has as many, trees made by hand can
 MAX_STEPS: Final = 10_000_000
 MAX_BYTES: Final = 10_000_000
 

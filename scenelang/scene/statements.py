@@ -75,7 +75,7 @@ def prepare_block(statements: Sequence[nodes.Stmt], place: Place, span: Span) ->
     unit, scope = place.unit, place.scope
     unit.nesting += 1
     if unit.nesting > MAX_NESTING:
-        message = f"blocks and parentheses nested deeper than {MAX_NESTING}"
+        message = f"a tree of more than {MAX_NESTING} levels"
         raise unit.session.halt("E0324", message, span)
     before = unit.weight
     bodies = [declare(stmt, place) for stmt in statements if isinstance(stmt, nodes.Fn | nodes.Module)]

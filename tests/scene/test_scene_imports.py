@@ -1,0 +1,161 @@
+"""Imports: what they bring, and what they refuse."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scene_cases import MODELS, Outcome, transform
+
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.scene.evaluate import load_scene
+
+
+def write(folder: Path, **files: str) -> None:
+    for name, text in files.items():
+        path = folder / (name.replace("__", "/") + ".nsg")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, "utf-8")
+
+
+def load(path: Path, **options: Any) -> Outcome:
+    found = Diagnostics()
+    scene, spans = load_scene(path, diagnostics=found, models=MODELS, **options)
+    return Outcome(scene, spans, found)
+
+
+LIB = """
+param k = 2 in 0..5;
+let twice = k * 2;
+fn f(x) = x * twice;
+module m(x) { square { translate(f(x), 0); } }
+star { scale(nonsense); }  // what an imported file draws is its own affair
+"""
+
+
+def test_names_of_another_file(tmp_path: Path) -> None:
+    write(
+        tmp_path,
+        lib=LIB,
+        main='import "lib.nsg" as lib; lib.m(1); star { translate(lib.f(2), lib.twice + lib.k); }',
+    )
+    scene = load(tmp_path / "main.nsg").good()
+    assert transform(scene).x == 4
+    assert (transform(scene, 1).x, transform(scene, 1).y) == (8, 6)
+    scene = load(tmp_path / "main.nsg", defines={"lib.k": "3"}).good()
+    assert transform(scene).x == 6
+    assert load(tmp_path / "main.nsg", defines={"k": "3"}).codes == ["E0211"]
+    assert load(tmp_path / "main.nsg", defines={"lib.k": "9"}).codes == ["E0309"]
+
+
+def test_vectors_of_another_file(tmp_path: Path) -> None:
+    write(tmp_path, lib="let v = [1, 2]; let mist = material flat;")
+    write(tmp_path, main='import "lib.nsg" as lib; square { translate(lib.v.y, lib.v[0]); lib.mist; }')
+    scene = load(tmp_path / "main.nsg").good()
+    assert (transform(scene).x, transform(scene).y) == (2, 1)
+    assert scene.nodes[0].material is not None
+
+
+def test_imports_of_imports_stay_private(tmp_path: Path) -> None:
+    write(tmp_path, a="let x = 3;", sub__b='import "../a.nsg" as a; let y = a.x + 1;')
+    write(tmp_path, main='import "sub/b.nsg" as b; square { translate(b.y, 0); }')
+    assert transform(load(tmp_path / "main.nsg").good()).x == 4
+    write(tmp_path, main='import "sub/b.nsg" as b; square { translate(b.a.x, 0); }')
+    assert load(tmp_path / "main.nsg").codes == ["E0212"]
+
+
+def test_animation_reaches_imports(tmp_path: Path) -> None:
+    write(tmp_path, lib="fn f(x) = x + frame;")
+    write(tmp_path, main='animate(1, 10); import "lib.nsg" as lib; square { translate(lib.f(1), 0); }')
+    assert transform(load(tmp_path / "main.nsg", frame=5).good()).x == 6
+
+
+@pytest.mark.parametrize(
+    ("path", "code"),
+    [
+        ("missing.nsg", "E0214"),
+        ("", "E0214"),
+        (".", "E0214"),
+        ("../outside.nsg", "E0215"),
+        ("sub/../../outside.nsg", "E0215"),
+        ("/etc/passwd", "E0215"),
+        ("C:\\\\x.nsg", "E0215"),
+        ("main.nsg", "E0216"),
+        ("bad.nsg", "E0214"),
+        ("pipe", "E0214"),
+    ],
+)
+def test_refused(tmp_path: Path, path: str, code: str) -> None:
+    root = tmp_path / "root"
+    write(
+        tmp_path,
+        outside="let x = 1;",
+        root__main=f'import "{path}" as lib; square {{ translate(lib.x, 0); }}',
+    )
+    (root / "bad.nsg").write_bytes(b"let x = 1; // \xff\xfe")
+    os.mkfifo(root / "pipe")
+    outcome = load(root / "main.nsg")
+    assert outcome.codes == [code]
+    assert outcome.only().span.text == f'"{path}"'  # type: ignore[union-attr]
+
+
+def test_links_do_not_leave_the_root(tmp_path: Path) -> None:
+    write(tmp_path, outside="let x = 1;", root__main='import "link.nsg" as lib;')
+    (tmp_path / "root" / "link.nsg").symlink_to(tmp_path / "outside.nsg")
+    assert load(tmp_path / "root" / "main.nsg").codes == ["E0215"]
+    load(tmp_path / "root" / "main.nsg", root=tmp_path).good()
+
+
+def test_cycles(tmp_path: Path) -> None:
+    write(tmp_path, a='import "b.nsg" as b; let x = 1;', b='import "a.nsg" as a; let y = 2;')
+    outcome = load(tmp_path / "a.nsg")
+    assert outcome.codes == ["E0216"]
+    assert outcome.only().message == "import cycle: a.nsg → b.nsg → a.nsg"
+    write(tmp_path, loop='import "loop2.nsg" as l;')
+    (tmp_path / "loop2.nsg").symlink_to(tmp_path / "loop2.nsg")
+    assert load(tmp_path / "loop.nsg").codes == ["E0214"]
+
+
+def test_diamonds_do_not_explode(tmp_path: Path) -> None:
+    for i in range(30):
+        write(tmp_path, **{f"f{i}": f'import "f{i + 1}.nsg" as a; import "f{i + 1}.nsg" as b; let x = 1;'})
+    write(tmp_path, f30="let x = 1;")
+    assert load(tmp_path / "f0.nsg").codes == ["E0324"]
+
+
+def test_mistakes_in_an_imported_file_are_shown_there(tmp_path: Path) -> None:
+    write(
+        tmp_path,
+        lib="let x = 1;\nfn f(a) = a + nope;",
+        main='import "lib.nsg" as lib; square { scale(lib.f(1)); }',
+    )
+    found = load(tmp_path / "main.nsg").only()
+    assert found.span is not None
+    assert found.span.source.name.endswith("lib.nsg")
+    assert (found.code, found.span.locate()[0]) == ("E0201", (2, 15))
+
+
+def test_unknown_names_of_a_file(tmp_path: Path) -> None:
+    write(tmp_path, lib="let size = 1; fn f(x) = x; module m() { square {} }")
+    write(
+        tmp_path,
+        main='import "lib.nsg" as lib; square { scale(lib.sise); translate(lib.g(1), 0); } lib.n(); lib.f(1);',
+    )
+    outcome = load(tmp_path / "main.nsg")
+    assert outcome.codes == ["E0212", "E0212", "E0212", "E0213"]
+    assert outcome.diagnostics.items[0].help == "did you mean 'size'?"
+
+
+def test_large_and_odd_files(tmp_path: Path) -> None:
+    (tmp_path / "big.nsg").write_text("// " + "x" * 10_000_000)
+    assert load(tmp_path / "big.nsg").codes == ["E0324"]
+    (tmp_path / "bom.nsg").write_bytes(b"\xef\xbb\xbfnsg 1; square {}")
+    load(tmp_path / "bom.nsg").good()
+    (tmp_path / "latin.nsg").write_bytes(b"// \xe9")
+    assert load(tmp_path / "latin.nsg").codes == ["E0214"]
+    with pytest.raises(FileNotFoundError):
+        load(tmp_path / "none.nsg")
+    with pytest.raises(IsADirectoryError):
+        load(tmp_path)
