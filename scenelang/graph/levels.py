@@ -8,9 +8,10 @@ then ``inner`` from its last to its first.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from scenelang.graph.steps import IDENTITY, Rows, Warp
+from scenelang.graph.steps import IDENTITY, Rows, Step, Warp
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,3 +29,47 @@ class Levels:
     middle: Rows = IDENTITY
     outer: tuple[Warp, ...] = ()
     affine: Rows = IDENTITY
+
+
+class LevelsError(ValueError):
+    """Raised where a chain of steps needs more levels than a model's lifting holds."""
+
+
+def split_levels(steps: Sequence[Step], limits: Mapping[str, int]) -> Levels:
+    """Sort a chain into the levels of a lifting.
+
+    A single run of warps fills ``inner`` first and then ``outer``, with no middle map between.
+
+    Args:
+        steps: nearest the leaf first, normalised (no two affine maps are neighbours; see `fold_warps`).
+        limits: a manifest's ``limits``; reads ``inner_warps`` and ``outer_warps``.
+
+    Raises:
+        LevelsError: the chain does not fit.
+    """
+    most_inner, most_outer = limits.get("inner_warps", 0), limits.get("outer_warps", 0)
+    runs: list[list[Warp]] = [[]]
+    maps: list[Rows] = []
+    for step in steps:
+        if isinstance(step, Warp):
+            runs[-1].append(step)
+        else:
+            maps.append(step.rows)
+            runs.append([])
+    # w… | w… A | w… A w… | w… A w… A, where the first run may be empty and the last one is if A is last.
+    first = runs[0]
+    if len(maps) == 0 or (len(maps) == 1 and not runs[1]):
+        if len(first) > most_inner + most_outer:
+            raise LevelsError(f"{len(first)} deformations in a row, at most {most_inner + most_outer} fit")
+        last = maps[0] if maps else IDENTITY
+        return Levels(tuple(first[:most_inner]), IDENTITY, tuple(first[most_inner:]), last)
+    second = runs[1]
+    if len(maps) > 2 or (len(maps) == 2 and runs[2]):
+        raise LevelsError(
+            f"{len(maps)} affine maps with deformations between them, at most one between and one after fit"
+        )
+    if len(first) > most_inner:
+        raise LevelsError(f"{len(first)} deformations before an affine map, at most {most_inner} fit")
+    if len(second) > most_outer:
+        raise LevelsError(f"{len(second)} deformations after an affine map, at most {most_outer} fit")
+    return Levels(tuple(first), maps[0], tuple(second), maps[1] if len(maps) == 2 else IDENTITY)

@@ -1,0 +1,78 @@
+"""Graph to Graph: `PASSES` is the order, and the only place that says it.
+
+Sharing equal subgraphs is left out on purpose: every row of a stream is lifted in one vectorised call,
+which costs less than finding the equal ones would.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from scenelang.graph.nodes import Graph
+from scenelang.graph.verify import Invariant, verify
+from scenelang.passes.check_levels import check_levels
+from scenelang.passes.check_trained import check_trained
+from scenelang.passes.context import Context
+from scenelang.passes.drop_empty import drop_empty
+from scenelang.passes.drop_hidden import drop_hidden
+from scenelang.passes.drop_identities import drop_identities
+from scenelang.passes.drop_unseen import drop_unseen
+from scenelang.passes.fold_affines import fold_affines
+from scenelang.passes.fold_warps import fold_warps
+from scenelang.passes.linearise import linearise
+from scenelang.passes.push_transforms import push_transforms
+
+
+class Pass(NamedTuple):
+    """A step of the compiler and the invariants that hold after it, and ever after."""
+
+    run: Callable[[Graph, Context], Graph]
+    establishes: frozenset[Invariant] = frozenset()
+
+    @property
+    def name(self) -> str:
+        """The name of its function, its file and its tests."""
+        return self.run.__name__
+
+
+PASSES: tuple[Pass, ...] = (
+    Pass(drop_empty, frozenset({Invariant.COMPOSITE})),
+    Pass(drop_identities),
+    Pass(fold_affines),
+    Pass(push_transforms, frozenset({Invariant.AT_LEAVES, Invariant.MERGED})),
+    Pass(fold_warps, frozenset({Invariant.NO_IDENTITIES})),
+    Pass(check_levels),
+    Pass(linearise, frozenset({Invariant.STREAM})),
+    Pass(drop_unseen),
+    Pass(drop_hidden),
+    Pass(check_trained),
+)
+
+
+def run_passes(graph: Graph, context: Context, after: Callable[[str, Graph], None] | None = None) -> Graph:
+    """Run all passes in order, verifying the graph after each.
+
+    Args:
+        graph: as lowered.
+        context: the model and where mistakes go.
+        after: called with ``"lower"`` and each pass's name and the graph it left.
+
+    Returns:
+        The graph after the last pass; if errors were reported on the way, what could be kept of it.
+    """
+    holds: frozenset[Invariant] = frozenset()
+    verify(graph, "lower")
+    if after is not None:
+        after("lower", graph)
+    for step in PASSES:
+        holds |= step.establishes
+        graph = verify(step.run(graph, context), step.name, holds)
+        if after is not None:
+            after(step.name, graph)
+        if context.diagnostics.errors:
+            if step.run is linearise:
+                break  # every mistake is found, and what is left is not the scene
+            # Without sound chains no bound means anything: look for refusals only.
+            context = Context(context.manifest, context.diagnostics, whole=False)
+    return graph

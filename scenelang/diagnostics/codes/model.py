@@ -1,3 +1,17 @@
 """E05xx, W05xx: what a model cannot do."""
 
-CODES: dict[str, str] = {}
+CODES: dict[str, str] = {
+    "E0501": "the model does not have a geometry",
+    "E0502": "the model does not have a material",
+    "E0503": "the model does not have a transform",
+    "E0504": "the model does not have a material operation",
+    "E0505": "a transform leaves the plane of a 2D model",
+    "E0506": "an object has more deformations than the model holds",
+    "E0507": "the canvas is larger than the model draws",
+    "E0508": "there is no such model",
+    "E0509": "no model fits the scene",
+    "W0501": "more objects than the model was trained on",
+    "W0502": "a twirl outside the trained range",
+    "W0503": "a bend outside the trained range",
+    "W0504": "an object outside the trained range of scales",
+}

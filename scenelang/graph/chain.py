@@ -1,0 +1,95 @@
+"""The algebra of chains of moves: what merges, what commutes, and the normal form that follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from scenelang.graph import affine
+from scenelang.graph.nodes import Move
+from scenelang.graph.steps import IDENTITY, Affine, Rows, Warp
+
+Moves = tuple[Move, ...]
+
+
+def is_identity(move: Move) -> bool:
+    """Whether a move leaves every point where it is, exactly."""
+    step = move.step
+    if isinstance(step, Affine):
+        return step.rows == IDENTITY
+    return step.twirl == 0.0 and step.bend == (0.0, 0.0)
+
+
+def merged(moves: Iterable[Move]) -> Moves:
+    """The same chain with neighbouring affine maps composed into one."""
+    out: list[Move] = []
+    for move in moves:
+        last = out[-1].step if out else None
+        if isinstance(move.step, Affine) and isinstance(last, Affine):
+            out[-1] = Move(Affine(affine.compose(move.step.rows, last.rows)), out[-1].span)
+        else:
+            out.append(move)
+    return tuple(out)
+
+
+def composed(moves: Iterable[Move]) -> Rows:
+    """All affine maps of a chain composed in order, deformations left out."""
+    rows = IDENTITY
+    for move in moves:
+        if isinstance(move.step, Affine):
+            rows = move.step.rows if rows is IDENTITY else affine.compose(move.step.rows, rows)
+    return rows
+
+
+def normal(moves: Iterable[Move], dimension: int) -> Moves:
+    """The chain with its deformations as near to the leaf, and as few steps, as the three rules allow.
+
+    - A warp without a bend and the warp after it are one warp, because a warp keeps every point's length:
+      ``[Warp(t, 0), Warp(u, b)] = [Warp(t + u, b)]``.
+    - In the plane, a similarity about the origin trades places with the warp after it. Let
+      M be s times an orthogonal matrix. A point q goes back through the warp (t, b) to R(t|q| + b.q) q;
+      with q = M u, |q| = s|u| and b.q = (M^T b).u, while M^-1 R(a) M is R(a) for a rotation and R(-a)
+      for a reflection. So ``[M, Warp(t, b)] = [Warp(+-s t, +-M^T b), M]``.
+    - Steps that do nothing vanish, and neighbouring affine maps compose.
+
+    Args:
+        moves: nearest the leaf first.
+        dimension: the model's; the second rule holds in the plane only.
+    """
+    out: list[Move] = []
+    for move in moves:
+        if isinstance(move.step, Warp):
+            _append_warp(out, move.step, move, dimension)
+        else:
+            _append_affine(out, move.step.rows, move)
+    return tuple(out)
+
+
+def _append_affine(out: list[Move], rows: Rows, move: Move) -> None:
+    if out and isinstance(last := out[-1].step, Affine):
+        move = out.pop()
+        rows = affine.compose(rows, last.rows)
+    if rows != IDENTITY:
+        out.append(Move(Affine(rows), move.span))
+
+
+def _append_warp(out: list[Move], warp: Warp, move: Move, dimension: int) -> None:
+    held: Move | None = None
+    if dimension == 2 and out and isinstance(last := out[-1].step, Affine):
+        alike = affine.similarity(last.rows)
+        if alike is not None:
+            warp = _carried_in(warp, last.rows, *alike)
+            held = out.pop()
+    if out and isinstance(inner := out[-1].step, Warp) and inner.bend == (0.0, 0.0):
+        move = out.pop()
+        warp = Warp(inner.twirl + warp.twirl, warp.bend)
+    if warp.twirl != 0.0 or warp.bend != (0.0, 0.0):
+        out.append(Move(warp, move.span))
+    if held is not None and isinstance(held.step, Affine):
+        _append_affine(out, held.step.rows, held)
+
+
+def _carried_in(warp: Warp, rows: Rows, scale: float, sign: float) -> Warp:
+    """The warp that stands before the similarity ``rows`` and does what ``warp`` did after it."""
+    x, y = warp.bend
+    bend = (sign * (rows[0] * x + rows[4] * y), sign * (rows[1] * x + rows[5] * y))
+    return Warp(sign * scale * warp.twirl, bend)

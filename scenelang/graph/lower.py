@@ -1,0 +1,175 @@
+"""Scene to Graph: transforms become steps, materials become colours, names are checked against a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.span import Span
+from scenelang.graph import affine
+from scenelang.graph.colour import WHITE, Triple, flat_colour
+from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
+from scenelang.graph.transforms import Refusal, step_of
+from scenelang.models.manifest import Manifest
+from scenelang.scene import schema
+
+MAX_OBJECTS = 100_000
+MAX_DEPTH = 1_000
+"""Nested nodes of a Scene. Text cannot come near it; a Scene built in Python can."""
+
+
+class Spans(Protocol):
+    """What knows where a Scene's nodes were written; the evaluator's SpanMap does."""
+
+    def span(self, node: object) -> Span | None:
+        """The place of ``node``, None where it is unknown."""
+
+
+def lower(scene: schema.Scene, manifest: Manifest, spans: Spans | None, diagnostics: Diagnostics) -> Graph:
+    """The graph of a scene for one model.
+
+    Where a name or a transform is not one the model has, a diagnostic says so and the node is kept
+    without it, so that everything else is checked too.
+
+    Args:
+        scene: a concrete scene.
+        manifest: the model's.
+        spans: where nodes were written; None for a scene that did not come from text.
+        diagnostics: receives E03xx and E05xx.
+    """
+    width, height = scene.canvas
+    most = manifest.limits.get("canvas", 8192)
+    if max(width, height) > most:
+        diagnostics.add(
+            "E0507",
+            f"a canvas of {width} x {height} pixels; model `{manifest.name}` draws at most {most} x {most}",
+            spans.span(scene) if spans else None,
+            help="render smaller with `canvas(w, h)` or `--size`",
+        )
+    root = _Lowering(manifest, spans, diagnostics).run(scene)
+    return Graph(root, scene.canvas, scene.background, manifest.dimension)
+
+
+@dataclass(slots=True)
+class _Open:
+    """A composite whose children are being lowered, and the operator that joins it to what came before."""
+
+    op: schema.Combine
+    node: schema.Group | schema.Boolean | schema.Chain | None
+    kind: str
+    todo: Iterator[tuple[schema.Combine, schema.SceneNode]]
+    material: schema.Material | None
+    links: list[Link] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Lowering:
+    manifest: Manifest
+    spans: Spans | None
+    diagnostics: Diagnostics
+    objects: int = 0
+    colours: dict[int, tuple[str, Triple]] = field(default_factory=dict)
+    said: set[tuple[str, str]] = field(default_factory=set)
+
+    def run(self, scene: schema.Scene) -> Fold:
+        stack = [_Open("union", None, "scene", _unions(scene.nodes), None)]
+        while True:
+            here = stack[-1]
+            item = next(here.todo, None)
+            if item is None:
+                stack.pop()
+                if here.node is None:
+                    return Fold("scene", tuple(here.links))
+                fold = Fold(here.kind, tuple(here.links), self.moves(here.node), self.place(here.node))
+                stack[-1].links.append(Link(here.op, fold))
+                continue
+            op, node = item
+            if not here.links:
+                op = "union"
+            material = node.material or here.material
+            if isinstance(node, schema.Object):
+                here.links.append(Link(op, self.leaf(node, material)))
+                self.objects += 1
+                if self.objects > MAX_OBJECTS:
+                    self.say("E0320", f"more than {MAX_OBJECTS:,} objects in one scene", node)
+                    return Fold("scene", ())
+            elif len(stack) > MAX_DEPTH:
+                fact = f"nodes nested deeper than {MAX_DEPTH:,}"
+                self.say("E0405", fact, node, "a group of a single child can be dropped")
+                return Fold("scene", ())
+            else:
+                kind = node.op if isinstance(node, schema.Boolean) else node.kind
+                stack.append(_Open(op, node, kind, self.children(node), material))
+
+    def children(
+        self, node: schema.Group | schema.Boolean | schema.Chain
+    ) -> Iterator[tuple[schema.Combine, schema.SceneNode]]:
+        if isinstance(node, schema.Group):
+            return _unions(node.children)
+        if isinstance(node, schema.Boolean):
+            return ((node.op, child) for child in node.children)
+        if node.children and node.children[0].op != "union":
+            fact = f"`{node.children[0].op}` on the first child of a chain, which has nothing before it"
+            self.say("E0335", fact, node.children[0].node, "leave the word out")
+        return ((link.op, link.node) for link in node.children)
+
+    def leaf(self, node: schema.Object, material: schema.Material | None) -> Leaf:
+        if node.geometry not in self.manifest.geometries:
+            self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
+        name, rgb = (self.manifest.default_material, WHITE) if material is None else self.colour(material)
+        return Leaf(node.geometry, name, rgb, self.moves(node), self.place(node))
+
+    def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
+        found = []
+        for transform in node.transforms:
+            if transform.kind not in self.manifest.transforms:
+                self.refuse("E0503", "transform", transform.kind, self.manifest.transforms, transform)
+                continue
+            step = step_of(transform, self.manifest.dimension)
+            if isinstance(step, Refusal):
+                self.say(step.code, step.message, transform, step.help)
+            else:
+                found.append(Move(step, self.place(transform)))
+        return tuple(found)
+
+    def colour(self, material: schema.Material) -> tuple[str, Triple]:
+        known = self.colours.get(id(material))
+        if known is not None:
+            return known
+        if material.name not in self.manifest.materials:
+            self.refuse("E0502", "material", material.name, self.manifest.materials, material)
+        for op in material.ops:
+            if op.kind not in self.manifest.material_ops:
+                self.refuse("E0504", "material operation", op.kind, self.manifest.material_ops, op)
+            elif isinstance(op, schema.Scale) and not affine.usable(affine.scaling(op.x, op.y), 2):
+                self.say("E0312", "`scale` of a texture is singular", op, "use factors other than 0")
+        self.colours[id(material)] = material.name, flat_colour(material.ops)
+        return self.colours[id(material)]
+
+    def refuse(self, code: str, what: str, name: str, known: Sequence[str], node: object) -> None:
+        from difflib import get_close_matches
+
+        near = get_close_matches(name, known, 1)
+        listed = ", ".join(f"`{k}`" for k in known)
+        advice = f"did you mean `{near[0]}`? it has {listed}" if near else f"it has {listed}"
+        self.say(code, f"model `{self.manifest.name}` has no {what} `{name}`", node, advice)
+
+    def say(self, code: str, message: str, node: object, help: str | None = None) -> None:
+        """Add a diagnostic; without a place each message is said once."""
+        span = self.place(node)
+        if span is None:
+            if (code, message) in self.said:
+                return
+            self.said.add((code, message))
+        self.diagnostics.add(code, message, span, help=help)
+
+    def place(self, node: object) -> Span | None:
+        return None if self.spans is None else self.spans.span(node)
+
+
+def _unions(
+    nodes: Sequence[schema.SceneNode],
+) -> Iterator[tuple[schema.Combine, schema.SceneNode]]:
+    return (("union", node) for node in nodes)

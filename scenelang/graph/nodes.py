@@ -1,0 +1,92 @@
+"""The Graph: leaves and folds, each with the moves that carry it into its parent's space.
+
+A leaf is one object. A fold is a boolean node, a group or a chain: its links are joined from the left,
+``(first op second) op third …``. Moves are nearest the leaf first. Everything is frozen; a pass builds a
+new graph.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scenelang.diagnostics.span import Span
+from scenelang.graph.steps import Step
+from scenelang.scene.schema import Combine
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A step and where it was written; a step that merges several keeps the place of the first."""
+
+    step: Step
+    span: Span | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """One object: a leaf geometry of a model, its constant colour and its moves.
+
+    Args:
+        geometry: name in the model's manifest.
+        material: name in the model's manifest.
+        rgb: the colour after the material's whole chain, in [0, 1], as written (sRGB in 2D).
+        moves: steps into the parent's space, nearest the leaf first.
+        span: where the object was written.
+    """
+
+    geometry: str
+    material: str
+    rgb: tuple[float, float, float]
+    moves: tuple[Move, ...] = ()
+    span: Span | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A child of a fold with the operator that joins it to what came before; the first is a union."""
+
+    op: Combine
+    node: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Fold:
+    """Children folded from the left. Without links it is the empty set: distance +infinity.
+
+    Args:
+        kind: the word it was written with: ``scene``, ``group``, ``chain`` or a boolean.
+        links: children in order.
+        moves: steps that apply to all children, nearest the leaf first.
+        span: where it was written.
+    """
+
+    kind: str
+    links: tuple[Link, ...]
+    moves: tuple[Move, ...] = ()
+    span: Span | None = None
+
+
+Node = Leaf | Fold
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """A whole scene as a graph for one model.
+
+    Args:
+        root: the top level, a fold of kind ``scene``; after `linearise` all its children are leaves.
+        canvas: width and height in pixels.
+        background: colour in [0, 1] as written, or None for transparency.
+        dimension: 2 or 3, the model's.
+    """
+
+    root: Fold
+    canvas: tuple[int, int]
+    background: tuple[float, float, float] | None
+    dimension: int
+
+    def window(self) -> tuple[float, float, float, float]:
+        """The part of the 2D world that the canvas shows: (xmin, ymin, xmax, ymax)."""
+        width, height = self.canvas
+        side = min(width, height)
+        return -width / side, -height / side, width / side, height / side

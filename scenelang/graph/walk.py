@@ -1,0 +1,62 @@
+"""Walking a graph without recursion, so that depth costs memory and never the interpreter's stack."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TypeVar
+
+from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move, Node
+
+T = TypeVar("T")
+
+
+def bottom_up(root: Node, leaf: Callable[[Leaf], T], fold: Callable[[Fold, list[T]], T]) -> T:
+    """The value of ``root``: a leaf is worth ``leaf(it)``, a fold ``fold(it, its children's values)``."""
+    if isinstance(root, Leaf):
+        return leaf(root)
+    open_folds: list[tuple[Fold, list[T]]] = [(root, [])]
+    while True:
+        node, done = open_folds[-1]
+        if len(done) < len(node.links):
+            child = node.links[len(done)].node
+            if isinstance(child, Leaf):
+                done.append(leaf(child))
+            else:
+                open_folds.append((child, []))
+            continue
+        value = fold(node, done)
+        open_folds.pop()
+        if not open_folds:
+            return value
+        open_folds[-1][1].append(value)
+
+
+def nodes(root: Node) -> Iterator[tuple[Node, int]]:
+    """Every node with its depth, parents before children, in file order."""
+    stack: list[tuple[Node, int]] = [(root, 0)]
+    while stack:
+        node, depth = stack.pop()
+        yield node, depth
+        if isinstance(node, Fold):
+            stack.extend((link.node, depth + 1) for link in reversed(node.links))
+
+
+def leaves(root: Node) -> Iterator[Leaf]:
+    """Every leaf, in file order."""
+    return (node for node, _ in nodes(root) if isinstance(node, Leaf))
+
+
+def map_moves(graph: Graph, change: Callable[[tuple[Move, ...]], tuple[Move, ...]]) -> Graph:
+    """The graph with ``change`` applied to the moves of every node."""
+
+    def leaf(node: Leaf) -> Node:
+        if not node.moves:
+            return node
+        return Leaf(node.geometry, node.material, node.rgb, change(node.moves), node.span)
+
+    def fold(node: Fold, children: list[Node]) -> Fold:
+        links = tuple(Link(link.op, child) for link, child in zip(node.links, children, strict=True))
+        return Fold(node.kind, links, change(node.moves), node.span)
+
+    root = fold(graph.root, [bottom_up(link.node, leaf, fold) for link in graph.root.links])
+    return Graph(root, graph.canvas, graph.background, graph.dimension)

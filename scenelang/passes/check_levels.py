@@ -1,0 +1,78 @@
+"""Each object's chain must fit the model's lifting and have an inverse."""
+
+from __future__ import annotations
+
+from math import hypot
+
+from scenelang.diagnostics.diagnostic import Label
+from scenelang.diagnostics.span import Span
+from scenelang.graph import affine
+from scenelang.graph.chain import composed
+from scenelang.graph.levels import LevelsError, split_levels
+from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.steps import Affine, Warp
+from scenelang.graph.walk import leaves
+from scenelang.passes.context import Context
+
+
+def check_levels(graph: Graph, context: Context) -> Graph:
+    """Report objects whose deformations or affine maps the model cannot hold; the graph is unchanged.
+
+    Before: the normal form of `fold_warps`.
+    """
+    for leaf in leaves(graph.root):
+        _check(leaf, graph.dimension, context)
+    return graph
+
+
+def _check(leaf: Leaf, dimension: int, context: Context) -> None:
+    limits = context.manifest.limits
+    if any(isinstance(move.step, Warp) for move in leaf.moves):
+        try:
+            split_levels([move.step for move in leaf.moves], limits)
+        except LevelsError as error:
+            inner, outer = limits.get("inner_warps", 0), limits.get("outer_warps", 0)
+            context.diagnostics.add(
+                "E0506",
+                f"the deformations of `{leaf.geometry}` do not fit model `{context.manifest.name}`: {error}",
+                leaf.span,
+                labels=_places(leaf),
+                help=f"the model holds up to {inner} deformations, an affine map, up to {outer} deformations "
+                "and an affine map; a `twirl` merges with the deformation after it, also across rotations "
+                "and uniform scales about the origin",
+            )
+            return
+    rows = composed(leaf.moves)
+    if not affine.usable(rows, dimension):
+        smallest, largest = affine.stretches(rows, dimension)
+        context.diagnostics.add(
+            "E0406",
+            f"the transforms of `{leaf.geometry}` compose to a singular one, "
+            f"which stretches by {smallest:.3g} to {largest:.3g}",
+            leaf.span,
+            labels=_places(leaf),
+            help="scale less along one direction, or less often",
+        )
+    elif not all(_mild(move.step) for move in leaf.moves if isinstance(move.step, Warp)):
+        context.diagnostics.add(
+            "E0406",
+            f"the deformations of `{leaf.geometry}` compose to one beyond float32",
+            leaf.span,
+            labels=_places(leaf),
+            help="deform less",
+        )
+
+
+def _mild(warp: Warp) -> bool:
+    return abs(warp.twirl) < affine.REACH and hypot(*warp.bend) < affine.REACH
+
+
+def _places(leaf: Leaf) -> list[Label]:
+    found: list[Label] = []
+    seen: set[Span] = {leaf.span} if leaf.span else set()
+    for move in leaf.moves:
+        if move.span is not None and move.span not in seen:
+            seen.add(move.span)
+            what = "affine from here on" if isinstance(move.step, Affine) else "deforms here"
+            found.append(Label(move.span, what))
+    return found[:8]

@@ -1,0 +1,98 @@
+"""Warnings where a scene lies outside what its model was trained on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+
+from scenelang.graph import affine
+from scenelang.graph.chain import composed
+from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.steps import Warp
+from scenelang.graph.walk import leaves
+from scenelang.models.manifest import Manifest
+from scenelang.passes.context import Context
+
+_CODES = {"objects": "W0501", "twirl": "W0502", "bend": "W0503", "scale": "W0504"}
+_TOLERANCE = 1e-9
+
+
+@dataclass(slots=True)
+class _Worst:
+    """The object furthest outside one range, and how many there are."""
+
+    value: float
+    excess: float
+    leaf: Leaf
+    count: int = 0
+
+
+def check_trained(graph: Graph, context: Context) -> Graph:
+    """Warn once for each quantity that leaves the trained range, at the object furthest out.
+
+    Deformations are measured in the normal form, per unit length of the space they act in; the scale of an
+    object is each of the two stretches of its affine maps.
+
+    Before: STREAM. After: unchanged.
+    """
+    manifest, worst, count = context.manifest, dict[str, _Worst](), 0
+    for leaf in leaves(graph.root):
+        count += 1
+        for quantity, value in _measures(leaf, graph.dimension):
+            _note(worst, quantity, value, leaf, manifest)
+    for quantity in ("twirl", "bend", "scale"):
+        if (found := worst.get(quantity)) is not None:
+            name = f"`{found.leaf.geometry}`"
+            subject = f"a scale of {found.value:.3g} of {name}"
+            if quantity != "scale":
+                subject = f"a `{quantity}` of {found.value:.3g} on {name}"
+            others = f", as {found.count - 1:,} more are" if found.count > 1 else ""
+            _warn(context, quantity, f"{subject} is outside the trained range {{}}{others}", found.leaf)
+    limits = manifest.trained.get("objects")
+    if limits is not None and count > limits[1]:
+        last = next((link.node for link in reversed(graph.root.links) if isinstance(link.node, Leaf)), None)
+        _warn(context, "objects", f"{count:,} objects are outside the trained range {{}}", last)
+    return graph
+
+
+def _measures(leaf: Leaf, dimension: int) -> list[tuple[str, float]]:
+    smallest, largest = affine.stretches(composed(leaf.moves), dimension)
+    found = [("scale", smallest), ("scale", largest)]
+    for move in leaf.moves:
+        if isinstance(move.step, Warp):
+            if move.step.twirl:
+                found.append(("twirl", move.step.twirl))
+            if move.step.bend != (0.0, 0.0):
+                found.append(("bend", hypot(*move.step.bend)))
+    return found
+
+
+def _note(worst: dict[str, _Worst], quantity: str, value: float, leaf: Leaf, manifest: Manifest) -> None:
+    limits = manifest.trained.get(quantity)
+    if limits is None:
+        return
+    low, high = limits
+    excess = max(low - value, value - high) / ((high - low) or 1.0)
+    if excess <= _TOLERANCE:
+        return
+    seen = worst.get(quantity)
+    if seen is None:
+        worst[quantity] = _Worst(value, excess, leaf, 1)
+        return
+    if leaf is not seen.leaf:
+        seen.count += 1
+    if excess > seen.excess:
+        seen.value, seen.excess, seen.leaf = value, excess, leaf
+
+
+def _warn(context: Context, quantity: str, message: str, leaf: Leaf | None) -> None:
+    low, high = context.manifest.trained[quantity]
+    figures = context.manifest.measured.get("stability", {}).get(quantity)
+    context.diagnostics.add(
+        _CODES[quantity],
+        message.format(f"{low:g} to {high:g} of model `{context.manifest.name}`"),
+        leaf.span if leaf is not None else None,
+        help=f"measured there: {figures}"
+        if figures
+        else "the picture may be less exact than the model's figures",
+    )

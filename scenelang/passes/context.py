@@ -1,0 +1,23 @@
+"""What every pass is given beside the graph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.models.manifest import Manifest
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """The model a graph is compiled for and where its mistakes go.
+
+    Args:
+        manifest: the model's.
+        diagnostics: receives E04xx, E05xx and warnings.
+        whole: False after an earlier error, when leaves may lack moves and no bound means anything.
+    """
+
+    manifest: Manifest
+    diagnostics: Diagnostics
+    whole: bool = True

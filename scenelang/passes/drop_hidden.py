@@ -1,0 +1,82 @@
+"""Rows of the stream that a later object is wholly drawn over vanish."""
+
+from __future__ import annotations
+
+from scenelang.graph import affine
+from scenelang.graph.bounds import Box, leaf_box
+from scenelang.graph.chain import composed
+from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.outlines import INNER_RADII
+from scenelang.graph.steps import Affine, Rows, Step
+from scenelang.passes.context import Context
+from scenelang.passes.drop_unseen import begun
+
+_MOST = 8
+"""Covers that are tried for each row: the largest ones seen, so that time stays linear."""
+
+_INSIDE = 1.0 - 1e-9
+"""Share of a cover's inner disc that counts, to cover the rounding of float64."""
+
+Cover = tuple[float, Rows, float]
+"""World radius, map from the world to the leaf, radius of the disc inside it."""
+
+
+def drop_hidden(graph: Graph, context: Context) -> Graph:
+    """Drop unions and subtractions whose whole leaf lies inside one that a later union draws.
+
+    What a row does to the picture stays within its leaf, and there the later union decides distance sign
+    and colour alone. A `smooth` looks at distances, so rows before the last one are kept. A leaf that is
+    drawn twice in the very same place is covered too.
+
+    Before: STREAM. After: STREAM; the reference image keeps every pixel.
+    """
+    if graph.dimension != 2:
+        return graph
+    links = graph.root.links
+    keep = [True] * len(links)
+    covers: list[Cover] = []
+    drawn: set[tuple[str, tuple[Step, ...]]] = set()
+    for index in range(len(links) - 1, -1, -1):
+        op, leaf = links[index].op, links[index].node
+        assert isinstance(leaf, Leaf)
+        if op == "smooth":
+            break
+        if op == "intersect":
+            continue
+        key = (leaf.geometry, tuple(move.step for move in leaf.moves))
+        if key in drawn or (covers and _covered(leaf_box(leaf, 0.0, 2), covers)):
+            keep[index] = False
+        elif op == "union":
+            drawn.add(key)
+            cover = _cover(leaf)
+            if cover is not None:
+                covers = sorted([*covers, cover], reverse=True)[:_MOST]
+    return Graph(begun(links, keep), graph.canvas, graph.background, graph.dimension)
+
+
+def _cover(leaf: Leaf) -> Cover | None:
+    """The disc that `leaf` certainly fills: warps before its first affine map leave it in place."""
+    radius = INNER_RADII.get(leaf.geometry)
+    if radius is None or not all(isinstance(move.step, Affine) for move in leaf.moves[-1:]):
+        return None
+    if any(isinstance(move.step, Affine) for move in leaf.moves[:-1]):
+        return None
+    rows = composed(leaf.moves)
+    return radius * affine.stretches(rows, 2)[0], affine.inverted(rows), radius * _INSIDE
+
+
+def _covered(box: Box, covers: list[Cover]) -> bool:
+    left, bottom, right, top = box
+    corners = ((left, bottom), (left, top), (right, bottom), (right, top))
+    for _, rows, radius in covers:
+        a, b, x = rows[0], rows[1], rows[3]
+        c, d, y = rows[4], rows[5], rows[7]
+        limit = radius * radius
+        # A disc is convex: a box is inside when its corners are.
+        for p, q in corners:
+            u, v = a * p + b * q + x, c * p + d * q + y
+            if not u * u + v * v < limit:
+                break
+        else:
+            return True
+    return False

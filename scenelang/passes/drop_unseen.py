@@ -1,0 +1,61 @@
+"""Rows of the stream that no pixel of the canvas can feel vanish.
+
+Only the window of the canvas matters. A row whose leaf is at ``level`` or more from all of it changes
+nothing there, where ``level`` leaves room for the `smooth` rows that come after: two streams whose
+distances are equal, or both at a level or above, are equal, or both at that level less k or above, after a
+`smooth`; a union, a subtraction or an intersection keeps the level. So a union n `smooth` rows before the
+end is dropped where its leaf stays n k away, and a `smooth` where it stays (n + 1) k away. A subtraction
+changes distances inside the picture, which a later `smooth` blends by, so it is kept then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from scenelang.graph.bounds import BLEND, leaf_box, overlap
+from scenelang.graph.nodes import Fold, Graph, Leaf, Link
+from scenelang.passes.context import Context
+
+
+def drop_unseen(graph: Graph, context: Context) -> Graph:
+    """Drop rows that provably stay off the canvas, and whatever they leave without an effect.
+
+    Before: STREAM. After: STREAM; the reference image keeps every pixel.
+    """
+    if graph.dimension != 2:
+        return graph
+    window = graph.window()
+    links = graph.root.links
+    keep = [False] * len(links)
+    smooths = 0
+    for index in range(len(links) - 1, -1, -1):
+        op, leaf = links[index].op, links[index].node
+        assert isinstance(leaf, Leaf)
+        if op == "subtract" and smooths:
+            keep[index] = True
+            continue
+        level = BLEND * (smooths + (op == "smooth"))
+        if overlap(leaf_box(leaf, level, graph.dimension), window):
+            keep[index] = True
+            smooths += op == "smooth"
+        elif op == "intersect":
+            break  # what comes before is cut down to nothing on the canvas
+    return Graph(begun(links, keep), graph.canvas, graph.background, graph.dimension)
+
+
+def begun(links: Sequence[Link], keep: Sequence[bool]) -> Fold:
+    """The stream of the rows to keep; where its first row goes, so do those that only cut what is left.
+
+    Args:
+        links: a stream.
+        keep: for each row whether it stays; a row that goes had no effect, or was the first.
+    """
+    kept: list[Link] = []
+    for index, (link, stays) in enumerate(zip(links, keep, strict=True)):
+        if not stays:
+            continue
+        if kept:
+            kept.append(link)
+        elif index == 0 or link.op in ("union", "smooth"):
+            kept.append(Link("union", link.node))
+    return Fold("scene", tuple(kept))

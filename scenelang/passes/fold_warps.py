@@ -1,0 +1,21 @@
+"""Chains of leaves take their normal form: deformations towards the leaf, as few steps as the rules allow."""
+
+from __future__ import annotations
+
+from scenelang.graph.chain import Moves, normal
+from scenelang.graph.nodes import Graph
+from scenelang.graph.walk import map_moves
+from scenelang.passes.context import Context
+
+
+def fold_warps(graph: Graph, context: Context) -> Graph:
+    """Merge warps, moving them towards the leaf past rotations, reflections and uniform scales.
+
+    Before: AT_LEAVES. After: MERGED, NO_IDENTITIES, and each leaf's moves are in the normal form of
+    `scenelang.graph.chain.normal`, where the rules are proved.
+    """
+
+    def change(moves: Moves) -> Moves:
+        return normal(moves, graph.dimension)
+
+    return map_moves(graph, change)
