@@ -29,6 +29,7 @@ from torch import Tensor, nn
 
 TOKENS = 4
 SHARPEN = (16.0, 256.0, 4096.0)  # per world unit: slopes at which signs are shown to the cell
+EMPTY = 1.0  # world units: the margin before the first object, out of reach of every blend
 RADIUS = 2.0  # leaf units: the decoder sees points in this disc, farther ones at its rim
 
 
@@ -47,10 +48,10 @@ class FramedConfig:
 
     code: int = 4
     material_code: int = 12
-    features: int = 2
-    state: int = 2
+    features: int = 1
+    state: int = 1
     decoder_width: int = 32
-    cell_width: int = 24
+    cell_width: int = 16
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
@@ -93,6 +94,8 @@ class Framed(nn.Module):
         materials: number of material codes.
     """
 
+    SPARSE = 4
+
     def __init__(self, config: FramedConfig, geometries: int, materials: int) -> None:
         super().__init__()
         self.config = c = config
@@ -115,20 +118,17 @@ class Framed(nn.Module):
         self.edge_slope = nn.Parameter(torch.tensor(math.log(20.0)))
 
         inputs = (c.features + c.state) * (1 + len(SHARPEN))
-        self.start = nn.Parameter(torch.ones(c.state))
         self.cell_w1 = nn.Parameter(torch.randn(TOKENS, inputs, c.cell_width) * math.sqrt(2 / inputs))
         self.cell_b1 = nn.Parameter(torch.randn(TOKENS, c.cell_width) * 0.1)
         self.cell_w2 = nn.Parameter(torch.randn(TOKENS, c.cell_width, c.state + 1) / math.sqrt(c.cell_width))
         self.cell_b2 = nn.Parameter(torch.full((TOKENS, c.state + 1), 0.5))
-        self.candidate = nn.Parameter(torch.randn(TOKENS, c.features, c.state) / math.sqrt(c.features))
+        self.candidate = nn.Parameter(torch.rand(TOKENS, c.features, c.state) - 0.5)
         self.bump = nn.Parameter(torch.zeros(TOKENS, c.state))
-        self.read_w = nn.Parameter(torch.randn(c.state) / math.sqrt(c.state))
-        self.read_b = nn.Parameter(torch.zeros(()))
         self.read_slope = nn.Parameter(torch.tensor(math.log(20.0)))
 
     def parts(self) -> tuple[list[nn.Parameter], list[nn.Parameter]]:
         """Parameters of the decoder (with the geometry codes) and all others, for the optimiser."""
-        decoder = [self.codes, self.edge_slope, self.far, *self.decoder_w, *self.decoder_b]
+        decoder = [self.codes, self.far, *self.decoder_w, *self.decoder_b]
         known = {id(p) for p in decoder}
         return decoder, [p for p in self.parameters() if id(p) not in known]
 
@@ -144,7 +144,8 @@ class Framed(nn.Module):
 
     def cell_weights(self) -> tuple[Tensor, ...]:
         """Parameters of the cell, each with tokens in front."""
-        return self.cell_w1, self.cell_b1, self.cell_w2, self.cell_b2, self.candidate, self.bump
+        candidate = self.candidate.clamp(-1.0, 1.0)
+        return self.cell_w1, self.cell_b1, self.cell_w2, self.cell_b2, candidate, self.bump
 
     def object_albedo(self, material_code: Tensor) -> Tensor:
         """Albedo (M, 3) of material codes (M, material_code)."""
@@ -168,6 +169,18 @@ class Framed(nn.Module):
                 x = torch.relu_(x) if not torch.is_grad_enabled() else torch.relu(x)
         x = x + (radius - RADIUS).clamp_min(0.0) * self.far
         return x * scale[:, None, None]
+
+    def slope(self, q: Tensor, layers: list[tuple[Tensor, Tensor]]) -> Tensor:
+        """Length of the gradient of the first feature in leaf space (M, P), at points in the disc (M, P, 2)."""
+        x, tangent = q, torch.eye(2, device=q.device).expand(q.shape[0], q.shape[1], 2, 2)
+        for i, (w, b) in enumerate(layers):
+            last = i == len(layers) - 1
+            x = torch.baddbmm(b[:, None], x, w)
+            tangent = (tangent.flatten(1, 2) @ w).view(*tangent.shape[:3], -1)  # (M, P, 2, G)
+            if not last:
+                tangent = tangent * (x > 0)[:, :, None]
+                x = torch.relu(x)
+        return torch.linalg.vector_norm(tangent[..., 0], dim=-1)
 
     def step(
         self,
@@ -195,10 +208,6 @@ class Framed(nn.Module):
         state = state + take * (new - state) - bump[:, None] * take * (1 - take)
         return state, colour + paint * (object_colour - colour)
 
-    def margin(self, state: Tensor) -> Tensor:
-        """What the coverage is read from: negative where covered, (…, S) -> (…)."""
-        return state @ self.read_w + self.read_b
-
     def trace(self, q: Tensor, scale: Tensor, code: Tensor, colours: Tensor, tokens: Tensor) -> Trace:
         """Run streams for training, keeping what the image of every prefix shows.
 
@@ -213,7 +222,8 @@ class Framed(nn.Module):
         layers = self.decoder_weights(code.reshape(b * n, -1))
         features = self.decode(q.reshape(b * n, p, 2), scale.reshape(-1), layers).view(b, n, p, -1)
         weights = self.cell_weights()
-        state = self.start.expand(b, p, -1)
+        state = torch.zeros(b, p, self.config.state, dtype=q.dtype, device=q.device)
+        state[..., 0] = EMPTY
         colour = torch.zeros(b, p, 3, dtype=q.dtype, device=q.device)
         margins, shown = [], []
         for i in range(n):
@@ -221,9 +231,10 @@ class Framed(nn.Module):
             state, colour = self.step(
                 features[:, i], state, colour, colours[:, i, None], tuple(w[t] for w in weights)
             )
-            margins.append(self.margin(state))
+            margins.append(state[..., 0])
             shown.append(colour)
         return Trace(
+            slope=self.slope(q.reshape(b * n, p, 2)[:, :: self.SPARSE].clamp(-RADIUS, RADIUS), layers),
             alone=features[..., 0] * self.edge_slope.exp(),
             margin=torch.stack(margins, 1) * self.read_slope.exp(),
             colour=torch.stack(shown, 1),
@@ -235,11 +246,13 @@ class Trace:
     """What `Framed.trace` returns.
 
     Args:
+        slope: how fast the first feature grows in leaf space, at every `SPARSE`-th point (B N, P').
         alone: logit against each object alone covering the point (B, N, P).
         margin: logit against coverage after each object (B, N, P).
         colour: register after each object (B, N, P, 3).
     """
 
+    slope: Tensor
     alone: Tensor
     margin: Tensor
     colour: Tensor

@@ -10,11 +10,15 @@ from scenelang.renderers.framed import Framed
 from scenelang.training.scenes import Batch
 
 
+SLOPE = 0.5  # weight of the distance prior
+
+
 def image_loss(network: Framed, batch: Batch) -> tuple[Tensor, dict[str, float]]:
     """Loss of a batch of streams at points.
 
     Coverage of each object alone and of each prefix by cross-entropy, colour where the prefix covers the
-    point by squared and absolute error. Padding counts for nothing.
+    point by squared and absolute error. A prior asks the first feature to grow like
+    a distance (Gropp et al. 2020, eq. 2). Padding counts for nothing.
 
     Returns:
         The loss, and its parts as numbers by name.
@@ -30,6 +34,7 @@ def image_loss(network: Framed, batch: Batch) -> tuple[Tensor, dict[str, float]]
     seen = batch.covered * used
     gap = trace.colour - batch.colour
     parts = {
+        "slope": SLOPE * (trace.slope - 1).square().mean(),
         "alone": (alone * used).sum() / entries,
         "cover": (cover * used).sum() / entries,
         "colour": ((4 * gap.square() + gap.abs()).sum(-1) * seen).sum() / entries,

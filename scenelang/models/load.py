@@ -1,0 +1,100 @@
+"""A model ready to draw: manifest, trained network, digest of its weights."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors.torch import load
+
+from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.models.weights import weights_path
+from scenelang.renderers.framed import Framed, FramedConfig
+
+MOST_BYTES = 64 * 1024 * 1024
+MOST_WIDTH = 1024
+
+
+class ModelError(Exception):
+    """A model's files are missing, damaged or not what its manifest says."""
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """What draws programs.
+
+    Args:
+        manifest: what the model states about itself.
+        network: the trained network, in evaluation mode, without gradients.
+        digest: SHA-256 of the weights file, hex.
+        header: how the weights were trained (config, seed, revision, budget).
+    """
+
+    manifest: Manifest
+    network: Framed
+    digest: str
+    header: dict[str, Any]
+
+
+def read_header(data: bytes) -> dict[str, Any]:
+    """The training header of a weights file; raises ModelError where there is none."""
+    try:
+        (length,) = struct.unpack("<Q", data[:8])
+        outer = json.loads(data[8 : 8 + length])
+        header = json.loads(outer["__metadata__"]["scenelang"])
+    except (struct.error, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ModelError(f"no training header: {error}") from None
+    if not isinstance(header, dict) or header.get("format") != 1:
+        raise ModelError("not a weights file of format 1")
+    return header
+
+
+def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Framed:
+    """Build the network that a weights file holds.
+
+    Raises:
+        ModelError: the file does not fit the manifest or itself, or holds numbers that are not finite.
+    """
+    if len(data) > MOST_BYTES:
+        raise ModelError(f"weights of more than {MOST_BYTES} bytes")
+    header = read_header(data)
+    try:
+        sizes = header["config"]["network"]
+        if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes.values()):
+            raise ModelError("a network size is out of range")
+        config = FramedConfig(**sizes)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ModelError(f"bad network sizes: {error}") from None
+    with torch.device("meta"):
+        network = Framed(config, len(manifest.geometries), len(manifest.materials))
+    try:
+        tensors = load(data)
+        network.load_state_dict(tensors, assign=True)
+    except Exception as error:
+        # safetensors raises its own class, torch a RuntimeError; both say what does not fit
+        raise ModelError(f"damaged weights: {error}") from None
+    for name, parameter in network.named_parameters():
+        if parameter.dtype != torch.float32 or not torch.isfinite(parameter).all():
+            raise ModelError(f"weights '{name}' are not finite float32 numbers")
+    return network.requires_grad_(False).eval().to(device)
+
+
+def load_model(name: str, device: str = "cpu", path: Path | None = None) -> Model:
+    """Load a shipped model, or one whose weights lie at ``path``.
+
+    Raises:
+        KeyError: there is no such model.
+        ModelError: its weights are missing or damaged.
+    """
+    manifest = load_manifest(name)
+    try:
+        data = (path or weights_path(name)).read_bytes()
+    except OSError as error:
+        raise ModelError(f"cannot read the weights of '{name}': {error.strerror}") from None
+    network = load_network(data, manifest, device)
+    return Model(manifest, network, hashlib.sha256(data).hexdigest(), read_header(data))

@@ -1,0 +1,190 @@
+"""Streaming objects through the framed network at any set of points.
+
+Channels lie in front of points, (channels, M), so that every step of the arithmetic runs over contiguous
+numbers, and only points that an object can reach meet it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from scenelang.lifting import exact
+from scenelang.renderers.frames import BLEND_REACH, ObjectFrame, local_points, read_frame
+from scenelang.renderers.framed import EMPTY, RADIUS, SHARPEN, Framed
+
+UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
+CHUNK = 4096  # points that go through the network at once; their activations stay in the L2 cache
+SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """One object, ready to draw: weights (out, in) and biases (out, 1)."""
+
+    frame: ObjectFrame
+    token: int
+    colour: Tensor  # (3, 1)
+    layers: tuple[tuple[Tensor, Tensor], ...]
+    reach: float  # leaf units; inf where the object concerns every point
+    touch: bool  # whether points in reach count as drawn on
+
+
+@dataclass(frozen=True, slots=True)
+class _Cell:
+    w1: Tensor
+    b1: Tensor
+    w2: Tensor
+    b2: Tensor
+    candidate: Tensor
+    bump: Tensor
+
+
+@dataclass(slots=True)
+class Shade:
+    """What `Stream.shade` gives at M points.
+
+    Args:
+        colour: (3, M), not multiplied by coverage.
+        coverage: (M,) in [0, 1].
+        edge: (M,) world distance to the nearest outline, as the network sees it, at most.
+        evaluated: number of (object, point) pairs that went through the network.
+    """
+
+    colour: Tensor
+    coverage: Tensor
+    edge: Tensor
+    evaluated: int
+
+
+class Stream:
+    """A program's objects with their weights, ready to be met by points.
+
+    Args:
+        network: trained parameters, on any device.
+        vectors: (N, 64) float32, geometry and material vectors.
+        tokens: (N,) boolean tokens 0 to 3.
+        skip: leave out the points that an object cannot reach.
+    """
+
+    @torch.no_grad()
+    def __init__(
+        self, network: Framed, vectors: np.ndarray, tokens: np.ndarray, *, skip: bool = True
+    ) -> None:
+        self.network = network
+        self.device = network.codes.device
+        self.cells = [
+            _Cell(
+                w1.T.contiguous(),
+                b1[:, None],
+                w2.T.contiguous(),
+                b2[:, None],
+                c.T.contiguous(),
+                bump[:, None],
+            )
+            for w1, b1, w2, b2, c, bump in zip(*network.cell_weights(), strict=True)
+        ]
+        self.slope = float(network.read_slope.exp()) / 4
+        self.unit = float(
+            network.cell_weights()[4][UNION, :, 0].norm()
+        )  # growth of the margin per world unit
+        self.sharpen = [float(s) for s in SHARPEN]
+        self.far = network.far[:, None]
+        self.rows = self._rows(vectors, tokens, skip)
+
+    def _rows(self, vectors: np.ndarray, tokens: np.ndarray, skip: bool) -> list[_Row]:
+        if not len(vectors):
+            return []
+        g, m = vectors[:, : exact.D_G], vectors[:, exact.D_G :]
+        codes, index = np.unique(g[:, exact.CODE], axis=0, return_inverse=True)
+        made = self.network.decoder_weights(torch.from_numpy(codes).to(self.device))
+        shapes = [tuple((w[i].T.contiguous(), b[i][:, None]) for w, b in made) for i in range(len(codes))]
+        codes_m = torch.from_numpy(np.ascontiguousarray(m[:, exact.MATERIAL_CODE])).to(self.device)
+        albedo = torch.cat([self.network.object_albedo(codes_m), torch.ones_like(codes_m[:, :1])], 1)
+        matrix = torch.from_numpy(m[:, exact.COLOUR].reshape(-1, 3, 4).copy()).to(self.device)
+        colours = (matrix @ albedo[:, :, None]).clamp(0.0, 1.0)  # (N, 3, 1)
+        blends_after = np.cumsum((tokens == SMOOTH)[::-1])[::-1]  # smooth unions from this row on
+        rows = []
+        for i, token in enumerate(tokens.tolist()):
+            frame = read_frame(g[i])
+            if not skip or token == INTERSECT or (token == SUBTRACT and blends_after[i]):
+                reach = float("inf")
+            else:
+                reach = 1.0 + SLACK + (BLEND_REACH / frame.scale if blends_after[i] else 0.0)
+            rows.append(
+                _Row(frame, token, colours[i], shapes[int(index.flat[i])], reach, token in (UNION, SMOOTH))
+            )
+        return rows
+
+    @torch.no_grad()
+    def shade(self, x: Tensor, y: Tensor) -> Shade:
+        """Draw at world points x, y (M,)."""
+        count = x.numel()
+        s = self.network.config.state
+        state = torch.zeros(s, count, device=x.device)  # (S, M)
+        state[0] = EMPTY
+        colour = torch.zeros(3, count, device=x.device)
+        edge = torch.full((count,), torch.inf, device=x.device)
+        touched = torch.zeros(count, dtype=torch.bool, device=x.device)
+        evaluated = 0
+        for row in self.rows:
+            qx, qy = local_points(row.frame, x, y)
+            radius = torch.hypot(qx, qy)
+            hit = radius <= row.reach if row.reach != float("inf") else None
+            if hit is None:
+                # what nothing was drawn on stays empty whatever follows, unless skipping is off
+                index = (
+                    touched.nonzero()[:, 0]
+                    if row.token != UNION and self.rows[0].reach != float("inf")
+                    else None
+                )
+            else:
+                index = (hit if row.touch else hit & touched).nonzero()[:, 0]
+                if row.touch:
+                    touched |= hit
+            todo = count if index is None else index.numel()
+            evaluated += todo
+            for start in range(0, todo, CHUNK):
+                stop = min(start + CHUNK, todo)
+                part = slice(start, stop) if index is None else index[start:stop]
+                features = self._decode(qx[part], qy[part], radius[part], row)  # (F, m)
+                old = torch.cat([features, state[:, part], colour[:, part]])
+                state_new, colour_new = self._step(old, row, s)
+                state[:, part], colour[:, part] = state_new, colour_new
+                edge[part] = torch.minimum(edge[part], features[0].abs() / row.frame.stretch)
+        edge = torch.minimum(edge, state[0].abs() / self.unit)
+        return Shade(colour, (0.5 - state[0] * self.slope).clamp_(0.0, 1.0), edge, evaluated)
+
+    def _decode(self, qx: Tensor, qy: Tensor, radius: Tensor, row: _Row) -> Tensor:
+        """Features (F, m) of leaf coordinates (m,)."""
+        x = torch.stack([qx, qy])
+        beyond = (radius - RADIUS).clamp_min_(0.0)
+        if row.reach > RADIUS:
+            x *= RADIUS / radius.clamp_min(RADIUS)
+        for i, (w, b) in enumerate(row.layers):
+            x = torch.addmm(b, w, x)
+            if i < 2:
+                x.relu_()
+        if row.reach > RADIUS:
+            x += beyond * self.far
+        return x.mul_(row.frame.scale)
+
+    def _step(self, old: Tensor, row: _Row, s: int) -> tuple[Tensor, Tensor]:
+        """The cell (`Framed.step`) on [features, state, colour] (F + S + 3, m)."""
+        cell = self.cells[row.token]
+        n = old.shape[0] - 3
+        seen = torch.empty((n * (1 + len(self.sharpen)), old.shape[1]), device=old.device)
+        seen[:n] = old[:n]
+        for i, slope in enumerate(self.sharpen, 1):
+            torch.mul(old[:n], slope, out=seen[i * n : (i + 1) * n])
+        seen[n:].clamp_(-1.0, 1.0)
+        hidden = torch.addmm(cell.b1, cell.w1, seen).relu_()
+        gates = torch.addmm(cell.b2, cell.w2, hidden).clamp_(0.0, 1.0)
+        take, paint = gates[:s], gates[s:]
+        state, colour = old[n - s : n], old[n:]
+        gap = (cell.candidate @ old[: n - s]).sub_(state)
+        new = torch.addcmul(state, take, gap).sub_((take * (1 - take)).mul_(cell.bump))
+        return new, torch.addcmul(colour, paint, row.colour - colour)
