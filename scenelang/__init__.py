@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
     from scenelang.diagnostics.diagnostic import Diagnostics as Diagnostics
     from scenelang.diagnostics.diagnostic import SceneError as SceneError
+    from scenelang.program.compile import compile as compile
+    from scenelang.program.program import Place as Place
+    from scenelang.program.program import Program as Program
+    from scenelang.program.program import ProgramError as ProgramError
+    from scenelang.program.store import load_program as load_program
     from scenelang.scene.load import load as load
     from scenelang.scene.load import loads as loads
     from scenelang.scene.schema import Animation as Animation
@@ -42,6 +47,9 @@ if TYPE_CHECKING:
 # Module -> public names it defines. A new public name is added here, above, and to __all__.
 _HOME: Final = {
     "scenelang.diagnostics.diagnostic": ("Diagnostic", "Diagnostics", "SceneError"),
+    "scenelang.program.compile": ("compile",),
+    "scenelang.program.program": ("Place", "Program", "ProgramError"),
+    "scenelang.program.store": ("load_program",),
     "scenelang.scene.load": ("load", "loads"),
     "scenelang.scene.schema": (
         "Animation",
@@ -86,6 +94,9 @@ __all__ = [
     "Material",
     "Matrix",
     "Object",
+    "Place",
+    "Program",
+    "ProgramError",
     "Rotate",
     "Scale",
     "Scene",
@@ -94,7 +105,9 @@ __all__ = [
     "Translate",
     "Twirl",
     "Twist",
+    "compile",
     "load",
+    "load_program",
     "loads",
 ]
 

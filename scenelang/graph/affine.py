@@ -20,7 +20,7 @@ so that ratio is still known to four digits here, while nothing that thin can be
 """
 
 REACH = 1e30
-"""Stretches outside ``1/REACH .. REACH`` and offsets beyond it leave the range of float32 when inverted."""
+"""Stretches outside ``1/REACH .. REACH`` leave the range of float32 when inverted, as do far offsets."""
 
 
 def compose(outer: Rows, inner: Rows) -> Rows:
@@ -123,9 +123,9 @@ def _stretches3(rows: Rows) -> tuple[float, float]:
 def usable(rows: Rows, dimension: int) -> bool:
     """Whether the map can be inverted in float64 and its inverse kept in float32."""
     smallest, largest = stretches(rows, dimension)
-    offset = max(abs(rows[3]), abs(rows[7]), abs(rows[11]))
+    offset = max(abs(rows[3]), abs(rows[7]), abs(rows[11]), 1.0)
     # Written so that NaN and infinity fail.
-    return smallest > SINGULAR * largest and smallest > 1.0 / REACH and largest < REACH and offset < REACH
+    return smallest > SINGULAR * largest and offset < REACH * smallest and largest < REACH
 
 
 def similarity(rows: Rows) -> tuple[float, float] | None:

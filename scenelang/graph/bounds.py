@@ -20,6 +20,7 @@ from scenelang.graph.chain import composed
 from scenelang.graph.nodes import Leaf
 from scenelang.graph.outlines import HULLS
 from scenelang.graph.steps import IDENTITY, Affine, Rows, Warp
+from scenelang.scene.schema import Combine
 
 Box = tuple[float, float, float, float]
 """xmin, ymin, xmax, ymax in the world."""
@@ -54,6 +55,26 @@ def leaf_box(leaf: Leaf, level: float, dimension: int) -> Box:
     else:
         box = _straight(leaf, composed(leaf.moves), reach)
     return _grown(box)
+
+
+def felt_level(op: Combine, smooths: int) -> float | None:
+    """How near a row's leaf has to come for the row to matter, as a level for `leaf_box`.
+
+    Two streams whose distances at a point are equal, or both at a level or above, are after a `smooth`
+    equal, or both at that level less k or above; a union, a subtraction or an intersection keeps the level.
+    So with n `smooth` rows still to come, a union matters within n k of its leaf and a `smooth` within
+    (n + 1) k. A subtraction changes distances inside the picture, which a later `smooth` blends by.
+
+    Args:
+        op: the row's operator; for an intersection the level within which anything before it can remain.
+        smooths: how many `smooth` rows follow.
+
+    Returns:
+        The level, or None where the row may matter anywhere.
+    """
+    if op == "subtract" and smooths:
+        return None
+    return BLEND * (smooths + (op == "smooth"))
 
 
 def overlap(a: Box, b: Box) -> bool:

@@ -9,8 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import Spans, lower
 from scenelang.graph.nodes import Graph
 from scenelang.graph.verify import Invariant, verify
+from scenelang.models.manifest import Manifest
 from scenelang.passes.check_levels import check_levels
 from scenelang.passes.check_trained import check_trained
 from scenelang.passes.context import Context
@@ -22,6 +25,7 @@ from scenelang.passes.fold_affines import fold_affines
 from scenelang.passes.fold_warps import fold_warps
 from scenelang.passes.linearise import linearise
 from scenelang.passes.push_transforms import push_transforms
+from scenelang.scene.schema import Scene
 
 
 class Pass(NamedTuple):
@@ -76,3 +80,28 @@ def run_passes(graph: Graph, context: Context, after: Callable[[str, Graph], Non
             # Without sound chains no bound means anything: look for refusals only.
             context = Context(context.manifest, context.diagnostics, whole=False)
     return graph
+
+
+def check_scene(
+    scene: Scene,
+    spans: Spans | None,
+    diagnostics: Diagnostics,
+    manifest: Manifest,
+    after: Callable[[str, Graph], None] | None = None,
+) -> Graph:
+    """Everything that can be said of a scene before it is lifted; imports no numpy.
+
+    Args:
+        scene: a concrete scene.
+        spans: where its nodes were written, None if it did not come from text.
+        diagnostics: receives errors and warnings.
+        manifest: of the model to draw with.
+        after: as for `run_passes`.
+
+    Returns:
+        The stream; it stands for the scene only if no error was reported.
+    """
+    before = len(diagnostics.errors)
+    graph = lower(scene, manifest, spans, diagnostics)
+    whole = len(diagnostics.errors) == before
+    return run_passes(graph, Context(manifest, diagnostics, whole), after)

@@ -42,9 +42,11 @@ def _check(leaf: Leaf, dimension: int, context: Context) -> None:
                 "and uniform scales about the origin",
             )
             return
-    rows = composed(leaf.moves)
-    if not affine.usable(rows, dimension):
-        smallest, largest = affine.stretches(rows, dimension)
+    # Each map is lifted by itself, so each needs an inverse, and so does what they compose to.
+    maps = [composed(leaf.moves), *(m.step.rows for m in leaf.moves if isinstance(m.step, Affine))]
+    bad = next((rows for rows in maps if not affine.usable(rows, dimension)), None)
+    if bad is not None:
+        smallest, largest = affine.stretches(bad, dimension)
         context.diagnostics.add(
             "E0406",
             f"the transforms of `{leaf.geometry}` compose to a singular one, "

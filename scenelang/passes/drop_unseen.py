@@ -1,18 +1,10 @@
-"""Rows of the stream that no pixel of the canvas can feel vanish.
-
-Only the window of the canvas matters. A row whose leaf is at ``level`` or more from all of it changes
-nothing there, where ``level`` leaves room for the `smooth` rows that come after: two streams whose
-distances are equal, or both at a level or above, are equal, or both at that level less k or above, after a
-`smooth`; a union, a subtraction or an intersection keeps the level. So a union n `smooth` rows before the
-end is dropped where its leaf stays n k away, and a `smooth` where it stays (n + 1) k away. A subtraction
-changes distances inside the picture, which a later `smooth` blends by, so it is kept then.
-"""
+"""Rows of the stream that no pixel of the canvas can feel vanish."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scenelang.graph.bounds import BLEND, leaf_box, overlap
+from scenelang.graph.bounds import felt_level, leaf_box, overlap
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link
 from scenelang.passes.context import Context
 
@@ -31,11 +23,8 @@ def drop_unseen(graph: Graph, context: Context) -> Graph:
     for index in range(len(links) - 1, -1, -1):
         op, leaf = links[index].op, links[index].node
         assert isinstance(leaf, Leaf)
-        if op == "subtract" and smooths:
-            keep[index] = True
-            continue
-        level = BLEND * (smooths + (op == "smooth"))
-        if overlap(leaf_box(leaf, level, graph.dimension), window):
+        level = felt_level(op, smooths)
+        if level is None or overlap(leaf_box(leaf, level, graph.dimension), window):
             keep[index] = True
             smooths += op == "smooth"
         elif op == "intersect":

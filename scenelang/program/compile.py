@@ -1,0 +1,86 @@
+"""Scene to Program in one call. Imports numpy, never torch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.graph.lower import Spans
+from scenelang.graph.nodes import Graph
+from scenelang.models.choose import choose_model
+from scenelang.models.manifest import Manifest, available, load_manifest
+from scenelang.passes import check_scene
+from scenelang.program.program import Program
+from scenelang.scene.schema import Scene
+
+
+def compile_scene(
+    scene: Scene,
+    *,
+    spans: Spans | None = None,
+    diagnostics: Diagnostics | None = None,
+    model: str | None = None,
+    after: Callable[[str, Graph], None] | None = None,
+) -> Program:
+    """Compile a scene for a model.
+
+    Args:
+        scene: a concrete scene.
+        spans: where its nodes were written, for diagnostics and the source map.
+        diagnostics: collects errors and warnings.
+        model: draw with this model instead of the one the scene names.
+        after: called with ``"lower"`` and the name of each pass and the graph it left.
+
+    Returns:
+        The Program; the same scene always gives the same one, byte for byte.
+
+    Raises:
+        SceneError: the scene cannot be compiled; it carries all diagnostics.
+        FileNotFoundError: the model has no weights.
+    """
+    found = diagnostics if diagnostics is not None else Diagnostics()
+    manifest = find_model(scene, found, model=model, spans=spans)
+    if manifest is not None:
+        graph = check_scene(scene, spans, found, manifest, after)
+    if manifest is None or found.errors:
+        raise SceneError(found)
+    # Lifting is what needs numpy; scenes with errors never come this far.
+    from scenelang.models.weights import load_codes
+    from scenelang.program.emit import emit
+
+    return emit(graph, manifest, load_codes(manifest.name))
+
+
+def find_model(
+    scene: Scene, diagnostics: Diagnostics, *, model: str | None = None, spans: Spans | None = None
+) -> Manifest | None:
+    """The manifest a scene is compiled for: the one asked for, the one it names, or the smallest that fits.
+
+    Args:
+        scene: a concrete scene.
+        diagnostics: receives E0210 or E0508 where there is none.
+        model: overrides the scene's.
+        spans: where the scene was written.
+    """
+    name = model if model is not None else scene.model
+    known = available()
+    place = spans.span(scene) if spans is not None else None
+    if name is not None:
+        if name in known:
+            return load_manifest(name)
+        listed = ", ".join(f"`{k}`" for k in known)
+        diagnostics.add("E0210", f"unknown model `{name}`", place, help=f"the models are {listed}")
+        return None
+    manifests = [load_manifest(k) for k in known]
+    fitting = choose_model(scene, manifests)
+    if fitting is None and len(manifests) == 1:
+        # Compiling for the only model there is says what exactly it lacks.
+        return manifests[0]
+    if fitting is None:
+        fact = "no single model has every geometry, material and transform of the scene"
+        diagnostics.add("E0508", fact, place, help="name one with `model`, and the errors say what it lacks")
+    return fitting
+
+
+compile = compile_scene
+"""`scenelang.compile`."""

@@ -1,0 +1,92 @@
+"""Stream to Program: chains are lifted, operators become tokens, boxes become bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.diagnostics.span import Span
+from scenelang.graph.bounds import Box, felt_level, leaf_box
+from scenelang.graph.levels import split_levels
+from scenelang.graph.nodes import Graph, Leaf
+from scenelang.lifting.exact import lift_colours, lift_many
+from scenelang.models.manifest import Manifest
+from scenelang.models.weights import Codes
+from scenelang.program.program import TOKENS, WIDTH, Place, Program, ProgramError
+from scenelang.scene.schema import Combine
+
+Rows = list[tuple[Combine, Leaf]]
+
+
+def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
+    """The Program of a stream.
+
+    Args:
+        graph: after all passes, without errors.
+        manifest: of the model it was made for.
+        codes: that model's learned codes.
+
+    Raises:
+        ProgramError: the model's lifting is not one of this version.
+    """
+    if manifest.lifting != "exact":
+        raise ProgramError(f"model `{manifest.name}` needs the lifting `{manifest.lifting}`")
+    rows = [(link.op, link.node) for link in graph.root.links if isinstance(link.node, Leaf)]
+    return Program(
+        vectors=_vectors(rows, manifest, codes),
+        tokens=np.array([TOKENS[op] for op, _ in rows], dtype=np.int8),
+        bounds=_bounds(rows, graph),
+        canvas=graph.canvas,
+        background=graph.background,
+        model=manifest.name,
+        weights=codes.digest,
+        objects=tuple(leaf.geometry for _, leaf in rows),
+        places=_places([leaf.span for _, leaf in rows]),
+    )
+
+
+def _vectors(rows: Rows, manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
+    vectors = np.zeros((len(rows), WIDTH), dtype=np.float32)  # (N, 64)
+    if rows:
+        levels = [split_levels([move.step for move in leaf.moves], manifest.limits) for _, leaf in rows]
+        geometry = lift_many(levels, [codes.geometry[leaf.geometry] for _, leaf in rows])
+        material = lift_colours(
+            [leaf.rgb for _, leaf in rows], [codes.material[leaf.material] for _, leaf in rows]
+        )
+        vectors[:, : WIDTH // 2] = geometry
+        vectors[:, WIDTH // 2 :] = material
+        vectors += 0.0  # one zero only, so that equal scenes give equal bytes
+    return vectors
+
+
+def _bounds(rows: Rows, graph: Graph) -> npt.NDArray[np.float32]:
+    window = graph.window()
+    boxes: list[Box] = []
+    smooths = 0
+    for op, leaf in reversed(rows):
+        level = felt_level(op, smooths)
+        everywhere = level is None or op == "intersect" or graph.dimension != 2
+        boxes.append(window if everywhere else leaf_box(leaf, level or 0.0, graph.dimension))
+        smooths += op == "smooth"
+    exact = np.array(boxes[::-1], dtype=np.float64).reshape(len(rows), 4)
+    most = np.finfo(np.float32).max
+    rounded = np.clip(exact, -most, most).astype(np.float32)
+    # Rounding to float32 may not shrink a box.
+    low = np.where(rounded[:, :2] > exact[:, :2], np.nextafter(rounded[:, :2], -most), rounded[:, :2])
+    high = np.where(rounded[:, 2:] < exact[:, 2:], np.nextafter(rounded[:, 2:], most), rounded[:, 2:])
+    return np.concatenate([low, high], axis=1).astype(np.float32)
+
+
+def _places(spans: list[Span | None]) -> tuple[Place | None, ...]:
+    known: dict[tuple[str, int, int], Place] = {}
+    places: list[Place | None] = []
+    for span in spans:
+        if span is None:
+            places.append(None)
+            continue
+        key = (span.source.name, span.start, span.end)
+        if key not in known:
+            (line, column), (end_line, end_column) = span.locate()
+            known[key] = Place(span.source.name, line, column, end_line, end_column)
+        places.append(known[key])
+    return tuple(places)

@@ -1,0 +1,141 @@
+"""The Program: what a compiled scene is to a renderer, and what embedders take away."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+MOST_OBJECTS = 100_000
+MOST_PIXELS = 8192
+WIDTH = 64
+TOKENS: dict[str, int] = {"union": 0, "smooth": 1, "subtract": 2, "intersect": 3}
+"""Boolean tokens; the first row's is 0 whatever it was written as."""
+
+
+class ProgramError(ValueError):
+    """A Program is not one: a damaged or foreign file, wrong shapes, or numbers out of range."""
+
+
+class Place(NamedTuple):
+    """Where an object was written: lines and columns from 1, in code points, the end exclusive."""
+
+    file: str
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Program:
+    """Objects in stream order. Arrays are copied, checked and made read-only.
+
+    Args:
+        vectors: float32 (N, 64), geometry vector (32) then material vector (32) of each object.
+        tokens: int8 (N,), how each joins what came before; see `TOKENS`.
+        bounds: float32 (N, 4), world xmin, ymin, xmax, ymax: outside it the row makes no difference to
+            the picture. An intersection, which reaches everything, has the whole canvas.
+        canvas: width and height in pixels.
+        background: (r, g, b) as written, or None for transparency.
+        model: name of the model that draws it.
+        weights: SHA-256 of that model's weights, hex.
+        objects: geometry name of each row.
+        places: where each row was written; None where that is unknown.
+
+    Raises:
+        ProgramError: anything is not as above.
+    """
+
+    vectors: npt.NDArray[np.float32] = field(repr=False)
+    tokens: npt.NDArray[np.int8] = field(repr=False)
+    bounds: npt.NDArray[np.float32] = field(repr=False)
+    canvas: tuple[int, int]
+    background: tuple[float, float, float] | None
+    model: str
+    weights: str
+    objects: tuple[str, ...]
+    places: tuple[Place | None, ...] = field(repr=False)
+
+    def __post_init__(self) -> None:
+        count = len(self.objects)
+        if count > MOST_OBJECTS:
+            raise ProgramError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
+        for name, dtype, shape in (
+            ("vectors", np.float32, (count, WIDTH)),
+            ("tokens", np.int8, (count,)),
+            ("bounds", np.float32, (count, 4)),
+        ):
+            array = _frozen(name, getattr(self, name), dtype, shape)
+            object.__setattr__(self, name, array)
+        if len(self.places) != count:
+            raise ProgramError(f"{len(self.places)} places for {count} objects")
+        _check_rows(self)
+        _check_settings(self)
+
+    def __len__(self) -> int:
+        return len(self.objects)
+
+    def digest(self) -> str:
+        """SHA-256, hex, of all that decides the picture: not of names or places in source text."""
+        colour = self.background and tuple(float(v) for v in self.background)
+        settings = (tuple(self.canvas), colour, self.model, self.weights, len(self))
+        total = hashlib.sha256(repr(settings).encode())
+        for array, kind in ((self.vectors, "<f4"), (self.tokens, "i1"), (self.bounds, "<f4")):
+            total.update(array.astype(kind).tobytes())
+        return total.hexdigest()
+
+    def save(self, path: str | Path) -> None:
+        """Write to a file, whole or not at all; the same Program gives the same bytes.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        from scenelang.program.store import save_program
+
+        save_program(self, path)
+
+
+def _frozen(name: str, array: Any, dtype: type[np.generic], shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    if not isinstance(array, np.ndarray) or array.dtype != dtype or array.shape != shape:
+        kind = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+        raise ProgramError(f"{name} are {kind}, not {np.dtype(dtype)} {shape}")
+    copy = np.array(array, order="C")
+    copy.setflags(write=False)
+    return copy
+
+
+def _check_rows(program: Program) -> None:
+    for name, array in (("vectors", program.vectors), ("bounds", program.bounds)):
+        finite = np.isfinite(array).all(axis=1)
+        if not finite.all():
+            row = int(np.argmin(finite))
+            raise ProgramError(f"{name} of object {row} (`{program.objects[row]}`) are not finite")
+    known = (program.tokens >= 0) & (program.tokens < len(TOKENS))
+    if not known.all():
+        row = int(np.argmin(known))
+        raise ProgramError(f"token {int(program.tokens[row])} of object {row}, where 0 to 3 are known")
+    if len(program) and program.tokens[0] != 0:
+        raise ProgramError(f"token {int(program.tokens[0])} of the first object, which is always 0")
+    if (program.bounds[:, :2] > program.bounds[:, 2:]).any():
+        raise ProgramError("bounds with a minimum above their maximum")
+
+
+def _check_settings(program: Program) -> None:
+    if len(program.canvas) != 2 or not all(
+        type(side) is int and 1 <= side <= MOST_PIXELS for side in program.canvas
+    ):
+        raise ProgramError(f"a canvas of {program.canvas!r}, where sides from 1 to {MOST_PIXELS} are allowed")
+    colour = program.background
+    if colour is not None and not (
+        len(colour) == 3 and all(type(v) in (int, float) and np.isfinite(v) for v in colour)
+    ):
+        raise ProgramError(f"a background of {colour!r}, which is no colour")
+    if not program.model:
+        raise ProgramError("no model is named")
+    if len(program.weights) != 64 or any(c not in "0123456789abcdef" for c in program.weights):
+        raise ProgramError("the digest of the weights is not 64 hexadecimal digits")

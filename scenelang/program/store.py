@@ -1,0 +1,231 @@
+"""Programs in files: safetensors with a JSON header, read as if a stranger had written them.
+
+Tensors: ``vectors`` F32 (N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the
+header's ``geometries``, ``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line,
+end column), all -1 where unknown. The header is the metadata entry ``scenelang``.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import struct
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
+
+FORMAT = 1
+MOST_HEADER = 1 << 20
+MOST_BYTES = MOST_HEADER + 8 + MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20)
+
+_LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
+    "vectors": ("F32", (WIDTH,)),
+    "tokens": ("I8", ()),
+    "bounds": ("F32", (4,)),
+    "objects": ("I32", ()),
+    "places": ("I32", (5,)),
+}
+
+
+def save_program(program: Program, path: str | Path) -> None:
+    """Write a Program to a temporary file beside ``path``, then rename it: whole or not at all.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    target = Path(path)
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(program_bytes(program))
+            file.flush()
+            os.fsync(file.fileno())
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)
+        os.replace(name, target)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(name)
+        raise
+
+
+def program_bytes(program: Program) -> bytes:
+    """The file of a Program; equal Programs give equal bytes."""
+    from safetensors.numpy import save
+
+    geometries = sorted(set(program.objects))
+    files = sorted({place.file for place in program.places if place is not None})
+    of_geometry = {name: index for index, name in enumerate(geometries)}
+    of_file = {name: index for index, name in enumerate(files)}
+    places = [(-1,) * 5 if place is None else (of_file[place.file], *place[1:]) for place in program.places]
+    header = {
+        "background": program.background,
+        "canvas": program.canvas,
+        "files": files,
+        "format": FORMAT,
+        "geometries": geometries,
+        "model": program.model,
+        "weights": program.weights,
+    }
+    tensors: dict[str, npt.NDArray[Any]] = {
+        "vectors": program.vectors,
+        "tokens": program.tokens,
+        "bounds": program.bounds,
+        "objects": np.array([of_geometry[name] for name in program.objects], dtype=np.int32),
+        "places": np.array(places, dtype=np.int32).reshape(len(program), 5),
+    }
+    text = json.dumps(header, sort_keys=True, separators=(",", ":"))
+    data: bytes = save(tensors, metadata={"scenelang": text})
+    return data
+
+
+def load_program(path: str | Path, *, weights: str | None = None) -> Program:
+    """Read a Program that was saved.
+
+    Args:
+        path: the file.
+        weights: SHA-256 of the weights it is to be drawn with, hex; by default those shipped for its model.
+
+    Raises:
+        ProgramError: the file is damaged, foreign or hostile, or was compiled for other weights.
+        OSError: the file cannot be read.
+    """
+    with open(path, "rb") as file:
+        data = file.read(MOST_BYTES + 1)
+    program = parse_program(data)
+    expected = weights if weights is not None else _shipped(program.model)
+    if program.weights != expected:
+        raise ProgramError(
+            f"the program was compiled for weights {program.weights[:12]}… of model `{program.model}`, "
+            f"these are {expected[:12]}…: compile the scene again"
+        )
+    return program
+
+
+def parse_program(data: bytes) -> Program:
+    """The Program that a file's bytes hold; everything in them is checked but the weights' digest.
+
+    Raises:
+        ProgramError: they hold none.
+    """
+    if len(data) > MOST_BYTES:
+        raise ProgramError(f"more than {MOST_BYTES:,} bytes, which no program has")
+    tensors = _tensors(data)
+    header = _header(data)
+    geometries, files = _names(header, "geometries"), _names(header, "files")
+    objects = _indexed(tensors["objects"], len(geometries), "objects")
+    background, canvas = header["background"], header["canvas"]
+    if not isinstance(canvas, list) or not (background is None or isinstance(background, list)):
+        raise ProgramError("a damaged header")
+    if not isinstance(header["model"], str) or not isinstance(header["weights"], str):
+        raise ProgramError("a damaged header")
+    return Program(
+        vectors=tensors["vectors"],
+        tokens=tensors["tokens"],
+        bounds=tensors["bounds"],
+        canvas=tuple(canvas),
+        background=None if background is None else tuple(background),
+        model=header["model"],
+        weights=header["weights"],
+        objects=tuple(geometries[index] for index in objects),
+        places=_places(tensors["places"], files),
+    )
+
+
+def _outer(data: bytes) -> dict[str, Any]:
+    """The safetensors header of a file."""
+    if len(data) < 8:
+        raise ProgramError("not a program: shorter than a header")
+    (length,) = struct.unpack("<Q", data[:8])
+    if length > min(MOST_HEADER, len(data) - 8):
+        raise ProgramError("not a program: its header does not fit")
+    outer = _json(data[8 : 8 + length])
+    if not isinstance(outer, dict):
+        raise ProgramError("not a program: its header is no object")
+    return outer
+
+
+def _tensors(data: bytes) -> dict[str, npt.NDArray[Any]]:
+    outer = _outer(data)
+    if outer.keys() - {"__metadata__"} != _LAYOUT.keys():
+        raise ProgramError("not a program: it holds other tensors")
+    count = None
+    for name, (dtype, rest) in _LAYOUT.items():
+        entry = outer[name]
+        shape = entry.get("shape") if isinstance(entry, dict) else None
+        if not isinstance(shape, list) or not shape or any(type(side) is not int for side in shape):
+            raise ProgramError(f"tensor `{name}` has no shape")
+        count = shape[0] if count is None else count
+        if entry.get("dtype") != dtype or tuple(shape) != (count, *rest):
+            raise ProgramError(f"tensor `{name}` is {entry.get('dtype')} {shape}")
+        if not 0 <= count <= MOST_OBJECTS:
+            raise ProgramError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
+
+    try:
+        tensors: dict[str, npt.NDArray[Any]] = load(data)
+    except (SafetensorError, ValueError, KeyError) as error:
+        raise ProgramError(f"a damaged program: {error}") from None
+    return tensors
+
+
+def _header(data: bytes) -> dict[str, Any]:
+    metadata = _outer(data).get("__metadata__")
+    text = metadata.get("scenelang") if isinstance(metadata, dict) else None
+    if not isinstance(text, str):
+        raise ProgramError("not a program: it has no header of scenelang")
+    header = _json(text.encode("utf-8", "surrogatepass"))
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise ProgramError(f"not a program of format {FORMAT}")
+    fields = {"background", "canvas", "files", "format", "geometries", "model", "weights"}
+    if header.keys() != fields:
+        raise ProgramError("the header has missing or unknown fields")
+    return header
+
+
+def _json(data: bytes) -> Any:
+    try:
+        return json.loads(data)
+    except (ValueError, RecursionError):
+        raise ProgramError("not a program: a header is no JSON") from None
+
+
+def _names(header: dict[str, Any], key: str) -> list[str]:
+    names = header[key]
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ProgramError(f"`{key}` in the header are no names")
+    return names
+
+
+def _indexed(array: npt.NDArray[Any], count: int, what: str) -> list[int]:
+    if ((array < 0) | (array >= count)).any():
+        raise ProgramError(f"`{what}` name what the header does not list")
+    return array.tolist()  # type: ignore[no-any-return]
+
+
+def _places(array: npt.NDArray[Any], files: list[str]) -> tuple[Place | None, ...]:
+    known = array[:, 0] >= 0
+    if (array[known][:, 0] >= len(files)).any() or (array[known][:, 1:] < 1).any():
+        raise ProgramError("places that no file has")
+    return tuple(Place(files[file], *rest) if file >= 0 else None for file, *rest in array.tolist())
+
+
+def _shipped(model: str) -> str:
+    """Digest of the weights shipped for a model."""
+    from scenelang.models.manifest import available
+    from scenelang.models.weights import load_codes
+
+    if model not in available():
+        raise ProgramError(f"unknown model `{model}`; the models are {', '.join(available())}")
+    try:
+        return load_codes(model).digest
+    except FileNotFoundError:
+        raise ProgramError(f"model `{model}` has no weights here") from None
