@@ -1,9 +1,213 @@
+"""At a mistake: say what it is, mend the tokens, go on.
+
+Well known mistakes are told apart first; then the best small repair is looked for (`syntax.repairs`); where
+none helps, the statement is skipped. Braces are balanced before parsing, so a skip stays inside its block.
+"""
+
 from __future__ import annotations
+
+from bisect import bisect_left
 from typing import Any
-from scenelang.syntax.tokens import Report, Tokens
+
+from scenelang.diagnostics.diagnostic import Edit, Fix
+from scenelang.diagnostics.span import Span
+from scenelang.syntax import mistakes
+from scenelang.syntax.automaton import fits, statement_depth
+from scenelang.syntax.lexer import UNIT_ALIASES, UNITS
+from scenelang.syntax.repairs import Search
+from scenelang.syntax.tables import END, tables
+from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
+
+_HEADS = ("let", "fn", "module", "param", "import", "for", "if", "group", "chain", "material", "union")
+
+
 class Recovery:
+    """Recovery for one file.
+
+    Args:
+        tokens: the tokens; they are edited.
+        report: takes the mistakes.
+    """
+
     def __init__(self, tokens: Tokens, report: Report) -> None:
-        self.tokens=tokens; self.report=report
+        self.tokens = tokens
+        self.report = report
+        self.repairs = 0
+        self.literals = tables().literals
+        self.heads = {self.literals[word] for word in _HEADS}
+
     def resume(self, states: list[int], values: list[Any], at: int) -> int | None:
-        self.report.add("E0101","unexpected text",self.tokens.starts[at],self.tokens.ends[at])
+        """Mend what does not fit at a token.
+
+        Args:
+            states, values: the parser's stacks; cut back where the statement is read again.
+            at: index of the token.
+
+        Returns:
+            The index to go on at, or None where there are too many mistakes.
+        """
+        self.repairs += 1
+        if self.report.full or self.repairs > 4 * MAX_MISTAKES:
+            return None
+        depth = statement_depth(states)
+        first = self._index(values[depth]) if depth < len(values) else at
+        known = self._head_mistake(states, first, at) if first < at else self._start_mistake(at)
+        if known or self._spaced_unit(at):
+            return at
+        search = Search(self.tokens, first, at)
+        repair = search.run(states[: depth + 1], states)
+        if repair is None:
+            del states[depth + 1 :], values[depth:]
+            return self._skip(states, first, at)
+        mistakes.report_repair(self.tokens, self.report, repair, search.open_brackets(repair.at))
+        self.tokens.replace(repair.at, repair.delete, repair.insert)
+        if repair.at == at:
+            return at
+        del states[depth + 1 :], values[depth:]
+        return first
+
+    def _index(self, value: Any) -> int:
+        """Index of the first token of something on the value stack."""
+        if isinstance(value, int):
+            return value
+        span: Span = value[1] if isinstance(value, tuple) else value.span
+        return bisect_left(self.tokens.starts, span.start)
+
+    def _is(self, index: int, *texts: str) -> bool:
+        return any(self.tokens.kinds[index] == self.literals[text] for text in texts)
+
+    def _insert(self, index: int, name: str) -> None:
+        self.tokens.replace(index, 0, [tables().kind(name)])
+
+    # ------------------------------------------------------------ well known mistakes
+
+    def _start_mistake(self, at: int) -> bool:
+        """A token that no statement begins with."""
+        tokens = self.tokens
+        start, end = tokens.starts[at], tokens.ends[at]
+        if self._is(at, ";"):
+            fix = Fix("remove it", (Edit(Span(tokens.source, start, end), ""),))
+            self.report.add("W0101", "stray `;`", start, end, help="no `;` follows a block", fix=fix)
+            tokens.replace(at, 1, [])
+            return True
+        if self._is(at, "{"):
+            self._headless(at)
+            self._insert(at, "BAD_HEAD")
+            return True
+        if self._is(at, "else"):
+            self.report.add("E0101", "`else` without `if`", start, end)
+            tokens.replace(at, 1, [] if self._is(at + 1, "if") else [tables().kind("BAD_HEAD")])
+            if not self._is(at, "if") and not self._is(at + 1, "{"):
+                tokens.replace(at, 1, [])
+            return True
+        return False
+
+    def _headless(self, at: int) -> None:
+        tokens = self.tokens
+        before = at - 1
+        if at and self._is(before, ";") and not tokens.on_new_line(at):
+            start, end = tokens.starts[before], tokens.ends[before]
+            fix = Fix("remove it", (Edit(Span(tokens.source, start, end), ""),))
+            self.report.add("E0130", "`;` between a statement and its block", start, end, fix=fix)
+            return
+        help = "a block belongs to a geometry, a module, `group`, `material`, `for`, `if` or a boolean word"
+        self.report.add("E0129", "block without a head", tokens.starts[at], tokens.ends[at], help=help)
+
+    def _head_mistake(self, states: list[int], first: int, at: int) -> bool:
+        """`for` and `if` without parentheses or braces."""
+        if self._is(at - 1, "for", "if") and not self._is(at, "("):
+            brace = self._next_brace(at)
+            if brace is None:
+                return False
+            mistakes.report_wrapping(self.tokens, self.report, "E0107", at, brace, "()")
+            self._insert(brace, ")")
+            self._insert(at, "(")
+            return True
+        wants_block = fits(states, self.literals["{"]) and not fits(states, self.literals[";"])
+        if not wants_block or not self._is(at - 1, ")", "else"):
+            return False
+        if not self._is(first, "for", "if", "module") or self._is(at, ";", "}", ")") or self._at_end(at):
+            return False
+        stop = self._end_of_statement(at)
+        mistakes.report_wrapping(self.tokens, self.report, "E0106", at, stop, "{}")
+        self._insert(stop, "}")
+        self._insert(at, "{")
+        return True
+
+    def _at_end(self, at: int) -> bool:
+        return self.tokens.kinds[at] == END
+
+    def _next_brace(self, at: int) -> int | None:
+        """Index of the `{` that follows in this statement, None where a `)` or `;` comes first."""
+        depth = 0
+        for index in range(at, len(self.tokens.kinds) - 1):
+            if self._is(index, "{"):
+                return index if depth == 0 else None
+            if self._is(index, ";", "}"):
+                return None
+            depth += self._is(index, "(", "[") - self._is(index, ")", "]")
+            if depth < 0:
+                return None
         return None
+
+    def _end_of_statement(self, at: int) -> int:
+        """Index after the statement that begins at a token: after its `;` or its block."""
+        depth = 0
+        for index in range(at, len(self.tokens.kinds) - 1):
+            if self._is(index, "}"):
+                if depth == 0:
+                    return index
+                depth -= 1
+                if depth == 0:
+                    return index + 1
+            elif self._is(index, "{"):
+                depth += 1
+            elif depth == 0 and self._is(index, ";"):
+                return index + 1
+        return len(self.tokens.kinds) - 1
+
+    def _spaced_unit(self, at: int) -> bool:
+        """`30 deg`: mend the number, drop the unit."""
+        tokens = self.tokens
+        kind = tables().kind
+        if not at or tokens.kinds[at] != kind("NAME") or tokens.kinds[at - 1] != kind("NUMBER"):
+            return False
+        word, gap = tokens.text(at), tokens.source.text[tokens.ends[at - 1] : tokens.starts[at]]
+        if word not in (*UNITS, *UNIT_ALIASES) or gap.strip(" ") or not tokens.text(at - 1)[-1:].isdigit():
+            return False
+        unit = UNIT_ALIASES.get(word, word)
+        start, end = tokens.starts[at - 1], tokens.ends[at]
+        fix = Fix(f"write `{unit}` right after the number", (
+            Edit(Span(tokens.source, tokens.ends[at - 1], end), unit),
+        ))
+        self.report.add(
+            "E0117", "space between a number and its unit", start, end, help="units are glued to their number", fix=fix
+        )
+        if word in UNITS:
+            tokens.ends[at - 1] = end
+        else:
+            tokens.reported.add(start)
+        tokens.replace(at, 1, [])
+        return True
+
+    # ------------------------------------------------------------ skipping
+
+    def _skip(self, states: list[int], first: int, at: int) -> int | None:
+        """Give the statement up: one `BadStmt` up to its `;`, its block, or the end of the block around."""
+        tokens = self.tokens
+        mistakes.report_unexpected(tokens, self.report, states, at)
+        stop = at
+        while not self._at_end(stop) and not self._is(stop, "}", "{"):
+            if self._is(stop, ";"):
+                stop += 1
+                break
+            if stop > at and tokens.kinds[stop] in self.heads and tokens.on_new_line(stop):
+                break
+            stop += 1
+        if stop == first:
+            return None
+        start, end = tokens.starts[first], tokens.ends[stop - 1]
+        headed = self._is(stop, "{") and not self._is(stop - 1, ";")
+        tokens.replace(first, stop - first, [tables().kind("BAD_HEAD" if headed else "BAD_STATEMENT")])
+        tokens.starts[first], tokens.ends[first] = start, end
+        return first

@@ -1,0 +1,119 @@
+"""Where the layout says that braces are amiss: a shortest path over the lines of a text.
+
+The state is how far the depth meant is from the depth written. It begins at 0, may change from line to
+line at the price of a slip, and has to make the depth 0 at the end; a line whose indentation does not agree
+with its depth costs 1. The cheapest path is the fewest slips that explain the layout.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from scenelang.syntax.tables import tables
+from scenelang.syntax.tokens import Tokens
+
+_SLIP = 2.5  # a slip costs as much as so many lines at the wrong depth
+_WIDEST = 12  # further off than this is not searched
+_NEVER = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """Between the tokens ``first`` and ``stop`` the depth meant goes ``shift`` away from the one written."""
+
+    first: int
+    stop: int
+    shift: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """A line that begins with a statement or a closing brace."""
+
+    first: int  # index of its first token
+    indent: int
+    depth: int  # by the braces as written
+
+
+def find_slips(tokens: Tokens) -> list[Slip]:
+    """The slips that explain best why braces do not match; none where there are too many."""
+    lines = _lines(tokens)
+    wanted = -lines[-1].depth
+    if abs(wanted) > _WIDEST or min(line.depth for line in lines) < -_WIDEST:
+        return []
+    came_from = _cheapest(lines, wanted)
+    state = wanted + _WIDEST
+    slips = []
+    for number in range(len(lines) - 1, 0, -1):
+        source = came_from[number][state]
+        if source != state:
+            slips.append(Slip(lines[number - 1].first, lines[number].first, state - source))
+        state = source
+    return slips[::-1]
+
+
+def _lines(tokens: Tokens) -> list[_Line]:
+    """The lines whose indentation says how deep they are, and the end of the text."""
+    literals = tables().literals
+    opening, closing, semicolon = literals["{"], literals["}"], literals[";"]
+    starters = {kind for text, kind in literals.items() if text.isalpha()} | {tables().kind("NAME")}
+    lines = []
+    depth = brackets = 0
+    previous = semicolon
+    for at, kind in enumerate(tokens.kinds[:-1]):
+        statement = previous in (semicolon, opening, closing) or kind == closing
+        if (statement or (kind in starters and brackets == 0)) and tokens.on_new_line(at):
+            lines.append(_Line(at, _indent(tokens, at), depth - (kind == closing)))
+        depth += (kind == opening) - (kind == closing)
+        if kind in (opening, closing, semicolon):
+            brackets = 0
+        brackets += (kind in (literals["("], literals["["])) - (kind in (literals[")"], literals["]"]))
+        previous = kind
+    lines.append(_Line(len(tokens.kinds) - 1, 0, depth))
+    return lines
+
+
+def _indent(tokens: Tokens, at: int) -> int:
+    text, start = tokens.source.text, tokens.starts[at]
+    return len(text[text.rfind("\n", 0, start) + 1 : start].expandtabs(8))
+
+
+def _unit(lines: list[_Line]) -> int:
+    """How much deeper one level stands; 0 where the text is not indented."""
+    pairs = zip(lines, lines[1:], strict=False)
+    steps = Counter(line.indent - before.indent for before, line in pairs if line.indent > before.indent)
+    return steps.most_common(1)[0][0] if steps else 0
+
+
+def _cheapest(lines: list[_Line], wanted: int) -> list[list[int]]:
+    """For each line and state the state before it on the cheapest path."""
+    unit = _unit(lines)
+    offsets = range(-_WIDEST, _WIDEST + 1)
+    costs = [0.0 if offset == 0 else _NEVER for offset in offsets]
+    came_from = [list(range(len(offsets)))]
+    for number, line in enumerate(lines):
+        if number:
+            sources, costs = _step(costs)
+            came_from.append(sources)
+        last = number == len(lines) - 1
+        for state, offset in enumerate(offsets):
+            depth = line.depth + offset
+            if depth < 0 or (last and offset != wanted):
+                costs[state] += _NEVER
+            elif not last and unit * depth != line.indent:
+                costs[state] += 1
+    return came_from
+
+
+def _step(costs: list[float]) -> tuple[list[int], list[float]]:
+    """For each state the cheapest one before it, and the cost; staying wins a tie, so slips come late."""
+    count = len(costs)
+    source = list(range(count))
+    best = costs.copy()
+    for states, step in ((range(1, count), -1), (range(count - 2, -1, -1), 1)):
+        for state in states:
+            if best[state + step] + _SLIP < best[state]:
+                best[state] = best[state + step] + _SLIP
+                source[state] = source[state + step]
+    return source, best

@@ -1,0 +1,164 @@
+"""Repairs in words: the diagnostic for each kind of mistake that recovery finds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from scenelang.diagnostics.diagnostic import Edit, Fix, Label
+from scenelang.diagnostics.span import Span
+from scenelang.syntax.automaton import fits
+from scenelang.syntax.repairs import Repair
+from scenelang.syntax.tables import END, tables
+from scenelang.syntax.tokens import Report, Tokens
+
+_KEYWORD_HELP = "choose another name"
+
+
+def report_repair(tokens: Tokens, report: Report, repair: Repair, open_brackets: Sequence[int]) -> None:
+    """Report the mistake that a repair mends.
+
+    Args:
+        tokens: the tokens before the repair.
+        report: takes the diagnostic.
+        repair: what is going to be done.
+        open_brackets: indices of the brackets open before it.
+    """
+    touched = range(repair.at, repair.end)
+    if any(tokens.starts[index] in tokens.reported for index in touched):
+        return  # a slip that has been reported already
+    names = [tables().kinds[kind] for kind in repair.insert]
+    if not repair.delete:
+        _report_insertion(tokens, report, repair.at, names, open_brackets)
+    elif not names:
+        _report_deletion(tokens, report, repair)
+    else:
+        _report_replacement(tokens, report, repair, names)
+
+
+def report_wrapping(tokens: Tokens, report: Report, code: str, first: int, stop: int, pair: str) -> None:
+    """Report parentheses or braces that are missing around the tokens ``[first, stop)``."""
+    start, end = tokens.starts[first], tokens.ends[stop - 1]
+    opening, closing = (pair[0], pair[1]) if pair == "()" else ("{ ", " }")
+    edits = (Edit(_empty(tokens, start), opening), Edit(_empty(tokens, end), closing))
+    what = "parentheses" if pair == "()" else "braces"
+    at = tokens.starts[first] if not tokens.on_new_line(first) else tokens.end_before(first)
+    report.add(
+        code,
+        f"missing {what}",
+        at,
+        max(at, end if pair == "()" else at),
+        help=f"{what} are mandatory here",
+        fix=Fix(f"put {what} around it", edits),
+    )
+
+
+def report_unexpected(tokens: Tokens, report: Report, states: list[int], at: int) -> None:
+    """Report a token that nothing could make sense of."""
+    if tokens.starts[at] in tokens.reported:
+        return
+    start, end = tokens.starts[at], tokens.ends[at]
+    if tokens.kinds[at] == END:
+        start = end = tokens.end_before(at)
+    report.add("E0122", f"this is no statement: unexpected {_shown(tokens, at)}", start, end)
+
+
+def _report_insertion(
+    tokens: Tokens, report: Report, at: int, names: list[str], open_brackets: Sequence[int]
+) -> None:
+    end = tokens.end_before(at)
+    found = _shown(tokens, at)
+    first = names[0]
+    # An operand is missed where the next token stands, anything else where the last one ended.
+    place = (end, end) if tokens.on_new_line(at) or tokens.kinds[at] == END else (tokens.starts[at], tokens.ends[at])
+    if first in (")", "]"):
+        text = "".join(names)
+        labels = [Label(tokens_span(tokens, open_brackets[-1]), "opened here")]
+        report.add("E0103", f"missing `{text}`", end, end, labels=labels, fix=_insert(tokens, end, text))
+    elif first == ";":
+        help = "a `;` ends every statement without a block"
+        report.add("E0102", "missing `;`", end, end, help=help, fix=_insert(tokens, end, ";"))
+    elif names == ["BAD_EXPRESSION"]:
+        report.add("E0108", f"expected an expression, found {found}", *place)
+    elif names == ["NAME"]:
+        report.add("E0109", f"expected a name, found {found}", *place)
+    elif names == ["STRING"]:
+        report.add("E0126", f"expected a string, found {found}", *place)
+    elif names == ["{", "}"]:
+        report.add("E0106", "missing block", end, end, help="braces are mandatory here, even around nothing")
+    elif first == "(":
+        text = "".join(names)
+        report.add("E0107", f"missing `{text}`", end, end, fix=_insert(tokens, end, text))
+    elif first == ",":
+        literal = all(_is_literal(tokens, index) for index in (at - 1, at))
+        message = "missing `,`" if literal else f"missing `,` or operator before {found}"
+        report.add("E0112", message, end, end, fix=_insert(tokens, end, ",") if literal else None)
+    elif first == "*":
+        report.add("E0112", f"missing operator before {found}", end, end)
+    elif names[1:]:
+        what = "a name" if names[1] == "NAME" else "a value"
+        report.add("E0126", f"missing `{first}` and {what}", end, end)
+    else:
+        safe = first in ("=", "in", "as")
+        fix = _insert(tokens, end, f" {first}") if safe else None
+        start = end if not tokens.on_new_line(at) else tokens.starts[at]
+        report.add("E0126", f"missing `{first}` before {found}", start, start, fix=fix)
+
+
+def _report_deletion(tokens: Tokens, report: Report, repair: Repair) -> None:
+    start, end = tokens.starts[repair.at], tokens.ends[repair.end - 1]
+    text = tokens.source.text[start:end]
+    if text in (")", "]"):
+        report.add("E0105", f"unmatched `{text}`", start, end, fix=_change("remove it", tokens, start, end, ""))
+    else:
+        report.add("E0101", f"unexpected {_quoted(text)}", start, end)
+
+
+def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
+    start, end = tokens.starts[repair.at], tokens.ends[repair.end - 1]
+    text = tokens.source.text[start:end]
+    new = "".join(names)
+    fix = _change(f"write `{new}`", tokens, start, end, new)
+    if repair.delete == 2:
+        first, second = tokens.text(repair.at), tokens.text(repair.at + 1)
+        report.add("E0131", f"`{first}` and `{second}` are in the wrong order", start, end)
+    elif new == "NAME":
+        report.add("E0110", f"`{text}` is a keyword, not a name", start, end, help=_KEYWORD_HELP)
+    elif new == "==":
+        report.add("E0111", "`=` does not compare", start, end, help="equality is `==`", fix=fix)
+    elif new == "{}":
+        report.add("E0106", f"missing block, found `{text}`", start, end)
+    elif text in (")", "]"):
+        report.add("E0105", f"`{text}` where `{new}` belongs", start, end, fix=fix)
+    elif text.isalpha():
+        report.add("E0127", f"`{text}` is not used here", start, end, help=f"`{new}` is the sign for it", fix=fix)
+    else:
+        report.add("E0130", f"`{text}` where `{new}` belongs", start, end, fix=fix)
+
+
+def _is_literal(tokens: Tokens, index: int) -> bool:
+    return tables().kinds[tokens.kinds[index]] in ("NUMBER", "COLOR", "STRING")
+
+
+def _shown(tokens: Tokens, at: int) -> str:
+    return "the end of the file" if tokens.kinds[at] == END else _quoted(tokens.text(at))
+
+
+def _quoted(text: str) -> str:
+    text = " ".join(text.split())
+    return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}…`"
+
+
+def tokens_span(tokens: Tokens, index: int) -> Span:
+    return Span(tokens.source, tokens.starts[index], tokens.ends[index])
+
+
+def _empty(tokens: Tokens, at: int) -> Span:
+    return Span(tokens.source, at, at)
+
+
+def _insert(tokens: Tokens, at: int, text: str) -> Fix:
+    return Fix(f"insert `{text.strip()}`", (Edit(_empty(tokens, at), text),))
+
+
+def _change(message: str, tokens: Tokens, start: int, end: int, text: str) -> Fix:
+    return Fix(message, (Edit(Span(tokens.source, start, end), text),))

@@ -1,0 +1,247 @@
+"""Which small edits of the tokens are tried at a mistake, what each costs, and the search for the best.
+
+A repair is worth how far parsing goes on after it, less what it costs; costs say which mistakes people
+make. Only repairs after which at least three tokens or a whole statement fit are taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+
+from scenelang.syntax.automaton import LOOKAHEAD, advance, fits, reach
+from scenelang.syntax.tables import END, tables
+from scenelang.syntax.tokens import Tokens
+
+Kinds = tuple[int, ...]
+
+WINDOW = 24
+"""How many tokens before the mistake the cause is looked for."""
+
+MAX_REPLAY = 400
+"""A statement with more tokens before the mistake is not tried again from its start."""
+
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """Put ``insert`` in the place of ``delete`` tokens at index ``at``."""
+
+    at: int
+    delete: int
+    insert: tuple[int, ...]
+    cost: float
+
+    @property
+    def end(self) -> int:
+        return self.at + self.delete
+
+
+# What is forgotten, and what that costs. Several tokens that only make sense together count as one.
+_INSERTIONS = {
+    ";": 1.3,
+    ",": 1.2,
+    "=": 1.3,
+    "in": 1.4,
+    "as": 1.4,
+    ":": 1.5,
+    "..": 2.0,
+    "(": 1.6,
+    "( )": 1.6,
+    "{ }": 1.9,
+    "let": 1.4,
+    "param": 1.5,
+    "fn": 1.5,
+    "for": 1.5,
+    "if": 1.5,
+    "nsg": 1.6,
+    "model": 1.7,
+    "import": 1.6,
+    "BAD_EXPRESSION": 1.6,
+    "NAME": 1.7,
+    "STRING": 1.8,
+    "*": 2.2,
+    "= BAD_EXPRESSION": 1.9,
+    "in BAD_EXPRESSION": 1.9,
+    "as NAME": 1.9,
+    ": BAD_EXPRESSION": 1.9,
+}
+_ONLY_BEFORE = {
+    "let": "NAME",
+    "param": "NAME",
+    "fn": "NAME",
+    "for": "(",
+    "if": "(",
+    "nsg": "NUMBER",
+    "model": "STRING",
+    "import": "STRING",
+}
+_ONLY_AFTER = {"as": "STRING", "as NAME": "STRING"}
+_REPLACEMENTS = {
+    "=": {"==": 1.0},
+    "==": {"=": 1.2},
+    ":": {"=": 1.2, ";": 1.2, "..": 1.4, ",": 1.4},
+    ";": {",": 1.2, ":": 1.5, "{ }": 1.8},
+    ",": {";": 1.2, "=": 1.6},
+    ".": {",": 1.5, ";": 1.5},
+    ")": {"]": 1.1},
+    "]": {")": 1.1},
+    "(": {"[": 1.3},
+    "[": {"(": 1.3},
+}
+_WORDS = {"and": "&&", "or": "||", "not": "!", "mod": "%"}
+_DELETION, _FURTHER_DELETION = 1.5, 0.6
+_SWAP = 1.7
+_KEYWORD_AS_NAME = 1.1
+_NEW_LINE = 0.6  # a token that begins a line is seldom the slip
+_CLOSING, _CLOSING_AND_SEMICOLON = 1.1, 1.8
+
+
+@cache
+def _insertions() -> list[tuple[Kinds, float, int, int]]:
+    """What may be forgotten, in kinds: the tokens, the cost, what has to stand after and before, or -1."""
+    kind = tables().kind
+    return [
+        (
+            tuple(map(kind, names.split())),
+            cost,
+            kind(_ONLY_BEFORE[names]) if names in _ONLY_BEFORE else -1,
+            kind(_ONLY_AFTER[names]) if names in _ONLY_AFTER else -1,
+        )
+        for names, cost in _INSERTIONS.items()
+    ]
+
+
+@cache
+def _replacements() -> dict[int, list[tuple[Kinds, float]]]:
+    """What may be written for something else, in kinds."""
+    kind = tables().kind
+    return {
+        kind(name): [(tuple(map(kind, names.split())), cost) for names, cost in costs.items()]
+        for name, costs in _REPLACEMENTS.items()
+    }
+
+
+def word_for(text: str) -> str | None:
+    """The operator that other languages write as this word."""
+    return _WORDS.get(text)
+
+
+class Search:
+    """Looks for the best repair of one mistake.
+
+    Args:
+        tokens: all tokens.
+        first: index of the first token of the statement that the mistake is in.
+        at: index of the token that did not fit.
+    """
+
+    def __init__(self, tokens: Tokens, first: int, at: int) -> None:
+        self.tokens = tokens
+        self.kinds = tokens.kinds
+        self.first = first
+        self.at = at
+        literals = tables().literals
+        self.closing_of = {literals["("]: literals[")"], literals["["]: literals["]"]}
+        self.closings = set(self.closing_of.values())
+        self.fixed = {END, literals["{"], literals["}"]}  # braces were matched before
+        self.ends = {literals[";"], literals["}"], END}
+        self.semicolon = literals[";"]
+        self.name = tables().kind("NAME")
+        self.keywords = {kind for text, kind in literals.items() if text.isalpha()}
+        self.best: Repair | None = None
+        self.score = 0.0
+
+    def run(self, base: list[int], stack: list[int]) -> Repair | None:
+        """The best repair, or None where none helps.
+
+        Args:
+            base: the states before the statement.
+            stack: the states at the mistake.
+        """
+        self._try_all(stack, self.at)
+        if self.best is not None and self.score >= LOOKAHEAD - 2:
+            return self.best
+        if self.at - self.first > MAX_REPLAY:
+            return self.best
+        prefix = base.copy()
+        for at in range(self.first, self.at):
+            if at >= self.at - WINDOW:
+                self._try_all(prefix, at)
+            if not advance(prefix, self.kinds[at]):
+                break
+        return self.best
+
+    def _try_all(self, stack: list[int], at: int) -> None:
+        distance = self.at - at
+        extra = 0.1 + 0.1 * distance if distance else 0.0
+        for repair in self._candidates(stack, at):
+            score = LOOKAHEAD - repair.cost - extra
+            if self.best is not None and score <= self.score:
+                continue
+            trial = stack.copy()
+            if not all(advance(trial, kind) for kind in repair.insert):
+                continue
+            start = max(self.at, repair.end)
+            stop = reach(trial, self.kinds, repair.end, start + LOOKAHEAD)
+            if stop < start + 3 and not any(kind in self.ends for kind in self.kinds[start:stop]):
+                continue
+            score -= LOOKAHEAD - min(stop - self.at, LOOKAHEAD)
+            if self.best is None or score > self.score:
+                self.best, self.score = repair, score
+
+    def _candidates(self, stack: list[int], at: int) -> Iterator[Repair]:
+        tokens, kinds = self.tokens, self.kinds
+        kind = kinds[at]
+        new_line = tokens.on_new_line(at)
+        yield from self._closings(at)
+        before = kinds[at - 1] if at else END
+        for insert, cost, needed_after, needed_before in _insertions():
+            if needed_after not in (-1, kind) or needed_before not in (-1, before):
+                continue
+            if insert[0] == self.semicolon and (new_line or kind in self.ends):
+                cost = 1.0
+            elif new_line and insert[0] not in self.ends:
+                cost += _NEW_LINE / 2
+            if fits(stack, insert[0]):
+                yield Repair(at, 0, insert, cost)
+        if kind in self.fixed:
+            return
+        for insert, cost in _replacements().get(kind, ()):
+            yield Repair(at, 1, insert, cost)
+        if kind in self.keywords:
+            yield Repair(at, 1, (self.name,), _KEYWORD_AS_NAME)
+        elif kind == self.name and (operator := word_for(tokens.text(at))):
+            yield Repair(at, 1, (tables().literals[operator],), 1.0)
+        if kinds[at + 1] not in self.fixed:
+            yield Repair(at, 2, (kinds[at + 1], kind), _SWAP)
+        cost = _DELETION
+        for count in range(1, 4):
+            if kinds[at + count - 1] in self.fixed:
+                return
+            if tokens.on_new_line(at + count - 1):
+                cost += _NEW_LINE
+            yield Repair(at, count, (), cost)
+            cost += _FURTHER_DELETION
+
+    def _closings(self, at: int) -> Iterator[Repair]:
+        """Close one bracket, or all that are open, perhaps ending the statement too."""
+        open_ = self.open_brackets(at)
+        if not open_:
+            return
+        closings = tuple(self.closing_of[self.kinds[index]] for index in reversed(open_))
+        yield Repair(at, 0, closings[:1], _CLOSING)
+        if len(closings) > 1:
+            yield Repair(at, 0, closings, _CLOSING + 0.1 * len(closings))
+        yield Repair(at, 0, (*closings, self.semicolon), _CLOSING_AND_SEMICOLON)
+
+    def open_brackets(self, at: int) -> list[int]:
+        """Indices of the brackets of the statement that are open before a token."""
+        open_: list[int] = []
+        for index in range(self.first, at):
+            kind = self.kinds[index]
+            if kind in self.closing_of:
+                open_.append(index)
+            elif kind in self.closings and open_:
+                open_.pop()
+        return open_
