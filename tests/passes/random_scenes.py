@@ -1,0 +1,79 @@
+"""Random Scene trees for property tests."""
+
+from __future__ import annotations
+
+import random
+
+from scenelang.scene import schema
+
+GEOMETRIES = ("square", "triangle", "star", "pentagon")
+
+
+def random_transform(rng: random.Random, warps: bool, room: float = 1.0) -> schema.Transform:
+    """Any transform that a 2D model has, mild enough to stay invertible."""
+    kind = rng.choice(["translate", "rotate", "scale", "uniform", "shear", "flip"] + ["warp"] * 2 * warps)
+    if kind == "translate":
+        return schema.Translate(x=rng.uniform(-room, room), y=rng.uniform(-room, room))
+    if kind == "rotate":
+        return schema.Rotate(angle=rng.uniform(-4, 4), axis=(0.0, 0.0, rng.choice([1.0, -2.0])))
+    if kind == "scale":
+        return schema.Scale(x=rng.uniform(0.4, 1.3), y=rng.uniform(0.4, 1.3), z=rng.uniform(-1, 1))
+    if kind == "uniform":
+        s = rng.uniform(0.5, 1.2)
+        return schema.Scale(x=s, y=s, z=s)
+    if kind == "shear":
+        return schema.Shear(axes=rng.choice(["xy", "yx"]), k=rng.uniform(-0.6, 0.6))
+    if kind == "flip":
+        return schema.Scale(x=-1.0, y=1.0, z=1.0)
+    k = rng.uniform(-1.2, 1.2)
+    return schema.Twirl(k=k) if rng.random() < 0.5 else schema.Bend(k=k)
+
+
+def random_material(rng: random.Random) -> schema.Material | None:
+    """A colour, or none."""
+    if rng.random() < 0.2:
+        return None
+    rgb = (rng.random(), rng.random(), rng.random())
+    return schema.Material(name="flat", ops=(schema.Color(rgb=rgb),))
+
+
+def random_leaf(rng: random.Random, warps: bool, spread: float = 1.0) -> schema.Object:
+    """A leaf with a few transforms, usually small enough for others to miss it."""
+    moves = [random_transform(rng, warps, 0.3) for _ in range(rng.randrange(3))]
+    s = rng.choice([0.05, 0.15, 0.3, 0.5])
+    moves.append(schema.Scale(x=s, y=s, z=1.0))
+    moves.append(schema.Translate(x=rng.uniform(-spread, spread), y=rng.uniform(-spread, spread)))
+    if warps and rng.random() < 0.15:
+        moves.append(random_transform(rng, True, 0.2))
+    return schema.Object(
+        geometry=rng.choice(GEOMETRIES), transforms=tuple(moves), material=random_material(rng)
+    )
+
+
+def random_node(rng: random.Random, depth: int, warps: bool, spread: float = 1.0) -> schema.SceneNode:
+    """A leaf, or a group, chain or boolean of up to three, some of them empty."""
+    if depth == 0 or rng.random() < 0.3:
+        return random_leaf(rng, warps, spread)
+    count = rng.choice([0, 1, 2, 2, 2, 3])
+    near = spread if rng.random() < 0.5 else 0.3 * spread
+    children = tuple(random_node(rng, depth - 1, warps, near) for _ in range(count))
+    moves = tuple(random_transform(rng, warps, 0.4) for _ in range(rng.choice([0, 0, 1, 2])))
+    if near < spread:
+        moves = (*moves, schema.Translate(x=rng.uniform(-1, 1), y=rng.uniform(-1, 1)))
+    kind = rng.choice(["group", "chain", "union", "union", "smooth", "subtract", "subtract", "intersect"])
+    material = random_material(rng) if rng.random() < 0.2 else None
+    if kind == "group":
+        return schema.Group(children=children, transforms=moves, material=material)
+    if kind == "chain":
+        ops = ["union"] + [rng.choice(["union", "union", "smooth", "subtract", "intersect"]) for _ in children[1:]]
+        links = tuple(schema.Link(op=op, node=child) for op, child in zip(ops, children, strict=False))
+        return schema.Chain(children=links, transforms=moves, material=material)
+    return schema.Boolean(op=kind, children=children, transforms=moves, material=material)
+
+
+def random_scene(seed: int, warps: bool = True) -> schema.Scene:
+    """A scene of one to three trees, on canvases of several shapes."""
+    rng = random.Random(seed)
+    canvas = rng.choice([(256, 256), (320, 192), (64, 200)])
+    nodes = tuple(random_node(rng, rng.choice([1, 2, 3]), warps) for _ in range(rng.choice([1, 1, 2, 3])))
+    return schema.Scene(nodes=nodes, canvas=canvas)
