@@ -34,6 +34,11 @@ class ObjectFrame:
     scale: float
     stretch: float
 
+    @property
+    def growth(self) -> float:
+        """How many leaf units a point moves at most as it moves by a world unit."""
+        return self.stretch / self.scale
+
 
 def read_frame(g: np.ndarray) -> ObjectFrame:
     """The frame of one geometry vector (32,)."""

@@ -13,8 +13,8 @@ import torch
 from torch import Tensor
 
 from scenelang.lifting import exact
-from scenelang.renderers.frames import BLEND_REACH, ObjectFrame, local_points, read_frame
 from scenelang.renderers.framed import EMPTY, RADIUS, SHARPEN, Framed
+from scenelang.renderers.frames import BLEND_REACH, ObjectFrame, local_points, read_frame
 
 UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
 CHUNK = 4096  # points that go through the network at once; their activations stay in the L2 cache
@@ -120,8 +120,8 @@ class Stream:
         return rows
 
     @torch.no_grad()
-    def shade(self, x: Tensor, y: Tensor) -> Shade:
-        """Draw at world points x, y (M,)."""
+    def shade(self, x: Tensor, y: Tensor, pad: float = 0.0) -> Shade:
+        """Draw at world points x, y (M,), with objects that come within ``pad`` world units of them."""
         count = x.numel()
         s = self.network.config.state
         state = torch.zeros(s, count, device=x.device)  # (S, M)
@@ -133,7 +133,8 @@ class Stream:
         for row in self.rows:
             qx, qy = local_points(row.frame, x, y)
             radius = torch.hypot(qx, qy)
-            hit = radius <= row.reach if row.reach != float("inf") else None
+            reach = row.reach + pad * row.frame.growth
+            hit = radius <= reach if reach != float("inf") else None
             if hit is None:
                 # what nothing was drawn on stays empty whatever follows, unless skipping is off
                 index = (

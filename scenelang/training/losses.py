@@ -9,7 +9,6 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 from scenelang.renderers.framed import Framed
 from scenelang.training.scenes import Batch
 
-
 SLOPE = 0.5  # weight of the distance prior
 
 

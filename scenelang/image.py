@@ -1,0 +1,90 @@
+"""Pictures as arrays that know how to save and show themselves."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import PIL.Image
+
+
+class Image(np.ndarray[Any, np.dtype[np.float32]]):
+    """A float32 array (H, W, 3), or (H, W, 4) with straight alpha; sRGB-encoded values in [0, 1].
+
+    Row 0 is the top. Notebooks show it as a PNG.
+    """
+
+    def to_uint8(self) -> npt.NDArray[np.uint8]:
+        """8-bit values, floor(255 v + 1/2)."""
+        return np.floor(np.clip(np.asarray(self), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+
+    def to_pil(self) -> PIL.Image.Image:
+        """A Pillow image, RGB or RGBA."""
+        from PIL import Image as pillow
+
+        return pillow.fromarray(self.to_uint8())
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a file whose format its suffix names, whole or not at all.
+
+        Formats without alpha (JPEG) get the picture over white.
+
+        Raises:
+            ValueError: Pillow knows no format of that suffix.
+            OSError: the file cannot be written.
+        """
+        from PIL import Image as pillow
+
+        target = Path(path)
+        pillow.init()
+        kind = pillow.EXTENSION.get(target.suffix.lower())
+        if kind is None or kind not in pillow.SAVE:
+            raise ValueError(f"no image format has the suffix '{target.suffix}'")
+        image = self.to_pil()
+        data = io.BytesIO()
+        try:
+            image.save(data, kind)
+        except OSError:
+            white = pillow.new("RGBA", image.size, "white")
+            data = io.BytesIO()
+            pillow.alpha_composite(white, image.convert("RGBA")).convert("RGB").save(data, kind)
+        write_whole(target, data.getvalue())
+
+    def _repr_png_(self) -> bytes | None:
+        if self.ndim != 3 or self.shape[2] not in (3, 4):
+            return None
+        data = io.BytesIO()
+        self.to_pil().save(data, "PNG")
+        return data.getvalue()
+
+
+def write_whole(target: Path, data: bytes) -> None:
+    """Write to a temporary file beside ``target``, then rename it: whole or not at all."""
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)
+        os.replace(name, target)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(name)
+        raise
+
+
+def from_samples(colour: npt.NDArray[Any], alpha: npt.NDArray[Any] | None) -> Image:
+    """An image of colours (H, W, 3); with coverage (H, W), colours are premultiplied and are divided by it."""
+    if alpha is None:
+        return np.clip(colour, 0.0, 1.0).astype(np.float32).view(Image)
+    straight = colour / np.maximum(alpha, 1e-6)[..., None]
+    return np.clip(np.concatenate([straight, alpha[..., None]], 2), 0.0, 1.0).astype(np.float32).view(Image)
