@@ -30,7 +30,7 @@ def _call(stmt: nodes.Call, place: Place) -> Action | None:
     binding = lookup(stmt.name, place.unit, place.scope)
     if binding is None:
         words = place.unit.session.vocabulary
-        if name in words.geometries():
+        if name in words.geometries:
             return prepare_object(stmt, place)
         _skim(stmt, place)
         _unknown(stmt, place)
@@ -73,7 +73,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
     owner = words.owner(name.text)
     if owner is not None and words.chosen is not None:
         message = f"geometry '{name.text}' belongs to model '{owner}', not '{words.chosen.name}'"
-        help = f"model '{words.chosen.name}' draws {listing(words.geometries())}"
+        help = f"model '{words.chosen.name}' draws {listing(words.geometries)}"
         session.error("E0205", message, name.span, help=help)
         return
     if name.text in FUNCTIONS:
@@ -82,8 +82,8 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
     hint, fix = did_you_mean(name.text, _candidates(stmt, place, scope), name.span)
-    if hint is None and place.kind in ("file", "group", "chain") and words.geometries():
-        hint = f"the model draws {listing(words.geometries())}"
+    if hint is None and place.kind in ("file", "group", "chain") and words.geometries:
+        hint = f"the model draws {listing(words.geometries)}"
     session.error("E0204", f"unknown {what} '{name.text}'", name.span, help=hint, fix=fix)
 
 
@@ -93,12 +93,12 @@ def _candidates(stmt: nodes.Call, place: Place, scope: Scope) -> set[str]:
     modules = {n for n, b in scope.visible() if b.kind == "module"}
     values = {n for n, b in scope.visible() if b.kind in VALUES}
     if place.kind == "material":
-        return words.material_ops()
+        return words.material_ops
     if place.kind == "object":
-        return words.transforms() if stmt.args is not None else {*values, "material"}
-    found = words.geometries() | modules
+        return words.transforms if stmt.args is not None else {*values, "material"}
+    found = words.geometries | modules
     if stmt.args is None and stmt.body is not None:
         found.update(NODE_WORDS)
     if stmt.args is not None and stmt.body is None:
-        found.update(words.transforms() if place.kind != "file" else SETTINGS)
+        found.update(words.transforms if place.kind != "file" else SETTINGS)
     return found

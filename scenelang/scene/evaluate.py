@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.models.manifest import Manifest
 from scenelang.scene import calls, params  # noqa: F401  (they register their statements)
@@ -156,7 +156,7 @@ def load_source(
     frame: int = 0,
 ) -> tuple[Scene | None, SpanMap]:
     """Parse and evaluate scene text; arguments as for `evaluate`."""
-    before = len(diagnostics.errors)
+    before, start = len(diagnostics.errors), len(diagnostics)
     file = parse(source, diagnostics)
     scene, spans = evaluate(
         file,
@@ -168,4 +168,17 @@ def load_source(
         path=path,
         frame=frame,
     )
+    diagnostics.items[start:] = in_file_order(diagnostics.items[start:])
     return (scene if len(diagnostics.errors) == before else None), spans
+
+
+def in_file_order(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Diagnostics by place, file by file as they were first met; those without a place come last."""
+    files: dict[str, int] = {}
+
+    def key(d: Diagnostic) -> tuple[int, int]:
+        if d.span is None:
+            return len(found), 0
+        return files.setdefault(d.span.source.name, len(files)), d.span.start
+
+    return sorted(found, key=key)

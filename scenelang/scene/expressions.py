@@ -22,6 +22,7 @@ class Varies:
 
 
 VARIES: Final = Varies()
+_FOLDED_NUMBERS: Final = 64
 
 
 class Code(NamedTuple):
@@ -72,6 +73,8 @@ def folded(unit: Unit, codes: list[Code], function: Callable[..., Any], run: Run
     values = [code.value for code in codes]
     if VARIES in values or POISON in values:
         return Code(run)
+    if any(value.__class__ is Vec and value.count > _FOLDED_NUMBERS for value in values):
+        return Code(run)  # work that counts as evaluation steps
     try:
         return constant(function(*values))
     except Problem:
@@ -89,7 +92,7 @@ def guarded(
             if value is POISON:
                 return POISON
             if value.__class__ is Vec:
-                session.tick(1 + value.count // 8, span)
+                session.tick(value.count, span)
         try:
             return function(*values)
         except Problem as problem:

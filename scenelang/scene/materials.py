@@ -53,7 +53,7 @@ def _prepare(
     """How to make the material node; None where the name is unknown."""
     operations = _operations(body, Place(unit, scope, "material")) if body else None
     session = unit.session
-    known = session.vocabulary.materials()
+    known = session.vocabulary.materials
     if known and name.text not in known:
         _unknown(name, unit, scope, known)
         return None

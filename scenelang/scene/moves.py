@@ -66,7 +66,7 @@ def _spec(stmt: nodes.Call, place: Place) -> Spec | None:
 def _offered(stmt: nodes.Call, place: Place) -> bool:
     """Whether the models in use have the operation; reports it if not."""
     name, words = stmt.name.text, place.unit.session.vocabulary
-    known = words.material_ops() if place.kind == "material" else words.transforms() | words.material_ops()
+    known = words.material_ops if place.kind == "material" else words.transforms | words.material_ops
     if name in known or not words.in_use:
         return True
     owner = words.owner(name)

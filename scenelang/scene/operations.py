@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from scenelang.scene import operators
-from scenelang.scene.expressions import Code, Run, folded, guarded, prepare, prepares
+from scenelang.scene.expressions import POISONED, Code, Run, folded, guarded, prepare, prepares
 from scenelang.scene.scope import Env, Scope
 from scenelang.scene.unit import Unit
 from scenelang.scene.values import POISON, Problem, describe
@@ -72,6 +72,8 @@ def _binary(expr: nodes.Binary, unit: Unit, scope: Scope) -> Code:
     if expr.op in ("&&", "||"):
         return _logic(expr, unit, scope)
     left, right = prepare(expr.left, unit, scope), prepare(expr.right, unit, scope)
+    if expr.op not in _FAST:
+        return POISONED  # recovery kept what was written, and reported it
     meaning = _meaning(expr.op)
     slow = guarded(unit, meaning, expr.op_span, (expr.left, expr.right))
     return folded(unit, [left, right], meaning, _join(left.run, right.run, expr.op, slow))

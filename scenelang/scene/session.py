@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import threading
 from collections.abc import Iterator
@@ -26,9 +27,9 @@ MAX_STEPS: Final = 10_000_000
 MAX_BYTES: Final = 10_000_000
 
 _STACK_FRAMES: Final = 200_000  # calls x nesting x frames per level, with room
-_stack_lock = threading.Lock()
-_stack_users = 0
-_stack_before = 0
+_lock = threading.Lock()
+_users = 0
+_before = (0, False)  # the interpreter's recursion limit, and whether it collected cycles
 
 
 class Halt(Exception):
@@ -46,23 +47,28 @@ UNBOUND: Final = Unbound()
 
 @contextmanager
 def deep_stack() -> Iterator[None]:
-    """Allow deep recursion of Python code, which costs no C stack from Python 3.11 on.
+    """Allow deep recursion of Python code, and stop looking for cycles meanwhile.
 
-    The interpreter's limit is one for all threads: the last user puts it back.
+    Such recursion costs no C stack from Python 3.11 on. Evaluation makes many lasting objects and no
+    cycles: looking for some takes four times as long as the rest. Both switches are the interpreter's,
+    one for all threads: the last user puts them back.
     """
-    global _stack_users, _stack_before
-    with _stack_lock:
-        if _stack_users == 0:
-            _stack_before = sys.getrecursionlimit()
-            sys.setrecursionlimit(max(_stack_before, _STACK_FRAMES))
-        _stack_users += 1
+    global _users, _before
+    with _lock:
+        if _users == 0:
+            _before = (sys.getrecursionlimit(), gc.isenabled())
+            sys.setrecursionlimit(max(_before[0], _STACK_FRAMES))
+            gc.disable()
+        _users += 1
     try:
         yield
     finally:
-        with _stack_lock:
-            _stack_users -= 1
-            if _stack_users == 0:
-                sys.setrecursionlimit(_stack_before)
+        with _lock:
+            _users -= 1
+            if _users == 0:
+                sys.setrecursionlimit(_before[0])
+                if _before[1]:
+                    gc.enable()
 
 
 @dataclass(slots=True)

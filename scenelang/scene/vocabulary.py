@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 from scenelang.models.manifest import Manifest, available, load_manifest
@@ -25,7 +26,7 @@ LANGUAGE: Final = frozenset((*TRANSFORMS, *MATERIAL_OPS, *SETTINGS))
 """Words that head a statement of the language; no module, material or geometry can have such a name."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Vocabulary:
     """What a scene may name: the chosen model's words, or those of all models.
 
@@ -37,7 +38,7 @@ class Vocabulary:
     models: tuple[Manifest, ...]
     chosen: Manifest | None = None
 
-    @property
+    @cached_property
     def in_use(self) -> tuple[Manifest, ...]:
         """The models whose names are accepted."""
         return (self.chosen,) if self.chosen else self.models
@@ -49,15 +50,19 @@ class Vocabulary:
                 return Vocabulary(self.models, manifest)
         return None
 
+    @cached_property
     def geometries(self) -> set[str]:
         return {name for m in self.in_use for name in m.geometries}
 
+    @cached_property
     def materials(self) -> set[str]:
         return {name for m in self.in_use for name in m.materials}
 
+    @cached_property
     def transforms(self) -> set[str]:
         return {name for m in self.in_use for name in m.transforms}
 
+    @cached_property
     def material_ops(self) -> set[str]:
         return {name for m in self.in_use for name in m.material_ops}
 
@@ -68,7 +73,7 @@ class Vocabulary:
                 return m.name
         return None
 
-    @property
+    @cached_property
     def dimension(self) -> int | None:
         """2 or 3 where the model is chosen or all agree."""
         dimensions = {m.dimension for m in self.in_use}

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import pytest
-from scene_cases import HERE, mismatch, run_text
+from scene_cases import HERE, Outcome, mismatch, run_text
 
 from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.codes.names import CODES as NAMES
@@ -15,9 +16,15 @@ CASES = [case.partition("\n")[::2] for case in (HERE / "errors.nsgs").read_text(
 MALFORMED = sorted((HERE / "malformed").glob("*.nsg"))
 
 
+@cache
+def outcome_of(text: str) -> Outcome:
+    """What running a case finds; two tests look at it."""
+    return run_text(text)
+
+
 @pytest.mark.parametrize(("title", "text"), CASES, ids=[title for title, _ in CASES])
 def test_one_mistake(title: str, text: str) -> None:
-    outcome = run_text(text)
+    outcome = outcome_of(text)
     assert mismatch(text, outcome.diagnostics) == ""
     assert (outcome.scene is None) == bool(outcome.diagnostics.errors)
 
@@ -35,7 +42,7 @@ def test_ten_malformed_scenes() -> None:
 
 def test_messages_keep_the_house_style() -> None:
     for title, text in CASES:
-        for d in run_text(text).diagnostics:
+        for d in outcome_of(text).diagnostics:
             assert d.code in CODES, title
             assert not d.message.endswith("."), d.message
             assert d.message[0] == d.message[0].lower(), d.message

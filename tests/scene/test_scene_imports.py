@@ -139,10 +139,8 @@ def test_mistakes_in_an_imported_file_are_shown_there(tmp_path: Path) -> None:
 
 def test_unknown_names_of_a_file(tmp_path: Path) -> None:
     write(tmp_path, lib="let size = 1; fn f(x) = x; module m() { square {} }")
-    write(
-        tmp_path,
-        main='import "lib.nsg" as lib; square { scale(lib.sise); translate(lib.g(1), 0); } lib.n(); lib.f(1);',
-    )
+    use = "square { scale(lib.sise); translate(lib.g(1), 0); } lib.n(); lib.f(1);"
+    write(tmp_path, main=f'import "lib.nsg" as lib; {use}')
     outcome = load(tmp_path / "main.nsg")
     assert outcome.codes == ["E0212", "E0212", "E0212", "E0213"]
     assert outcome.diagnostics.items[0].help == "did you mean 'size'?"

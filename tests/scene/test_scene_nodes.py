@@ -17,7 +17,7 @@ def nodes(text: str, **options: object) -> tuple[SceneNode, ...]:
 
 CHAIN = """
 nsg 1;                                   // language version, first statement, optional
-model "shapes2d";                        // optional: without it the compiler picks the smallest model that fits
+model "shapes2d";                        // optional: without it the smallest that fits
 param k = 0.6 in 0..1;                   // scenelang render chain.nsg -D k=0.9
 chain {                                  // streamed top to bottom, one boolean token per object
   square           { scale(0.8); translate(-0.2, 0); material flat { color(#d33); } }
@@ -240,8 +240,8 @@ def test_the_innermost_material_holds() -> None:
 
 
 def test_scopes() -> None:
-    text = "let a = 1; group { let a = a + 1; square { let a = a + 1; translate(a, 0); } } star { translate(a, 0); }"
-    group, star = nodes(text)
+    inner = "group { let a = a + 1; square { let a = a + 1; translate(a, 0); } }"
+    group, star = nodes(f"let a = 1; {inner} star {{ translate(a, 0); }}")
     assert isinstance(group, nsg.Group)
     assert group.children[0].transforms == (nsg.Translate(x=3, y=0),)
     assert star.transforms == (nsg.Translate(x=1, y=0),)
@@ -270,8 +270,8 @@ def test_a_nested_function_sees_this_pass_only() -> None:
 
 
 def test_materials_are_values() -> None:
-    text = "let ms = [material flat, material flat { color(#f00); }]; for (m in ms) { square { m { hue(1rad); } } }"
-    first, second = nodes(text)
+    values = "let ms = [material flat, material flat { color(#f00); }];"
+    first, second = nodes(f"{values} for (m in ms) {{ square {{ m {{ hue(1rad); }} }} }}")
     assert first.material == nsg.Material(name="flat", ops=(nsg.Hue(angle=1),))
     assert second.material == nsg.Material(name="flat", ops=(nsg.Color(rgb=(1, 0, 0)), nsg.Hue(angle=1)))
     (node,) = nodes("module m(look) { square { look; } } m(material flat);")

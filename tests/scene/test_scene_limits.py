@@ -1,0 +1,113 @@
+"""Limits: a clear error, soon, with bounded memory, and never a traceback."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+
+import pytest
+from scene_cases import Outcome, run_text
+
+from scenelang.scene import session
+from scenelang.scene.session import MAX_DEPTH, MAX_OBJECTS
+
+
+def test_objects_at_the_limit() -> None:
+    text = "for (i in 0..<{}) {{ square; }}"
+    assert len(run_text(text.format(MAX_OBJECTS)).good().nodes) == MAX_OBJECTS
+    outcome = run_text(text.format(MAX_OBJECTS + 1))
+    assert outcome.codes == ["E0320"]
+    assert outcome.only().message == "more than 100,000 objects in one scene"
+
+
+@pytest.mark.parametrize("kind", ["fn", "module"])
+def test_calls_at_the_limit(kind: str) -> None:
+    if kind == "fn":
+        text = "fn f(n) = n <= 1 ? 1 : 1 + f(n - 1); square {{ translate(f({}), 0); }}"
+    else:
+        text = "module m(n) {{ group {{ square; if (n > 1) {{ m(n - 1) {{ scale(2); }} }} }} }} m({});"
+    run_text(text.format(MAX_DEPTH)).good()
+    outcome = run_text(text.format(MAX_DEPTH + 1))
+    assert outcome.codes == ["E0321"]
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("for (i in 0..1e300) {}", "E0322"),
+        ("for (i in 0..1e9) { for (j in 0..1e9) {} }", "E0322"),
+        ("fn f(n) = n < 1 ? 1 : f(n - 1) + f(n - 1); square { translate(f(60), 0); }", "E0322"),
+        ("for (i in 0..1e9) { group {} }", "E0320"),
+        ("square { for (i in 0..1e9) { translate(i, i); } }", "E0320"),
+        ("square { for (i in 0..1e9) { translate(1, 1); } }", "E0320"),
+        ("square { material flat { for (i in 0..1e9) { hue(1rad); } } }", "E0320"),
+        ("fn wrap(v, n) = n < 1 ? v : wrap([v], n - 1); let a = wrap(1, 100);", "E0323"),
+        ("fn twice(v, n) = n < 1 ? v : twice([v, v, v, v], n - 1); let a = twice(1, 12);", "E0323"),
+        ("let a = 9 ^ 9 ^ 9 ^ 9;", "E0306"),
+        ("let a = 0..1e308 step 1e-308; for (i in a) {}", "E0306"),
+        ("animate(1e9, 1e9);", "E0311"),
+    ],
+)
+def test_a_clear_error(text: str, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session, "MAX_STEPS", 200_000)
+    monkeypatch.setattr(session, "MAX_PARTS", 20_000)
+    assert run_text(text).codes == [code]
+
+
+def test_the_step_limit_is_met_soon() -> None:
+    started = time.perf_counter()
+    outcome = run_text("for (i in 0..1e9) { for (j in 0..1e9) {} }")
+    assert outcome.only().message == "more than 10,000,000 evaluation steps"
+    assert time.perf_counter() - started < 60
+
+
+def test_work_on_vectors_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A loop over operations on large vectors meets the step limit, not the end of patience."""
+    monkeypatch.setattr(session, "MAX_STEPS", 1_000_000)
+    ten = ", ".join(["{}"] * 10)
+    build = "let a = [" + ", ".join(["1"] * 10) + "];"
+    for inner, outer in ("ab", "bc", "cd", "de"):
+        build += f"let {outer} = [{ten.format(*inner * 10)}];"
+    assert run_text(build + "for (i in 0..1e6) { let x = e * i; }").codes == ["E0322"]
+
+
+def test_a_range_costs_nothing() -> None:
+    run_text("let r = 0..1e15; square { translate(r[3], len(r)); }").good()
+
+
+def test_the_recursion_limit_is_put_back() -> None:
+    before = sys.getrecursionlimit()
+    run_text("fn f(n) = f(n + 1); let a = f(0);")
+    assert sys.getrecursionlimit() == before
+
+
+def test_deep_calls_in_a_thread_with_a_small_stack() -> None:
+    """Python frames need no C stack, so 200 calls of 100 levels each fit into 512 KB."""
+    deep = "(" * 90 + "f(n - 1)" + " + 1)" * 90
+    text = f"fn f(n) = n < 1 ? 0 : {deep}; square {{ translate(f(199), 0); }}"
+    results: list[Outcome] = []
+    old = threading.stack_size(512 * 1024)
+    try:
+        thread = threading.Thread(target=lambda: results.append(run_text(text)))
+        thread.start()
+        thread.join()
+    finally:
+        threading.stack_size(old)
+    results[0].good()
+
+
+def test_time_grows_linearly() -> None:
+    text = """for (i in 0..<{}) {{
+      square {{ scale(0.01 + 0.001 * rand(i)); rotate(1turn * i / 7); translate(rand(i + 1), rand(i + 2));
+        material flat {{ color(hsv(i / 100, 0.5, 0.9)); }} }}
+    }}"""
+
+    def seconds(n: int) -> float:
+        started = time.perf_counter()
+        assert len(run_text(text.format(n)).good().nodes) == n
+        return time.perf_counter() - started
+
+    seconds(100)
+    small = min(seconds(1000) for _ in range(3))
+    assert seconds(10_000) < 20 * small + 0.5
