@@ -7,7 +7,7 @@ from scenelang.scene.expressions import prepare
 from scenelang.scene.functions import FUNCTIONS
 from scenelang.scene.materials import prepare_value_use
 from scenelang.scene.moves import prepare_move
-from scenelang.scene.objects import prepare_module_call, prepare_object
+from scenelang.scene.objects import HOLDERS, prepare_module_call, prepare_object
 from scenelang.scene.references import VALUES, lookup, unknown_member, wrong_kind
 from scenelang.scene.scope import Scope
 from scenelang.scene.settings import prepare_setting
@@ -64,6 +64,8 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         if alias is not None and alias.kind == "import":
             unknown_member(name, unit, alias.value)
             return
+    if words.blind and place.kind in HOLDERS:
+        return  # it may be a geometry of the model that is not at hand
     later = scope.defined_later(name.text)
     if later is not None:
         help = f"move the definition of '{name.text}' above this line"

@@ -99,10 +99,11 @@ def _choose(file: nodes.File, words: Vocabulary, model: str | None, diagnostics:
         if chosen is None:
             help = f"there is {listing(m.name for m in words.models)}"
             diagnostics.add("E0210", f"unknown model '{model}'", None, help=help)
-        return chosen or words
+        return chosen or Vocabulary(words.models, blind=True)
     for stmt in file.statements:
         if isinstance(stmt, nodes.Model) and isinstance(stmt.name, nodes.String):
-            return words.choose(stmt.name.value) or words  # an unknown one is reported when it is met
+            # An unknown model is reported when its statement is met.
+            return words.choose(stmt.name.value) or Vocabulary(words.models, blind=True)
     return words
 
 

@@ -31,15 +31,13 @@ class Unreadable(Exception):
 
 
 def read_source(path: Path, name: str) -> SourceFile:
-    """The text of a file.
+    """The text of a file or pipe.
 
     Raises:
-        Unreadable: no regular file, too large, or not UTF-8.
+        Unreadable: too large, or not UTF-8.
         OSError: as the system says.
     """
     with path.open("rb") as stream:
-        if not path.is_file():
-            raise Unreadable("E0214", "it is not a regular file")
         data = stream.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
         raise Unreadable("E0324", f"a file of more than {MAX_BYTES // 1_000_000} MB")

@@ -86,6 +86,8 @@ def _operations(body: nodes.Block, place: Place) -> Callable[[Env], tuple[Any, .
 def _unknown(name: nodes.Name, unit: Unit, scope: Scope, known: set[str]) -> None:
     """Report a name that no model in use has for a material."""
     session, words = unit.session, unit.session.vocabulary
+    if words.blind:
+        return
     owner = words.owner(name.text)
     binding = scope.find(name.text)
     if binding is not None and binding.kind in ("let", "argument", "loop"):

@@ -67,7 +67,7 @@ def _offered(stmt: nodes.Call, place: Place) -> bool:
     """Whether the models in use have the operation; reports it if not."""
     name, words = stmt.name.text, place.unit.session.vocabulary
     known = words.material_ops if place.kind == "material" else words.transforms | words.material_ops
-    if name in known or not words.in_use:
+    if name in known or words.blind:
         return True
     owner = words.owner(name)
     model = f"model '{words.chosen.name}' has" if words.chosen else "the models here have"

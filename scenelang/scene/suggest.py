@@ -9,14 +9,34 @@ from scenelang.diagnostics.span import Span
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name most like ``name``, or None where none is close."""
-    from difflib import get_close_matches
+    """The known name with the fewest slips from ``name``: at most one in three letters, ties by name.
 
-    choices = {k.lower(): k for k in sorted(known, reverse=True)}
-    found = get_close_matches(name.lower(), choices, n=1, cutoff=0.6 if len(name) > 3 else 0.5)
-    if not found or (len(name) == 1 and len(found[0]) > 1):
-        return None
-    return choices[found[0]]
+    A slip is a letter more, less or other, or two neighbours swapped; case does not count.
+    """
+    best, found = len(name) // 3, None
+    for candidate in sorted(known):
+        slips = _slips(name.lower(), candidate.lower(), best)
+        if slips < best or (slips == best and found is None):
+            best, found = slips, candidate
+    return found if len(name) > 1 else None
+
+
+def _slips(a: str, b: str, limit: int) -> int:
+    """Optimal string alignment distance; anything above ``limit`` once it is sure to exceed it."""
+    if abs(len(a) - len(b)) > limit:
+        return limit + 1
+    older: list[int] = []
+    row = list(range(len(b) + 1))
+    for i, letter in enumerate(a, 1):
+        older, last, row = row, older, [i]
+        for j, other in enumerate(b, 1):
+            cost = min(older[j] + 1, row[j - 1] + 1, older[j - 1] + (letter != other))
+            if i > 1 and j > 1 and letter == b[j - 2] and a[i - 2] == other:
+                cost = min(cost, last[j - 2] + 1)
+            row.append(cost)
+        if min(row) > limit and (not last or min(older) > limit):
+            return limit + 1
+    return row[-1]
 
 
 def did_you_mean(name: str, known: Iterable[str], span: Span) -> tuple[str | None, Fix | None]:

@@ -33,10 +33,12 @@ class Vocabulary:
     Args:
         models: all models that are at hand.
         chosen: the scene's model; None where the compiler picks one later.
+        blind: the scene names a model that is not at hand, so nothing is known about its words.
     """
 
     models: tuple[Manifest, ...]
     chosen: Manifest | None = None
+    blind: bool = False
 
     @cached_property
     def in_use(self) -> tuple[Manifest, ...]:

@@ -11,6 +11,7 @@ from scene_cases import HERE, Outcome, mismatch, run_text
 from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.codes.names import CODES as NAMES
 from scenelang.diagnostics.codes.types import CODES as TYPES
+from scenelang.scene.suggest import nearest
 
 CASES = [case.partition("\n")[::2] for case in (HERE / "errors.nsgs").read_text("utf-8").split("=== ")[1:]]
 MALFORMED = sorted((HERE / "malformed").glob("*.nsg"))
@@ -91,6 +92,23 @@ def test_fixes_mend(bad: str, good: str) -> None:
     mended = apply_fix(bad)
     assert mended.replace("  ", " ") == good
     run_text(mended).good()
+
+
+def test_suggestions() -> None:
+    known = ["square", "star", "translate", "size", "Y", "f"]
+    for name, found in {
+        "squar": "square",
+        "sqaure": "square",
+        "Square": "square",
+        "tranlsate": "translate",
+        "sise": "size",
+        "circle": None,
+        "y": None,
+        "zz": None,
+        "stair": "star",
+        "": None,
+    }.items():
+        assert nearest(name, known) == found, name
 
 
 def test_labels_show_both_places() -> None:
