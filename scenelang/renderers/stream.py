@@ -102,7 +102,7 @@ class Stream:
         codes, index = np.unique(g[:, exact.CODE], axis=0, return_inverse=True)
         made = self.network.decoder_weights(torch.from_numpy(codes).to(self.device))
         shapes = [tuple((w[i].T.contiguous(), b[i][:, None]) for w, b in made) for i in range(len(codes))]
-        codes_m = torch.from_numpy(np.ascontiguousarray(m[:, exact.MATERIAL_CODE])).to(self.device)
+        codes_m = torch.from_numpy(m[:, exact.MATERIAL_CODE].copy()).to(self.device)
         albedo = torch.cat([self.network.object_albedo(codes_m), torch.ones_like(codes_m[:, :1])], 1)
         matrix = torch.from_numpy(m[:, exact.COLOUR].reshape(-1, 3, 4).copy()).to(self.device)
         colours = (matrix @ albedo[:, :, None]).clamp(0.0, 1.0)  # (N, 3, 1)

@@ -1,0 +1,180 @@
+"""Seeded random scenes to evaluate on, as Scenes: they go through the whole compiler.
+
+``shapes2d`` is the base set: 1 to 4 objects, twirl and bend in ±0.8, scale 0.2 to 0.55 per axis, any
+rotation, translation in ±0.7, in that order, colours uniform in 0.1 to 1, 40 % unions only, else tokens
+uniform. The others change one thing each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenelang.scene.schema import (
+    Bend,
+    Boolean,
+    Chain,
+    Color,
+    Combine,
+    Group,
+    Link,
+    Material,
+    Object,
+    Rotate,
+    Scale,
+    Scene,
+    SceneNode,
+    Shear,
+    Transform,
+    Translate,
+    Twirl,
+)
+
+GEOMETRIES = ("square", "triangle", "star", "pentagon")
+WORDS: tuple[Combine, ...] = ("union", "smooth", "subtract", "intersect")
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True, slots=True)
+class SetConfig:
+    """What the scenes of a set are like.
+
+    Args:
+        objects: fewest and most objects.
+        deformed: with twirl and bend.
+        unions: share of scenes that are unions only.
+        size: factor on scales and translations of the objects.
+        canvas: pixels.
+        affine_steps: random scales, rotations, translations and shears instead of one each; 0 for one each.
+        shuffled: scale, rotate, translate and shear once each, in random order.
+        nest: how objects are put together: "chain", "groups" (each in two nested groups) or "tree".
+    """
+
+    objects: tuple[int, int] = (1, 4)
+    deformed: bool = True
+    unions: float = 0.4
+    size: float = 1.0
+    canvas: tuple[int, int] = (256, 256)
+    affine_steps: int = 0
+    shuffled: bool = False
+    nest: str = "chain"
+
+
+SETS: dict[str, SetConfig] = {
+    "shapes2d": SetConfig(),
+    "unions": SetConfig(unions=1.0),
+    "affine": SetConfig(unions=1.0, deformed=False),
+    "chains": SetConfig(unions=0.0, objects=(2, 4)),
+    "groups": SetConfig(nest="groups"),
+    "twelve": SetConfig(affine_steps=12),
+    "shuffled": SetConfig(shuffled=True),
+    "tiny": SetConfig(size=0.1),
+    "wide": SetConfig(canvas=(320, 192)),
+    "tree": SetConfig(nest="tree", objects=(3, 6)),
+    "many": SetConfig(objects=(16, 16)),
+}
+
+
+def _uniform(rng: Rng, low: float, high: float) -> float:
+    return float(rng.uniform(low, high))
+
+
+def _moves(rng: Rng, config: SetConfig) -> list[Transform]:
+    moves: list[Transform] = []
+    if config.deformed:
+        moves += [Twirl(k=_uniform(rng, -0.8, 0.8)), Bend(k=_uniform(rng, -0.8, 0.8))]
+    scale = Scale(x=_uniform(rng, 0.2, 0.55) * config.size, y=_uniform(rng, 0.2, 0.55) * config.size, z=1.0)
+    rotate = Rotate(angle=_uniform(rng, -math.pi, math.pi))
+    # tiny objects stand close together, so that they still meet
+    reach = 0.7 * (config.size if config.size < 1 else 1.0)
+    translate = Translate(x=_uniform(rng, -reach, reach), y=_uniform(rng, -reach, reach))
+    if config.shuffled:
+        some: list[Transform] = [scale, rotate, translate, Shear(axes="xy", k=_uniform(rng, -0.6, 0.6))]
+        return moves + [some[i] for i in rng.permutation(4)]
+    if not config.affine_steps:
+        return [*moves, scale, rotate, translate]
+    return moves + _long_chain(rng, config.affine_steps, scale, rotate, translate)
+
+
+def _long_chain(rng: Rng, steps: int, scale: Scale, rotate: Rotate, translate: Translate) -> list[Transform]:
+    """Random steps around the usual three, small enough that the object stays on the canvas."""
+    chain: list[Transform] = [scale]
+    for _ in range(steps - 3):
+        kind = int(rng.integers(4))
+        if kind == 0:
+            chain.append(Scale(x=_uniform(rng, 0.85, 1.18), y=_uniform(rng, 0.85, 1.18), z=1.0))
+        elif kind == 1:
+            chain.append(Rotate(angle=_uniform(rng, -math.pi, math.pi)))
+        elif kind == 2:
+            chain.append(Translate(x=_uniform(rng, -0.12, 0.12), y=_uniform(rng, -0.12, 0.12)))
+        else:
+            chain.append(Shear(axes="xy", k=_uniform(rng, -0.25, 0.25)))
+    return [*chain, rotate, translate]
+
+
+def _object(rng: Rng, config: SetConfig) -> Object:
+    rgb = tuple(_uniform(rng, 0.1, 1.0) for _ in range(3))
+    return Object(
+        geometry=GEOMETRIES[int(rng.integers(4))],
+        transforms=tuple(_moves(rng, config)),
+        material=Material(name="flat", ops=(Color(rgb=rgb),)),  # type: ignore[arg-type]
+    )
+
+
+def _tree(rng: Rng, leaves: list[SceneNode]) -> SceneNode:
+    """A nested tree that the compiler can linearise: the first child may be composite, unions any."""
+    if len(leaves) == 1:
+        return leaves[0]
+    cut = int(rng.integers(1, len(leaves)))
+    if cut < len(leaves) - 1 and rng.random() < 0.5:
+        # (…) - (b ∪ c) and (…) ∪ (c ∪ d) are rewritten
+        op: Combine = "subtract" if rng.random() < 0.5 else "union"
+        rest = Boolean(op="union", children=tuple(leaves[cut:]))
+        return Boolean(op=op, children=(_tree(rng, leaves[:cut]), rest))
+    word = WORDS[int(rng.integers(4))]
+    return Boolean(op=word, children=(_tree(rng, leaves[:-1]), leaves[-1]))
+
+
+def random_scene(rng: Rng, config: SetConfig) -> Scene:
+    """One scene of a set."""
+    count = int(rng.integers(config.objects[0], config.objects[1] + 1))
+    objects = [_object(rng, config) for _ in range(count)]
+    if config.nest == "tree":
+        return Scene(model="shapes2d", canvas=config.canvas, nodes=(_tree(rng, list(objects)),))
+    unions = rng.random() < config.unions
+    words = ["union", *(WORDS[0 if unions else int(rng.integers(4))] for _ in range(count - 1))]
+    nodes: list[SceneNode] = list(objects)
+    turn = Rotate(angle=_uniform(rng, -math.pi, math.pi))
+    if config.nest == "groups":
+        shift = Translate(x=_uniform(rng, -0.1, 0.1), y=_uniform(rng, -0.1, 0.1))
+        nodes = [
+            Group(children=(Group(children=(n,), transforms=(shift,)),), transforms=(turn,)) for n in nodes
+        ]
+    links = tuple(Link(op=w, node=n) for w, n in zip(words, nodes, strict=True))
+    chain = Chain(children=links)
+    return Scene(model="shapes2d", canvas=config.canvas, nodes=(chain,))
+
+
+def scenes(name: str, seed: int, covers: Callable[[Scene], float]) -> Callable[[int], Scene]:
+    """A function from index to scene; scenes that cover under 2 % of the canvas are drawn again.
+
+    Args:
+        name: of a set in `SETS`.
+        seed: of the set; training uses other streams of random numbers.
+        covers: share of the canvas that a scene covers.
+    """
+    config = SETS[name]
+    # a tenth of the size covers a hundredth as much
+    least = 0.02 * min(1.0, config.size**2)
+
+    def scene(index: int) -> Scene:
+        for attempt in range(1000):
+            made = random_scene(np.random.default_rng([seed, index, attempt]), config)
+            if covers(made) >= least:
+                return made
+        raise RuntimeError(f"no scene of set {name} covers enough")
+
+    return scene
