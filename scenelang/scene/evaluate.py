@@ -20,7 +20,7 @@ from scenelang.scene.imports import Loader, Unreadable, prepare_file, read_sourc
 from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
 from scenelang.scene.session import Halt, Session, deep_stack
-from scenelang.scene.spans import SpanMap
+from scenelang.scene.spans import Place, SpanMap
 from scenelang.scene.suggest import listing
 from scenelang.scene.unit import Unit
 from scenelang.scene.vocabulary import Vocabulary, vocabulary
@@ -89,6 +89,9 @@ def evaluate(
             "nodes": tuple(out.children),
         },
     )
+    written = settings.given.get("model")
+    if written is not None:
+        session.spans.record(scene, Place(written, written))
     return scene, session.spans
 
 

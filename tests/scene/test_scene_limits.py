@@ -9,8 +9,12 @@ import time
 import pytest
 from scene_cases import Outcome, run_text
 
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.scene import session
+from scenelang.scene.evaluate import evaluate
 from scenelang.scene.session import MAX_DEPTH, MAX_OBJECTS
+from scenelang.syntax import nodes
 
 
 def test_objects_at_the_limit() -> None:
@@ -111,3 +115,21 @@ def test_time_grows_linearly() -> None:
     seconds(100)
     small = min(seconds(1000) for _ in range(3))
     assert seconds(10_000) < 20 * small + 0.5
+
+
+def test_trees_made_by_hand_can_be_too_deep() -> None:
+    """Text is cut off by the parser; a tree from elsewhere meets a limit of its own."""
+    source = SourceFile("made.nsg", "")
+    span = Span(source, 0, 0)
+    expr: nodes.Expr = nodes.Number(1.0, "", span)
+    for _ in range(5000):
+        expr = nodes.Unary("-", expr, span)
+    file = nodes.File((nodes.Let(nodes.Name("a", span), expr, span),), span)
+    found = Diagnostics()
+    assert evaluate(file, diagnostics=found)[0] is None
+    assert [d.code for d in found] == ["E0324"]
+
+
+def test_ten_thousand_flat_objects() -> None:
+    line = "square { scale(0.1); translate(0.5, -0.5); material flat { color(#d33); } }\n"
+    assert len(run_text(line * 10_000).good().nodes) == 10_000
