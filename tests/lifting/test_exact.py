@@ -1,0 +1,97 @@
+"""Lifted vectors against products of their matrices and against points carried back step by step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from scenelang.graph.levels import Levels
+from scenelang.graph.steps import Affine, Rows, Step, Warp
+from scenelang.lifting.exact import INNER_WARPS, OUTER_WARPS, leaf_vector, lift_colours, lift_many, matrices
+from scenelang.reference.image import carry_back, distance_scale
+from scenelang.renderers.frames import local_points, read_frame
+
+CODE = (0.5, -1.0, 2.0, 3.0)
+
+
+def random_rows(rng: np.random.Generator) -> Rows:
+    a = rng.uniform(-1, 1, (3, 4))
+    a[:, :3] += np.eye(3) * 1.5
+    return tuple(a.ravel().tolist())
+
+
+def random_levels(rng: np.random.Generator, inner: int, outer: int) -> Levels:
+    def warps(count: int) -> tuple[Warp, ...]:
+        return tuple(
+            Warp(float(rng.uniform(-1, 1)), (float(rng.uniform(-1, 1)), float(rng.uniform(-1, 1))))
+            for _ in range(count)
+        )
+
+    return Levels(warps(inner), random_rows(rng), warps(outer), random_rows(rng))
+
+
+def steps_of(levels: Levels) -> tuple[Step, ...]:
+    return (*levels.inner, Affine(levels.middle), *levels.outer, Affine(levels.affine))
+
+
+SIZES = [(i, o) for i in range(INNER_WARPS + 1) for o in range(OUTER_WARPS + 1)]
+
+
+@pytest.mark.parametrize(("inner", "outer"), SIZES)
+def test_vector_is_the_product_of_matrices(inner: int, outer: int) -> None:
+    levels = random_levels(np.random.default_rng(inner * 10 + outer), inner, outer)
+    g = leaf_vector(CODE)
+    for matrix in matrices(levels):
+        g = matrix @ g
+    np.testing.assert_allclose(lift_many([levels], [CODE])[0], g, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(("inner", "outer"), SIZES)
+def test_vector_carries_points_back_as_the_reference_does(inner: int, outer: int) -> None:
+    rng = np.random.default_rng(100 + inner * 10 + outer)
+    levels = random_levels(rng, inner, outer)
+    x, y = rng.uniform(-2, 2, (2, 50))
+    frame = read_frame(lift_many([levels], [CODE])[0])
+    got = local_points(frame, torch.from_numpy(x), torch.from_numpy(y))
+    want = carry_back(steps_of(levels), x, y)
+    for a, b in zip(got, want, strict=True):
+        np.testing.assert_allclose(a.numpy(), b, rtol=1e-9, atol=1e-9)
+    assert frame.scale == pytest.approx(distance_scale(steps_of(levels)), rel=1e-9)
+
+
+@pytest.mark.parametrize(("inner", "outer"), [(0, 0), (1, 0), (2, 3), (0, 2)])
+def test_points_near_the_leaf_move_no_faster_than_the_frame_says(inner: int, outer: int) -> None:
+    rng = np.random.default_rng(inner + outer)
+    levels = random_levels(rng, inner, outer)
+    frame = read_frame(lift_many([levels], [CODE])[0])
+    x, y = rng.uniform(-4, 4, (2, 20000))
+    step = 1e-5
+    qx, qy = carry_back(steps_of(levels), x, y)
+    for dx, dy in ((step, 0.0), (0.0, step)):
+        rx, ry = carry_back(steps_of(levels), x + dx, y + dy)
+        speed = np.hypot(rx - qx, ry - qy) / step
+        near = np.hypot(qx, qy) <= 1
+        assert near.any()
+        assert speed[near].max() <= frame.growth * (1 + 1e-3)
+
+
+def test_lengths_of_chains_do_not_matter() -> None:
+    """A hundred affine matrices one after the other leave what their product leaves."""
+    rng = np.random.default_rng(5)
+    g, total = leaf_vector(CODE), np.eye(4)
+    for _ in range(100):
+        angle, (u, v) = rng.uniform(-3, 3), rng.uniform(-0.1, 0.1, 2)
+        step = np.eye(4)
+        step[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        step[:2, 3] = u, v
+        total = step @ total
+        g = matrices(Levels(affine=tuple(step[:3].ravel().tolist())))[-1] @ g
+    whole = lift_many([Levels(affine=tuple(total[:3].ravel().tolist()))], [CODE])[0]
+    np.testing.assert_allclose(g, whole, atol=1e-12)
+
+
+def test_material_vector_multiplies_the_albedo() -> None:
+    m = lift_colours([(0.2, 0.4, 0.6)], [np.arange(12.0)])[0]
+    np.testing.assert_allclose(m[8:20].reshape(3, 4) @ [1, 1, 1, 1], (0.2, 0.4, 0.6))
+    np.testing.assert_allclose(m[20:32], np.arange(12.0))

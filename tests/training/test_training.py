@@ -1,0 +1,99 @@
+"""Training data against the slow oracle, and a loop that can be killed and go on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+
+from scenelang.renderers.framed import FramedConfig
+from scenelang.training.checkpoint import load_tensors
+from scenelang.training.config import Phase, TrainConfig, read_config
+from scenelang.training.loop import train
+from scenelang.training.scenes import GEOMETRIES, SceneConfig, random_batch
+from tests.reference import oracle
+
+WORDS = ("union", "smooth", "subtract", "intersect")
+
+
+def tiny_config(iterations: int = 6) -> TrainConfig:
+    return TrainConfig(
+        model="shapes2d",
+        seed=3,
+        rate=0.01,
+        phases=(Phase(iterations, 4, 1), Phase(iterations, 3, 3, 0.1)),
+        network=FramedConfig(decoder_width=8, cell_width=8),
+        scenes=SceneConfig(points=16),
+    )
+
+
+def test_batches_show_what_the_oracle_shows() -> None:
+    batch = random_batch(8, 4, SceneConfig(points=32), torch.Generator().manual_seed(2))
+    wrong = looked = 0
+    for b in range(8):
+        for p in range(32):
+            state = (float("inf"), (0.0, 0.0, 0.0))
+            for n in range(int(batch.count[b])):
+                corners = oracle.outline(GEOMETRIES[batch.leaf[b, n]])
+                d = oracle.polygon_distance(corners, *batch.q[b, n, p].tolist()) * float(batch.scale[b, n])
+                c = tuple(batch.rgb[b, n].tolist())
+                state = (d, c) if n == 0 else oracle.step(state, d, c, WORDS[batch.tokens[b, n]])
+                if abs(state[0]) < 1e-4 or abs(d) < 1e-4:
+                    break  # float32 may fall on the other side
+                assert bool(batch.inside[b, n, p]) == (d < 0)
+                assert bool(batch.covered[b, n, p]) == (state[0] < 0)
+                looked += 1
+                if state[0] < 0:
+                    gap = max(
+                        abs(x - y) for x, y in zip(batch.colour[b, n, p].tolist(), state[1], strict=True)
+                    )
+                    wrong += gap > 2e-3
+    assert looked > 300
+    assert wrong == 0
+
+
+def test_a_training_that_was_stopped_goes_on_as_if_it_had_not(tmp_path: Path) -> None:
+    config = tiny_config()
+    assert train(config, tmp_path / "whole", report_every=4)
+    halted = 0
+    while not train(config, tmp_path / "parts", budget_s=0.0, report_every=4):
+        halted += 1
+    assert halted >= 5
+    whole, _ = load_tensors(tmp_path / "whole" / "weights.safetensors")
+    parts, header = load_tensors(tmp_path / "parts" / "weights.safetensors")
+    assert header["iteration"] == config.iterations
+    for name, tensor in whole.items():
+        assert torch.equal(tensor, parts[name]), name
+
+
+def test_a_checkpoint_of_another_configuration_is_refused(tmp_path: Path) -> None:
+    train(tiny_config(), tmp_path, budget_s=0.0)
+    with pytest.raises(ValueError, match="another configuration"):
+        train(tiny_config(7), tmp_path)
+
+
+def test_unknown_keys_of_a_configuration_fail(tmp_path: Path) -> None:
+    path = tmp_path / "c.json"
+    path.write_text('{"model": "shapes2d", "sead": 1}')
+    with pytest.raises(ValueError, match="sead"):
+        read_config(str(path))
+
+
+def test_the_shipped_configuration_reads() -> None:
+    assert read_config("shapes2d").model == "shapes2d"
+
+
+def test_training_learns(tmp_path: Path) -> None:
+    """A hundred steps on single objects already lower the loss by a third."""
+    config = TrainConfig(
+        model="shapes2d",
+        seed=0,
+        rate=0.01,
+        phases=(Phase(150, 16, 1),),
+        network=FramedConfig(),
+        scenes=SceneConfig(points=64),
+    )
+    losses: list[float] = []
+    train(config, tmp_path, report=lambda i, n, s, parts: losses.append(parts["alone"]), report_every=25)
+    assert losses[-1] < losses[0] * 2 / 3
