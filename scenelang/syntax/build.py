@@ -26,7 +26,7 @@ class Builder(ExpressionBuilder):
         return [getattr(self, name) if name else None for _, _, name in tables().rules]
 
     def keyword(self, token: int) -> Keyword:
-        return self.tokens.text(token), self._span(token, token)
+        return self.sign(token), self._span(token, token)
 
     def file(self, statements: list[nodes.Stmt] | None = None) -> nodes.File:
         return nodes.File(tuple(statements or ()), Span(self.source, 0, len(self.text)))

@@ -14,6 +14,7 @@ from typing import Any
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import nodes
+from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
 
 Arguments = tuple[tuple[nodes.Argument, ...], int]
@@ -37,9 +38,14 @@ class ExpressionBuilder:
         self.text = tokens.source.text
         self.starts = tokens.starts
         self.ends = tokens.ends
+        self.signs = tables().kinds
 
     def _span(self, first: int, last: int) -> Span:
         return Span(self.source, self.starts[first], self.ends[last])
+
+    def sign(self, token: int) -> Any:
+        """What a literal token stands for; recovery may have read it from other text."""
+        return self.signs[self.tokens.kinds[token]]
 
     # ------------------------------------------------------------ lists
 
@@ -109,11 +115,10 @@ class ExpressionBuilder:
         span = Span(self.source, left.span.start, right.span.end)
         if start == end:  # an operator that recovery put in
             return nodes.BadExpr(span)
-        return nodes.Binary(self.text[start:end], left, right, Span(self.source, start, end), span)
+        return nodes.Binary(self.sign(op), left, right, Span(self.source, start, end), span)
 
     def unary(self, op: int, operand: nodes.Expr) -> nodes.Expr:
-        sign: Any = self.tokens.text(op)
-        return nodes.Unary(sign, operand, Span(self.source, self.starts[op], operand.span.end))
+        return nodes.Unary(self.sign(op), operand, Span(self.source, self.starts[op], operand.span.end))
 
     def material(self, word: int, name: nodes.Name) -> nodes.Expr:
         span = Span(self.source, self.starts[word], name.span.end)

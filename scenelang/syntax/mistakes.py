@@ -26,6 +26,8 @@ def report_repair(tokens: Tokens, report: Report, repair: Repair, open_brackets:
     touched = range(repair.at, repair.end)
     if any(tokens.starts[index] in tokens.reported for index in touched):
         return  # a slip that has been reported already
+    if touched and tokens.starts[repair.at] == tokens.ends[repair.end - 1]:
+        return  # what recovery put in itself, at a mistake that has been reported
     names = [tables().kinds[kind] for kind in repair.insert]
     if not repair.delete:
         _report_insertion(tokens, report, repair.at, names, open_brackets)

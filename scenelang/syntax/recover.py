@@ -12,9 +12,9 @@ from typing import Any
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import mistakes
-from scenelang.syntax.automaton import fits, statement_depth
+from scenelang.syntax.automaton import fits, reach, statement_depth
 from scenelang.syntax.lexer import UNIT_ALIASES, UNITS
-from scenelang.syntax.repairs import Search
+from scenelang.syntax.repairs import FOLLOWED, Search
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
 
@@ -51,8 +51,8 @@ class Recovery:
             return None
         depth = statement_depth(states)
         first = self._index(values[depth]) if depth < len(values) else at
-        known = self._head_mistake(states, first, at) if first < at else self._start_mistake(at)
-        if known or self._spaced_unit(at):
+        known = self._head_mistake(states, first, at) if first < at else self._start_mistake(states, at)
+        if known or self._spaced_unit(at) or self._unseparated(states, at):
             return at
         search = Search(self.tokens, first, at)
         repair = search.run(states[: depth + 1], states)
@@ -81,10 +81,12 @@ class Recovery:
 
     # ------------------------------------------------------------ well known mistakes
 
-    def _start_mistake(self, at: int) -> bool:
+    def _start_mistake(self, states: list[int], at: int) -> bool:
         """A token that no statement begins with."""
         tokens = self.tokens
         start, end = tokens.starts[at], tokens.ends[at]
+        if self._is(at, ";", "{") and self._better_swapped(states, at):
+            return False
         if self._is(at, ";"):
             fix = Fix("remove it", (Edit(Span(tokens.source, start, end), ""),))
             self.report.add("W0101", "stray `;`", start, end, help="no `;` follows a block", fix=fix)
@@ -102,6 +104,15 @@ class Recovery:
             return True
         return False
 
+    def _better_swapped(self, states: list[int], at: int) -> bool:
+        """Whether more fits when a `;` or `{` changes places with the next token than otherwise."""
+        kinds = self.tokens.kinds
+        rest = kinds[at + 2 : at + 2 + FOLLOWED]
+        instead = [tables().kind("BAD_HEAD"), kinds[at]] if self._is(at, "{") else []
+        swapped = reach(states.copy(), [kinds[at + 1], kinds[at], *rest], 0, len(rest) + 2)
+        kept = reach(states.copy(), [*instead, kinds[at + 1], *rest], 0, len(rest) + 1 + len(instead))
+        return swapped - 2 > kept - 1 - len(instead)
+
     def _headless(self, at: int) -> None:
         tokens = self.tokens
         before = at - 1
@@ -117,7 +128,7 @@ class Recovery:
         """`for` and `if` without parentheses or braces."""
         if self._is(at - 1, "for", "if") and not self._is(at, "("):
             brace = self._next_brace(at)
-            if brace is None:
+            if brace is None or not self._wrapped_fits(states, at, brace):
                 return False
             mistakes.report_wrapping(self.tokens, self.report, "E0107", at, brace, "()")
             self._insert(brace, ")")
@@ -129,13 +140,26 @@ class Recovery:
         if not self._is(first, "for", "if", "module") or self._is(at, ";", "}", ")") or self._at_end(at):
             return False
         stop = self._end_of_statement(at)
+        few = [self.literals["{"], *self.tokens.kinds[at : min(stop, at + 4)]]
+        if reach(states.copy(), few, 0, len(few)) < len(few):
+            return False
         mistakes.report_wrapping(self.tokens, self.report, "E0106", at, stop, "{}")
+        if self._is(stop, "else") and not self._is(stop + 1, "{", "if"):
+            last = self._end_of_statement(stop + 1)
+            self._insert(last, "}")
+            self._insert(stop + 1, "{")
         self._insert(stop, "}")
         self._insert(at, "{")
         return True
 
     def _at_end(self, at: int) -> bool:
         return self.tokens.kinds[at] == END
+
+    def _wrapped_fits(self, states: list[int], at: int, brace: int) -> bool:
+        """Whether the tokens up to a brace are what belongs between parentheses."""
+        kinds = self.tokens.kinds
+        wrapped = [self.literals["("], *kinds[at:brace], self.literals[")"], kinds[brace]]
+        return reach(states.copy(), wrapped, 0, len(wrapped)) == len(wrapped)
 
     def _next_brace(self, at: int) -> int | None:
         """Index of the `{` that follows in this statement, None where a `)` or `;` comes first."""
@@ -188,6 +212,22 @@ class Recovery:
         else:
             tokens.reported.add(start)
         tokens.replace(at, 1, [])
+        return True
+
+    def _unseparated(self, states: list[int], at: int) -> bool:
+        """`[1 2 3]`: put the commas in, as one mistake."""
+        tokens = self.tokens
+        literal = {tables().kind(name) for name in ("NUMBER", "COLOR", "STRING")}
+        stop = at
+        while tokens.kinds[stop] in literal:
+            stop += 1
+        if stop < at + 2 or tokens.kinds[at - 1] not in literal or not fits(states, self.literals[","]):
+            return False
+        gaps = [tokens.ends[index - 1] for index in range(at, stop)]
+        edits = tuple(Edit(Span(tokens.source, gap, gap), ",") for gap in gaps)
+        self.report.add("E0112", "missing `,`", gaps[0], gaps[-1], fix=Fix("insert `,` between them", edits))
+        for index in reversed(range(at, stop)):
+            self._insert(index, ",")
         return True
 
     # ------------------------------------------------------------ skipping

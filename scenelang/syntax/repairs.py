@@ -16,6 +16,9 @@ from scenelang.syntax.tokens import Tokens
 
 Kinds = tuple[int, ...]
 
+FOLLOWED = 32
+"""How far the repairs that look best are followed to choose between them."""
+
 WINDOW = 24
 """How many tokens before the mistake the cause is looked for."""
 
@@ -127,6 +130,13 @@ def word_for(text: str) -> str | None:
     return _WORDS.get(text)
 
 
+Found = tuple[float, Repair, list[int]]
+
+
+def _by_score(found: Found) -> float:
+    return -found[0]
+
+
 class Search:
     """Looks for the best repair of one mistake.
 
@@ -149,8 +159,9 @@ class Search:
         self.semicolon = literals[";"]
         self.name = tables().kind("NAME")
         self.keywords = {kind for text, kind in literals.items() if text.isalpha()}
-        self.best: Repair | None = None
-        self.score = 0.0
+        self.equal = literals["="]
+        self.definitions = {literals["fn"], literals["module"]}
+        self.comma = literals[","]
 
     def run(self, base: list[int], stack: list[int]) -> Repair | None:
         """The best repair, or None where none helps.
@@ -159,36 +170,49 @@ class Search:
             base: the states before the statement.
             stack: the states at the mistake.
         """
-        self._try_all(stack, self.at)
-        if self.best is not None and self.score >= LOOKAHEAD - 2:
-            return self.best
+        found = self._try_all(stack, self.at)
+        best = self._settle(found)
+        if best is not None and best[0] >= FOLLOWED - 2:
+            return best[1]
         if self.at - self.first > MAX_REPLAY:
-            return self.best
+            return best[1] if best is not None else None
         prefix = base.copy()
         for at in range(self.first, self.at):
             if at >= self.at - WINDOW:
-                self._try_all(prefix, at)
+                found += self._try_all(prefix, at)
             if not advance(prefix, self.kinds[at]):
                 break
-        return self.best
+        best = self._settle(found)
+        return best[1] if best is not None else None
 
-    def _try_all(self, stack: list[int], at: int) -> None:
+    def _try_all(self, stack: list[int], at: int) -> list[Found]:
+        """All repairs at one token that help, each with its score and the states after it."""
+        found: list[Found] = []
         distance = self.at - at
         extra = 0.1 + 0.1 * distance if distance else 0.0
         for repair in self._candidates(stack, at):
-            score = LOOKAHEAD - repair.cost - extra
-            if self.best is not None and score <= self.score:
-                continue
             trial = stack.copy()
             if not all(advance(trial, kind) for kind in repair.insert):
                 continue
             start = max(self.at, repair.end)
-            stop = reach(trial, self.kinds, repair.end, start + LOOKAHEAD)
+            after = trial.copy()
+            stop = reach(after, self.kinds, repair.end, start + LOOKAHEAD)
             if stop < start + 3 and not any(kind in self.ends for kind in self.kinds[start:stop]):
                 continue
-            score -= LOOKAHEAD - min(stop - self.at, LOOKAHEAD)
-            if self.best is None or score > self.score:
-                self.best, self.score = repair, score
+            score = min(stop - self.at, LOOKAHEAD) - repair.cost - extra
+            found.append((score, repair, trial))
+        return found
+
+    def _settle(self, found: list[Found]) -> tuple[float, Repair] | None:
+        """The best of several repairs: the few that look best are followed further."""
+        settled: tuple[float, Repair] | None = None
+        for score, repair, trial in sorted(found, key=_by_score)[:8]:
+            start = max(self.at, repair.end)
+            stop = reach(trial.copy(), self.kinds, repair.end, start + FOLLOWED)
+            score += (min(stop - self.at, FOLLOWED) - LOOKAHEAD) * 1.0 if stop > start + LOOKAHEAD else 0.0
+            if settled is None or score > settled[0]:
+                settled = score, repair
+        return settled
 
     def _candidates(self, stack: list[int], at: int) -> Iterator[Repair]:
         tokens, kinds = self.tokens, self.kinds
@@ -205,16 +229,17 @@ class Search:
                 cost += _NEW_LINE / 2
             if fits(stack, insert[0]):
                 yield Repair(at, 0, insert, cost)
+        if kinds[at + 1 :] and self._swappable(kind, kinds[at + 1]):
+            yield Repair(at, 2, (kinds[at + 1], kind), _SWAP)
         if kind in self.fixed:
             return
         for insert, cost in _replacements().get(kind, ()):
-            yield Repair(at, 1, insert, cost)
+            header = kind == self.equal and self.kinds[self.first] in self.definitions
+            yield Repair(at, 1, insert, cost + 0.5 * header)
         if kind in self.keywords:
             yield Repair(at, 1, (self.name,), _KEYWORD_AS_NAME)
         elif kind == self.name and (operator := word_for(tokens.text(at))):
             yield Repair(at, 1, (tables().literals[operator],), 1.0)
-        if kinds[at + 1] not in self.fixed:
-            yield Repair(at, 2, (kinds[at + 1], kind), _SWAP)
         cost = _DELETION
         for count in range(1, 4):
             if kinds[at + count - 1] in self.fixed:
@@ -224,16 +249,22 @@ class Search:
             yield Repair(at, count, (), cost)
             cost += _FURTHER_DELETION
 
+    def _swappable(self, left: int, right: int) -> bool:
+        """Whether two tokens may be the wrong way round; at most one of them is a brace."""
+        return END not in (left, right) and left != right and not (left in self.fixed and right in self.fixed)
+
     def _closings(self, at: int) -> Iterator[Repair]:
         """Close one bracket, or all that are open, perhaps ending the statement too."""
         open_ = self.open_brackets(at)
         if not open_:
             return
+        # Nobody forgets to close what holds nothing, or after a comma.
+        dangling = at - 1 == open_[-1] or self.kinds[at - 1] == self.comma
         closings = tuple(self.closing_of[self.kinds[index]] for index in reversed(open_))
-        yield Repair(at, 0, closings[:1], _CLOSING)
+        yield Repair(at, 0, closings[:1], _CLOSING + dangling)
         if len(closings) > 1:
-            yield Repair(at, 0, closings, _CLOSING + 0.1 * len(closings))
-        yield Repair(at, 0, (*closings, self.semicolon), _CLOSING_AND_SEMICOLON)
+            yield Repair(at, 0, closings, _CLOSING + dangling + 0.1 * len(closings))
+        yield Repair(at, 0, (*closings, self.semicolon), _CLOSING_AND_SEMICOLON + dangling)
 
     def open_brackets(self, at: int) -> list[int]:
         """Indices of the brackets of the statement that are open before a token."""

@@ -104,10 +104,10 @@ class Tokens:
     def replace(self, index: int, count: int, kinds: Sequence[int]) -> None:
         """Put tokens of other kinds in the place of ``count`` tokens.
 
-        One for one they keep the places of the old tokens; otherwise new ones are empty and stand where
-        the first old one began, or at the end of the token before where none goes.
+        A token that takes the place of another keeps it; otherwise new ones are empty and stand where the
+        first old one began, or at the end of the token before where none goes.
         """
-        if len(kinds) == count:
+        if len(kinds) == count == 1:
             self.kinds[index : index + count] = kinds
             return
         at = self.starts[index] if count else self.end_before(index)
