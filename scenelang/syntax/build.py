@@ -44,7 +44,14 @@ class Builder(ExpressionBuilder):
         return nodes.Param(name, default, None, span) if name.text else nodes.BadStmt(span)
 
     def param_in(
-        self, word: int, name: nodes.Name, equal: int, default: nodes.Expr, within: int, range: nodes.Expr, last: int
+        self,
+        word: int,
+        name: nodes.Name,
+        equal: int,
+        default: nodes.Expr,
+        within: int,
+        range: nodes.Expr,
+        last: int,
     ) -> nodes.Stmt:
         span = self._span(word, last)
         return nodes.Param(name, default, range, span) if name.text else nodes.BadStmt(span)
@@ -103,9 +110,7 @@ class Builder(ExpressionBuilder):
         else_: int,
         otherwise: nodes.Block | nodes.If,
     ) -> nodes.Stmt:
-        return nodes.If(
-            condition, then, otherwise, Span(self.source, self.starts[word], otherwise.span.end)
-        )
+        return nodes.If(condition, then, otherwise, Span(self.source, self.starts[word], otherwise.span.end))
 
     def node(self, kind: Keyword, body: nodes.Block) -> nodes.Stmt:
         return nodes.Node(kind[0], body, kind[1].to(body.span), kind[1])

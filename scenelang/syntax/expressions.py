@@ -4,7 +4,6 @@ Tokens come as indices into `Tokens`. A node's span runs from its first token to
 invented is an empty token; an expression that rests on one becomes a `BadExpr`.
 """
 
-
 from __future__ import annotations
 
 from dataclasses import replace
@@ -148,9 +147,7 @@ class ExpressionBuilder:
             return nodes.CallExpr(nodes.Name(text, at.span.to(name.span)), args[0], span)
         if not isinstance(at, nodes.BadExpr):
             help = f"write `{name.text}(…)` with the value as an argument"
-            self.report.add(
-                "E0128", "only a name can be called", value.span.start, name.span.end, help=help
-            )
+            self.report.add("E0128", "only a name can be called", value.span.start, name.span.end, help=help)
         return nodes.BadExpr(span)
 
     def call_expr(self, name: nodes.Name, args: Arguments) -> nodes.Expr:

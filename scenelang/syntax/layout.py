@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Tokens
@@ -81,9 +82,9 @@ def _indent(tokens: Tokens, at: int) -> int:
 
 def _unit(lines: list[_Line]) -> int:
     """How much deeper one level stands; 0 where the text is not indented."""
-    pairs = zip(lines, lines[1:], strict=False)
+    pairs = pairwise(lines)
     steps = Counter(line.indent - before.indent for before, line in pairs if line.indent > before.indent)
-    return steps.most_common(1)[0][0] if steps else 0
+    return min(steps, key=lambda step: (-steps[step], step), default=0)
 
 
 def _cheapest(lines: list[_Line], wanted: int) -> list[list[int]]:

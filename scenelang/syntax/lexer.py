@@ -135,7 +135,11 @@ class _Slips:
     def _open_comment(self, start: int, end: int, text: str) -> None:
         self.tokens.cut = True
         self.report.add(
-            "E0115", "comment is never closed", start, end, help="a comment ends with `*/`; the rest is skipped"
+            "E0115",
+            "comment is never closed",
+            start,
+            end,
+            help="a comment ends with `*/`; the rest is skipped",
         )
 
     def _close_comment(self, start: int, end: int, text: str) -> None:
@@ -154,7 +158,9 @@ class _Slips:
         self._keep("STRING", start, end)
         safe = '"' not in text and "\\" not in text
         fix = self._fix(start, end, f'"{text[1:-1]}"') if safe else None
-        self.report.add("E0123", "string in the wrong quotes", start, end, help='strings stand in `"`', fix=fix)
+        self.report.add(
+            "E0123", "string in the wrong quotes", start, end, help='strings stand in `"`', fix=fix
+        )
 
     def _number(self, start: int, end: int, text: str) -> None:
         self._keep("NUMBER", start, end)

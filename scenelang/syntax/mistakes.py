@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.syntax.automaton import fits
 from scenelang.syntax.repairs import Repair
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
@@ -54,7 +53,7 @@ def report_wrapping(tokens: Tokens, report: Report, code: str, first: int, stop:
     )
 
 
-def report_unexpected(tokens: Tokens, report: Report, states: list[int], at: int) -> None:
+def report_unexpected(tokens: Tokens, report: Report, at: int) -> None:
     """Report a token that nothing could make sense of."""
     if tokens.starts[at] in tokens.reported:
         return
@@ -71,10 +70,14 @@ def _report_insertion(
     found = _shown(tokens, at)
     first = names[0]
     # An operand is missed where the next token stands, anything else where the last one ended.
-    place = (end, end) if tokens.on_new_line(at) or tokens.kinds[at] == END else (tokens.starts[at], tokens.ends[at])
+    place = (
+        (end, end)
+        if tokens.on_new_line(at) or tokens.kinds[at] == END
+        else (tokens.starts[at], tokens.ends[at])
+    )
     if first in (")", "]"):
         text = "".join(names)
-        labels = [Label(tokens_span(tokens, open_brackets[-1]), "opened here")]
+        labels = [Label(_span(tokens, open_brackets[-1]), "opened here")]
         report.add("E0103", f"missing `{text}`", end, end, labels=labels, fix=_insert(tokens, end, text))
     elif first == ";":
         help = "a `;` ends every statement without a block"
@@ -110,7 +113,9 @@ def _report_deletion(tokens: Tokens, report: Report, repair: Repair) -> None:
     start, end = tokens.starts[repair.at], tokens.ends[repair.end - 1]
     text = tokens.source.text[start:end]
     if text in (")", "]"):
-        report.add("E0105", f"unmatched `{text}`", start, end, fix=_change("remove it", tokens, start, end, ""))
+        report.add(
+            "E0105", f"unmatched `{text}`", start, end, fix=_change("remove it", tokens, start, end, "")
+        )
     else:
         report.add("E0101", f"unexpected {_quoted(text)}", start, end)
 
@@ -132,7 +137,9 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
     elif text in (")", "]"):
         report.add("E0105", f"`{text}` where `{new}` belongs", start, end, fix=fix)
     elif text.isalpha():
-        report.add("E0127", f"`{text}` is not used here", start, end, help=f"`{new}` is the sign for it", fix=fix)
+        report.add(
+            "E0127", f"`{text}` is not used here", start, end, help=f"`{new}` is the sign for it", fix=fix
+        )
     else:
         report.add("E0130", f"`{text}` where `{new}` belongs", start, end, fix=fix)
 
@@ -150,7 +157,7 @@ def _quoted(text: str) -> str:
     return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}…`"
 
 
-def tokens_span(tokens: Tokens, index: int) -> Span:
+def _span(tokens: Tokens, index: int) -> Span:
     return Span(tokens.source, tokens.starts[index], tokens.ends[index])
 
 

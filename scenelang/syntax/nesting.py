@@ -19,7 +19,8 @@ _OTHER, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range
 @cache
 def _classes() -> tuple[int, ...]:
     """What each kind does to the depth."""
-    classes = {text: _OPERATOR for text in "|| && == != < <= > >= + - * / % ! ^ ? . else".split()}
+    operators = ("||", "&&", "==", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "%", "!", "^", "?", ".")
+    classes = dict.fromkeys((*operators, "else"), _OPERATOR)
     classes |= {"(": _OPEN, "[": _OPEN, ")": _CLOSE, "]": _CLOSE, ",": _COMMA, ";": _SEMICOLON}
     classes |= {"{": _BRACE, "}": _END_BRACE}
     return tuple(classes.get(name, _OTHER) for name in tables().kinds)
@@ -100,9 +101,11 @@ def _end_of_cut(kinds: list[int], first: int, within_list: bool) -> int:
         c = classes[kind]
         if open_braces:
             open_braces += (c == _BRACE) - (c == _END_BRACE)
-        elif chain and at > first and kinds[at - 1] == end_brace and kind != otherwise:
-            return at
-        elif c in (_END_BRACE, _SEMICOLON) or (c == _CLOSE and not open_brackets):
+        elif (
+            c in (_END_BRACE, _SEMICOLON)
+            or (c == _CLOSE and not open_brackets)
+            or (chain and at > first and kinds[at - 1] == end_brace and kind != otherwise)
+        ):
             return at
         elif c == _BRACE:
             open_braces += 1

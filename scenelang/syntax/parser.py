@@ -43,7 +43,9 @@ def _run(tokens: Tokens, report: Report) -> nodes.File:
     language = tables()
     actions, gotos, final = language.actions, language.gotos, language.final
     callbacks = Builder(tokens, report).callbacks()
-    rules = [(length, origin, call) for (length, origin, _), call in zip(language.rules, callbacks, strict=True)]
+    rules = [
+        (length, origin, call) for (length, origin, _), call in zip(language.rules, callbacks, strict=True)
+    ]
     recovery: Recovery | None = None
     kinds = tokens.kinds
     states = [language.start]

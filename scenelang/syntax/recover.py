@@ -58,7 +58,7 @@ class Recovery:
         repair = search.run(states[: depth + 1], states)
         if repair is None:
             del states[depth + 1 :], values[depth:]
-            return self._skip(states, first, at)
+            return self._skip(first, at)
         mistakes.report_repair(self.tokens, self.report, repair, search.open_brackets(repair.at))
         self.tokens.replace(repair.at, repair.delete, repair.insert)
         if repair.at == at:
@@ -201,11 +201,17 @@ class Recovery:
             return False
         unit = UNIT_ALIASES.get(word, word)
         start, end = tokens.starts[at - 1], tokens.ends[at]
-        fix = Fix(f"write `{unit}` right after the number", (
-            Edit(Span(tokens.source, tokens.ends[at - 1], end), unit),
-        ))
+        fix = Fix(
+            f"write `{unit}` right after the number",
+            (Edit(Span(tokens.source, tokens.ends[at - 1], end), unit),),
+        )
         self.report.add(
-            "E0117", "space between a number and its unit", start, end, help="units are glued to their number", fix=fix
+            "E0117",
+            "space between a number and its unit",
+            start,
+            end,
+            help="units are glued to their number",
+            fix=fix,
         )
         if word in UNITS:
             tokens.ends[at - 1] = end
@@ -232,10 +238,10 @@ class Recovery:
 
     # ------------------------------------------------------------ skipping
 
-    def _skip(self, states: list[int], first: int, at: int) -> int | None:
+    def _skip(self, first: int, at: int) -> int | None:
         """Give the statement up: one `BadStmt` up to its `;`, its block, or the end of the block around."""
         tokens = self.tokens
-        mistakes.report_unexpected(tokens, self.report, states, at)
+        mistakes.report_unexpected(tokens, self.report, at)
         stop = at
         while not self._at_end(stop) and not self._is(stop, "}", "{"):
             if self._is(stop, ";"):
