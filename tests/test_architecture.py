@@ -1,0 +1,167 @@
+"""Imports run forward only, along the pipeline of docs/architecture.md, and what is heavy comes late."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "scenelang"
+
+# A module may import modules of its own line and of the lines above.
+ORDER = (
+    "scenelang.diagnostics",
+    "scenelang.syntax",
+    "scenelang.models.manifest",
+    "scenelang.scene",
+    "scenelang.models.choose",
+    "scenelang.graph",
+    "scenelang.passes",
+    "scenelang.lifting",
+    "scenelang.models.weights",
+    "scenelang.program",
+    "scenelang.image",
+    "scenelang.reference",
+    "scenelang.renderers",
+    "scenelang.models.load",
+    "scenelang.training",
+    "scenelang.backend",
+    "scenelang.evaluation",
+    "scenelang.cli",
+)
+# The reference defines the training images; what is measured against it may not draw with it.
+APART = (("scenelang.renderers", "scenelang.reference"), ("scenelang.reference", "scenelang.renderers"))
+# Empty packages that hold others of the order.
+BARE = {"scenelang", "scenelang.models"}
+FACADES = {"scenelang", "scenelang.__main__"}  # fetch from anywhere, and nothing imports them
+MAY_BE_HEAVY = (
+    "scenelang.renderers",
+    "scenelang.models.load",
+    "scenelang.training",
+    "scenelang.backend",
+    "scenelang.evaluation",
+    "scenelang.cli",
+)
+
+
+def module_name(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+MODULES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def imports(path: Path) -> Iterator[tuple[str, int]]:
+    """Every module that a file imports anywhere, in functions and for types too, and the line."""
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, node.lineno
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno} imports relatively"
+            for alias in node.names:
+                full = f"{node.module}.{alias.name}"
+                yield (full if full in MODULES else str(node.module)), node.lineno
+
+
+def inside(module: str, prefix: str) -> bool:
+    return module == prefix or module.startswith(prefix + ".")
+
+
+def place(module: str) -> int:
+    found = [index for index, prefix in enumerate(ORDER) if inside(module, prefix)]
+    assert found, f"{module} has no place in ORDER: give it one here and in docs/architecture.md"
+    return found[0]
+
+
+def test_imports_run_forward() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line} imports {target}"
+        for module, path in MODULES.items()
+        if module not in FACADES | BARE
+        for target, line in imports(path)
+        if target in MODULES and target not in BARE and place(target) > place(module)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_reference_and_renderers_stay_apart() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line} imports {target}"
+        for module, path in MODULES.items()
+        for source, forbidden in APART
+        if inside(module, source)
+        for target, line in imports(path)
+        if inside(target, forbidden)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_the_compiler_never_imports_torch() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line} imports {target}"
+        for module, path in MODULES.items()
+        if module not in FACADES and not any(inside(module, prefix) for prefix in MAY_BE_HEAVY)
+        for target, line in imports(path)
+        if inside(target, "torch")
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_nothing_imports_a_facade() -> None:
+    for module, path in MODULES.items():
+        if module not in FACADES:
+            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+                if isinstance(node, ast.ImportFrom) and node.module == "scenelang":
+                    wanted = {f"scenelang.{alias.name}" for alias in node.names}
+                    assert wanted <= MODULES.keys() | {"scenelang.__version__"}, f"{path}:{node.lineno}"
+
+
+def test_docstring_and_architecture_tell_the_order() -> None:
+    """The stages named in the package's docstring, in docs/architecture.md and in ORDER agree."""
+    stages = ["syntax", "scene", "graph", "passes", "program", "renderers"]
+    docstring = ast.get_docstring(ast.parse((PACKAGE / "__init__.py").read_text("utf-8"))) or ""
+    page = (ROOT / "docs/architecture.md").read_text("utf-8")
+    headings = re.findall(r"^## \d+\. `(\w+)/`", page, re.MULTILINE)
+    assert re.findall(r"``(\w+)``", docstring) == stages
+    assert headings == stages
+    assert sorted(stages, key=lambda stage: place(f"scenelang.{stage}")) == stages
+
+
+def loaded_by(*arguments: str) -> set[str]:
+    """Top-level modules that a fresh process has loaded after ``scenelang ARGUMENTS``."""
+    code = (
+        "import sys\n"
+        "from scenelang.cli.main import main\n"
+        f"sys.argv = {['scenelang', *arguments]!r}\n"
+        "try:\n    main()\nexcept SystemExit as stop:\n    assert not stop.code, stop.code\n"
+        "print('LOADED', *sorted({name.split('.')[0] for name in sys.modules}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.rpartition("LOADED")[2].split())
+
+
+def test_check_loads_neither_torch_nor_numpy() -> None:
+    assert not loaded_by("check", str(ROOT / "examples/night.nsg")) & {"torch", "numpy", "lark"}
+
+
+def test_help_loads_nothing_heavy() -> None:
+    assert not loaded_by("--help") & {"torch", "numpy", "pydantic"}
+
+
+def test_compile_loads_no_torch(tmp_path: Path) -> None:
+    arguments = ("compile", str(ROOT / "examples/chain.nsg"), "-o", str(tmp_path / "chain.safetensors"))
+    assert "torch" not in loaded_by(*arguments)
+
+
+def test_import_loads_nothing_heavy() -> None:
+    code = (
+        "import scenelang, sys; print(*sorted(m for m in sys.modules if m in ('torch', 'numpy', 'pydantic')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
