@@ -1,0 +1,106 @@
+"""Cases of the conformance suite: how a scene is evaluated, and what is expected of it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.graph.lower import lower
+from scenelang.graph.nodes import Graph
+from scenelang.models.manifest import load_manifest
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import Program
+from scenelang.reference.image import evaluate, reference_image, sample_points
+from scenelang.scene.evaluate import load_scene
+
+FOLDER = Path(__file__).parent / "cases"
+NAMES = sorted(path.stem for path in FOLDER.glob("*.nsg"))
+GEOMETRY, MATERIAL = slice(4, 32), slice(32, 52)  # what of a vector is not learned
+
+Arrays = dict[str, npt.NDArray[np.float32]]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a scene gives: the JSON and the arrays of its case, and the graph as lowered."""
+
+    facts: dict[str, Any]
+    arrays: Arrays
+    graph: Graph | None
+
+
+def stored(name: str) -> tuple[dict[str, Any], Arrays]:
+    """The expectations of a case."""
+    facts = json.loads((FOLDER / f"{name}.json").read_text("utf-8"))
+    path = FOLDER / f"{name}.npz"
+    if not path.exists():
+        return facts, {}
+    with np.load(path, allow_pickle=False) as data:
+        return facts, {key: data[key] for key in data.files}
+
+
+def run(name: str, given: Mapping[str, Any]) -> Outcome:
+    """Evaluate, compile and draw a case by the reference.
+
+    Args:
+        name: of the case.
+        given: ``input`` of its JSON.
+    """
+    found = Diagnostics()
+    path = FOLDER / f"{name}.nsg"
+    scene, spans = load_scene(path, diagnostics=found, defines=given["params"], frame=given["frame"])
+    program = None
+    if scene is not None:
+        try:
+            program = compile_scene(scene, spans=spans, diagnostics=found)
+        except SceneError:
+            program = None
+    facts: dict[str, Any] = {"input": dict(given), "errors": [d.code for d in found.errors]}
+    if scene is None or program is None:
+        return Outcome(facts, {}, None)
+    graph = lower(scene, load_manifest(program.model), None, Diagnostics())
+    arrays: Arrays = {
+        "picture": np.asarray(reference_image(graph)),
+        "geometry": program.vectors[:, GEOMETRY],
+        "material": program.vectors[:, MATERIAL],
+    }
+    facts |= {
+        "canvas": list(program.canvas),
+        "background": None if program.background is None else list(program.background),
+        "model": program.model,
+        "objects": list(program.objects),
+        "tokens": program.tokens.tolist(),
+        "stream": stream_digest(program),
+        "weights": program.weights,
+        "program": program.digest(),
+    }
+    return Outcome(facts, arrays, graph)
+
+
+def stream_digest(program: Program) -> str:
+    """SHA-256, hex, of the stream without anything learned; README.md defines it."""
+    total = hashlib.sha256()
+    for name in program.objects:
+        total.update(name.encode() + b"\0")
+    total.update(program.tokens.astype("i1").tobytes())
+    for part in (GEOMETRY, MATERIAL):
+        total.update(np.ascontiguousarray(program.vectors[:, part], dtype="<f4").tobytes())
+    return total.hexdigest()
+
+
+def is_stable(graph: Graph, by: float = 1e-9) -> bool:
+    """Whether moving all samples by a little changes nothing that shows."""
+    x, y = (v.ravel() for v in sample_points(graph.canvas, range(graph.canvas[1]), 2))
+    pictures = []
+    for dx, dy in ((0.0, 0.0), (by, by), (-by, by), (by, -by), (-by, -by)):
+        d, c = evaluate(graph.root, x + dx, y + dy)
+        pictures.append(np.where((d < 0)[:, None], c, -1.0))
+    return all(np.abs(p - pictures[0]).max() < 1e-6 for p in pictures)

@@ -1,0 +1,47 @@
+"""This implementation against the conformance suite."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from scenelang.models.weights import load_codes
+from tests.conformance.cases import FOLDER, NAMES, Outcome, run, stored
+
+
+@cache
+def outcome_of(name: str) -> Outcome:
+    """What a case gives, evaluated once."""
+    return run(name, stored(name)[0]["input"])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_case(name: str) -> None:
+    facts, arrays = stored(name)
+    outcome = outcome_of(name)
+    learned = {"weights", "program"}
+    assert {k: v for k, v in outcome.facts.items() if k not in learned} == {
+        k: v for k, v in facts.items() if k not in learned
+    }
+    assert outcome.arrays.keys() == arrays.keys()
+    for key, tolerance in (("picture", 1e-6), ("geometry", 0.0), ("material", 0.0)):
+        if key in arrays:
+            assert outcome.arrays[key].shape == arrays[key].shape
+            np.testing.assert_allclose(outcome.arrays[key], arrays[key], rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if (FOLDER / f"{name}.npz").exists()])
+def test_program_digest(name: str) -> None:
+    facts, _ = stored(name)
+    message = "the weights are new: python -m tests.conformance.update"
+    assert facts["weights"] == load_codes(facts["model"]).digest, message
+    outcome = outcome_of(name)
+    assert outcome.facts["program"] == facts["program"]
+
+
+def test_every_case_has_its_files() -> None:
+    names = {path.stem for path in FOLDER.glob("*.json")}
+    assert names == set(NAMES)
+    assert {path.stem for path in FOLDER.glob("*.npz")} <= names
