@@ -32,21 +32,19 @@ class _Frame:
         fold: the composite.
         stream: what it has given so far.
         refused: it is only read for its mistakes.
-        todo: links still to come, the next one last.
+        todo: links still to come, the next one last, each with the operand it was written after.
         smooths: how many of those are `smooth`.
-        first: its first operand, as written.
     """
 
     fold: Fold
     stream: Stream
     refused: bool = False
-    todo: list[Link] = field(default_factory=list)
+    todo: list[tuple[Link, Node]] = field(default_factory=list)
     smooths: int = 0
-    first: Node | None = None
 
-    def put(self, links: Sequence[Link]) -> None:
-        """Put links before all that are still to come."""
-        self.todo.extend(reversed(links))
+    def put(self, links: Sequence[Link], before: Node) -> None:
+        """Put links before all that are still to come; ``before`` is the operand they were written after."""
+        self.todo.extend((link, before) for link in reversed(links))
         self.smooths += sum(link.op == "smooth" for link in links)
 
 
@@ -74,33 +72,32 @@ def linearise(graph: Graph, context: Context) -> Graph:
 
 def _frame(fold: Fold, dimension: int, refused: bool = False) -> _Frame:
     frame = _Frame(fold, Stream(dimension), refused)
-    frame.put(fold.links)
+    if fold.links:
+        frame.put(fold.links, fold.links[0].node)
     return frame
 
 
 def _advance(here: _Frame, context: Context) -> _Frame | None:
     """Take the next link; returns the frame of a composite that has to be streamed by itself."""
-    link = here.todo.pop()
+    link, before = here.todo.pop()
     op, node = link.op, link.node
     here.smooths -= op == "smooth"
-    if here.first is None:
-        here.first = node
     if isinstance(node, Leaf):
         here.stream.push(op, node)
         return None
     if not here.stream.rows:
-        here.put(node.links)
+        here.put(node.links, node.links[0].node)
         return None
     core = _core(op, node)
     tail = node.links[core:]
-    here.put(tail if op == "intersect" else [Link(op, after.node) for after in tail])
+    here.put(tail if op == "intersect" else [Link(op, after.node) for after in tail], before)
     if core == 1:
-        here.put([Link(op, node.links[0].node)])
+        here.put([Link(op, node.links[0].node)], before)
         return None
     rest = node if not tail else Fold(node.kind, node.links[:core], (), node.span)
     refused = op != "union" or here.smooths > 0
     if refused:
-        _refuse(op, rest, here, context)
+        _refuse(op, rest, before, context)
     return _frame(rest, here.stream.dimension, refused)
 
 
@@ -143,7 +140,7 @@ def _attach(above: _Frame, done: _Frame, context: Context) -> None:
     )
 
 
-def _refuse(op: Combine, fold: Fold, here: _Frame, context: Context) -> None:
+def _refuse(op: Combine, fold: Fold, before: Node, context: Context) -> None:
     what = _named(fold)
     code, message, label, advice = {
         "union": (
@@ -172,8 +169,7 @@ def _refuse(op: Combine, fold: Fold, here: _Frame, context: Context) -> None:
             "put it first: of two operands `smooth` makes the same picture either way round",
         ),
     }[op]
-    before = here.first
-    labels = [Label(before.span, label)] if before is not None and before.span is not None else []
+    labels = [Label(before.span, label)] if before.span is not None else []
     context.diagnostics.add(code, message, fold.span, labels=labels, help=advice)
 
 

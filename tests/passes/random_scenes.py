@@ -65,7 +65,9 @@ def random_node(rng: random.Random, depth: int, warps: bool, spread: float = 1.0
     if kind == "group":
         return schema.Group(children=children, transforms=moves, material=material)
     if kind == "chain":
-        ops = ["union"] + [rng.choice(["union", "union", "smooth", "subtract", "intersect"]) for _ in children[1:]]
+        ops = ["union"] + [
+            rng.choice(["union", "union", "smooth", "subtract", "intersect"]) for _ in children[1:]
+        ]
         links = tuple(schema.Link(op=op, node=child) for op, child in zip(ops, children, strict=False))
         return schema.Chain(children=links, transforms=moves, material=material)
     return schema.Boolean(op=kind, children=children, transforms=moves, material=material)
@@ -77,3 +79,36 @@ def random_scene(seed: int, warps: bool = True) -> schema.Scene:
     canvas = rng.choice([(256, 256), (320, 192), (64, 200)])
     nodes = tuple(random_node(rng, rng.choice([1, 2, 3]), warps) for _ in range(rng.choice([1, 1, 2, 3])))
     return schema.Scene(nodes=nodes, canvas=canvas)
+
+
+def blob_scene(seed: int) -> schema.Scene:
+    """Small chains of `smooth` leaves, near each other and near the edge of the canvas."""
+    rng = random.Random(seed)
+
+    def leaf(x: float, y: float) -> schema.Object:
+        s = rng.uniform(0.05, 0.25)
+        moves = (
+            schema.Rotate(angle=rng.uniform(0, 6)),
+            schema.Scale(x=s, y=s * rng.uniform(0.3, 1.0), z=1.0),
+            schema.Rotate(angle=rng.uniform(0, 6)),
+            schema.Translate(x=x + rng.uniform(-0.3, 0.3), y=y + rng.uniform(-0.3, 0.3)),
+        )
+        return schema.Object(geometry=rng.choice(GEOMETRIES), transforms=moves, material=random_material(rng))
+
+    def blob(x: float, y: float) -> schema.Chain:
+        words = ["smooth", "smooth", "union", "subtract"]
+        ops = ["union"] + [rng.choice(words) for _ in range(rng.choice([1, 1, 2, 3]))]
+        return schema.Chain(children=tuple(schema.Link(op=op, node=leaf(x, y)) for op in ops))
+
+    apart = rng.uniform(0.3, 1.3)
+    x, y = rng.choice([(0.0, 0.0), (0.9, 0.0), (-1.1, 0.9), (1.3, -1.2)])
+    nodes = (
+        blob(x - apart / 2, y),
+        blob(x + apart / 2, y),
+        *(leaf(x, y - 0.6) for _ in range(rng.randrange(2))),
+    )
+    if rng.random() < 0.5:
+        tail = schema.Link(op=rng.choice(["smooth", "subtract", "union"]), node=leaf(0.7 * x, 0.7 * y))
+        head = schema.Link(op="union", node=schema.Group(children=nodes))
+        return schema.Scene(nodes=(schema.Chain(children=(head, tail)),))
+    return schema.Scene(nodes=nodes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_scenes import random_scene
+from random_scenes import blob_scene, random_scene
 from tree_oracle import assert_same_picture, graph_picture, stream_picture, tree_picture
 
 from scenelang.diagnostics.diagnostic import Diagnostics
@@ -49,6 +49,21 @@ def test_random_trees_keep_their_picture(block: int) -> None:
         covered += assert_same_picture(tree_picture(scene, points), stream_picture(final, points))
     assert accepted > 60
     assert covered > 1000
+
+
+def test_smooth_blobs_keep_their_picture() -> None:
+    """Two composites in one stream, and rows off the canvas, where `smooth` reaches beyond each leaf."""
+    accepted = 0
+    for seed in range(1200):
+        scene = blob_scene(seed)
+        stages, diagnostics = compiled(scene)
+        if diagnostics.errors:
+            continue
+        accepted += 1
+        final = list(stages.values())[-1]
+        points = window_points(final, seed)
+        assert_same_picture(tree_picture(scene, points), stream_picture(final, points))
+    assert accepted > 300
 
 
 def test_each_pass_keeps_the_picture() -> None:

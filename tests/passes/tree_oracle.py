@@ -32,7 +32,9 @@ def polygon_distance(points: np.ndarray, ring: np.ndarray) -> np.ndarray:
     nearest = np.full(len(points), np.inf)
     inside = np.zeros(len(points), dtype=bool)
     for (ax, ay), (bx, by) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-        t = ((points[:, 0] - ax) * (bx - ax) + (points[:, 1] - ay) * (by - ay)) / ((bx - ax) ** 2 + (by - ay) ** 2)
+        t = ((points[:, 0] - ax) * (bx - ax) + (points[:, 1] - ay) * (by - ay)) / (
+            (bx - ax) ** 2 + (by - ay) ** 2
+        )
         t = np.clip(t, 0, 1)
         gap = np.hypot(points[:, 0] - ax - t * (bx - ax), points[:, 1] - ay - t * (by - ay))
         nearest = np.minimum(nearest, gap)
