@@ -12,9 +12,12 @@ import importlib
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from scenelang.backend.errors import RenderError as RenderError
+    from scenelang.backend.render import render as render
     from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
     from scenelang.diagnostics.diagnostic import Diagnostics as Diagnostics
     from scenelang.diagnostics.diagnostic import SceneError as SceneError
+    from scenelang.image import Image as Image
     from scenelang.program.compile import compile as compile
     from scenelang.program.program import Place as Place
     from scenelang.program.program import Program as Program
@@ -46,7 +49,10 @@ if TYPE_CHECKING:
 
 # Module -> public names it defines. A new public name is added here, above, and to __all__.
 _HOME: Final = {
+    "scenelang.backend.errors": ("RenderError",),
+    "scenelang.backend.render": ("render",),
     "scenelang.diagnostics.diagnostic": ("Diagnostic", "Diagnostics", "SceneError"),
+    "scenelang.image": ("Image",),
     "scenelang.program.compile": ("compile",),
     "scenelang.program.program": ("Place", "Program", "ProgramError"),
     "scenelang.program.store": ("load_program",),
@@ -90,6 +96,7 @@ __all__ = [
     "Grayscale",
     "Group",
     "Hue",
+    "Image",
     "Link",
     "Material",
     "Matrix",
@@ -97,6 +104,7 @@ __all__ = [
     "Place",
     "Program",
     "ProgramError",
+    "RenderError",
     "Rotate",
     "Scale",
     "Scene",
@@ -109,6 +117,7 @@ __all__ = [
     "load",
     "load_program",
     "loads",
+    "render",
 ]
 
 

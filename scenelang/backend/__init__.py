@@ -1,0 +1,1 @@
+"""What draws: a trained network, or the exact definition."""

@@ -1,0 +1,149 @@
+"""Programs drawn by torch: the device, the models that are loaded, and the process's threads and memory.
+
+Drawing tiles in a pool of threads with one torch thread each takes 0.8 of the time of a single thread on
+two cores. Torch's own threads gain as much on an idle machine and are thirty times slower than one beside
+any other busy process, as they wait for each other after every small product.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+
+import torch
+
+from scenelang.backend.errors import RenderError
+from scenelang.models.load import Model, ModelError, load_model
+from scenelang.program.program import Program
+from scenelang.renderers.draw import Drawing, draw
+
+KEEP_BYTES = 256 << 20
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
+
+_loading = threading.Lock()
+_drawing = threading.Lock()
+
+
+def keep_memory() -> bool:
+    """Have glibc reuse blocks up to `KEEP_BYTES` instead of giving each back to the kernel.
+
+    Otherwise every operation on a large array pays a page fault for every 4 KB of its result.
+
+    Returns:
+        Whether the C library is glibc and took it.
+    """
+    try:
+        if not sys.platform.startswith("linux") or not (os.confstr("CS_GNU_LIBC_VERSION") or ""):
+            return False
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError, ValueError):
+        return False  # musl has neither the name nor the function
+    return all(mallopt(option, KEEP_BYTES) == 1 for option in (_M_MMAP_THRESHOLD, _M_TRIM_THRESHOLD))
+
+
+def choose_device(device: str) -> str:
+    """The torch device that ``auto``, ``cpu`` or ``cuda`` means here.
+
+    Raises:
+        RenderError: CUDA is asked for and there is none.
+        ValueError: an unknown name.
+    """
+    if device not in ("auto", "cpu", "cuda"):
+        raise ValueError(f"unknown device {device!r}; there are 'auto', 'cpu' and 'cuda'")
+    if device == "cpu":
+        return "cpu"
+    if torch.cuda.is_available():
+        return "cuda"
+    if device == "cuda":
+        built = "sees no device" if torch.version.cuda else "is built without it"
+        raise RenderError(f"CUDA is asked for, but this torch {built}")
+    return "cpu"
+
+
+def usable_cores() -> int:
+    """Cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@lru_cache(maxsize=8)
+def _load(name: str, device: str) -> Model:
+    keep_memory()
+    return load_model(name, device)
+
+
+def open_model(name: str, device: str = "cpu") -> Model:
+    """A shipped model, loaded once for each process and device.
+
+    Raises:
+        RenderError: there is none of that name, or its weights are missing or damaged.
+    """
+    try:
+        with _loading:
+            return _load(name, device)
+    except KeyError:
+        raise RenderError(f"unknown model `{name}`") from None
+    except ModelError as error:
+        raise RenderError(str(error)) from None
+
+
+@contextmanager
+def _one_torch_thread() -> Iterator[None]:
+    """Torch computes each operation on one core meanwhile.
+
+    The setting is partly the process's and partly a thread's, and worker threads take it over when they
+    start; so it is set around the pool, not inside it, and put back.
+    """
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def draw_program(
+    program: Program,
+    model: Model,
+    *,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Drawing:
+    """Draw a Program.
+
+    One drawing runs at a time, on all of ``threads``: torch's number of threads is the process's.
+
+    Args:
+        program: compiled for this model's weights.
+        model: from `open_model`.
+        threads: tiles drawn at the same time; by default one for each usable core.
+        progress: called with the share done, in [0, 1], from any thread.
+
+    Raises:
+        RenderError: the Program was compiled for another model or other weights.
+    """
+    if program.model != model.manifest.name:
+        raise RenderError(f"a program for model `{program.model}`, not `{model.manifest.name}`")
+    if program.weights != model.digest:
+        raise RenderError(
+            f"the program was compiled for weights {program.weights[:12]}… of model `{program.model}`, "
+            f"these are {model.digest[:12]}…: compile the scene again"
+        )
+    if model.network.codes.device.type != "cpu":
+        threads = 1  # the device is busy with one tile
+    with _drawing, _one_torch_thread():
+        return draw(
+            model.network,
+            program.vectors,
+            program.tokens,
+            program.canvas,
+            program.background,
+            threads=usable_cores() if threads is None else threads,
+            progress=progress,
+        )

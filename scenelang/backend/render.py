@@ -1,0 +1,71 @@
+"""Pictures in one call: `scenelang.render`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
+
+from scenelang.backend.errors import RenderError
+from scenelang.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from scenelang.image import Image
+    from scenelang.program.program import Program
+
+Backend = Literal["neural", "reference"]
+Device = Literal["auto", "cpu", "cuda"]
+
+
+def render(
+    program_or_scene: Program | Scene,
+    *,
+    backend: Backend = "neural",
+    device: Device = "auto",
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Image:
+    """Draw a Program, or a Scene, which is compiled first.
+
+    A model is loaded when it is first drawn with and then kept. The same Program, device and number of
+    threads give the same picture bit for bit; other devices and numbers the same within 1/255.
+
+    Args:
+        program_or_scene: what to draw.
+        backend: ``"neural"`` draws with the trained network, ``"reference"`` a Scene by the exact
+            definition, which knows no boolean rule and none of a model's limits.
+        device: where the network runs; ``"auto"`` is CUDA where there is any.
+        threads: tiles drawn at the same time; by default as many as there are usable cores.
+        progress: called with the share done, in [0, 1], from any thread.
+
+    Returns:
+        The picture, float32 (H, W, 3), or (H, W, 4) where the background is none.
+
+    Raises:
+        SceneError: the Scene cannot be compiled.
+        RenderError: there is no such device, the model's weights are missing or not those the Program was
+            compiled for, or the reference was given a Program.
+        ValueError: an argument is none of the above.
+    """
+    if threads is not None and threads < 1:
+        raise ValueError(f"{threads} threads, where at least 1 is needed")
+    if backend == "reference":
+        from scenelang.backend.exact import draw_exact
+
+        if not isinstance(program_or_scene, Scene):
+            raise RenderError("the reference draws scenes; a program keeps only what the network needs")
+        return draw_exact(program_or_scene)
+    if backend != "neural":
+        raise ValueError(f"unknown backend {backend!r}; there are 'neural' and 'reference'")
+    if isinstance(program_or_scene, Scene):
+        from scenelang.program.compile import compile_scene
+
+        try:
+            program = compile_scene(program_or_scene)
+        except FileNotFoundError as error:
+            raise RenderError(f"a model has no weights here: {error.filename}") from None
+    else:
+        program = program_or_scene
+    from scenelang.backend.neural import choose_device, draw_program, open_model
+
+    model = open_model(program.model, choose_device(device))
+    return draw_program(program, model, threads=threads, progress=progress).image
