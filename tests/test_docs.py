@@ -1,0 +1,188 @@
+"""The documentation is true: its scenes, commands, links, Python and pictures are tried."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.span import SourceFile
+from scenelang.passes import check_scene
+from scenelang.program.compile import find_model
+from scenelang.scene.evaluate import load_source
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "tests").rglob("*.md")])
+README = (ROOT / "README.md").read_text("utf-8")
+VENV = ".venv/bin/"
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of code of a page."""
+
+    page: str
+    line: int
+    language: str
+    words: tuple[str, ...]
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.page}:{self.line}"
+
+
+def blocks() -> list[Block]:
+    found = []
+    for page in PAGES:
+        text = page.read_text("utf-8")
+        for match in re.finditer(r"^```([^\n]*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
+            head = match[1].split()
+            line = text[: match.start()].count("\n") + 1
+            name = str(page.relative_to(ROOT))
+            found.append(Block(name, line, head[0] if head else "", tuple(head[1:]), match[2]))
+    return found
+
+
+BLOCKS = blocks()
+
+
+def of(language: str) -> list[Block]:
+    return [block for block in BLOCKS if block.language == language]
+
+
+@pytest.mark.parametrize("block", of("nsg"), ids=str)
+def test_scenes_give_what_the_page_says(block: Block) -> None:
+    """A block of ``nsg`` has no errors, one of ``nsg E0402 …`` those that it names."""
+    found = Diagnostics()
+    source = SourceFile(str(block), block.text)
+    scene, spans = load_source(source, diagnostics=found, root=ROOT / "examples")
+    if scene is not None:
+        manifest = find_model(scene, found, spans=spans)
+        if manifest is not None:
+            check_scene(scene, spans, found, manifest)
+    assert tuple(d.code for d in found.errors) == block.words, [(d.message, d.span) for d in found]
+
+
+def test_blocks_say_their_language() -> None:
+    assert not [
+        str(block) for block in BLOCKS if block.language not in {"nsg", "sh", "python", "text", "json"}
+    ]
+
+
+def commands() -> list[tuple[str, str]]:
+    """(place, command) of every line of every ``sh`` block, split at ``&&``."""
+    return [
+        (str(block), part.strip())
+        for block in of("sh")
+        for line in block.text.splitlines()
+        for part in re.split(r"&&|\|", line.split(" #")[0])
+        if part.strip()
+    ]
+
+
+@cache
+def help_of(subcommand: str) -> str:
+    code = "from scenelang.cli.main import main; main()"
+    arguments = [sys.executable, "-c", code, subcommand, "--help"]
+    shown = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert shown.returncode == 0, shown.stderr
+    return shown.stdout
+
+
+@pytest.mark.parametrize(("place", "command"), commands())
+def test_commands_name_what_exists(place: str, command: str) -> None:
+    """Scripts and files exist; subcommands and options are ones that `scenelang` has."""
+    words = shlex.split(command)
+    output = {words[i + 1] for i, word in enumerate(words[:-1]) if word == "-o"}
+    for word in words[1:]:
+        if word.startswith(("examples/", "docs/", "tests/", "benchmarks/", ".ci/")) and word not in output:
+            assert (ROOT / word).exists(), f"{place}: {word}"
+    program = words[0].removeprefix(VENV)
+    assert program in {"python3", "python", "pip", "pytest", "ruff", "mypy", "bash", "git", "scenelang"}, (
+        place
+    )
+    if program == "scenelang":
+        shown = subprocess.run(
+            [sys.executable, "-m", "scenelang", words[1], "--help"],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert shown.returncode == 0, f"{place}: {shown.stderr}"
+        for word in words[2:]:
+            if re.match(r"-{1,2}[A-Za-z]", word):
+                assert re.search(rf"(?<!\S){re.escape(word)}\b", shown.stdout), f"{place}: {word}"
+
+
+@pytest.mark.parametrize("block", [b for b in of("python") if b.page == "README.md"], ids=str)
+def test_python_runs(block: Block, tmp_path: Path) -> None:
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", block.text],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "chain.png").stat().st_size > 1000
+    assert "star {" in done.stdout
+
+
+def headings(page: Path) -> set[str]:
+    """Anchors of a page, as code hosts make them."""
+    titles = re.findall(r"^#+ (.*)$", page.read_text("utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
+    text = re.sub(r"`[^`\n]*`", "", text)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"https?://", target):
+            continue
+        path, _, anchor = target.partition("#")
+        goal = (page.parent / path).resolve() if path else page
+        assert goal.exists(), f"{page.name}: {target}"
+        assert goal.is_relative_to(ROOT), f"{page.name}: {target}"
+        if anchor:
+            assert anchor in headings(goal), f"{page.name}: {target}"
+
+
+def test_ci_runs_the_commands_of_the_readme() -> None:
+    """Each is one line, and `.ci/run` takes it from the README by a pattern that only it matches."""
+    script = (ROOT / ".ci/run").read_text("utf-8")
+    patterns = re.findall(r"grep -m1 '(\^python3[^']*)' README\.md", script)
+    assert len(patterns) == 2
+    for pattern in patterns:
+        assert len(re.findall(pattern + ".*" * (not pattern.endswith("$")), README, re.MULTILINE)) == 1
+    assert 'bash -c "$render"' in script
+    assert 'bash -c "$tests"' in script
+
+
+def test_every_picture_is_made_and_used() -> None:
+    pictures = {path.name for path in (ROOT / "docs/pictures").glob("*.png")}
+    examples = {f"{path.stem}.png" for path in (ROOT / "examples").glob("*.nsg")}
+    assert pictures == examples | {"gallery.png", "chain-compared.png"}
+    assert sum(path.stat().st_size for path in (ROOT / "docs/pictures").glob("*.png")) < 500_000
+
+
+def test_every_page_is_linked() -> None:
+    """From the README, or from a page that it links."""
+    seen, todo = set(), [ROOT / "README.md"]
+    while todo:
+        page = todo.pop()
+        if page in seen:
+            continue
+        seen.add(page)
+        targets = re.findall(r"\]\(([^)#\s]+\.md)", page.read_text("utf-8"))
+        todo += [(page.parent / target).resolve() for target in targets]
+    assert set(PAGES) <= seen
