@@ -94,8 +94,6 @@ class Framed(nn.Module):
         materials: number of material codes.
     """
 
-    SPARSE = 4
-
     def __init__(self, config: FramedConfig, geometries: int, materials: int) -> None:
         super().__init__()
         self.config = c = config
@@ -115,12 +113,13 @@ class Framed(nn.Module):
             nn.Parameter((torch.rand(c.code + 1, b) * 2 - 1) / fan) for b in sizes[1:]
         )
         self.far = nn.Parameter(torch.ones(c.features))  # growth of the features beyond the rim
-        self.edge_slope = nn.Parameter(torch.tensor(math.log(20.0)))
+        self.edge_slope = nn.Parameter(torch.tensor(math.log(50.0)))
 
         inputs = (c.features + c.state) * (1 + len(SHARPEN))
         self.cell_w1 = nn.Parameter(torch.randn(TOKENS, inputs, c.cell_width) * math.sqrt(2 / inputs))
         self.cell_b1 = nn.Parameter(torch.randn(TOKENS, c.cell_width) * 0.1)
         self.cell_w2 = nn.Parameter(torch.randn(TOKENS, c.cell_width, c.state + 1) / math.sqrt(c.cell_width))
+        self.cell_skip = nn.Parameter(torch.zeros(TOKENS, c.features + c.state, c.state + 1))
         self.cell_b2 = nn.Parameter(torch.full((TOKENS, c.state + 1), 0.5))
         self.candidate = nn.Parameter(torch.rand(TOKENS, c.features, c.state) - 0.5)
         self.bump = nn.Parameter(torch.zeros(TOKENS, c.state))
@@ -145,7 +144,7 @@ class Framed(nn.Module):
     def cell_weights(self) -> tuple[Tensor, ...]:
         """Parameters of the cell, each with tokens in front."""
         candidate = self.candidate.clamp(-1.0, 1.0)
-        return self.cell_w1, self.cell_b1, self.cell_w2, self.cell_b2, candidate, self.bump
+        return self.cell_w1, self.cell_b1, self.cell_w2, self.cell_skip, self.cell_b2, candidate, self.bump
 
     def object_albedo(self, material_code: Tensor) -> Tensor:
         """Albedo (M, 3) of material codes (M, material_code)."""
@@ -170,18 +169,6 @@ class Framed(nn.Module):
         x = x + (radius - RADIUS).clamp_min(0.0) * self.far
         return x * scale[:, None, None]
 
-    def slope(self, q: Tensor, layers: list[tuple[Tensor, Tensor]]) -> Tensor:
-        """Length of the gradient of the first feature in leaf space (M, P), at points in the disc (M, P, 2)."""
-        x, tangent = q, torch.eye(2, device=q.device).expand(q.shape[0], q.shape[1], 2, 2)
-        for i, (w, b) in enumerate(layers):
-            last = i == len(layers) - 1
-            x = torch.baddbmm(b[:, None], x, w)
-            tangent = (tangent.flatten(1, 2) @ w).view(*tangent.shape[:3], -1)  # (M, P, 2, G)
-            if not last:
-                tangent = tangent * (x > 0)[:, :, None]
-                x = torch.relu(x)
-        return torch.linalg.vector_norm(tangent[..., 0], dim=-1)
-
     def step(
         self,
         features: Tensor,
@@ -199,10 +186,11 @@ class Framed(nn.Module):
             object_colour: (B, 1, 3).
             weights: w1 (B, F + S, K), b1 (B, K), w2 (B, K, 3 S + 1), b2 (B, 3 S + 1).
         """
-        w1, b1, w2, b2, candidate, bump = weights
+        w1, b1, w2, skip, b2, candidate, bump = weights
         seen = sharpen(torch.cat([features, state], -1))
         hidden = torch.relu(torch.baddbmm(b1[:, None], seen, w1))  # (B, P, K)
-        gates = gate(torch.baddbmm(b2[:, None], hidden, w2))  # (B, P, S + 1)
+        lines = torch.baddbmm(b2[:, None], seen[..., : skip.shape[1]], skip)
+        gates = gate(torch.baddbmm(lines, hidden, w2))  # (B, P, S + 1)
         take, paint = gates[..., :-1], gates[..., -1:]
         new = torch.bmm(features, candidate)  # (B, P, S)
         state = state + take * (new - state) - bump[:, None] * take * (1 - take)
@@ -234,8 +222,9 @@ class Framed(nn.Module):
             margins.append(state[..., 0])
             shown.append(colour)
         return Trace(
-            slope=self.slope(q.reshape(b * n, p, 2)[:, :: self.SPARSE].clamp(-RADIUS, RADIUS), layers),
+            distance=features[..., 0],
             alone=features[..., 0] * self.edge_slope.exp(),
+            depth=torch.stack(margins, 1),
             margin=torch.stack(margins, 1) * self.read_slope.exp(),
             colour=torch.stack(shown, 1),
         )
@@ -246,13 +235,15 @@ class Trace:
     """What `Framed.trace` returns.
 
     Args:
-        slope: how fast the first feature grows in leaf space, at every `SPARSE`-th point (B N, P').
-        alone: logit against each object alone covering the point (B, N, P).
-        margin: logit against coverage after each object (B, N, P).
+        distance: first feature of each object, world units (B, N, P).
+        alone: the same as a logit against the object alone covering the point.
+        depth: first entry of the state after each object, world units (B, N, P).
+        margin: the same as a logit against coverage after each object.
         colour: register after each object (B, N, P, 3).
     """
 
-    slope: Tensor
+    distance: Tensor
     alone: Tensor
+    depth: Tensor
     margin: Tensor
     colour: Tensor

@@ -38,6 +38,7 @@ class _Cell:
     w1: Tensor
     b1: Tensor
     w2: Tensor
+    skip: Tensor
     b2: Tensor
     candidate: Tensor
     bump: Tensor
@@ -81,16 +82,15 @@ class Stream:
                 w1.T.contiguous(),
                 b1[:, None],
                 w2.T.contiguous(),
+                skip.T.contiguous(),
                 b2[:, None],
                 c.T.contiguous(),
                 bump[:, None],
             )
-            for w1, b1, w2, b2, c, bump in zip(*network.cell_weights(), strict=True)
+            for w1, b1, w2, skip, b2, c, bump in zip(*network.cell_weights(), strict=True)
         ]
         self.slope = float(network.read_slope.exp()) / 4
-        self.unit = float(
-            network.cell_weights()[4][UNION, :, 0].norm()
-        )  # growth of the margin per world unit
+        self.unit = float(self.cells[UNION].candidate[0].norm())  # growth of the margin per world unit
         self.sharpen = [float(s) for s in SHARPEN]
         self.far = network.far[:, None]
         self.rows = self._rows(vectors, tokens, skip)
@@ -183,7 +183,8 @@ class Stream:
             torch.mul(old[:n], slope, out=seen[i * n : (i + 1) * n])
         seen[n:].clamp_(-1.0, 1.0)
         hidden = torch.addmm(cell.b1, cell.w1, seen).relu_()
-        gates = torch.addmm(cell.b2, cell.w2, hidden).clamp_(0.0, 1.0)
+        lines = torch.addmm(cell.b2, cell.skip, old[:n])
+        gates = lines.addmm_(cell.w2, hidden).clamp_(0.0, 1.0)
         take, paint = gates[:s], gates[s:]
         state, colour = old[n - s : n], old[n:]
         gap = (cell.candidate @ old[: n - s]).sub_(state)

@@ -21,14 +21,14 @@ class Phase:
 
     Args:
         iterations: optimiser steps.
-        streams: streams B of a batch.
-        objects: most objects of a stream.
+        objects: most objects of a stream; 0 trains on the leaves alone, without frames or cell.
+        streams: streams B of a batch; for leaves alone the factor on the number of points of each.
         decoder_rate: the decoder's learning rate as a share of the cell's.
     """
 
     iterations: int
-    streams: int
     objects: int
+    streams: int
     decoder_rate: float = 1.0
 
 

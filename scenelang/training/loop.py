@@ -15,8 +15,8 @@ import torch
 from scenelang.renderers.framed import Framed
 from scenelang.training.checkpoint import load_tensors, pack_training, save_tensors, unpack_training
 from scenelang.training.config import TrainConfig
-from scenelang.training.losses import image_loss
-from scenelang.training.scenes import GEOMETRIES, random_batch
+from scenelang.training.losses import image_loss, leaf_loss
+from scenelang.training.scenes import GEOMETRIES, leaf_batch, random_batch
 
 WARM_UP = 200
 Report = Callable[[int, int, float, dict[str, float]], None]
@@ -77,8 +77,11 @@ def train(
         share = config.rate * _schedule(into, phase.iterations)
         optimiser.param_groups[0]["lr"] = share
         optimiser.param_groups[1]["lr"] = share * phase.decoder_rate
-        batch = random_batch(phase.streams, phase.objects, config.scenes, scenes)
-        loss, parts = image_loss(network, batch)
+        if phase.objects:
+            batch = random_batch(phase.streams, phase.objects, config.scenes, scenes)
+            loss, parts = image_loss(network, batch)
+        else:
+            loss, parts = leaf_loss(network, leaf_batch(phase.streams * config.scenes.points, scenes))
         optimiser.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)

@@ -1,23 +1,27 @@
-"""What is asked of the network: the images of each object alone and of every prefix of the stream."""
+"""What is asked of the network: the images of each object alone and of every prefix of the stream.
+
+An image here has colour, coverage and distance, as renderers write them side by side.
+"""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor
-from torch.nn.functional import binary_cross_entropy_with_logits
+from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
 
 from scenelang.renderers.framed import Framed
-from scenelang.training.scenes import Batch
+from scenelang.training.scenes import Batch, LeafBatch
 
-SLOPE = 0.5  # weight of the distance prior
+SHARP = 0.02  # distances are asked for relative to themselves plus this
+FAR_LEAF, FAR_WORLD = 2.0, 0.4  # leaf and world units: farther outside, a distance makes no difference
 
 
 def image_loss(network: Framed, batch: Batch) -> tuple[Tensor, dict[str, float]]:
     """Loss of a batch of streams at points.
 
-    Coverage of each object alone and of each prefix by cross-entropy, colour where the prefix covers the
-    point by squared and absolute error. A prior asks the first feature to grow like
-    a distance (Gropp et al. 2020, eq. 2). Padding counts for nothing.
+    Coverage by cross-entropy and distance by relative absolute error, of each object alone and of each
+    prefix; colour where the prefix covers the point by squared and absolute error. Padding counts for
+    nothing.
 
     Returns:
         The loss, and its parts as numbers by name.
@@ -28,14 +32,31 @@ def image_loss(network: Framed, batch: Batch) -> tuple[Tensor, dict[str, float]]
     trace = network.trace(batch.q, batch.scale, network.codes[batch.leaf], colours, batch.tokens)
     used = (torch.arange(n, device=batch.leaf.device) < batch.count[:, None]).float()[..., None]  # (B, N, 1)
     entries = used.sum() * batch.q.shape[2]
-    alone = binary_cross_entropy_with_logits(trace.alone, 1 - batch.inside, reduction="none")
-    cover = binary_cross_entropy_with_logits(trace.margin, 1 - batch.covered, reduction="none")
-    seen = batch.covered * used
+    inside, covered = (batch.distance < 0).float(), (batch.depth < 0).float()
+    alone = cross_entropy(trace.alone, 1 - inside, reduction="none")
+    cover = cross_entropy(trace.margin, 1 - covered, reduction="none")
+    scale = batch.scale[..., None]  # world per leaf unit
+    shape = (trace.distance - batch.distance).abs() / (batch.distance.abs() + SHARP * scale)
+    depth = (trace.depth - batch.depth).abs() / (batch.depth.abs() + SHARP)
     gap = trace.colour - batch.colour
+    terms = {
+        "alone": alone * used,
+        "cover": cover * used,
+        "shape": shape * used * (batch.distance < FAR_LEAF * scale),
+        "depth": depth * used * (batch.depth < FAR_WORLD),
+        "colour": (12 * gap.square() + 3 * gap.abs()).sum(-1) * covered * used,
+    }
+    parts = {name: term.sum() / entries for name, term in terms.items()}
+    return torch.stack(list(parts.values())).sum(), {k: v.item() for k, v in parts.items()}
+
+
+def leaf_loss(network: Framed, batch: LeafBatch) -> tuple[Tensor, dict[str, float]]:
+    """Loss of the leaves alone, in their own frames: coverage and distance, as in `image_loss`."""
+    one = torch.ones(len(network.codes), device=batch.q.device)
+    features = network.decode(batch.q, one, network.decoder_weights(network.codes))[..., 0]
+    inside = (batch.distance < 0).float()
     parts = {
-        "slope": SLOPE * (trace.slope - 1).square().mean(),
-        "alone": (alone * used).sum() / entries,
-        "cover": (cover * used).sum() / entries,
-        "colour": ((4 * gap.square() + gap.abs()).sum(-1) * seen).sum() / entries,
+        "alone": cross_entropy(features * network.edge_slope.exp(), 1 - inside),
+        "shape": ((features - batch.distance).abs() / (batch.distance.abs() + SHARP)).mean(),
     }
     return torch.stack(list(parts.values())).sum(), {k: v.item() for k, v in parts.items()}

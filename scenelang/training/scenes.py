@@ -58,8 +58,8 @@ class Batch:
         rgb: colours (B, N, 3).
         tokens: (B, N) int64.
         count: (B,) objects in use; the rest is padding far off every point.
-        inside: object alone covers the point (B, N, P), 0 or 1.
-        covered: stream up to the object covers the point (B, N, P), 0 or 1.
+        distance: signed distance of each object alone, world units (B, N, P); inside it is negative.
+        depth: distance D of the stream up to the object, world units (B, N, P).
         colour: exact colour after the object (B, N, P, 3).
     """
 
@@ -69,8 +69,8 @@ class Batch:
     rgb: Tensor
     tokens: Tensor
     count: Tensor
-    inside: Tensor
-    covered: Tensor
+    distance: Tensor
+    depth: Tensor
     colour: Tensor
 
 
@@ -174,6 +174,33 @@ def _points(
     return torch.where(chosen, even, points)
 
 
+@dataclass(slots=True)
+class LeafBatch:
+    """Points in the spaces of all leaves G.
+
+    Args:
+        q: leaf coordinates (G, P, 2).
+        distance: signed distance, leaf units (G, P).
+    """
+
+    q: Tensor
+    distance: Tensor
+
+
+def leaf_batch(p: int, g: torch.Generator) -> LeafBatch:
+    """Draw P points for every leaf: half near its outline at all scales, half over twice its disc."""
+    leaf = torch.arange(len(GEOMETRIES), device=g.device)[:, None].expand(-1, p)
+    near = _boundary(leaf, g)
+    near = near + torch.randn(near.shape, generator=g, device=g.device) * 10 ** _uniform(
+        (*leaf.shape, 1), -3.5, 0.0, g
+    )
+    angle, radius = _uniform(leaf.shape, 0.0, math.tau, g), 2.0 * _uniform(leaf.shape, 0.0, 1.0, g) ** 0.7
+    even = torch.stack([radius * angle.cos(), radius * angle.sin()], -1)
+    q = torch.where((torch.arange(p, device=g.device) % 2 == 0)[:, None], near, even)
+    sectors = (v[:, None] for v in _sectors(g.device).unbind(-1))
+    return LeafBatch(q, sector_distance(q[..., 0], q[..., 1], *sectors))
+
+
 def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Batch:
     """Draw B streams of 1 to N objects with P points each."""
     p = config.points
@@ -216,7 +243,7 @@ def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Bat
     keep_n = keep[:, None].expand(b, n, p)
     q = torch.stack([qx, qy], -1).gather(2, keep_n[..., None].expand(b, n, p, 2))
     colour = torch.stack([c.expand(*big_d.shape, 3) for big_d, c in steps], 1)
-    covered = torch.stack([big_d < 0 for big_d, _ in steps], 1)
+    depth = torch.stack([big_d for big_d, _ in steps], 1)
     return Batch(
         q=q,
         scale=singular,
@@ -224,7 +251,7 @@ def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Bat
         rgb=rgb,
         tokens=tokens,
         count=count,
-        inside=(d < 0).float().gather(2, keep_n),
-        covered=covered.float().gather(2, keep_n),
+        distance=d.gather(2, keep_n),
+        depth=depth.gather(2, keep_n),
         colour=colour.gather(2, keep_n[..., None].expand(b, n, p, 3)),
     )
