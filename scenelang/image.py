@@ -24,7 +24,8 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
 
     def to_uint8(self) -> npt.NDArray[np.uint8]:
         """8-bit values, floor(255 v + 1/2)."""
-        return np.floor(np.clip(np.asarray(self), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+        scaled: npt.NDArray[np.float32] = np.clip(np.asarray(self), 0.0, 1.0) * 255.0 + 0.5
+        return np.floor(scaled).astype(np.uint8)
 
     def to_pil(self) -> PIL.Image.Image:
         """A Pillow image, RGB or RGBA."""
@@ -83,8 +84,9 @@ def write_whole(target: Path, data: bytes) -> None:
 
 
 def from_samples(colour: npt.NDArray[Any], alpha: npt.NDArray[Any] | None) -> Image:
-    """An image of colours (H, W, 3); with coverage (H, W), colours are premultiplied and are divided by it."""
-    if alpha is None:
-        return np.clip(colour, 0.0, 1.0).astype(np.float32).view(Image)
-    straight = colour / np.maximum(alpha, 1e-6)[..., None]
-    return np.clip(np.concatenate([straight, alpha[..., None]], 2), 0.0, 1.0).astype(np.float32).view(Image)
+    """An image of colours (H, W, 3); with coverage (H, W), of premultiplied ones, which it divides."""
+    if alpha is not None:
+        straight = colour / np.maximum(alpha, 1e-6)[..., None]
+        colour = np.concatenate([straight, alpha[..., None]], 2)
+    image: Image = np.clip(colour, 0.0, 1.0).astype(np.float32).view(Image)
+    return image

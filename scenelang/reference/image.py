@@ -78,7 +78,8 @@ def sample_points(canvas: tuple[int, int], rows: range, per_side: int) -> tuple[
     x = ((np.arange(width * per_side) + 0.5) / per_side - width / 2) / unit
     fine = np.arange(rows.start * per_side, rows.stop * per_side)
     y = (height / 2 - (fine + 0.5) / per_side) / unit
-    return np.broadcast_arrays(x[None, :], y[:, None])
+    shape = (len(y), len(x))
+    return np.broadcast_to(x[None, :], shape), np.broadcast_to(y[:, None], shape)
 
 
 def reference_image(graph: Graph, *, per_side: int = 2) -> Image:

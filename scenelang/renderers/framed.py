@@ -66,8 +66,8 @@ class _Clamp(torch.autograd.Function):
         return x.clamp(0.0, 1.0)
 
     @staticmethod
-    def backward(ctx: Any, grad: Tensor) -> Tensor:  # type: ignore[override]
-        (x,) = ctx.saved_tensors
+    def backward(ctx: Any, grad: Tensor) -> Tensor:
+        x: Tensor = ctx.saved_tensors[0]
         inside = (x >= 0) & (x <= 1)
         inward = ((x < 0) & (grad < 0)) | ((x > 1) & (grad > 0))
         return grad * (inside.to(grad.dtype) + 0.1 * inward.to(grad.dtype))
@@ -76,7 +76,8 @@ class _Clamp(torch.autograd.Function):
 def gate(x: Tensor) -> Tensor:
     """A saturating gate: clamp(x, 0, 1), trainable from outside the interval."""
     if torch.is_grad_enabled() and x.requires_grad:
-        return _Clamp.apply(x)  # type: ignore[no-any-return, no-untyped-call]
+        clamped: Tensor = _Clamp.apply(x)  # type: ignore[no-untyped-call]
+        return clamped
     return x.clamp(0.0, 1.0)
 
 
@@ -148,7 +149,8 @@ class Framed(nn.Module):
 
     def object_albedo(self, material_code: Tensor) -> Tensor:
         """Albedo (M, 3) of material codes (M, material_code)."""
-        return material_code @ self.albedo[:-1] + self.albedo[-1]
+        albedo: Tensor = material_code @ self.albedo[:-1] + self.albedo[-1]
+        return albedo
 
     # ------------------------------------------------------------------ network
 
@@ -167,7 +169,8 @@ class Framed(nn.Module):
             if i < 2:
                 x = torch.relu_(x) if not torch.is_grad_enabled() else torch.relu(x)
         x = x + (radius - RADIUS).clamp_min(0.0) * self.far
-        return x * scale[:, None, None]
+        features: Tensor = x * scale[:, None, None]
+        return features
 
     def step(
         self,

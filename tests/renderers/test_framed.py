@@ -14,6 +14,7 @@ from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
 from scenelang.renderers.draw import draw
 from scenelang.renderers.framed import Framed, FramedConfig
+from scenelang.renderers.frames import local_points
 from scenelang.renderers.stream import Stream
 from scenelang.scene.schema import Object, Scale, Scene, Translate
 
@@ -39,7 +40,8 @@ def picture(network: Framed, program: Program, **options: object) -> np.ndarray:
 
 
 def one_object(geometry: str) -> Scene:
-    return Scene(canvas=(64, 64), nodes=(Object(geometry=geometry, transforms=(Scale(x=0.8, y=0.8, z=1),)),))
+    node = Object(geometry=geometry, transforms=(Scale(x=0.8, y=0.8, z=1),))
+    return Scene(canvas=(64, 64), background=(0, 0, 0), nodes=(node,))
 
 
 def test_random_weights_draw_noise(model: Model) -> None:
@@ -96,8 +98,6 @@ def test_streaming_equals_the_network_it_was_trained_as(model: Model) -> None:
         stream = Stream(network, program.vectors, program.tokens, skip=False)
         x, y = torch.from_numpy(np.random.default_rng(0).uniform(-1, 1, (2, 500)).astype(np.float32))
         shade = stream.shade(x, y)
-        from scenelang.renderers.frames import local_points
-
         q = torch.stack([torch.stack(local_points(r.frame, x, y), -1) for r in stream.rows])
         scale = torch.tensor([r.frame.scale for r in stream.rows])
         codes = torch.from_numpy(program.vectors[:, :4].copy())

@@ -22,7 +22,7 @@ def tiny_config(iterations: int = 6) -> TrainConfig:
         model="shapes2d",
         seed=3,
         rate=0.01,
-        phases=(Phase(iterations, 4, 1), Phase(iterations, 3, 3, 0.1)),
+        phases=(Phase(iterations, 0, 1), Phase(iterations, 3, 4, 0.1)),
         network=FramedConfig(decoder_width=8, cell_width=8),
         scenes=SceneConfig(points=16),
     )
@@ -41,8 +41,8 @@ def test_batches_show_what_the_oracle_shows() -> None:
                 state = (d, c) if n == 0 else oracle.step(state, d, c, WORDS[batch.tokens[b, n]])
                 if abs(state[0]) < 1e-4 or abs(d) < 1e-4:
                     break  # float32 may fall on the other side
-                assert bool(batch.inside[b, n, p]) == (d < 0)
-                assert bool(batch.covered[b, n, p]) == (state[0] < 0)
+                assert bool(batch.distance[b, n, p] < 0) == (d < 0)
+                assert bool(batch.depth[b, n, p] < 0) == (state[0] < 0)
                 looked += 1
                 if state[0] < 0:
                     gap = max(
@@ -85,12 +85,12 @@ def test_the_shipped_configuration_reads() -> None:
 
 
 def test_training_learns(tmp_path: Path) -> None:
-    """A hundred steps on single objects already lower the loss by a third."""
+    """A few steps on the leaves already lower the loss by a third."""
     config = TrainConfig(
         model="shapes2d",
         seed=0,
         rate=0.01,
-        phases=(Phase(150, 16, 1),),
+        phases=(Phase(150, 0, 4),),
         network=FramedConfig(),
         scenes=SceneConfig(points=64),
     )
