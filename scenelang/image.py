@@ -45,10 +45,7 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         from PIL import Image as pillow
 
         target = Path(path)
-        pillow.init()
-        kind = pillow.EXTENSION.get(target.suffix.lower())
-        if kind is None or kind not in pillow.SAVE:
-            raise ValueError(f"no image format has the suffix '{target.suffix}'")
+        kind = image_format(target)
         image = self.to_pil()
         data = io.BytesIO()
         try:
@@ -65,6 +62,24 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         data = io.BytesIO()
         self.to_pil().save(data, "PNG")
         return data.getvalue()
+
+
+def image_format(path: str | os.PathLike[str]) -> str:
+    """Pillow's name for the format that a file's suffix names.
+
+    Raises:
+        ValueError: it writes no format of that suffix.
+    """
+    from PIL import Image as pillow
+
+    suffix = Path(path).suffix.lower()
+    pillow.preinit()  # the common formats; loading all takes as long as loading Pillow
+    if pillow.EXTENSION.get(suffix) not in pillow.SAVE:
+        pillow.init()
+    kind = pillow.EXTENSION.get(suffix)
+    if kind is None or kind not in pillow.SAVE:
+        raise ValueError(f"no image format has the suffix '{suffix}'")
+    return kind
 
 
 def write_whole(target: Path, data: bytes) -> None:

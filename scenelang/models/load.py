@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,15 +11,12 @@ import torch
 from safetensors.torch import load
 
 from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.models.weights import weights_path
+from scenelang.models.weights import ModelError as ModelError
+from scenelang.models.weights import read_header, weights_path
 from scenelang.renderers.framed import Framed, FramedConfig
 
 MOST_BYTES = 64 * 1024 * 1024
 MOST_WIDTH = 1024
-
-
-class ModelError(Exception):
-    """A model's files are missing, damaged or not what its manifest says."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,19 +34,6 @@ class Model:
     network: Framed
     digest: str
     header: dict[str, Any]
-
-
-def read_header(data: bytes) -> dict[str, Any]:
-    """The training header of a weights file; raises ModelError where there is none."""
-    try:
-        (length,) = struct.unpack("<Q", data[:8])
-        outer = json.loads(data[8 : 8 + length])
-        header = json.loads(outer["__metadata__"]["scenelang"])
-    except (struct.error, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise ModelError(f"no training header: {error}") from None
-    if not isinstance(header, dict) or header.get("format") != 1:
-        raise ModelError("not a weights file of format 1")
-    return header
 
 
 def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Framed:

@@ -1,13 +1,20 @@
-"""Codes and digest of a model's weights, read without torch."""
+"""Codes, header and digest of a model's weights, read without torch."""
 
 from __future__ import annotations
 
 import hashlib
+import json
+import struct
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from scenelang.models.manifest import ROOT, load_manifest
+
+
+class ModelError(Exception):
+    """A model's files are missing, damaged or not what its manifest says."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +35,19 @@ class Codes:
 def weights_path(name: str) -> Path:
     """Where a shipped model's weights lie."""
     return ROOT / name / "weights.safetensors"
+
+
+def read_header(data: bytes) -> dict[str, Any]:
+    """The training header of a weights file; raises ModelError where there is none."""
+    try:
+        (length,) = struct.unpack("<Q", data[:8])
+        outer = json.loads(data[8 : 8 + length])
+        header = json.loads(outer["__metadata__"]["scenelang"])
+    except (struct.error, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ModelError(f"no training header: {error}") from None
+    if not isinstance(header, dict) or header.get("format") != 1:
+        raise ModelError("not a weights file of format 1")
+    return header
 
 
 @lru_cache(maxsize=8)

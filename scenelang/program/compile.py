@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.graph.lower import Spans
@@ -10,8 +11,10 @@ from scenelang.graph.nodes import Graph
 from scenelang.models.choose import choose_model
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.passes import check_scene
-from scenelang.program.program import Program
 from scenelang.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from scenelang.program.program import Program
 
 
 def compile_scene(
@@ -44,7 +47,7 @@ def compile_scene(
         graph = check_scene(scene, spans, found, manifest, after)
     if manifest is None or found.errors:
         raise SceneError(found)
-    # Lifting is what needs numpy; scenes with errors never come this far.
+    # Lifting is what needs numpy; scenes that are only checked or have errors never come this far.
     from scenelang.models.weights import load_codes
     from scenelang.program.emit import emit
 

@@ -31,7 +31,7 @@ def evaluate(
     file: nodes.File,
     *,
     diagnostics: Diagnostics,
-    defines: Mapping[str, Any] | None = None,
+    defines: Mapping[str, Any] | Defines | None = None,
     models: Iterable[Manifest] | None = None,
     model: str | None = None,
     root: Path | None = None,
@@ -43,7 +43,8 @@ def evaluate(
     Args:
         file: the tree.
         diagnostics: where mistakes go.
-        defines: values for params: text as after ``-D NAME=``, or Python values.
+        defines: values for params: text as after ``-D NAME=``, or Python values. `Defines` may be shared by
+            several evaluations; the caller then reports what none of them used.
         models: manifests that names are taken from; by default those of all shipped models.
         model: name of the model to use, instead of the one that the file names.
         root: folder that imports cannot leave; by default that of ``path``.
@@ -59,7 +60,7 @@ def evaluate(
     resolved = path.resolve() if path is not None else None
     folder = root.resolve() if root is not None else resolved.parent if resolved is not None else None
     loader = Loader(folder, [resolved] if resolved is not None else [])
-    inputs = Defines(defines or {})
+    inputs = defines if isinstance(defines, Defines) else Defines(defines or {})
     unit = Unit(file.span.source, session, loader, inputs, resolved)
     if not _animates(file):
         session.animated[:] = [0.0, 0.0, 0.0, 1.0]
@@ -69,7 +70,9 @@ def evaluate(
     with deep_stack():
         try:
             body = prepare_file(unit, file)
-            inputs.report_unused(diagnostics, unit.lost)
+            inputs.lost |= unit.lost
+            if inputs is not defines:
+                inputs.report_unused(diagnostics)
             session.tick(body.weight, file.span)
             for act in body.actions:
                 act(unit.root_env, out)
@@ -118,7 +121,7 @@ def load_scene(
     path: str | os.PathLike[str],
     *,
     diagnostics: Diagnostics,
-    defines: Mapping[str, Any] | None = None,
+    defines: Mapping[str, Any] | Defines | None = None,
     root: str | os.PathLike[str] | None = None,
     model: str | None = None,
     models: Iterable[Manifest] | None = None,
@@ -152,7 +155,7 @@ def load_source(
     source: SourceFile,
     *,
     diagnostics: Diagnostics,
-    defines: Mapping[str, Any] | None = None,
+    defines: Mapping[str, Any] | Defines | None = None,
     root: Path | None = None,
     path: Path | None = None,
     model: str | None = None,

@@ -39,6 +39,15 @@ def read_source(path: Path, name: str) -> SourceFile:
     """
     with path.open("rb") as stream:
         data = stream.read(MAX_BYTES + 1)
+    return decode_source(data, name)
+
+
+def decode_source(data: bytes, name: str) -> SourceFile:
+    """The text that a file's bytes are.
+
+    Raises:
+        Unreadable: more than `MAX_BYTES`, or not UTF-8.
+    """
     if len(data) > MAX_BYTES:
         raise Unreadable("E0324", f"a file of more than {MAX_BYTES // 1_000_000} MB")
     try:

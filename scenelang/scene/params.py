@@ -29,15 +29,17 @@ class Defines:
     Args:
         values: text as after ``-D NAME=``, or a Python value.
         known: where each param stands, by its name seen from the first file.
+        lost: words that recovery skipped: a param may have been among them.
     """
 
     values: Mapping[str, Any]
     known: dict[str, Span] = field(default_factory=dict)
+    lost: set[str] = field(default_factory=set)
 
-    def report_unused(self, diagnostics: Diagnostics, lost: frozenset[str]) -> None:
+    def report_unused(self, diagnostics: Diagnostics) -> None:
         """Report values that no param takes."""
         for name in self.values:
-            if name in self.known or name in lost:
+            if name in self.known or name in self.lost:
                 continue
             found = nearest(name, self.known)
             if found:
