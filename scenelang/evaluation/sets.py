@@ -47,6 +47,7 @@ class SetConfig:
         deformed: with twirl and bend.
         unions: share of scenes that are unions only.
         size: factor on scales and translations of the objects.
+        warp: largest twirl and bend.
         canvas: pixels.
         affine_steps: random scales, rotations, translations and shears instead of one each; 0 for one each.
         shuffled: scale, rotate, translate and shear once each, in random order.
@@ -57,6 +58,7 @@ class SetConfig:
     deformed: bool = True
     unions: float = 0.4
     size: float = 1.0
+    warp: float = 0.8
     canvas: tuple[int, int] = (256, 256)
     affine_steps: int = 0
     shuffled: bool = False
@@ -75,6 +77,9 @@ SETS: dict[str, SetConfig] = {
     "wide": SetConfig(canvas=(320, 192)),
     "tree": SetConfig(nest="tree", objects=(3, 6)),
     "many": SetConfig(objects=(16, 16)),
+    "crowd": SetConfig(objects=(100, 100), size=0.4),
+    "strong": SetConfig(warp=2.4),
+    "large": SetConfig(size=3.0),
 }
 
 
@@ -85,11 +90,14 @@ def _uniform(rng: Rng, low: float, high: float) -> float:
 def _moves(rng: Rng, config: SetConfig) -> list[Transform]:
     moves: list[Transform] = []
     if config.deformed:
-        moves += [Twirl(k=_uniform(rng, -0.8, 0.8)), Bend(k=_uniform(rng, -0.8, 0.8))]
+        moves += [
+            Twirl(k=_uniform(rng, -config.warp, config.warp)),
+            Bend(k=_uniform(rng, -config.warp, config.warp)),
+        ]
     scale = Scale(x=_uniform(rng, 0.2, 0.55) * config.size, y=_uniform(rng, 0.2, 0.55) * config.size, z=1.0)
     rotate = Rotate(angle=_uniform(rng, -math.pi, math.pi))
     # tiny objects stand close together, so that they still meet
-    reach = 0.7 * (config.size if config.size < 1 else 1.0)
+    reach = 0.7 * (config.size if config.size < 0.2 else 1.0)
     translate = Translate(x=_uniform(rng, -reach, reach), y=_uniform(rng, -reach, reach))
     if config.shuffled:
         some: list[Transform] = [scale, rotate, translate, Shear(axes="xy", k=_uniform(rng, -0.6, 0.6))]

@@ -1,0 +1,88 @@
+"""``scenelang compare``: network, reference and FLIP map of one scene side by side, with figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scenelang.cli import options
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from scenelang.image import Image
+    from scenelang.scene.params import Defines
+
+
+@click.command("compare")
+@click.argument("scene", metavar="SCENE")
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="Picture; by default SCENE-compare.png.")
+@options.define
+@options.model
+@options.size
+@options.frame
+@options.root
+@options.device
+@options.threads
+@click.pass_context
+def command(
+    ctx: click.Context,
+    scene: str,
+    out: Path | None,
+    defines: Defines,
+    model: str | None,
+    size: tuple[int, int] | None,
+    frame: int,
+    root: str | None,
+    device: str,
+    threads: int | None,
+) -> None:
+    """Draw SCENE with the network and exactly, and show where they differ.
+
+    Prints PSNR (at most 50 dB), SSIM and FLIP. Transparent pictures are compared over white.
+    """
+    from scenelang.cli.clock import Clock
+    from scenelang.cli.eval import need_metrics
+    from scenelang.cli.inputs import Request, read_input, unused_defines
+    from scenelang.cli.say import say_diagnostics
+    from scenelang.diagnostics.diagnostic import SceneError
+
+    need_metrics()
+    found = read_input(scene, Request(defines, model, root, frame, size), Clock())
+    for item in unused_defines(Request(defines)):
+        found.diagnostics.items.append(item)
+    if found.scene is None or found.diagnostics.errors:
+        say_diagnostics(found.diagnostics)
+        ctx.exit(1)
+    from scenelang.backend.exact import draw_exact
+    from scenelang.backend.neural import choose_device, draw_program, open_model
+    from scenelang.evaluation.metrics import measure
+    from scenelang.evaluation.sheet import side_by_side
+    from scenelang.program.compile import compile_scene
+
+    try:
+        program = compile_scene(found.scene, spans=found.spans, diagnostics=found.diagnostics, model=model)
+    except SceneError:
+        say_diagnostics(found.diagnostics)
+        ctx.exit(1)
+    say_diagnostics(found.diagnostics)
+    opened = open_model(program.model, choose_device(device))
+    picture = _over_white(draw_program(program, opened, threads=threads).image)
+    exact = _over_white(draw_exact(found.scene, spans=found.spans, model=model))
+    figures = measure(picture, exact)
+    text = f"PSNR {figures['psnr']:.2f} dB  SSIM {figures['ssim']:.4f}  FLIP {figures['flip']:.4f}"
+    stem = "stdin" if scene == "-" else Path(scene).stem
+    target = out if out is not None else Path(f"{stem}-compare.png")
+    side_by_side(picture, exact, text).save(target)
+    click.echo(f"{text}  {target}")
+
+
+def _over_white(image: Image) -> np.ndarray:
+    """Colours (H, W, 3) of a picture that may have alpha."""
+    if image.shape[2] == 3:
+        return image
+    alpha = image[..., 3:]
+    over: np.ndarray = image[..., :3] * alpha + (1 - alpha)
+    return over
