@@ -110,9 +110,6 @@ class _Lowering:
             return _unions(node.children)
         if isinstance(node, schema.Boolean):
             return ((node.op, child) for child in node.children)
-        if node.children and node.children[0].op != "union":
-            fact = f"`{node.children[0].op}` on the first child of a chain, which has nothing before it"
-            self.say("E0335", fact, node.children[0].node, "leave the word out")
         return ((link.op, link.node) for link in node.children)
 
     def leaf(self, node: schema.Object, material: schema.Material | None) -> Leaf:

@@ -35,8 +35,6 @@ def step_of(transform: schema.Transform, dimension: int) -> Step | Refusal:
             "bend the shape with `twirl` or `bend` instead",
         )
     rows = _rows(transform)
-    if isinstance(rows, Refusal):
-        return rows
     if dimension == 2:
         reason = _leaves_plane(transform, rows)
         if reason is not None:
@@ -50,20 +48,16 @@ def step_of(transform: schema.Transform, dimension: int) -> Step | Refusal:
 _Map = schema.Translate | schema.Rotate | schema.Scale | schema.Shear | schema.Matrix
 
 
-def _rows(transform: _Map) -> Rows | Refusal:
+def _rows(transform: _Map) -> Rows:
     if isinstance(transform, schema.Translate):
         return affine.translation(transform.x, transform.y, transform.z)
     if isinstance(transform, schema.Scale):
         return affine.scaling(transform.x, transform.y, transform.z)
     if isinstance(transform, schema.Rotate):
-        if not any(transform.axis):
-            return Refusal("E0311", "the axis of `rotate` has length 0", "name one, such as `axis = Z`")
         return affine.rotation(transform.angle, transform.axis)
     if isinstance(transform, schema.Shear):
         return affine.shearing(transform.axes, transform.k)
-    first, second, third, last = transform.rows
-    if last != (0.0, 0.0, 0.0, 1.0):
-        return Refusal("E0311", "the last row of `matrix` is not 0 0 0 1", "only affine maps are transforms")
+    first, second, third, _ = transform.rows
     return (*first, *second, *third)
 
 

@@ -1,0 +1,121 @@
+"""Boxes contain what they say, by sampling; the grid finds what a plain loop finds."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+from test_graph_chain import random_step
+
+from scenelang.graph.bounds import EVERYWHERE, leaf_box, overlap
+from scenelang.graph.chain import composed, normal
+from scenelang.graph.grid import Grid
+from scenelang.graph.nodes import Leaf, Move
+from scenelang.graph.steps import Affine, Warp
+
+CORNERS = {
+    "square": np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / np.sqrt(2),
+    "triangle": np.array([[0, 1], [-np.sqrt(0.75), -0.5], [np.sqrt(0.75), -0.5]]),
+}
+
+
+def hull_points(name: str, reach: float, rng: np.random.Generator) -> np.ndarray:
+    """Points of the leaf dilated by ``reach``, most of them on its border."""
+    corners = CORNERS[name]
+    weights = rng.dirichlet(np.full(len(corners), 0.3), size=600)
+    turn = rng.uniform(0, 2 * np.pi, 600)
+    return weights @ corners + reach * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+
+
+def forward(points: np.ndarray, steps) -> np.ndarray:
+    """Leaf points into the world; a warp is undone by turning by the angle at the world point."""
+    for step in steps:
+        if isinstance(step, Affine):
+            rows = np.array(step.rows).reshape(3, 4)
+            points = points @ rows[:2, :2].T + rows[:2, 3]
+            continue
+        # Lengths are kept, so only the angle is unknown: iterate p = R(-angle(p)) q by bisection on phi,
+        # phi = phi_q + twirl r + r |b| cos(phi - phi_b), whose right side is continuous and bounded.
+        r, phi_q = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
+        most, at = np.hypot(*step.bend) * r, np.arctan2(step.bend[1], step.bend[0])
+        middle = phi_q + step.twirl * r
+        low, high = middle - most - 1e-9, middle + most + 1e-9
+        for _ in range(80):
+            phi = (low + high) / 2
+            above = middle + most * np.cos(phi - at) - phi > 0
+            low, high = np.where(above, phi, low), np.where(above, high, phi)
+        points = np.stack([r * np.cos(low), r * np.sin(low)], axis=1)
+    return points
+
+
+@pytest.mark.parametrize("level", [0.0, 0.15, 0.6])
+@pytest.mark.parametrize("name", ["square", "triangle"])
+def test_boxes_contain_the_leaf(name: str, level: float) -> None:
+    rng, draw = random.Random(7), np.random.default_rng(7)
+    shares = []
+    for _ in range(150):
+        chain = [random_step(rng) for _ in range(rng.randrange(6))]
+        moves = normal(map(Move, chain), 2)
+        block = np.array(composed(moves)).reshape(3, 4)[:2, :2]
+        reach = level / np.linalg.svd(block, compute_uv=False)[-1]
+        box = leaf_box(Leaf(name, "flat", (1, 1, 1), moves), level, 2)
+        points = forward(hull_points(name, reach * (1 - 1e-9), draw), [move.step for move in moves])
+        assert (points >= np.array(box[:2])).all()
+        assert (points <= np.array(box[2:])).all()
+        extent = np.ptp(points, axis=0)
+        shares.append(np.prod(extent) / ((box[2] - box[0]) * (box[3] - box[1])))
+    assert np.median(shares) > 0.4, "boxes are far too wide"
+
+
+def test_boxes_of_straight_leaves_are_tight() -> None:
+    leaf = Leaf("square", "flat", (1, 1, 1), (Move(Affine((0.5, 0, 0, 0.2, 0, 0.25, 0, 0, 0, 0, 1, 0))),))
+    half = 2**-0.5
+    expected = (0.2 - half / 2, -half / 4, 0.2 + half / 2, half / 4)
+    assert leaf_box(leaf, 0.0, 2) == pytest.approx(expected, abs=1e-8)
+    # the distance scale is 0.25, so a level of 0.1 reaches 0.4 in the leaf, 0.2 and 0.1 in the world
+    wider = (expected[0] - 0.2, expected[1] - 0.1, expected[2] + 0.2, expected[3] + 0.1)
+    assert leaf_box(leaf, 0.1, 2) == pytest.approx(wider, abs=1e-8)
+
+
+def test_boxes_that_cannot_be_known() -> None:
+    huge = Leaf(
+        "square", "flat", (1, 1, 1), (Move(Affine((1e308, 1e308, 0, 1e308, 0, 1, 0, 0, 0, 0, 1, 0))),)
+    )
+    flat = Leaf("square", "flat", (1, 1, 1), (Move(Affine((0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0))),))
+    far = Leaf(
+        "star",
+        "flat",
+        (1, 1, 1),
+        (Move(Affine((1, 0, 0, 1e308, 0, 1, 0, 1e308, 0, 0, 1, 0))), Move(Warp(1e300, (1e300, 0)))),
+    )
+    assert leaf_box(huge, 1.0, 2) == EVERYWHERE
+    assert leaf_box(flat, 1.0, 2) == EVERYWHERE
+    assert leaf_box(flat, 0.0, 3) == EVERYWHERE
+    assert not any(np.isnan(leaf_box(far, 0.1, 2)))
+
+
+def test_the_grid_finds_what_a_loop_finds() -> None:
+    rng = random.Random(8)
+    leaf = Leaf("square", "flat", (1, 1, 1))
+
+    def box():
+        x, y = rng.uniform(-3, 3), rng.uniform(-3, 3)
+        w, h = 10 ** rng.uniform(-3, 0), 10 ** rng.uniform(-3, 0)
+        return x, y, x + w, y + h
+
+    grid, boxes = Grid(), []
+    found = 0
+    for _ in range(600):
+        new = box()
+        hit = any(overlap(new, old) for old in boxes)
+        assert (grid.touched(new) is not None) == hit
+        found += hit
+        if not hit or rng.random() < 0.02:
+            grid.add(new, leaf)
+            boxes.append(new)
+    assert 50 < found < 550
+    grid.clip((0.0, 0.0, 1.0, 1.0), leaf)
+    assert len(grid.entries) == 1
+    assert grid.touched((2.0, 2.0, 3.0, 3.0)) is None
+    assert grid.touched(EVERYWHERE) is leaf
