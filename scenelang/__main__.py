@@ -1,0 +1,5 @@
+"""``python -m scenelang``."""
+
+from scenelang.cli.main import main
+
+main()

@@ -1,0 +1,111 @@
+"""Scenes that the command line names: files, or ``-`` for standard input."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from scenelang.cli.clock import Clock
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.scene.evaluate import evaluate
+from scenelang.scene.imports import Unreadable, decode_source, read_source
+from scenelang.scene.params import Defines
+from scenelang.scene.schema import Scene
+from scenelang.scene.session import MAX_BYTES
+from scenelang.scene.spans import SpanMap
+from scenelang.syntax import parse
+
+STDIN = "-"
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What the command line says about every scene.
+
+    Args:
+        defines: values for params, shared by all scenes.
+        model: name of the model to use.
+        root: folder that imports cannot leave.
+        frame: frame of the animation.
+        size: canvas instead of the scene's.
+    """
+
+    defines: Defines
+    model: str | None = None
+    root: str | None = None
+    frame: int = 0
+    size: tuple[int, int] | None = None
+
+
+@dataclass(slots=True)
+class Input:
+    """A scene as it was read.
+
+    Args:
+        name: as the user wrote it.
+        scene: None if it has errors.
+        spans: where its nodes were written.
+        diagnostics: what was found so far.
+    """
+
+    name: str
+    scene: Scene | None = None
+    spans: SpanMap = field(default_factory=SpanMap)
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)
+
+
+def read_input(name: str, request: Request, clock: Clock) -> Input:
+    """Parse and evaluate one scene.
+
+    Raises:
+        OSError: it cannot be opened.
+    """
+    found = Input(name)
+    path = None if name == STDIN else Path(name)
+    try:
+        if path is None:
+            source = decode_source(sys.stdin.buffer.read(MAX_BYTES + 1), "<stdin>")
+        else:
+            source = read_source(path, name)
+    except Unreadable as error:
+        empty = SourceFile(name, "")
+        found.diagnostics.add(error.code, f"cannot read '{name}': {error}", Span(empty, 0, 0))
+        return found
+    with clock("parse"):
+        tree = parse(source, found.diagnostics)
+    folder = request.root if request.root is not None else "." if path is None else None
+    with clock("evaluate"):
+        scene, spans = evaluate(
+            tree,
+            diagnostics=found.diagnostics,
+            defines=request.defines,
+            model=request.model,
+            root=None if folder is None else Path(folder),
+            path=path,
+            frame=request.frame,
+        )
+    if scene is not None and not found.diagnostics.errors:
+        if request.size is not None:
+            sized = scene.model_copy(update={"canvas": request.size})
+            if spans.span(scene) is not None:
+                spans.copy(scene, sized)
+            scene = sized
+        found.scene, found.spans = scene, spans
+    return found
+
+
+def unused_defines(request: Request) -> list[Diagnostic]:
+    """An error for every ``-D`` that no scene read so far has a param for."""
+    found = Diagnostics()
+    request.defines.report_unused(found)
+    return found.items
+
+
+def merged(parts: list[list[Diagnostic]]) -> Diagnostics:
+    """All diagnostics; what several scenes import and share is said once."""
+    found = Diagnostics()
+    for d in (d for part in parts for d in part):
+        found.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
+    return found

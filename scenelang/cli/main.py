@@ -1,0 +1,102 @@
+"""The command line: ``scenelang COMMAND``. Exit codes: 0 good, 1 a scene has errors, 2 usage or I/O."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import sys
+from collections.abc import Sequence
+from typing import Final
+
+import click
+
+from scenelang.backend.errors import RenderError
+
+# Command -> what `--help` says. Each lies in `scenelang/cli/<command>.py` as `command`, imported when called.
+COMMANDS: Final = {
+    "render": "Draw scenes or compiled programs.",
+    "check": "Report what is wrong with scenes.",
+    "compile": "Compile a scene to a program.",
+    "compare": "Draw a scene beside its exact picture.",
+    "models": "List models, or tell about one.",
+    "eval": "Measure a model on unseen scenes.",
+    "train": "Train a model's weights.",
+    "explain": "Say what a diagnostic's code means.",
+}
+INTERRUPTED: Final = 130  # as shells report it
+
+
+class Trouble(click.ClickException):
+    """What is neither a scene's mistake nor a bug: files that cannot be read or written, a missing device."""
+
+    exit_code = 2
+
+
+class _Commands(click.Group):
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"scenelang.cli.{cmd_name}").command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        from difflib import get_close_matches
+
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            near = get_close_matches(args[0], COMMANDS, 1)
+            advice = f" Did you mean '{near[0]}'?" if near else ""
+            ctx.fail(f"No such command '{args[0]}'.{advice}")
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> object:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise click.exceptions.Exit(INTERRUPTED) from None
+        except BrokenPipeError:
+            raise  # whoever reads our output has enough; click ends the process quietly
+        except OSError as error:
+            raise Trouble(describe(error)) from None
+        except RenderError as error:
+            raise Trouble(str(error)) from None
+
+
+def describe(error: OSError) -> str:
+    """A system error in a line."""
+    reason = (error.strerror or str(error) or "unreadable").lower()
+    return f"{error.filename}: {reason}" if error.filename else reason
+
+
+@click.group(
+    cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
+@click.version_option(package_name="scenelang", message="%(prog)s %(version)s")
+def cli() -> None:
+    """Render 2D scenes, written as text, with a trained neural network.
+
+    Try: scenelang render examples/chain.nsg -o chain.png
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a command and exit.
+
+    Args:
+        arguments: as after ``scenelang``; by default the process's.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a scene's text may not fit the terminal's encoding
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        cli.main(args=None if arguments is None else list(arguments), prog_name="scenelang")
+    except KeyboardInterrupt:
+        raise SystemExit(INTERRUPTED) from None

@@ -1,0 +1,67 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from scenelang.scene.params import Defines
+
+
+def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
+    if value is None:
+        return None
+    found = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", value)
+    if found is None:
+        raise click.BadParameter(f"'{value}' is no size such as 320x192", ctx, param)
+    width, height = int(found[1]), int(found[2])
+    if not (1 <= width <= 8192 and 1 <= height <= 8192):
+        raise click.BadParameter(f"'{value}' has a side outside 1..8192", ctx, param)
+    return width, height
+
+
+def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Defines:
+    from scenelang.scene.params import Defines
+
+    found: dict[str, str] = {}
+    for value in values:
+        name, equals, text = value.partition("=")
+        if not equals or not re.fullmatch(r"[A-Za-z_][\w.]*", name.strip()):
+            raise click.BadParameter(f"'{value}' is not NAME=value", ctx, param)
+        found[name.strip()] = text.strip()
+    return Defines(found)
+
+
+define = click.option(
+    "-D",
+    "defines",
+    multiple=True,
+    metavar="NAME=VALUE",
+    callback=_defines,
+    help="Set a param of the scene; may be given several times.",
+)
+model = click.option("--model", metavar="NAME", help="Use this model instead of the scene's.")
+root = click.option(
+    "--root",
+    type=click.Path(exists=True, file_okay=False),
+    help="Folder that imports cannot leave; by default the scene's.",
+)
+size = click.option(
+    "--size", metavar="WxH", callback=_size, help="Canvas size in pixels instead of the scene's."
+)
+frame = click.option(
+    "--frame", type=click.IntRange(0), default=0, metavar="N", help="Frame of the animation, from 0."
+)
+strict = click.option("--strict", is_flag=True, help="Count warnings as errors.")
+device = click.option(
+    "--device",
+    type=click.Choice(["auto", "cpu", "cuda"]),
+    default="auto",
+    show_default=True,
+    help="Where the network runs; auto is CUDA where there is any.",
+)
+threads = click.option("--threads", type=click.IntRange(1), metavar="N", help="Threads on the CPU.")
+verbose = click.option("-v", "--verbose", is_flag=True, help="Say what was compiled and where the time went.")
