@@ -28,16 +28,26 @@ class ObjectFrame:
         steps: frames and warps in the order a world point meets them; identities are left out.
         scale: world distance per leaf distance, the smallest singular value of the composed map.
         stretch: how much faster than one world unit per world unit a distance can change at most.
+        centre: world point about which the object lies.
+        half: half extents (x, y) of the world box that holds a leaf disc of radius r: half[0] r + half[1].
     """
 
     steps: tuple[Frame | Warp, ...]
     scale: float
     stretch: float
+    centre: tuple[float, float]
+    half: tuple[tuple[float, float], tuple[float, float]]
 
     @property
     def growth(self) -> float:
         """How many leaf units a point moves at most as it moves by a world unit."""
         return self.stretch / self.scale
+
+    def box(self, radius: float) -> tuple[float, float, float, float]:
+        """World box (xmin, ymin, xmax, ymax) outside which leaf coordinates are longer than ``radius``."""
+        dx, dy = (slope * radius + more for slope, more in self.half)
+        x, y = self.centre
+        return x - dx, y - dy, x + dx, y + dy
 
 
 def read_frame(g: np.ndarray) -> ObjectFrame:
@@ -45,26 +55,33 @@ def read_frame(g: np.ndarray) -> ObjectFrame:
     g = g.astype(np.float64)
     last, middle = g[exact.FRAME], g[exact.MIDDLE]
     outer, inner = g[exact.OUTER].reshape(-1, 3), g[exact.INNER].reshape(-1, 3)
-    linear = _linear(middle) @ _linear(last)
-    singular = np.linalg.svd(linear, compute_uv=False)
+    # from the leaf through the middle map, and on into the world; warps keep the distance to the origin
+    middle_linear, middle_shift = _invert(middle)
+    last_linear, last_shift = _invert(last)
+    reach, moved = float(np.linalg.norm(middle_linear, 2)), float(np.hypot(*middle_shift))
     steps: list[Frame | Warp] = []
     stretch = 1.0
-    # radius within which the leaf lies, seen from the frame that the warps turn about
-    unit = 1.0
-    middle_inverse = np.linalg.inv(_linear(middle))
-    spread = float(np.linalg.norm(middle_inverse, 2) + np.linalg.norm(middle_inverse @ middle[[2, 5]]))
-    for frame, warps, radius in ((last, outer, spread), (middle, inner, unit)):
+    for frame, warps, radius in ((last, outer, reach + moved), (middle, inner, 1.0)):
         if not np.array_equal(frame, (1, 0, 0, 0, 1, 0)):
             steps.append(tuple(frame.tolist()))
         for twirl, x, y in warps.tolist():
             if twirl or x or y:
                 steps.append((twirl, x, y))
                 stretch *= 1.0 + radius * (abs(twirl) + float(np.hypot(x, y)))
-    return ObjectFrame(tuple(steps), float(1.0 / singular[0]), stretch)
+    total = last_linear @ middle_linear
+    rows = np.linalg.norm(last_linear if outer.any() else total, axis=1).tolist()
+    if outer.any():
+        centre, half = last_shift, tuple((r * reach, r * moved) for r in rows)
+    else:
+        centre, half = last_linear @ middle_shift + last_shift, tuple((r, 0.0) for r in rows)
+    scale = float(np.linalg.svd(total, compute_uv=False)[1])
+    return ObjectFrame(tuple(steps), scale, stretch, (float(centre[0]), float(centre[1])), (half[0], half[1]))
 
 
-def _linear(frame: np.ndarray) -> np.ndarray:
-    return frame.reshape(2, 3)[:, :2]
+def _invert(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Linear part (2, 2) and shift (2,) of the map that a frame (6,) is the inverse of."""
+    linear = np.linalg.inv(frame.reshape(2, 3)[:, :2])
+    return linear, -linear @ frame[[2, 5]]
 
 
 def local_points(frame: ObjectFrame, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:

@@ -38,7 +38,7 @@ class _Cell:
     w1: Tensor
     b1: Tensor
     w2: Tensor
-    skip: Tensor
+    lines: Tensor
     b2: Tensor
     candidate: Tensor
     bump: Tensor
@@ -76,26 +76,27 @@ class Stream:
         self, network: Framed, vectors: np.ndarray, tokens: np.ndarray, *, skip: bool = True
     ) -> None:
         self.network = network
+        self.skip = skip
         self.device = network.codes.device
         self.cells = [
             _Cell(
                 w1.T.contiguous(),
                 b1[:, None],
                 w2.T.contiguous(),
-                skip.T.contiguous(),
+                lines.T.contiguous(),
                 b2[:, None],
                 c.T.contiguous(),
                 bump[:, None],
             )
-            for w1, b1, w2, skip, b2, c, bump in zip(*network.cell_weights(), strict=True)
+            for w1, b1, w2, lines, b2, c, bump in zip(*network.cell_weights(), strict=True)
         ]
         self.slope = float(network.read_slope.exp()) / 4
         self.unit = float(self.cells[UNION].candidate[0].norm())  # growth of the margin per world unit
         self.sharpen = [float(s) for s in SHARPEN]
         self.far = network.far[:, None]
-        self.rows = self._rows(vectors, tokens, skip)
+        self.rows = self._rows(vectors, tokens)
 
-    def _rows(self, vectors: np.ndarray, tokens: np.ndarray, skip: bool) -> list[_Row]:
+    def _rows(self, vectors: np.ndarray, tokens: np.ndarray) -> list[_Row]:
         if not len(vectors):
             return []
         g, m = vectors[:, : exact.D_G], vectors[:, exact.D_G :]
@@ -110,7 +111,7 @@ class Stream:
         rows = []
         for i, token in enumerate(tokens.tolist()):
             frame = read_frame(g[i])
-            if not skip or token == INTERSECT or (token == SUBTRACT and blends_after[i]):
+            if not self.skip or token == INTERSECT or (token == SUBTRACT and blends_after[i]):
                 reach = float("inf")
             else:
                 reach = 1.0 + SLACK + (BLEND_REACH / frame.scale if blends_after[i] else 0.0)
@@ -131,46 +132,51 @@ class Stream:
         touched = torch.zeros(count, dtype=torch.bool, device=x.device)
         evaluated = 0
         for row in self.rows:
-            qx, qy = local_points(row.frame, x, y)
-            radius = torch.hypot(qx, qy)
-            reach = row.reach + pad * row.frame.growth
-            hit = radius <= reach if reach != float("inf") else None
-            if hit is None:
-                # what nothing was drawn on stays empty whatever follows, unless skipping is off
-                index = (
-                    touched.nonzero()[:, 0]
-                    if row.token != UNION and self.rows[0].reach != float("inf")
-                    else None
-                )
-            else:
-                index = (hit if row.touch else hit & touched).nonzero()[:, 0]
-                if row.touch:
-                    touched |= hit
-            todo = count if index is None else index.numel()
-            evaluated += todo
-            for start in range(0, todo, CHUNK):
-                stop = min(start + CHUNK, todo)
-                part = slice(start, stop) if index is None else index[start:stop]
-                features = self._decode(qx[part], qy[part], radius[part], row)  # (F, m)
+            index, qx, qy, radius = self._meet(row, x, y, touched, pad)
+            evaluated += qx.numel()
+            for start in range(0, qx.numel(), CHUNK):
+                at = slice(start, start + CHUNK)
+                part = at if index is None else index[at]
+                features = self._decode(qx[at], qy[at], radius[at], row)  # (F, m)
                 old = torch.cat([features, state[:, part], colour[:, part]])
-                state_new, colour_new = self._step(old, row, s)
-                state[:, part], colour[:, part] = state_new, colour_new
+                state[:, part], colour[:, part] = self._step(old, row, s)
                 edge[part] = torch.minimum(edge[part], features[0].abs() / row.frame.stretch)
         edge = torch.minimum(edge, state[0].abs() / self.unit)
         return Shade(colour, (0.5 - state[0] * self.slope).clamp_(0.0, 1.0), edge, evaluated)
 
+    def _meet(
+        self, row: _Row, x: Tensor, y: Tensor, touched: Tensor, pad: float
+    ) -> tuple[Tensor | None, Tensor, Tensor, Tensor]:
+        """Which points an object meets (None: all), their leaf coordinates and their lengths.
+
+        Marks the points on which a union draws. What nothing was drawn on stays empty whatever follows.
+        """
+        if row.reach == float("inf"):
+            index = touched.nonzero()[:, 0] if self.skip else None
+        else:
+            reach = row.reach + pad * row.frame.growth
+            xmin, ymin, xmax, ymax = row.frame.box(reach)
+            index = ((x >= xmin) & (x <= xmax) & (y >= ymin) & (y <= ymax)).nonzero()[:, 0]
+        qx, qy = local_points(row.frame, *((x, y) if index is None else (x[index], y[index])))
+        radius = torch.hypot(qx, qy)
+        if index is None or row.reach == float("inf"):
+            return index, qx, qy, radius
+        near = radius <= reach
+        if row.touch:
+            touched[index[near]] = True
+        else:
+            near &= touched[index]
+        return index[near], qx[near], qy[near], radius[near]
+
     def _decode(self, qx: Tensor, qy: Tensor, radius: Tensor, row: _Row) -> Tensor:
         """Features (F, m) of leaf coordinates (m,)."""
         x = torch.stack([qx, qy])
-        beyond = (radius - RADIUS).clamp_min_(0.0)
-        if row.reach > RADIUS:
-            x *= RADIUS / radius.clamp_min(RADIUS)
+        x *= RADIUS / radius.clamp_min(RADIUS)
         for i, (w, b) in enumerate(row.layers):
             x = torch.addmm(b, w, x)
             if i < 2:
                 x.relu_()
-        if row.reach > RADIUS:
-            x += beyond * self.far
+        x += (radius - RADIUS).clamp_min_(0.0) * self.far
         return x.mul_(row.frame.scale)
 
     def _step(self, old: Tensor, row: _Row, s: int) -> tuple[Tensor, Tensor]:
@@ -183,7 +189,7 @@ class Stream:
             torch.mul(old[:n], slope, out=seen[i * n : (i + 1) * n])
         seen[n:].clamp_(-1.0, 1.0)
         hidden = torch.addmm(cell.b1, cell.w1, seen).relu_()
-        lines = torch.addmm(cell.b2, cell.skip, old[:n])
+        lines = torch.addmm(cell.b2, cell.lines, old[:n])
         gates = lines.addmm_(cell.w2, hidden).clamp_(0.0, 1.0)
         take, paint = gates[:s], gates[s:]
         state, colour = old[n - s : n], old[n:]

@@ -76,6 +76,20 @@ def test_points_near_the_leaf_move_no_faster_than_the_frame_says(inner: int, out
         assert speed[near].max() <= frame.growth * (1 + 1e-3)
 
 
+@pytest.mark.parametrize(("inner", "outer"), SIZES)
+@pytest.mark.parametrize("radius", [1.0, 3.0])
+def test_boxes_hold_discs(inner: int, outer: int, radius: float) -> None:
+    rng = np.random.default_rng(7 * inner + outer)
+    levels = random_levels(rng, inner, outer)
+    frame = read_frame(lift_many([levels], [CODE])[0])
+    xmin, ymin, xmax, ymax = frame.box(radius)
+    x, y = rng.uniform(-2, 2, (2, 20000)) * max(xmax - xmin, ymax - ymin)
+    within = np.hypot(*carry_back(steps_of(levels), x, y)) <= radius
+    outside = (x < xmin) | (x > xmax) | (y < ymin) | (y > ymax)
+    assert within.any()
+    assert not (within & outside).any()
+
+
 def test_lengths_of_chains_do_not_matter() -> None:
     """A hundred affine matrices one after the other leave what their product leaves."""
     rng = np.random.default_rng(5)
