@@ -18,7 +18,7 @@ from torch import Tensor
 
 from scenelang.image import Image, from_samples
 from scenelang.renderers.framed import Framed
-from scenelang.renderers.stream import Stream
+from scenelang.renderers.stream import PixelRows, Stream
 
 TILE = 1 << 15  # pixels that are drawn at a time
 NEAR = 0.85  # pixels: farther from an outline a pixel has one colour
@@ -109,7 +109,7 @@ def _tile(stream: Stream, canvas: tuple[int, int], rows: range, adaptive: bool) 
     if not adaptive:
         sampled, pairs = _four(stream, x, y, px)
         return sampled, pairs, x.numel()
-    shade = stream.shade(x, y, pad=CORNER * px)
+    shade = stream.shade(x, y, CORNER * px, PixelRows(-y.cpu().numpy()))
     picture = torch.cat([shade.colour * shade.coverage, shade.coverage[None]]).T.contiguous()
     near = (shade.edge < NEAR * px).nonzero()[:, 0]
     pairs = shade.evaluated
@@ -125,6 +125,6 @@ def _four(stream: Stream, x: Tensor, y: Tensor, px: float) -> tuple[Tensor, int]
     offsets = torch.tensor([-0.25, 0.25], device=x.device) * px
     sx = (x[:, None, None] + offsets[None, None, :]).expand(-1, 2, 2).reshape(-1)
     sy = (y[:, None, None] + offsets[None, :, None]).expand(-1, 2, 2).reshape(-1)
-    shade = stream.shade(sx, sy)
+    shade = stream.shade(sx, sy, 0.0, PixelRows(-y.cpu().numpy(), 4, 0.3 * px))
     samples = torch.cat([shade.colour * shade.coverage, shade.coverage[None]])  # (4, 4 M)
     return samples.view(4, -1, 4).mean(2).T.contiguous().cpu(), shade.evaluated

@@ -61,6 +61,27 @@ class Shade:
     evaluated: int
 
 
+@dataclass(frozen=True, slots=True)
+class PixelRows:
+    """Points in pixel order: from the top row down, ``group`` points a pixel.
+
+    Args:
+        down: (pixels,) minus the world y of the pixels' centres, which never falls.
+        group: points a pixel.
+        spread: how far up or down from its centre a pixel's points may lie, world units.
+    """
+
+    down: np.ndarray
+    group: int = 1
+    spread: float = 0.0
+
+    def between(self, ymin: float, ymax: float) -> tuple[int, int]:
+        """Range of points outside which none has a y in [ymin, ymax]."""
+        first = int(self.down.searchsorted(-(ymax + self.spread)))
+        last = int(self.down.searchsorted(-(ymin - self.spread), "right"))
+        return self.group * first, self.group * last
+
+
 class Stream:
     """A program's objects with their weights, ready to be met by points.
 
@@ -121,8 +142,14 @@ class Stream:
         return rows
 
     @torch.no_grad()
-    def shade(self, x: Tensor, y: Tensor, pad: float = 0.0) -> Shade:
-        """Draw at world points x, y (M,), with objects that come within ``pad`` world units of them."""
+    def shade(self, x: Tensor, y: Tensor, pad: float = 0.0, rows: PixelRows | None = None) -> Shade:
+        """Draw at world points.
+
+        Args:
+            x, y: (M,).
+            pad: objects that come within so many world units of a point meet it.
+            rows: how the points lie in rows; saves an object the look at points above and below it.
+        """
         count = x.numel()
         s = self.network.config.state
         state = torch.zeros(s, count, device=x.device)  # (S, M)
@@ -132,7 +159,7 @@ class Stream:
         touched = torch.zeros(count, dtype=torch.bool, device=x.device)
         evaluated = 0
         for row in self.rows:
-            index, qx, qy, radius = self._meet(row, x, y, touched, pad)
+            index, qx, qy, radius = self._meet(row, x, y, touched, pad, rows)
             evaluated += qx.numel()
             for start in range(0, qx.numel(), CHUNK):
                 at = slice(start, start + CHUNK)
@@ -145,7 +172,7 @@ class Stream:
         return Shade(colour, (0.5 - state[0] * self.slope).clamp_(0.0, 1.0), edge, evaluated)
 
     def _meet(
-        self, row: _Row, x: Tensor, y: Tensor, touched: Tensor, pad: float
+        self, row: _Row, x: Tensor, y: Tensor, touched: Tensor, pad: float, rows: PixelRows | None
     ) -> tuple[Tensor | None, Tensor, Tensor, Tensor]:
         """Which points an object meets (None: all), their leaf coordinates and their lengths.
 
@@ -156,7 +183,13 @@ class Stream:
         else:
             reach = row.reach + pad * row.frame.growth
             xmin, ymin, xmax, ymax = row.frame.box(reach)
-            index = ((x >= xmin) & (x <= xmax) & (y >= ymin) & (y <= ymax)).nonzero()[:, 0]
+            first, last = 0, x.numel()
+            if rows is not None:
+                first, last = rows.between(ymin, ymax)
+            if first >= last:
+                return touched.new_empty(0, dtype=torch.int64), x[:0], x[:0], x[:0]
+            xs, ys = x[first:last], y[first:last]
+            index = ((xs >= xmin) & (xs <= xmax) & (ys >= ymin) & (ys <= ymax)).nonzero()[:, 0] + first
         qx, qy = local_points(row.frame, *((x, y) if index is None else (x[index], y[index])))
         radius = torch.hypot(qx, qy)
         if index is None or row.reach == float("inf"):
