@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import struct
 from dataclasses import dataclass
 from functools import lru_cache
@@ -32,6 +33,23 @@ class Codes:
     digest: str
 
 
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a weights file says about itself.
+
+    Args:
+        digest: SHA-256 of the file, hex.
+        bytes: its size.
+        parameters: numbers in it.
+        training: its header: config, seed, iterations, seconds, device, revision.
+    """
+
+    digest: str
+    bytes: int
+    parameters: int
+    training: dict[str, Any]
+
+
 def weights_path(name: str) -> Path:
     """Where a shipped model's weights lie."""
     return ROOT / name / "weights.safetensors"
@@ -48,6 +66,24 @@ def read_header(data: bytes) -> dict[str, Any]:
     if not isinstance(header, dict) or header.get("format") != 1:
         raise ModelError("not a weights file of format 1")
     return header
+
+
+def read_facts(name: str) -> Facts:
+    """What the weights file of a shipped model says about itself.
+
+    Raises:
+        OSError: it cannot be read.
+        ModelError: it is damaged.
+    """
+    data = weights_path(name).read_bytes()
+    training = read_header(data)
+    (length,) = struct.unpack("<Q", data[:8])
+    tensors = {k: v for k, v in json.loads(data[8 : 8 + length]).items() if k != "__metadata__"}
+    try:
+        parameters = sum(math.prod(entry["shape"]) for entry in tensors.values())
+    except (KeyError, TypeError) as error:
+        raise ModelError(f"damaged weights: {error}") from None
+    return Facts(hashlib.sha256(data).hexdigest(), len(data), parameters, training)
 
 
 @lru_cache(maxsize=8)

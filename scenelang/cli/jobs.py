@@ -1,0 +1,171 @@
+"""From an input of the command line to something a backend draws."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scenelang.cli.clock import Clock
+from scenelang.cli.inputs import Input, Request, read_input
+from scenelang.diagnostics.diagnostic import Diagnostic, SceneError
+from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.walk import nodes
+from scenelang.program.compile import compile_scene
+
+if TYPE_CHECKING:
+    from scenelang.program.program import Program
+
+After = Callable[[str, Graph], None]
+PROGRAM = ".safetensors"
+
+
+@dataclass(slots=True)
+class Job:
+    """One input, ready to be drawn or with the reason why not.
+
+    Args:
+        name: as the user wrote it.
+        diagnostics: of a scene.
+        trouble: why a compiled program cannot be drawn.
+        program: what the network draws.
+        source: the scene, where there is one.
+        notes: what to say about it on ``-v``.
+    """
+
+    name: str
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    trouble: str | None = None
+    program: Program | None = None
+    source: Input | None = None
+    notes: list[str] = field(default_factory=list)
+
+    def failed(self, strict: bool) -> bool:
+        """Whether there is nothing to draw."""
+        wrong = any(d.severity == "error" or strict for d in self.diagnostics)
+        return wrong or self.trouble is not None
+
+
+def prepare(
+    name: str,
+    request: Request,
+    clock: Clock,
+    *,
+    compiled: bool = True,
+    verbose: bool = False,
+    after: After | None = None,
+) -> Job:
+    """Read an input and compile it if it is a scene.
+
+    Args:
+        name: a scene, ``-``, or a compiled program.
+        request: what the command line says about every scene.
+        clock: takes the time.
+        compiled: whether a scene has to be compiled to be drawn.
+        verbose: make notes of what the passes did.
+        after: called with the name of each pass and the graph it left.
+
+    Raises:
+        OSError: the input cannot be read, or a model has no weights.
+    """
+    if name.endswith(PROGRAM):
+        return _stored(name, request, clock)
+    found = read_input(name, request, clock)
+    job = Job(name, source=found)
+    if found.scene is not None and compiled:
+        passes = PassNotes(further=after)
+        try:
+            with clock("compile"):
+                job.program = compile_scene(
+                    found.scene,
+                    spans=found.spans,
+                    diagnostics=found.diagnostics,
+                    model=request.model,
+                    after=passes.after if verbose else after,
+                )
+            job.notes = [*program_notes(job.program, _why(found, request)), *passes.lines]
+        except SceneError:
+            pass  # its diagnostics are the input's
+    job.diagnostics = found.diagnostics.items
+    return job
+
+
+def _why(found: Input, request: Request) -> str:
+    """Why a scene is drawn with its model."""
+    if request.model is not None:
+        return "by --model"
+    named = found.scene is not None and found.scene.model is not None
+    return "named by the scene" if named else "the smallest that has all it uses"
+
+
+def _stored(name: str, request: Request, clock: Clock) -> Job:
+    from scenelang.program.program import ProgramError
+    from scenelang.program.store import load_program
+
+    try:
+        with clock("load program"):
+            program = load_program(Path(name))
+    except ProgramError as error:
+        return Job(name, trouble=str(error))
+    if request.model not in (None, program.model):
+        return Job(name, trouble=f"compiled for model `{program.model}`, not `{request.model}`")
+    if request.frame:
+        return Job(name, trouble=f"a program is a single frame, and --frame asks for {request.frame}")
+    if request.size is not None:
+        (width, height), (old_width, old_height) = request.size, program.canvas
+        if width * old_height != height * old_width:
+            aspect = (
+                f"{width}x{height} has another shape than the {old_width}x{old_height} it was compiled for"
+            )
+            return Job(name, trouble=f"{aspect}; objects outside it are gone: compile the scene again")
+        program = replace(program, canvas=request.size)
+    return Job(name, program=program, notes=program_notes(program, "named by the program"))
+
+
+def program_notes(program: Program, why: str) -> list[str]:
+    """Lines about a compiled scene."""
+    from scenelang.program.program import TOKENS
+
+    names = {value: word for word, value in TOKENS.items()}
+    shapes = Counter(program.objects)
+    words = Counter(program.tokens.tolist())
+    width, height = program.canvas
+    return [
+        f"{width} x {height} pixels, model {program.model} ({why}), weights {program.weights[:12]}",
+        f"objects: {len(program)}" + _counts(shapes),
+        "tokens: " + (_counts({names[t]: n for t, n in sorted(words.items())})[2:-1] or "none"),
+    ]
+
+
+def _counts(counts: dict[str, int]) -> str:
+    """`` (2 star, 1 square)``, or nothing."""
+    listed = ", ".join(f"{number} {name}" for name, number in counts.items())
+    return f" ({listed})" if listed else ""
+
+
+@dataclass(slots=True)
+class PassNotes:
+    """What each pass changed, told by the numbers of objects, folds and moves.
+
+    Args:
+        lines: one for each pass with an effect.
+        further: called as `after` is.
+    """
+
+    lines: list[str] = field(default_factory=list)
+    further: After | None = None
+    _before: tuple[int, int, int] | None = None
+
+    def after(self, name: str, graph: Graph) -> None:
+        """Look at the graph a pass left."""
+        found = [node for node, _ in nodes(graph.root)]
+        objects = sum(isinstance(node, Leaf) for node in found)
+        counts = (objects, len(found) - objects, sum(len(node.moves) for node in found))
+        if counts != self._before:
+            now = f"{counts[0]} objects, {counts[1]} folds, {counts[2]} moves"
+            self.lines.append(f"{name}: {now}" if self._before else f"as written: {now}")
+        self._before = counts
+        if self.further is not None:
+            self.further(name, graph)

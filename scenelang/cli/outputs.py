@@ -1,0 +1,60 @@
+"""Where pictures go: one file, or a folder of them. Everything is settled before any work."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from scenelang.cli.inputs import STDIN
+
+
+def targets(names: Sequence[str], out: str) -> list[Path]:
+    """The file that each scene is drawn to; a folder for many scenes is made.
+
+    Args:
+        names: of the scenes, as the user wrote them.
+        out: a file for one scene; a folder for many, or where it is there already or ends in a slash.
+
+    Raises:
+        click.UsageError: no format has the suffix, two scenes have one name, or a file is in the way.
+        OSError: the folder cannot be made.
+    """
+    from scenelang.image import image_format
+
+    path = Path(out)
+    if len(names) == 1 and not path.is_dir() and not out.endswith(("/", "\\")):
+        try:
+            image_format(path)
+        except ValueError as error:
+            advice = " A folder ends in a slash." if not path.suffix else ""
+            raise click.UsageError(f"cannot write '{out}': {error}.{advice}") from None
+        if not path.parent.is_dir():
+            raise click.UsageError(f"cannot write '{out}': there is no folder '{path.parent}'.")
+        return [path]
+    if path.exists() and not path.is_dir():
+        raise click.UsageError(f"'{out}' is a file; {len(names)} scenes need a folder.")
+    if not path.exists() and not out.endswith(("/", "\\")) and _is_picture(path):
+        raise click.UsageError(f"'{out}' names a picture; {len(names)} scenes need a folder.")
+    files = [path / f"{_stem(name)}.png" for name in names]
+    owner: dict[str, str] = {}
+    for name, file in zip(names, files, strict=True):
+        first = owner.setdefault(file.name.casefold(), name)
+        if first is not name:
+            raise click.UsageError(f"'{first}' and '{name}' would both be drawn to '{file}'.")
+    path.mkdir(parents=True, exist_ok=True)
+    return files
+
+
+def _is_picture(path: Path) -> bool:
+    from scenelang.image import image_format
+
+    try:
+        return bool(image_format(path))
+    except ValueError:
+        return False
+
+
+def _stem(name: str) -> str:
+    return "stdin" if name == STDIN else Path(name).stem

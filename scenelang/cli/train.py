@@ -1,0 +1,128 @@
+"""``scenelang train``: weights from a configuration, with a checkpoint to go on from."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from scenelang.cli import options
+
+Report = Callable[[int, int, float, dict[str, float]], None]
+
+
+@click.command("train")
+@click.argument("config")
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="Gets the checkpoint, the log and at the end the weights.",
+)
+@click.option(
+    "--budget",
+    type=click.FloatRange(0, min_open=True),
+    metavar="MINUTES",
+    help="Stop after this time, with a checkpoint.",
+)
+@options.device
+@options.threads
+@click.option(
+    "--every", type=click.IntRange(1), default=500, show_default=True, help="Steps between reports."
+)
+@click.pass_context
+def command(
+    ctx: click.Context,
+    config: str,
+    out: Path,
+    budget: float | None,
+    device: str,
+    threads: int | None,
+    every: int,
+) -> None:
+    """Train, or go on where the checkpoint in FOLDER was saved.
+
+    CONFIG is a JSON file or the name of a shipped configuration. By default one thread computes, as for
+    the shipped weights. Exits with 0 also when the budget ends first.
+    """
+    import torch
+    from pydantic import ValidationError
+
+    from scenelang.backend.neural import choose_device, keep_memory
+    from scenelang.training.config import read_config
+    from scenelang.training.loop import train
+
+    try:
+        wanted = read_config(config)
+    except ValidationError as error:
+        raise click.UsageError(f"bad configuration '{config}': {_first(error)}") from None
+    keep_memory()
+    torch.set_num_threads(threads or 1)
+    place = choose_device(device)
+    click.echo(f"training {wanted.model}: {wanted.iterations:,} steps on {place}, into {out}", err=True)
+    last: dict[str, float] = {}
+    try:
+        with _reporter() as report:
+
+            def note(done: int, total: int, seconds: float, parts: dict[str, float]) -> None:
+                last.clear()
+                last.update(parts)
+                report(done, total, seconds, parts)
+
+            finished = train(
+                wanted,
+                out,
+                budget_s=math.inf if budget is None else 60 * budget,
+                device=place,
+                report=note,
+                report_every=every,
+            )
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    except KeyboardInterrupt:
+        click.echo(f"interrupted; the same command goes on from the checkpoint in {out}", err=True)
+        raise
+    reached = f", mean loss {_losses(last)}" if last else ""
+    if finished:
+        click.echo(f"done{reached}: {out / 'weights.safetensors'}")
+    else:
+        click.echo(f"out of time{reached}: the same command goes on from the checkpoint in {out}")
+    ctx.exit(0)
+
+
+@contextmanager
+def _reporter() -> Iterator[Report]:
+    """A bar on a terminal, plain lines elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda done, total, seconds, parts: click.echo(
+            f"{done:,} of {total:,} steps, {seconds:.0f} s, {_losses(parts)}", err=True
+        )
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True)) as shown:
+        task = shown.add_task("starting", total=None)
+        yield lambda done, total, seconds, parts: shown.update(
+            task, completed=done, total=total, description=_losses(parts)
+        )
+
+
+def _losses(parts: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.4g}" for name, value in parts.items())
+
+
+def _first(error: Exception) -> str:
+    """The first mistake that pydantic found, in a line."""
+    errors = getattr(error, "errors", list)()
+    if not errors:
+        return str(error)
+    where = ".".join(str(part) for part in errors[0]["loc"])
+    return f"{where}: {errors[0]['msg']}" if where else str(errors[0]["msg"])
