@@ -46,10 +46,12 @@ def reach(stack: list[int], kinds: list[int], start: int, stop: int) -> int:
 
 
 def statement_depth(stack: list[int]) -> int:
-    """Index of the innermost state in which a statement can begin."""
+    """Index of the innermost state in which a statement can begin; the last where one has just ended."""
     language = tables()
     bad_statement = language.kind("BAD_STATEMENT")
     at = len(stack) - 1
-    while bad_statement not in language.actions[stack[at]]:
+    if bad_statement in language.actions[stack[at]]:
+        return at
+    while language.actions[stack[at]].get(bad_statement, -1) < 0:
         at -= 1
     return at

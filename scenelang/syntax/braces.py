@@ -20,19 +20,10 @@ _LONGEST = 80  # so many places before the first misfit are tried
 
 def balance(tokens: Tokens, report: Report) -> None:
     """Report braces that do not match and mend the token list."""
-    opening, closing = tables().literals["{"], tables().literals["}"]
-    depth = lowest = 0
-    for kind in tokens.kinds:
-        if kind == opening:
-            depth += 1
-        elif kind == closing:
-            depth -= 1
-            lowest = min(lowest, depth)
-    if depth or lowest:
-        mender = _Mender(tokens, report)
-        for slip in reversed(find_slips(tokens)):  # from the last on, so that indices hold
-            mender.mend(slip)
-        mender.match_the_rest()
+    mender = _Mender(tokens, report)
+    for slip in reversed(find_slips(tokens)):  # from the last on, so that indices hold
+        mender.mend(slip)
+    mender.match_the_rest()
 
 
 class _Mender:

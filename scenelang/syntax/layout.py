@@ -14,7 +14,7 @@ from itertools import pairwise
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Tokens
 
-_SLIP = 2.5  # a slip costs as much as so many lines at the wrong depth
+_SLIP = 1.4  # a slip costs as much as so many lines at the wrong depth
 _WIDEST = 12  # further off than this is not searched
 _NEVER = 1e9
 

@@ -6,18 +6,19 @@ tables, keeps token indices on its stack and hands over to `syntax.recover` at a
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.syntax import nodes
-from scenelang.syntax.braces import balance
 from scenelang.syntax.build import Builder
 from scenelang.syntax.lexer import scan
 from scenelang.syntax.nesting import limit_nesting
-from scenelang.syntax.recover import Recovery
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
+
+if TYPE_CHECKING:
+    from scenelang.syntax.recover import Recovery
 
 
 def parse(source: SourceFile, diagnostics: Diagnostics) -> nodes.File:
@@ -32,11 +33,29 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> nodes.File:
     """
     report = Report(source)
     tokens = scan(source, report)
-    balance(tokens, report)
+    if _unbalanced(tokens):
+        # What only mistakes need is loaded at the first one: most runs start and end without any.
+        from scenelang.syntax.braces import balance
+
+        balance(tokens, report)
     limit_nesting(tokens, report)
     file = _run(tokens, report)
     report.flush(diagnostics)
     return file
+
+
+def _unbalanced(tokens: Tokens) -> bool:
+    """Whether some brace has no counterpart."""
+    opening, closing = tables().literals["{"], tables().literals["}"]
+    depth = 0
+    for kind in tokens.kinds:
+        if kind == opening:
+            depth += 1
+        elif kind == closing:
+            depth -= 1
+            if depth < 0:
+                return True
+    return depth != 0
 
 
 def _run(tokens: Tokens, report: Report) -> nodes.File:
@@ -57,6 +76,8 @@ def _run(tokens: Tokens, report: Report) -> nodes.File:
         action = actions[state].get(kind)
         if action is None:
             if recovery is None:
+                from scenelang.syntax.recover import Recovery
+
                 recovery = Recovery(tokens, report)
             resumed = recovery.resume(states, values, at)
             if resumed is None:

@@ -14,7 +14,7 @@ from scenelang.diagnostics.span import Span
 from scenelang.syntax import mistakes
 from scenelang.syntax.automaton import fits, reach, statement_depth
 from scenelang.syntax.lexer import UNIT_ALIASES, UNITS
-from scenelang.syntax.repairs import FOLLOWED, Search
+from scenelang.syntax.repairs import FOLLOWED, MAX_REPLAY, Search
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
 
@@ -61,7 +61,7 @@ class Recovery:
             return self._skip(first, at)
         mistakes.report_repair(self.tokens, self.report, repair, search.open_brackets(repair.at))
         self.tokens.replace(repair.at, repair.delete, repair.insert)
-        if repair.at == at:
+        if at - first > MAX_REPLAY:
             return at
         del states[depth + 1 :], values[depth:]
         return first
@@ -134,6 +134,10 @@ class Recovery:
             self._insert(brace, ")")
             self._insert(at, "(")
             return True
+        if self._is(at - 1, "import") and self._bare_path(at):
+            return True
+        if at == first + 1 and self._bare_argument(states, at):
+            return True
         wants_block = fits(states, self.literals["{"]) and not fits(states, self.literals[";"])
         if not wants_block or not self._is(at - 1, ")", "else"):
             return False
@@ -155,10 +159,45 @@ class Recovery:
     def _at_end(self, at: int) -> bool:
         return self.tokens.kinds[at] == END
 
-    def _wrapped_fits(self, states: list[int], at: int, brace: int) -> bool:
-        """Whether the tokens up to a brace are what belongs between parentheses."""
+    def _bare_path(self, at: int) -> bool:
+        """`import lib/parts.nsg as parts`: the path without its quotes."""
+        tokens = self.tokens
+        for stop in range(at + 1, min(at + 20, len(tokens.kinds) - 1)):
+            if tokens.on_new_line(stop) or self._is(stop, ";"):
+                return False
+            if self._is(stop, "as"):
+                break
+        else:
+            return False
+        start, end = tokens.starts[at], tokens.ends[stop - 1]
+        span = Span(tokens.source, start, end)
+        fix = Fix("put quotes around it", (Edit(span, f'"{span.text}"'),))
+        self.report.add("E0126", f"expected a string, found `{span.text}`", start, end, fix=fix)
+        tokens.replace(at, stop - at, [])
+        self._insert(at, "STRING")
+        return True
+
+    def _bare_argument(self, states: list[int], at: int) -> bool:
+        """`color #d33;`: a literal behind a name without parentheses."""
+        kind = tables().kind
+        if self.tokens.kinds[at - 1] != kind("NAME"):
+            return False
+        if self.tokens.kinds[at] not in (kind("NUMBER"), kind("COLOR"), self.literals["["]):
+            return False
+        for stop in range(at + 1, min(at + 40, len(self.tokens.kinds) - 1)):
+            if self._is(stop, ";"):
+                if not self._wrapped_fits(states, at, stop):
+                    return False
+                mistakes.report_wrapping(self.tokens, self.report, "E0107", at, stop, "()")
+                self._insert(stop, ")")
+                self._insert(at, "(")
+                return True
+        return False
+
+    def _wrapped_fits(self, states: list[int], at: int, stop: int) -> bool:
+        """Whether the tokens ``[at, stop)`` are what belongs between parentheses there."""
         kinds = self.tokens.kinds
-        wrapped = [self.literals["("], *kinds[at:brace], self.literals[")"], kinds[brace]]
+        wrapped = [self.literals["("], *kinds[at:stop], self.literals[")"], kinds[stop]]
         return reach(states.copy(), wrapped, 0, len(wrapped)) == len(wrapped)
 
     def _next_brace(self, at: int) -> int | None:

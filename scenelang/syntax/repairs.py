@@ -94,7 +94,7 @@ _REPLACEMENTS = {
 }
 _WORDS = {"and": "&&", "or": "||", "not": "!", "mod": "%"}
 _DELETION, _FURTHER_DELETION = 1.5, 0.6
-_SWAP = 1.7
+_SWAP = 1.8
 _KEYWORD_AS_NAME = 1.1
 _NEW_LINE = 0.6  # a token that begins a line is seldom the slip
 _CLOSING, _CLOSING_AND_SEMICOLON = 1.1, 1.8
@@ -130,7 +130,7 @@ def word_for(text: str) -> str | None:
     return _WORDS.get(text)
 
 
-Found = tuple[float, Repair, list[int]]
+Found = tuple[float, float, Repair, list[int]]
 
 
 def _by_score(found: Found) -> float:
@@ -157,6 +157,11 @@ class Search:
         self.fixed = {END, literals["{"], literals["}"]}  # braces were matched before
         self.ends = {literals[";"], literals["}"], END}
         self.semicolon = literals[";"]
+        self.bound = next(  # where the statement ends, or its head
+            index + 1
+            for index in range(at, len(self.kinds))
+            if self.kinds[index] in (*self.fixed, self.semicolon)
+        )
         self.name = tables().kind("NAME")
         self.keywords = {kind for text, kind in literals.items() if text.isalpha()}
         self.equal = literals["="]
@@ -168,25 +173,34 @@ class Search:
 
         Args:
             base: the states before the statement.
-            stack: the states at the mistake.
+            stack: the states at the mistake; used as they are where the statement is too long to replay.
         """
-        found = self._try_all(stack, self.at)
-        best = self._settle(found)
-        if best is not None and best[0] >= FOLLOWED - 2:
-            return best[1]
         if self.at - self.first > MAX_REPLAY:
+            best = self._settle(self._try_all(stack, self.at))
             return best[1] if best is not None else None
+        # Replayed, since the parser may have applied rules that only the bad token asked for.
+        prefixes = []
         prefix = base.copy()
         for at in range(self.first, self.at):
             if at >= self.at - WINDOW:
-                found += self._try_all(prefix, at)
-            if not advance(prefix, self.kinds[at]):
-                break
+                prefixes.append((at, prefix.copy()))
+            advance(prefix, self.kinds[at])
+        found = self._try_all(prefix, self.at)
+        best = self._settle(found)
+        if best is not None and best[0] >= self._worth(self.at + FOLLOWED) - 2:
+            return best[1]
+        for at, prefix in prefixes:
+            found += self._try_all(prefix, at)
         best = self._settle(found)
         return best[1] if best is not None else None
 
+    def _worth(self, stop: int) -> float:
+        """What it is worth that the tokens up to ``stop`` fit: those of later statements count little."""
+        own = min(stop, self.bound) - self.at
+        return own + 0.15 * (min(stop, self.at + FOLLOWED) - self.at - own)
+
     def _try_all(self, stack: list[int], at: int) -> list[Found]:
-        """All repairs at one token that help, each with its score and the states after it."""
+        """All repairs at one token that help, each with its score, its cost and the states after it."""
         found: list[Found] = []
         distance = self.at - at
         extra = 0.1 + 0.1 * distance if distance else 0.0
@@ -199,17 +213,17 @@ class Search:
             stop = reach(after, self.kinds, repair.end, start + LOOKAHEAD)
             if stop < start + 3 and not any(kind in self.ends for kind in self.kinds[start:stop]):
                 continue
-            score = min(stop - self.at, LOOKAHEAD) - repair.cost - extra
-            found.append((score, repair, trial))
+            cost = repair.cost + extra
+            found.append((self._worth(stop) - cost, cost, repair, trial))
         return found
 
     def _settle(self, found: list[Found]) -> tuple[float, Repair] | None:
         """The best of several repairs: the few that look best are followed further."""
         settled: tuple[float, Repair] | None = None
-        for score, repair, trial in sorted(found, key=_by_score)[:8]:
+        for _, cost, repair, trial in sorted(found, key=_by_score)[:8]:
             start = max(self.at, repair.end)
             stop = reach(trial.copy(), self.kinds, repair.end, start + FOLLOWED)
-            score += (min(stop - self.at, FOLLOWED) - LOOKAHEAD) * 1.0 if stop > start + LOOKAHEAD else 0.0
+            score = self._worth(stop) - cost
             if settled is None or score > settled[0]:
                 settled = score, repair
         return settled
@@ -237,14 +251,17 @@ class Search:
             header = kind == self.equal and self.kinds[self.first] in self.definitions
             yield Repair(at, 1, insert, cost + 0.5 * header)
         if kind in self.keywords:
-            yield Repair(at, 1, (self.name,), _KEYWORD_AS_NAME)
+            yield Repair(at, 1, (self.name,), _KEYWORD_AS_NAME + (at < self.at))
         elif kind == self.name and (operator := word_for(tokens.text(at))):
             yield Repair(at, 1, (tables().literals[operator],), 1.0)
         cost = _DELETION
         for count in range(1, 4):
-            if kinds[at + count - 1] in self.fixed:
+            last = at + count - 1
+            if kinds[last] in self.fixed or (count > 1 and kinds[last] == self.semicolon):
                 return
-            if tokens.on_new_line(at + count - 1):
+            if tokens.on_new_line(last):
+                if count > 1:
+                    return
                 cost += _NEW_LINE
             yield Repair(at, count, (), cost)
             cost += _FURTHER_DELETION
