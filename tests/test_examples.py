@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -37,3 +38,21 @@ def test_script_draws(tmp_path: Path) -> None:
     script, target = EXAMPLES / "spiral.py", tmp_path / "spiral.png"
     subprocess.run([sys.executable, "-W", "error", str(script), str(target)], check=True, capture_output=True)
     assert target.stat().st_size > 1000
+
+
+def suggestions() -> list[tuple[str, dict[str, str]]]:
+    """(file, values of params) of what the comments of examples suggest to try with -D."""
+    found = []
+    for path in SCENES:
+        for line in path.read_text("utf-8").splitlines():
+            if line.startswith("//") and "-D " in line:
+                named = re.search(r"scenelang render (\S+) -o ", line)
+                assert named is None or named[1] == path.name
+                found.append((path.name, dict(re.findall(r"-D ([\w.]+)=(\S+)", line))))
+    return found
+
+
+@pytest.mark.parametrize(("name", "params"), suggestions())
+def test_suggestions_of_comments_work(name: str, params: dict[str, str]) -> None:
+    assert params
+    assert nsg.compile(nsg.load(EXAMPLES / name, params=params)).digest()
