@@ -143,11 +143,13 @@ class _Sector:
 
     def turned(self, warp: Warp) -> _Sector:
         """A sector around the image of this one: each point turns by ``twirl |p| + bend . p``."""
+        if self.whole:
+            return self
         twist = sorted((warp.twirl * self.near, warp.twirl * self.far))
         x, y = warp.bend
         most = hypot(x, y) * self.far
         low, high = twist[0] - most, twist[1] + most
-        if not self.whole and most > 0.0:
+        if most > 0.0:
             # `p` is the turned point. Its angle is now known roughly, which bounds the bend better.
             rough = _Sector(self.near, self.far, self.first + low, self.last + high)
             low, high = twist[0] - rough.furthest(-x, -y), twist[1] + rough.furthest(x, y)

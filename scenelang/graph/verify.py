@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from enum import Enum
-from math import isfinite
 
-from scenelang.graph.nodes import Fold, Graph, Leaf
-from scenelang.graph.steps import Affine, Warp
-from scenelang.graph.walk import nodes
+from scenelang.graph.nodes import Fold, Graph, Move
+from scenelang.graph.steps import IDENTITY, Affine
 
 
 class Invariant(Enum):
@@ -39,43 +38,69 @@ def verify(graph: Graph, stage: str, holds: Collection[Invariant] = ()) -> Graph
     Raises:
         InternalError: an invariant is broken.
     """
-    flat = graph.dimension == 2
-    fault: str | None = None
+    fault = None
     if graph.root.kind != "scene" or graph.root.moves:
         fault = "the root is a scene without moves"
-    tidy, merged = Invariant.NO_IDENTITIES in holds, Invariant.MERGED in holds
-    for node, depth in nodes(graph.root):
-        if isinstance(node, Fold):
-            if node.links and node.links[0].op != "union":
-                fault = "the first link of a fold is a union"
-            if depth and Invariant.COMPOSITE in holds and len(node.links) < 2:
-                fault = Invariant.COMPOSITE.value
-            if node.moves and Invariant.AT_LEAVES in holds:
-                fault = Invariant.AT_LEAVES.value
-            if depth and Invariant.STREAM in holds:
-                fault = Invariant.STREAM.value
-        fault = _moves_fault(node, flat, tidy, merged) or fault
-        if fault is not None:
-            raise InternalError(f"internal error after pass `{stage}`: it does not hold that {fault}")
+    check = _Check(graph.dimension == 2, Invariant.NO_IDENTITIES in holds, Invariant.MERGED in holds)
+    folds = [graph.root]
+    while folds and fault is None:
+        fold = folds.pop()
+        fault = _fold_fault(fold, fold is graph.root, holds) or check.moves_fault(fold.moves)
+        for link in fold.links:
+            node = link.node
+            if isinstance(node, Fold):
+                folds.append(node)
+                continue
+            r, g, b = node.rgb
+            if not (0.0 <= r <= 1.0 and 0.0 <= g <= 1.0 and 0.0 <= b <= 1.0):
+                fault = "colours lie in [0, 1]"
+            elif node.moves:
+                fault = fault or check.moves_fault(node.moves)
+    if fault is not None:
+        raise InternalError(f"internal error after pass `{stage}`: it does not hold that {fault}")
     return graph
 
 
-def _moves_fault(node: Leaf | Fold, flat: bool, tidy: bool, merged: bool) -> str | None:
-    before: object = None
-    for move in node.moves:
-        step = move.step
-        if isinstance(step, Affine):
-            if flat and (step.rows[2], step.rows[6], *step.rows[8:]) != _PLANE:
-                return "a map of a 2D model keeps the plane"
-            if merged and isinstance(before, Affine):
-                return Invariant.MERGED.value
-        elif tidy and step == _STILL:
-            return Invariant.NO_IDENTITIES.value
-        before = step
-    if isinstance(node, Leaf) and not all(0.0 <= v <= 1.0 and isfinite(v) for v in node.rgb):
-        return "colours lie in [0, 1]"
+def _fold_fault(fold: Fold, root: bool, holds: Collection[Invariant]) -> str | None:
+    if fold.links and fold.links[0].op != "union":
+        return "the first link of a fold is a union"
+    if fold.moves and Invariant.AT_LEAVES in holds:
+        return Invariant.AT_LEAVES.value
+    if root:
+        return None
+    if Invariant.STREAM in holds:
+        return Invariant.STREAM.value
+    if Invariant.COMPOSITE in holds and len(fold.links) < 2:
+        return Invariant.COMPOSITE.value
     return None
 
 
-_PLANE = (0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-_STILL = Warp(0.0, (0.0, 0.0))
+@dataclass(frozen=True, slots=True)
+class _Check:
+    """What must hold of each chain: 2D maps keep the plane, no identities, no neighbouring maps."""
+
+    flat: bool
+    tidy: bool
+    merged: bool
+
+    def moves_fault(self, moves: tuple[Move, ...]) -> str | None:
+        after_map = False
+        for move in moves:
+            step = move.step
+            if isinstance(step, Affine):
+                rows = step.rows
+                if self.flat and (rows[2] or rows[6] or rows[8:] != _PLANE):
+                    return "a map of a 2D model keeps the plane"
+                if self.merged and after_map:
+                    return Invariant.MERGED.value
+                still = self.tidy and rows == IDENTITY
+                after_map = True
+            else:
+                still = self.tidy and step.twirl == 0.0 and step.bend == (0.0, 0.0)
+                after_map = False
+            if still:
+                return Invariant.NO_IDENTITIES.value
+        return None
+
+
+_PLANE = (0.0, 0.0, 1.0, 0.0)

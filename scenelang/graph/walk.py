@@ -31,19 +31,15 @@ def bottom_up(root: Node, leaf: Callable[[Leaf], T], fold: Callable[[Fold, list[
         open_folds[-1][1].append(value)
 
 
-def nodes(root: Node) -> Iterator[tuple[Node, int]]:
-    """Every node with its depth, parents before children, in file order."""
-    stack: list[tuple[Node, int]] = [(root, 0)]
-    while stack:
-        node, depth = stack.pop()
-        yield node, depth
-        if isinstance(node, Fold):
-            stack.extend((link.node, depth + 1) for link in reversed(node.links))
-
-
 def leaves(root: Node) -> Iterator[Leaf]:
     """Every leaf, in file order."""
-    return (node for node, _ in nodes(root) if isinstance(node, Leaf))
+    stack = [root]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Leaf):
+            yield node
+        else:
+            stack.extend([link.node for link in reversed(node.links)])
 
 
 def map_moves(graph: Graph, change: Callable[[tuple[Move, ...]], tuple[Move, ...]]) -> Graph:
@@ -55,8 +51,8 @@ def map_moves(graph: Graph, change: Callable[[tuple[Move, ...]], tuple[Move, ...
         return Leaf(node.geometry, node.material, node.rgb, change(node.moves), node.span)
 
     def fold(node: Fold, children: list[Node]) -> Fold:
-        links = tuple(Link(link.op, child) for link, child in zip(node.links, children, strict=True))
-        return Fold(node.kind, links, change(node.moves), node.span)
+        links = [Link(link.op, child) for link, child in zip(node.links, children, strict=True)]
+        return Fold(node.kind, tuple(links), change(node.moves), node.span)
 
     root = fold(graph.root, [bottom_up(link.node, leaf, fold) for link in graph.root.links])
     return Graph(root, graph.canvas, graph.background, graph.dimension)

@@ -49,7 +49,7 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
         elif op == "union":
             drawn.add(key)
             cover = _cover(leaf)
-            if cover is not None:
+            if cover is not None and (len(covers) < _MOST or cover > covers[-1]):
                 covers = sorted([*covers, cover], reverse=True)[:_MOST]
     return Graph(begun(links, keep), graph.canvas, graph.background, graph.dimension)
 
