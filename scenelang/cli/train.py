@@ -7,10 +7,14 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from scenelang.cli import options
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 Report = Callable[[int, int, float, dict[str, float]], None]
 
@@ -90,7 +94,12 @@ def command(
         raise
     reached = f", mean loss {_losses(last)}" if last else ""
     if finished:
-        click.echo(f"done{reached}: {out / 'weights.safetensors'}")
+        from scenelang.evaluation.record import record_measured
+
+        weights = out / "weights.safetensors"
+        figures = record_measured(weights, wanted.model)
+        means = ", ".join(f"{k[5:]} {v['mean']:.1f}" for k, v in figures.items() if k.startswith("psnr_"))
+        click.echo(f"done{reached}; PSNR of unseen scenes (dB): {means}: {weights}")
     else:
         click.echo(f"out of time{reached}: the same command goes on from the checkpoint in {out}")
     ctx.exit(0)
@@ -119,10 +128,8 @@ def _losses(parts: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.4g}" for name, value in parts.items())
 
 
-def _first(error: Exception) -> str:
-    """The first mistake that pydantic found, in a line."""
-    errors = getattr(error, "errors", list)()
-    if not errors:
-        return str(error)
-    where = ".".join(str(part) for part in errors[0]["loc"])
-    return f"{where}: {errors[0]['msg']}" if where else str(errors[0]["msg"])
+def _first(error: ValidationError) -> str:
+    """The first mistake that was found, in a line."""
+    mistake = error.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in mistake["loc"])
+    return f"{where}: {mistake['msg']}" if where else mistake["msg"]

@@ -63,7 +63,7 @@ def scenes_of(model: Model, name: str, seed: int) -> Callable[[int], Scene]:
 
 def draw_scene(model: Model, scene: Scene, threads: int = 1) -> tuple[Program, Image]:
     """Compile a scene and draw it with a model."""
-    program = compile_scene(scene, model=model.manifest.name)
+    program = compile_scene(scene, model=model.manifest.name, codes=model.codes())
     drawing = draw(
         model.network, program.vectors, program.tokens, program.canvas, program.background, threads=threads
     )
@@ -141,11 +141,15 @@ def summarise(cases: list[Case]) -> dict[str, Any]:
     """Mean, 5th percentile from the bad end, and worst of each figure."""
     out: dict[str, Any] = {"count": len(cases)}
     for figure, bad_end in (("psnr", 5), ("ssim", 5), ("flip", 95)):
-        values = np.array([c.figures[figure] for c in cases])
-        worst = values.max() if bad_end > 50 else values.min()
-        out[figure] = {
-            "mean": round(float(values.mean()), 5),
-            "p5": round(float(np.percentile(values, bad_end)), 5),
-            "worst": round(float(worst), 5),
-        }
+        out[figure] = spread([c.figures[figure] for c in cases], bad_end)
     return out
+
+
+def spread(values: list[float], bad_end: int) -> dict[str, float]:
+    """Mean, worst and the percentile ``bad_end``, which says where the bad values lie; named p5."""
+    worst = max(values) if bad_end > 50 else min(values)
+    return {
+        "mean": round(float(np.mean(values)), 5),
+        "p5": round(float(np.percentile(values, bad_end)), 5),
+        "worst": round(worst, 5),
+    }

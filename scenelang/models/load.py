@@ -11,8 +11,8 @@ import torch
 from safetensors.torch import load
 
 from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.models.weights import Codes, read_header, weights_path
 from scenelang.models.weights import ModelError as ModelError
-from scenelang.models.weights import read_header, weights_path
 from scenelang.renderers.framed import Framed, FramedConfig
 
 MOST_BYTES = 64 * 1024 * 1024
@@ -34,6 +34,14 @@ class Model:
     network: Framed
     digest: str
     header: dict[str, Any]
+
+    def codes(self) -> Codes:
+        """The codes of these weights, as `compile_scene` takes them."""
+        return Codes(
+            dict(zip(self.manifest.geometries, map(tuple, self.network.codes.tolist()), strict=True)),
+            dict(zip(self.manifest.materials, map(tuple, self.network.material_codes.tolist()), strict=True)),
+            self.digest,
+        )
 
 
 def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Framed:

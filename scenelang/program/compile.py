@@ -10,6 +10,7 @@ from scenelang.graph.lower import Spans
 from scenelang.graph.nodes import Graph
 from scenelang.models.choose import choose_model
 from scenelang.models.manifest import Manifest, available, load_manifest
+from scenelang.models.weights import Codes
 from scenelang.passes import check_scene
 from scenelang.scene.schema import Scene
 
@@ -23,6 +24,7 @@ def compile_scene(
     spans: Spans | None = None,
     diagnostics: Diagnostics | None = None,
     model: str | None = None,
+    codes: Codes | None = None,
     after: Callable[[str, Graph], None] | None = None,
 ) -> Program:
     """Compile a scene for a model.
@@ -32,6 +34,7 @@ def compile_scene(
         spans: where its nodes were written, for diagnostics and the source map.
         diagnostics: collects errors and warnings.
         model: draw with this model instead of the one the scene names.
+        codes: lift with these instead of the model's shipped ones, for weights under trial.
         after: called with ``"lower"`` and the name of each pass and the graph it left.
 
     Returns:
@@ -51,7 +54,7 @@ def compile_scene(
     from scenelang.models.weights import load_codes
     from scenelang.program.emit import emit
 
-    return emit(graph, manifest, load_codes(manifest.name))
+    return emit(graph, manifest, codes or load_codes(manifest.name))
 
 
 def find_model(
