@@ -31,15 +31,19 @@ def bottom_up(root: Node, leaf: Callable[[Leaf], T], fold: Callable[[Fold, list[
         open_folds[-1][1].append(value)
 
 
+def nodes(root: Node) -> Iterator[tuple[Node, int]]:
+    """Every node with its depth, parents before children, in file order."""
+    stack: list[tuple[Node, int]] = [(root, 0)]
+    while stack:
+        node, depth = stack.pop()
+        yield node, depth
+        if isinstance(node, Fold):
+            stack.extend([(link.node, depth + 1) for link in reversed(node.links)])
+
+
 def leaves(root: Node) -> Iterator[Leaf]:
     """Every leaf, in file order."""
-    stack = [root]
-    while stack:
-        node = stack.pop()
-        if isinstance(node, Leaf):
-            yield node
-        else:
-            stack.extend([link.node for link in reversed(node.links)])
+    return (node for node, _ in nodes(root) if isinstance(node, Leaf))
 
 
 def map_moves(graph: Graph, change: Callable[[tuple[Move, ...]], tuple[Move, ...]]) -> Graph:
