@@ -28,8 +28,8 @@ def targets(names: Sequence[str], out: str) -> list[Path]:
         try:
             image_format(path)
         except ValueError as error:
-            advice = " A folder ends in a slash." if not path.suffix else ""
-            raise click.UsageError(f"cannot write '{out}': {error}.{advice}") from None
+            advice = "a picture has a suffix such as .png, a folder ends in a slash"
+            raise click.UsageError(f"cannot write '{out}': {error if path.suffix else advice}.") from None
         if not path.parent.is_dir():
             raise click.UsageError(f"cannot write '{out}': there is no folder '{path.parent}'.")
         return [path]
