@@ -20,7 +20,7 @@ PICTURES = DOCS / "pictures"
 GALLERY = ("gear", "flower", "tangram", "night", "blobs", "logo", "deformations", "tree")
 COMPARED = "chain"
 GAP_PX = 8
-LOUDER = 5  # factor on the difference of two pictures
+LOUDER = 20  # factor on the difference of two pictures
 SHARPER = 2  # the gallery's scenes are drawn larger by this
 
 

@@ -12,7 +12,7 @@ from scenelang.models.weights import load_codes
 from tests.conformance.cases import FOLDER, NAMES, Outcome, run, stored
 from tests.pictures import premultiplied, psnr_db
 
-LEAST_DB = 26.0
+LEAST_DB = 36.0
 
 
 @cache
