@@ -104,9 +104,12 @@ class _Mender:
         tokens.replace(at, 0, [kind])
 
     def _delete(self, at: int) -> None:
+        self._report_unmatched(at)
+        self.tokens.replace(at, 1, [])
+
+    def _report_unmatched(self, at: int) -> None:
         span = self._span(at)
         self.report.add("E0105", f"unmatched `{span.text}`", span.start, span.end)
-        self.tokens.replace(at, 1, [])
 
     def match_the_rest(self) -> None:
         """Drop what still closes nothing and close what is still open."""
@@ -120,8 +123,9 @@ class _Mender:
                 depth -= 1
             elif kind == self.closing:
                 stray.append(at)
-        for at in reversed(stray):
-            self._delete(at)
+        for at in stray:
+            self._report_unmatched(at)
+        tokens.drop(stray)
         if not depth:
             return
         last = len(tokens.kinds) - 1

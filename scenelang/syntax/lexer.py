@@ -198,5 +198,6 @@ class _Slips:
         )
 
     def _illegal(self, start: int, end: int, text: str) -> None:
+        self.tokens.reported.add(start)
         shown = text if text.isprintable() else " ".join(f"U+{ord(c):04X}" for c in text[:8])
-        self.report.add("E0113", f"illegal character `{shown}`", start, end, fix=self._fix(start, end, ""))
+        self.report.add("E0113", f"illegal character `{shown}`", start, end)

@@ -27,6 +27,9 @@ def report_repair(tokens: Tokens, report: Report, repair: Repair, open_brackets:
         return  # a slip that has been reported already
     if touched and tokens.starts[repair.at] == tokens.ends[repair.end - 1]:
         return  # what recovery put in itself, at a mistake that has been reported
+    gap = range(tokens.end_before(repair.at), tokens.starts[repair.at])
+    if not touched and any(at in tokens.reported for at in gap):
+        return  # what belongs here was read as something illegal
     names = [tables().kinds[kind] for kind in repair.insert]
     if not repair.delete:
         _report_insertion(tokens, report, repair.at, names, open_brackets)
@@ -36,21 +39,25 @@ def report_repair(tokens: Tokens, report: Report, repair: Repair, open_brackets:
         _report_replacement(tokens, report, repair, names)
 
 
-def report_wrapping(tokens: Tokens, report: Report, code: str, first: int, stop: int, pair: str) -> None:
-    """Report parentheses or braces that are missing around the tokens ``[first, stop)``."""
-    start, end = tokens.starts[first], tokens.ends[stop - 1]
-    opening, closing = (pair[0], pair[1]) if pair == "()" else ("{ ", " }")
-    edits = (Edit(_empty(tokens, start), opening), Edit(_empty(tokens, end), closing))
-    what = "parentheses" if pair == "()" else "braces"
-    at = tokens.starts[first] if not tokens.on_new_line(first) else tokens.end_before(first)
-    report.add(
-        code,
-        f"missing {what}",
-        at,
-        max(at, end if pair == "()" else at),
-        help=f"{what} are mandatory here",
-        fix=Fix(f"put {what} around it", edits),
-    )
+def report_parentheses(tokens: Tokens, report: Report, first: int, stop: int) -> None:
+    """Report parentheses that are missing around the tokens ``[first, stop)``."""
+    before, start, end = tokens.end_before(first), tokens.starts[first], tokens.ends[stop - 1]
+    called = tables().kinds[tokens.kinds[first - 1]] == "NAME"  # no space goes between a name and its `(`
+    opening = Edit(Span(tokens.source, before if called else start, start), "(")
+    fix = Fix("put parentheses around it", (opening, Edit(_empty(tokens, end), ")")))
+    report.add("E0107", "missing parentheses", start, end, fix=fix)
+
+
+def report_braces(tokens: Tokens, report: Report, statements: Sequence[tuple[int, int]]) -> None:
+    """Report braces that are missing around statements, each the tokens ``[first, stop)``."""
+    edits = []
+    for first, stop in statements:
+        edits.append(Edit(_empty(tokens, tokens.starts[first]), "{ "))
+        edits.append(Edit(_empty(tokens, tokens.ends[stop - 1]), " }"))
+    first = statements[0][0]
+    at = tokens.end_before(first) if tokens.on_new_line(first) else tokens.starts[first]
+    fix = Fix("put braces around it", tuple(edits))
+    report.add("E0106", "missing braces", at, at, help="braces are mandatory here", fix=fix)
 
 
 def report_unexpected(tokens: Tokens, report: Report, at: int) -> None:

@@ -16,6 +16,9 @@ MAX_DEPTH = 200
 _OTHER, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range(8)
 
 
+_OPERANDS = {"NAME", "NUMBER", "STRING", "COLOR", ")", "]", "true", "false", "step", "as"}
+
+
 @cache
 def _classes() -> tuple[int, ...]:
     """What each kind does to the depth."""
@@ -30,7 +33,7 @@ def limit_nesting(tokens: Tokens, report: Report) -> None:
     """Report what is nested deeper than `MAX_DEPTH` and take it out of the token list."""
     kinds = tokens.kinds
     classes = _classes()
-    else_kind = tables().literals["else"]
+    else_kind, round_ = tables().literals["else"], tables().literals[")"]
     cuts: list[tuple[int, int, list[int]]] = []
     depth = floor = ground = 0  # now; where this list item began; where this block's statements begin
     brackets: list[tuple[int, int]] = []  # open in this block: their kind and the floor outside
@@ -43,12 +46,18 @@ def limit_nesting(tokens: Tokens, report: Report) -> None:
             continue
         if c <= _BRACE:
             if depth == MAX_DEPTH:
-                first = at if c == _OPERATOR else at + 1
-                resume = _end_of_cut(kinds, first, c == _OPERATOR)
-                closed = c != _OPERATOR and classes[kinds[resume]] in (_CLOSE, _END_BRACE)
-                unclosed = [] if closed or c == _OPERATOR else [*(open_ for open_, _ in brackets), kind]
-                cuts.append((first, resume, _stand_in(kinds, at, unclosed)))
-                resume += closed
+                if c == _BRACE:
+                    first, resume = at + 1, _end_of_block(kinds, at + 1)
+                    cuts.append((first, resume, []))
+                elif _goes_on(kinds, at):
+                    first, resume = at, _end_of_part(kinds, at, True)
+                    cuts.append((first, resume, _stand_in(kinds, at, [])))
+                else:
+                    first, resume = at + 1, _end_of_part(kinds, at + 1, False)
+                    closed = classes[kinds[resume]] == _CLOSE
+                    unclosed = [] if closed else [*(open_ for open_, _ in brackets), kind]
+                    cuts.append((first, resume, _stand_in(kinds, at, unclosed)))
+                resume += first > at and classes[kinds[resume]] in (_CLOSE, _END_BRACE)
                 if not told:
                     _report(tokens, report, at)
                 told = True
@@ -63,7 +72,7 @@ def limit_nesting(tokens: Tokens, report: Report) -> None:
                 brackets = []
         elif c == _CLOSE:
             if brackets:
-                depth = floor - 1
+                depth = floor - (kind == round_)  # `v[0]` makes the tree deeper by what it goes on
                 floor = brackets.pop()[1]
         elif c == _COMMA:
             depth = floor
@@ -90,8 +99,30 @@ def _report(tokens: Tokens, report: Report, at: int) -> None:
     )
 
 
-def _end_of_cut(kinds: list[int], first: int, within_list: bool) -> int:
-    """Index of the token that ends what is cut: the closing bracket, a separator, or the end of the block."""
+def _follows_operand(kinds: list[int], at: int) -> bool:
+    """Whether an expression can end right before a token."""
+    return tables().kinds[kinds[at - 1]] in _OPERANDS
+
+
+def _goes_on(kinds: list[int], at: int) -> bool:
+    """Whether a token goes on with what is before it: an operator, or the bracket of an index."""
+    indexes = kinds[at] == tables().literals["["] and _follows_operand(kinds, at)
+    return indexes or _classes()[kinds[at]] == _OPERATOR
+
+
+def _end_of_block(kinds: list[int], first: int) -> int:
+    """Index of the `}` that closes the block whose first token this is."""
+    classes = _classes()
+    depth = 0
+    for at in range(first, len(kinds)):
+        depth += (classes[kinds[at]] == _BRACE) - (classes[kinds[at]] == _END_BRACE)
+        if depth < 0:
+            return at
+    return len(kinds) - 1
+
+
+def _end_of_part(kinds: list[int], first: int, within_list: bool) -> int:
+    """Index of the token that ends a part of a statement: the closing bracket or a separator."""
     classes = _classes()
     question, colon, otherwise, end_brace = (tables().literals[text] for text in ("?", ":", "else", "}"))
     chain = within_list and kinds[first] == otherwise
@@ -124,12 +155,9 @@ def _stand_in(kinds: list[int], at: int, unclosed: list[int]) -> list[int]:
     """The kinds that stand for what is cut behind a bracket or from an operator on."""
     language = tables()
     literals = language.literals
-    kind = kinds[at]
-    if kind in (literals["{"], literals["else"]):
+    if kinds[at] == literals["else"]:
         return []
-    operands = ("NAME", "NUMBER", "STRING", "COLOR", ")", "]", "true", "false", "step", "as")
-    before = language.kinds[kinds[at - 1]]
-    if _classes()[kind] == _OPERATOR and before in operands:
+    if _goes_on(kinds, at) and _follows_operand(kinds, at):
         return []
     closing = [literals[")"] if open_ == literals["("] else literals["]"] for open_ in reversed(unclosed)]
     return [language.kind("BAD_EXPRESSION"), *closing]

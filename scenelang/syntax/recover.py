@@ -130,7 +130,7 @@ class Recovery:
             brace = self._next_brace(at)
             if brace is None or not self._wrapped_fits(states, at, brace):
                 return False
-            mistakes.report_wrapping(self.tokens, self.report, "E0107", at, brace, "()")
+            mistakes.report_parentheses(self.tokens, self.report, at, brace)
             self._insert(brace, ")")
             self._insert(at, "(")
             return True
@@ -147,13 +147,13 @@ class Recovery:
         few = [self.literals["{"], *self.tokens.kinds[at : min(stop, at + 4)]]
         if reach(states.copy(), few, 0, len(few)) < len(few):
             return False
-        mistakes.report_wrapping(self.tokens, self.report, "E0106", at, stop, "{}")
+        bare = [(at, stop)]
         if self._is(stop, "else") and not self._is(stop + 1, "{", "if"):
-            last = self._end_of_statement(stop + 1)
-            self._insert(last, "}")
-            self._insert(stop + 1, "{")
-        self._insert(stop, "}")
-        self._insert(at, "{")
+            bare.append((stop + 1, self._end_of_statement(stop + 1)))
+        mistakes.report_braces(self.tokens, self.report, bare)
+        for first, stop in reversed(bare):
+            self._insert(stop, "}")
+            self._insert(first, "{")
         return True
 
     def _at_end(self, at: int) -> bool:
@@ -188,7 +188,7 @@ class Recovery:
             if self._is(stop, ";"):
                 if not self._wrapped_fits(states, at, stop):
                     return False
-                mistakes.report_wrapping(self.tokens, self.report, "E0107", at, stop, "()")
+                mistakes.report_parentheses(self.tokens, self.report, at, stop)
                 self._insert(stop, ")")
                 self._insert(at, "(")
                 return True

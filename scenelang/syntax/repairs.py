@@ -157,11 +157,11 @@ class Search:
         self.fixed = {END, literals["{"], literals["}"]}  # braces were matched before
         self.ends = {literals[";"], literals["}"], END}
         self.semicolon = literals[";"]
-        self.bound = next(  # where the statement ends, or its head
-            index + 1
-            for index in range(at, len(self.kinds))
-            if self.kinds[index] in (*self.fixed, self.semicolon)
-        )
+        self.bound = at  # where the statement ends, or its head
+        while self.bound < min(at + FOLLOWED, len(self.kinds)):
+            self.bound += 1
+            if self.kinds[self.bound - 1] in (*self.fixed, self.semicolon):
+                break
         self.name = tables().kind("NAME")
         self.keywords = {kind for text, kind in literals.items() if text.isalpha()}
         self.equal = literals["="]

@@ -70,7 +70,7 @@ class Tokens:
         kinds: kind of each token, an index into `Tables.kinds`.
         starts: offset of its first code point.
         ends: offset after its last one.
-        reported: starts of the tokens that a mistake has been reported for.
+        reported: where tokens and illegal characters begin that a mistake has been reported for.
         cut: the text ends inside a comment, so what is missing at its end is no further mistake.
     """
 
@@ -114,3 +114,9 @@ class Tokens:
         self.kinds[index : index + count] = kinds
         self.starts[index : index + count] = [at] * len(kinds)
         self.ends[index : index + count] = [at] * len(kinds)
+
+    def drop(self, indices: Sequence[int]) -> None:
+        """Take out any number of tokens at once."""
+        gone = set(indices)
+        for column in (self.kinds, self.starts, self.ends):
+            column[:] = [value for index, value in enumerate(column) if index not in gone]

@@ -1,0 +1,118 @@
+"""Every mistake is reported once, where it is, and nothing else is."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from scenelang.diagnostics.codes.syntax import CODES
+from scenelang.diagnostics.diagnostic import Diagnostic
+from scenelang.syntax import nodes
+from tests.syntax.reading import MALFORMED, apply, expected, mistakes, read
+
+ONE_LINERS: list[tuple[str, list[tuple[int, str]]]] = [
+    ("let a = 1", [(10, "E0102")]),
+    ("scale(0.8) translate(1, 2);", [(11, "E0102")]),
+    ("translate(-0.2, 0; scale(2);", [(18, "E0103")]),
+    ("translate(sin(cos(0.5);", [(23, "E0103")]),
+    ("fn f(p = abs(sin(p));", [(7, "E0103")]),
+    ("group { star; ", [(14, "E0104")]),
+    ("star { } }", [(10, "E0105")]),
+    ("let v = [1, 2);", [(14, "E0105")]),
+    ("for (i in 0..3) star;", [(17, "E0106")]),
+    ("group star { } }", [(6, "E0106")]),
+    ("scale 0.8);", [(6, "E0107")]),
+    ("if a > 2 { star; }", [(4, "E0107")]),
+    ("let a = ;", [(9, "E0108")]),
+    ("let = 3;", [(5, "E0109")]),
+    ("let if = 3;", [(5, "E0110")]),
+    ("if (a = b) { star; }", [(7, "E0111")]),
+    ("translate(0.1 0.2);", [(14, "E0112")]),
+    ("let a = b ~ c;", [(11, "E0113")]),
+    ('model "shapes2d;', [(7, "E0114")]),
+    ("star; /* never", [(7, "E0115")]),
+    ("scale(1.2.3);", [(7, "E0116")]),
+    ("rotate(30 deg);", [(8, "E0117")]),
+    ("rotate(30 degrees);", [(8, "E0117")]),
+    ("color(#12);", [(7, "E0118")]),
+    (r'model "a\b";', [(9, "E0119")]),
+    ("let a = " + "(" * 300 + "1" + ")" * 300 + ";", [(209, "E0120")]),
+    ("import as x y z;", [(8, "E0122")]),
+    ("model 'shapes2d';", [(7, "E0123")]),
+    ("let ä = 1;", [(5, "E0124")]),
+    ("let a = 1e400;", [(9, "E0125")]),
+    ("let a 3;", [(6, "E0126")]),
+    ("param k;", [(8, "E0126")]),
+    ("import parts.nsg as parts;", [(8, "E0126")]),
+    ("let a = 2 ** 3;", [(11, "E0127")]),
+    ("let a = [1].f();", [(9, "E0128")]),
+    ("{ star; }", [(1, "E0129")]),
+    ("translate(1; 2);", [(12, "E0130")]),
+    ("f(a: 1);", [(4, "E0130")]),
+    ("a let = 3;", [(1, "E0131")]),
+    ("star { };", [(9, "W0101")]),
+    ("star { }; ; ;", [(9, "W0101"), (11, "W0101"), (13, "W0101")]),
+    ("let let a = 3;", [(5, "E0101")]),
+    ("else { star; }", [(1, "E0101")]),
+]
+
+
+def too_many() -> str:
+    return "let = 1;\n" * 300
+
+
+@pytest.mark.parametrize("path", MALFORMED, ids=lambda path: path.stem)
+def test_malformed_scene(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert mistakes(read(text)[1]) == expected(text)
+
+
+def test_there_are_ten_malformed_scenes() -> None:
+    assert len(MALFORMED) == 10
+    assert all(len(expected(path.read_text(encoding="utf-8"))) >= 3 for path in MALFORMED)
+
+
+@pytest.mark.parametrize(("text", "where"), ONE_LINERS, ids=lambda value: str(value)[:30])
+def test_one_liner(text: str, where: list[tuple[int, str]]) -> None:
+    tree, diagnostics = read(text)
+    assert mistakes(diagnostics) == [(1, column, code) for column, code in where]
+    assert tree.span.end == len(text)
+
+
+def test_every_code_is_produced() -> None:
+    texts = [path.read_text(encoding="utf-8") for path in MALFORMED]
+    texts += [text for text, _ in ONE_LINERS]
+    texts.append(too_many())
+    assert {d.code for text in texts for d in read(text)[1]} == set(CODES)
+
+
+def test_too_many_mistakes_end_the_report() -> None:
+    tree, diagnostics = read(too_many())
+    assert len(diagnostics) == 201
+    assert diagnostics[-1].code == "E0121"
+    assert isinstance(tree.statements[-1], nodes.BadStmt)
+
+
+def fixable() -> list[tuple[str, Diagnostic]]:
+    texts = [path.read_text(encoding="utf-8") for path in MALFORMED]
+    texts += [text for text, _ in ONE_LINERS]
+    return [(text, d) for text in texts for d in read(text)[1] if d.fix is not None]
+
+
+@pytest.mark.parametrize(("text", "diagnostic"), fixable(), ids=lambda v: getattr(v, "code", ""))
+def test_a_fix_mends_its_mistake_and_makes_none(text: str, diagnostic: Diagnostic) -> None:
+    assert diagnostic.fix is not None
+    before = Counter(d.code for d in read(text)[1])
+    after = Counter(d.code for d in read(apply(text, diagnostic.fix))[1])
+    assert before - after == Counter([diagnostic.code])
+    assert after <= before
+
+
+def test_messages_follow_the_house_style() -> None:
+    texts = [path.read_text(encoding="utf-8") for path in MALFORMED] + [text for text, _ in ONE_LINERS]
+    for text in texts:
+        for d in read(text)[1]:
+            assert d.message[0] in "`" or not d.message[0].isupper()
+            assert not d.message.endswith(".")
