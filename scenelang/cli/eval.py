@@ -48,7 +48,10 @@ def command(
     if unknown:
         raise click.UsageError(f"no set '{unknown[0]}'; the sets are {', '.join(SETS)}")
     need_metrics()
+    import torch
+
     from scenelang.backend.errors import RenderError
+    from scenelang.backend.neural import keep_memory
     from scenelang.evaluation.run import evaluate_set, worst_sheet
     from scenelang.image import write_whole
     from scenelang.models.load import ModelError, load_model
@@ -59,6 +62,8 @@ def command(
         raise click.UsageError(f"no model '{model}'") from None
     except ModelError as error:
         raise RenderError(str(error)) from None
+    keep_memory()
+    torch.set_num_threads(threads)
     out.mkdir(parents=True, exist_ok=True)
     for name in chosen:
         summary, cases = evaluate_set(
