@@ -1,0 +1,132 @@
+"""The other commands, and whole processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Folder
+
+
+def test_help_lists_every_command(folder: Folder) -> None:
+    from scenelang.cli.main import COMMANDS
+
+    said = folder.run("--help").stdout
+    for name, words in COMMANDS.items():
+        assert f"  {name} " in said
+        assert words in said
+        assert folder.run(name, "--help").exit_code == 0
+
+
+def test_version(folder: Folder) -> None:
+    assert folder.run("--version").stdout.startswith("scenelang ")
+
+
+def test_models(folder: Folder) -> None:
+    assert folder.run("models").stdout.startswith("shapes2d  2D  ")
+    said = folder.run("models", "shapes2d").stdout
+    for words in ("square, triangle, star, pentagon", "sha256", "seed", "revision", "numbers"):
+        assert words in said
+    assert folder.run("models", "shapes").exit_code == 2
+    listed = json.loads(folder.run("models", "--format", "json").stdout)
+    facts = json.loads(folder.run("models", "shapes2d", "--format", "json").stdout)
+    assert listed == [facts]
+    assert facts["weights"]["training"]["config"]["model"] == "shapes2d"
+    assert facts["weights"]["parameters"] > 1000
+
+
+def test_models_without_weights(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("scenelang.models.weights.weights_path", lambda name: folder.path / "none")
+    assert "missing or damaged" in folder.run("models", "shapes2d").stdout
+
+
+def test_explain(folder: Folder) -> None:
+    assert folder.run("explain", "e0401").stdout.startswith("error E0401 (graph and booleans): ")
+    assert folder.run("explain", "W0501").stdout.startswith("warning W0501 ")
+    assert folder.run("explain", "E9999").exit_code == 2
+
+
+def tiny_config(folder: Folder, **changes: object) -> str:
+    from scenelang.training.config import CONFIGS
+
+    config = json.loads((CONFIGS / "shapes2d.json").read_text())
+    config["phases"] = [{"objects": 2, "iterations": 6, "streams": 2}]
+    config["scenes"]["points"] = 16
+    return folder.write("tiny.json", json.dumps({**config, **changes}))
+
+
+def test_train(folder: Folder) -> None:
+    arguments = ("train", tiny_config(folder), "-o", "run", "--device", "cpu", "--every", "2")
+    result = folder.run(*arguments)
+    assert result.exit_code == 0
+    assert "2 of 6 steps" in result.stderr
+    assert result.stdout.startswith("done, mean loss ")
+    weights = Path("run/weights.safetensors").read_bytes()
+    again = folder.run(*arguments)
+    assert again.exit_code == 0
+    assert Path("run/weights.safetensors").stat().st_size == len(weights)
+
+
+def test_train_stops_at_its_budget(folder: Folder) -> None:
+    arguments = ("train", tiny_config(folder), "-o", "run", "--device", "cpu")
+    result = folder.run(*arguments, "--budget", "1e-9")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("out of time")
+    assert not Path("run/weights.safetensors").exists()
+    assert folder.run(*arguments).stdout.startswith("done")
+
+
+def test_train_usage(folder: Folder) -> None:
+    name = tiny_config(folder, nonsense=1)
+    assert "nonsense" in folder.run("train", name, "-o", "run").stderr
+    assert folder.run("train", "none.json", "-o", "run").exit_code == 2
+    folder.run("train", tiny_config(folder), "-o", "run", "--device", "cpu")
+    other = folder.run("train", tiny_config(folder, seed=7), "-o", "run", "--device", "cpu")
+    assert other.exit_code == 2
+    assert "another configuration" in other.stderr
+
+
+def process(*arguments: str, **options: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "scenelang", *arguments]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)  # type: ignore[call-overload, no-any-return]
+
+
+def test_whole_processes(folder: Folder) -> None:
+    folder.write("a.nsg")
+    with process("render", "a.nsg", "-o", "a.png", "--size", "32x32") as drawn:
+        assert drawn.communicate() == ("", "")
+    assert drawn.returncode == 0
+    assert Path("a.png").exists()
+    with process("check", "none.nsg") as checked:
+        assert checked.communicate() == ("", "Error: none.nsg: no such file or directory\n")
+    assert checked.returncode == 2
+
+
+def test_a_scene_of_any_characters_on_a_terminal_of_few(folder: Folder) -> None:
+    name = folder.write("a.nsg", "// ☂\nsquare { scale(☂); }\n")
+    with process("check", name, env={**os.environ, "PYTHONIOENCODING": "latin-1"}) as run:
+        out, err = run.communicate()
+    assert run.returncode == 1
+    assert "\\u2602" in out
+    assert err == ""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
+def test_interrupted(folder: Folder) -> None:
+    name = folder.write("a.nsg", "for (i in 0..<400) { star { scale(0.9); rotate(1turn * rand(i)); } }")
+    with process("render", name, "-o", "a.png", "--size", "4096x4096", "-v") as run:
+        assert run.stderr is not None
+        for line in run.stderr:
+            if line.startswith("1 warning"):
+                break  # what comes next takes seconds: torch is loaded, and the picture is drawn
+        run.send_signal(signal.SIGINT)
+        _, err = run.communicate()
+    assert run.returncode == 130, err
+    assert "Traceback" not in err
+    assert os.listdir() == ["a.nsg"]

@@ -1,0 +1,222 @@
+"""`scenelang render` and `compile`: where pictures go, what is refused, that pictures repeat."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.cli.conftest import GOOD, Folder
+
+
+def picture(path: str | Path) -> np.ndarray:
+    with Image.open(path) as image:
+        return np.asarray(image).astype(int)
+
+
+def test_one_scene(folder: Folder) -> None:
+    result = folder.run("render", folder.write("a.nsg"), "-o", "a.png")
+    assert (result.exit_code, result.output) == (0, "")
+    pixels = picture("a.png")
+    assert pixels.shape == (256, 256, 3)
+    assert np.abs(pixels[128, 128] - (0xDD, 0x33, 0x33)).max() <= 1
+    assert np.abs(pixels[3, 3] - 255).max() <= 1
+
+
+def test_the_reference(folder: Folder) -> None:
+    name = folder.write("a.nsg")
+    assert folder.run("render", name, "-o", "a.png", "--backend", "reference").exit_code == 0
+    assert folder.run("render", name, "-o", "b.png").exit_code == 0
+    assert np.abs(picture("a.png") - picture("b.png")).mean() < 4
+
+
+def test_formats_and_sizes(folder: Folder) -> None:
+    name = folder.write("a.nsg", "background(none);" + GOOD)
+    for suffix, channels in (("png", 4), ("jpg", 3), ("webp", 4), ("TIFF", 4)):
+        assert folder.run("render", name, "-o", f"a.{suffix}", "--size", "48x32").exit_code == 0
+        assert picture(f"a.{suffix}").shape == (32, 48, channels)
+    assert picture("a.png")[0, 0, 3] == 0
+    assert picture("a.jpg")[0, 0].min() >= 254
+
+
+def test_many_scenes_alone_or_together(folder: Folder) -> None:
+    names = [folder.write("a.nsg"), folder.write("b.nsg", "star { scale(0.4); twirl(1); }")]
+    assert folder.run("render", *names, "-o", "out").exit_code == 0
+    assert sorted(os.listdir("out")) == ["a.png", "b.png"]
+    for name in ("a", "b"):
+        assert folder.run("render", f"{name}.nsg", "-o", f"{name}.png").exit_code == 0
+        assert Path(f"{name}.png").read_bytes() == Path(f"out/{name}.png").read_bytes()
+
+
+def test_one_scene_into_a_folder(folder: Folder) -> None:
+    name = folder.write("a.nsg")
+    assert folder.run("render", name, "-o", "new/").exit_code == 0
+    assert folder.run("render", name, "-o", "new").exit_code == 0
+    assert os.listdir("new") == ["a.png"]
+
+
+def test_threads_agree(folder: Folder) -> None:
+    name = folder.write("a.nsg")
+    for threads in ("1", "2", "5"):
+        assert folder.run("render", name, "-o", f"{threads}.png", "--threads", threads).exit_code == 0
+    assert np.abs(picture("1.png") - picture("2.png")).max() <= 1
+    assert np.abs(picture("1.png") - picture("5.png")).max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("a.nsg", "-o", "a.xyz"), "suffix '.xyz'"),
+        (("a.nsg", "-o", "a"), "a folder ends in a slash"),
+        (("a.nsg", "-o", "none/a.png"), "no folder 'none'"),
+        (("a.nsg", "b/a.nsg", "-o", "out"), "both be drawn to"),
+        (("a.nsg", "b.nsg", "-o", "a.nsg"), "is a file"),
+        (("a.nsg", "b.nsg", "-o", "out.png"), "names a picture"),
+        (("a.nsg", "-o", "a.png", "--size", "3"), "no size such as"),
+        (("a.nsg", "-o", "a.png", "--size", "9000x1"), "outside 1..8192"),
+        (("a.nsg", "-o", "a.png", "--threads", "0"), "--threads"),
+    ],
+)
+def test_usage_is_settled_before_any_work(folder: Folder, arguments: tuple[str, ...], said: str) -> None:
+    for name in ("a.nsg", "b.nsg", "b/a.nsg"):
+        folder.write(name)
+    before = sorted(os.listdir())
+    result = folder.run("render", *arguments)
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert sorted(os.listdir()) == before
+
+
+def test_scenes_with_errors_are_left_out(folder: Folder) -> None:
+    bad, good = folder.write("bad.nsg", "square { scale(foo); }"), folder.write("good.nsg")
+    result = folder.run("render", bad, good, "-o", "out")
+    assert result.exit_code == 1
+    assert "bad.nsg:1:16" in result.stderr
+    assert "^^^" in result.stderr
+    assert os.listdir("out") == ["good.png"]
+    missing = folder.run("render", "none.nsg", good, bad, "-o", "more")
+    assert missing.exit_code == 2
+    assert os.listdir("more") == ["good.png"]
+
+
+def test_warnings_are_shown_and_strict_refuses(folder: Folder) -> None:
+    name = folder.write("a.nsg", "square { material flat { color([2, 0, 0]); } }")
+    result = folder.run("render", name, "-o", "a.png", "--size", "16x16")
+    assert result.exit_code == 0
+    assert "W0301" in result.stderr
+    assert folder.run("render", name, "-o", "b.png", "--strict").exit_code == 1
+    assert not Path("b.png").exists()
+
+
+def test_an_unused_define_draws_nothing(folder: Folder) -> None:
+    used, other = folder.write("a.nsg", "param k = 0.5; square { scale(k); }"), folder.write("b.nsg")
+    small = ("--size", "16x16")
+    assert folder.run("render", used, other, "-o", "out", "-D", "k=0.2", *small).exit_code == 0
+    result = folder.run("render", used, other, "-o", "none", "-D", "q=0.2", *small)
+    assert result.exit_code == 1
+    assert "E0211" in result.stderr
+    assert not os.listdir("none")
+
+
+def test_what_cannot_be_written(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device", ".a.png.x.part")
+
+    monkeypatch.setattr(os, "replace", full)
+    result = folder.run("render", folder.write("a.nsg"), "-o", "a.png", "--size", "16x16")
+    assert result.exit_code == 2
+    assert result.stderr == "Error: cannot write 'a.png': no space left on device\n"
+    assert os.listdir() == ["a.nsg"]
+
+
+def test_cuda_that_is_not_there(folder: Folder) -> None:
+    import torch
+
+    if torch.cuda.is_available():
+        pytest.skip("it is there")
+    result = folder.run("render", folder.write("a.nsg"), "-o", "a.png", "--device", "cuda")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("Error: CUDA is asked for")
+
+
+def test_verbose(folder: Folder) -> None:
+    result = folder.run("render", folder.write("a.nsg"), "-o", "a.png", "-v")
+    said = result.stderr
+    assert "objects: 2 (1 square, 1 star)" in said
+    assert "tokens: 2 union" in said
+    assert "model shapes2d (the smallest that has all it uses)" in said
+    assert "push_transforms" in said or "fold_affines" in said
+    for stage in ("parse", "evaluate", "compile", "load torch", "load model", "draw", "save"):
+        assert f"{stage} " in said.rpartition("time (ms):")[2]
+
+
+def test_programs(folder: Folder) -> None:
+    name = folder.write("a.nsg")
+    assert folder.run("compile", name, "-o", "a.safetensors").exit_code == 0
+    assert folder.run("render", "a.safetensors", "-o", "p.png").exit_code == 0
+    assert folder.run("render", name, "-o", "s.png").exit_code == 0
+    assert Path("p.png").read_bytes() == Path("s.png").read_bytes()
+    assert folder.run("render", "a.safetensors", "-o", "p.png", "--size", "64x64").exit_code == 0
+    assert folder.run("render", name, "-o", "s.png", "--size", "64x64").exit_code == 0
+    assert Path("p.png").read_bytes() == Path("s.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--size", "64x32"), "another shape"),
+        (("--backend", "reference"), "the reference draws scenes"),
+        (("--frame", "3"), "a single frame"),
+        (("--model", "other"), "not `other`"),
+        (("-D", "k=1"), "E0211"),
+    ],
+)
+def test_what_programs_cannot(folder: Folder, arguments: tuple[str, ...], said: str) -> None:
+    folder.run("compile", folder.write("a.nsg"), "-o", "a.safetensors")
+    result = folder.run("render", "a.safetensors", "-o", "p.png", *arguments)
+    assert result.exit_code == 1
+    assert said in result.stderr
+    assert not Path("p.png").exists()
+
+
+def test_damaged_programs(folder: Folder) -> None:
+    folder.run("compile", folder.write("a.nsg"), "-o", "a.safetensors")
+    Path("b.safetensors").write_bytes(Path("a.safetensors").read_bytes()[:200])
+    result = folder.run("render", "a.safetensors", "b.safetensors", "-o", "out")
+    assert result.exit_code == 1
+    assert result.stderr.startswith("Error: b.safetensors: not a program")
+    assert os.listdir("out") == ["a.png"]
+
+
+def test_standard_input(folder: Folder) -> None:
+    assert folder.run("render", "-", "-o", "a.png", "--size", "16x16", stdin=GOOD).exit_code == 0
+    assert picture("a.png").shape == (16, 16, 3)
+
+
+def test_dump_after(folder: Folder) -> None:
+    text = "group { star { scale(0.5); } translate(0.1, 0); rotate(0deg); }"
+    result = folder.run(
+        "compile", folder.write("a.nsg", text), "--dump-after", "lower", "--dump-after", "linearise"
+    )
+    assert result.exit_code == 0
+    lower, _, linear = result.stdout.partition("after linearise:")
+    assert "(group)" in lower
+    assert "(group)" not in linear
+    assert "star #ffffff  [0.5 0 0.1; 0 0.5 0]" in linear
+    assert "drop_empty" in folder.run("compile", "a.nsg", "--dump-after", "nothing").stderr
+
+
+@pytest.mark.parametrize("arguments", [(), ("-o", "a.png"), ("-o", "none/a.safetensors")])
+def test_compile_usage(folder: Folder, arguments: tuple[str, ...]) -> None:
+    assert folder.run("compile", folder.write("a.nsg"), *arguments).exit_code == 2
+    assert os.listdir() == ["a.nsg"]
+
+
+def test_compile_refuses_errors(folder: Folder) -> None:
+    result = folder.run("compile", folder.write("a.nsg", "square { scale(foo); }"), "-o", "a.safetensors")
+    assert result.exit_code == 1
+    assert "E0201" in result.stderr
+    assert os.listdir() == ["a.nsg"]
