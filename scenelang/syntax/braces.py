@@ -10,7 +10,7 @@ from __future__ import annotations
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
 from scenelang.syntax.automaton import advance, reach
-from scenelang.syntax.layout import Slip, find_slips
+from scenelang.syntax.layout import Slip, find_hidden_slips, find_slips
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
 
@@ -24,6 +24,21 @@ def balance(tokens: Tokens, report: Report) -> None:
     for slip in reversed(find_slips(tokens)):  # from the last on, so that indices hold
         mender.mend(slip)
     mender.match_the_rest()
+
+
+def balance_hidden(tokens: Tokens, report: Report) -> bool:
+    """Mend braces that match by number only; False where nothing speaks for it.
+
+    For texts that have other mistakes: the layout of a sound text is its author's business.
+    """
+    slips = find_hidden_slips(tokens)
+    mender = _Mender(tokens, report)
+    if not slips or not all(mender.is_plausible(slip) for slip in slips):
+        return False
+    for slip in reversed(slips):
+        mender.mend(slip)
+    mender.match_the_rest()
+    return True
 
 
 class _Mender:
@@ -50,7 +65,7 @@ class _Mender:
         """Mend one line, brace by brace."""
         stop = slip.stop
         for _ in range(abs(slip.shift)):
-            at, insert = self._best(slip.first, stop, slip.shift > 0)
+            at, insert, _ = self._best(slip.first, stop, slip.shift > 0)
             if at < stop:
                 stop += 1 if insert else -1
             if insert:
@@ -58,8 +73,14 @@ class _Mender:
             else:
                 self._delete(at)
 
-    def _best(self, first: int, stop: int, opens: bool) -> tuple[int, bool]:
-        """Where to mend the tokens ``[first, stop)``, and whether to insert a brace there.
+    def is_plausible(self, slip: Slip) -> bool:
+        """Whether a slip makes sense of its line, and does not just undo a block that stands flush left."""
+        if slip.shift < 0:
+            return self.tokens.kinds[slip.stop - 1] != self.opening
+        return self._best(slip.first, slip.stop, True)[2]
+
+    def _best(self, first: int, stop: int, opens: bool) -> tuple[int, bool, bool]:
+        """Where to mend the tokens ``[first, stop)``, whether by inserting, and whether all fits then.
 
         Args:
             opens: the line lacks a `{` or has a `}` too many; otherwise the other way about.
@@ -74,21 +95,24 @@ class _Mender:
         goes_on = kinds[first] == self.closing and kinds[first + 1] == self.otherwise
         stack = (self.in_if if goes_on else self.in_block).copy()
         misfit = reach(stack.copy(), kinds, first, end)
-        # Nothing to go by: a `}` belongs to the end of the line, a surplus one is the last.
-        best = (-1, 0.0, stop, True)  # reach, preference, place, whether to insert
-        from_ = max(first, misfit - _LONGEST)
-        for at in range(first, min(misfit, limit) + 1):
-            if at >= from_:
-                if kinds[at] == surplus and at < limit:
-                    got = reach(stack.copy(), kinds, at + 1, end)
-                    best = max(best, (got, 0.5 if opens else 0.2, at, False))
-                trial = stack.copy()
-                if at <= stop and advance(trial, missing):
-                    got = reach(trial, kinds, at, end)
-                    best = max(best, (got, 0.3, at, True))
+        places = range(max(first, min(misfit, limit) - _LONGEST), min(misfit, limit) + 1)
+        for at in range(first, places.start):
+            advance(stack, kinds[at])
+        found = []  # how far all fits then, which way is likelier, where, whether by inserting
+        for at in places:
+            if kinds[at] == surplus and at < limit:
+                got = reach(stack.copy(), kinds, at + 1, end)
+                found.append((got, 0.5 if opens else 0.2, at, False))
+            trial = stack.copy()
+            if at <= stop and advance(trial, missing):
+                found.append((reach(trial, kinds, at, end), 0.3, at, True))
             if not advance(stack, kinds[at]):
                 break
-        return best[2], best[3]
+        got, _, at, insert = max(found, default=(-1, 0.0, stop, True))
+        if got <= misfit < end:  # another mistake is in the way: the end of the line is as good a guess
+            last = [index for index in places if kinds[index] == surplus and index < limit][-1:]
+            return (last[0], False, False) if opens and last else (stop, True, False)
+        return at, insert, got == end
 
     # ------------------------------------------------------------ mending
 

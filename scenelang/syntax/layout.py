@@ -39,7 +39,31 @@ class _Line:
 
 def find_slips(tokens: Tokens) -> list[Slip]:
     """The slips that explain best why braces do not match; none where there are too many."""
+    return _slips(_lines(tokens))
+
+
+def find_hidden_slips(tokens: Tokens) -> list[Slip]:
+    """Slips in braces that match by number: a `}` is missing here and one too many there.
+
+    Only what the layout says loudly counts: several lines stand too far left, and a few single slips
+    explain nearly all that is amiss. Lines too far right are taken for taste.
+    """
     lines = _lines(tokens)
+    unit = _unit(lines)
+    slips = _slips(lines)
+    if not slips or any(abs(slip.shift) > 1 for slip in slips):
+        return []
+    astray = left = 0
+    for line in lines[:-1]:
+        offset = sum(slip.shift for slip in slips if slip.stop <= line.first)
+        if offset > 0:
+            return []
+        astray += line.indent != unit * line.depth
+        left += line.indent != unit * (line.depth + offset)
+    return slips if astray >= 4 and 4 * left <= astray else []
+
+
+def _slips(lines: list[_Line]) -> list[Slip]:
     wanted = -lines[-1].depth
     if abs(wanted) > _WIDEST or min(line.depth for line in lines) < -_WIDEST:
         return []
@@ -108,13 +132,13 @@ def _cheapest(lines: list[_Line], wanted: int) -> list[list[int]]:
 
 
 def _step(costs: list[float]) -> tuple[list[int], list[float]]:
-    """For each state the cheapest one before it, and the cost; staying wins a tie, so slips come late."""
+    """For each state the cheapest one before it, and the cost; moving wins a tie, so slips come late."""
     count = len(costs)
     source = list(range(count))
     best = costs.copy()
     for states, step in ((range(1, count), -1), (range(count - 2, -1, -1), 1)):
         for state in states:
-            if best[state + step] + _SLIP < best[state]:
+            if best[state + step] + _SLIP <= best[state]:
                 best[state] = best[state + step] + _SLIP
                 source[state] = source[state + step]
     return source, best

@@ -33,13 +33,20 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> nodes.File:
     """
     report = Report(source)
     tokens = scan(source, report)
-    if _unbalanced(tokens):
+    matching = not _unbalanced(tokens)
+    if not matching:
         # What only mistakes need is loaded at the first one: most runs start and end without any.
         from scenelang.syntax.braces import balance
 
         balance(tokens, report)
-    limit_nesting(tokens, report)
     file = _run(tokens, report)
+    if report.found and matching and not report.full:
+        from scenelang.syntax.braces import balance_hidden
+
+        again = Report(source)
+        tokens = scan(source, again)
+        if balance_hidden(tokens, again):
+            file, report = _run(tokens, again), again
     report.flush(diagnostics)
     return file
 
@@ -59,6 +66,7 @@ def _unbalanced(tokens: Tokens) -> bool:
 
 
 def _run(tokens: Tokens, report: Report) -> nodes.File:
+    limit_nesting(tokens, report)
     language = tables()
     actions, gotos, final = language.actions, language.gotos, language.final
     callbacks = Builder(tokens, report).callbacks()

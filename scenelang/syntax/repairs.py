@@ -16,7 +16,7 @@ from scenelang.syntax.tokens import Tokens
 
 Kinds = tuple[int, ...]
 
-FOLLOWED = 32
+FOLLOWED = 80
 """How far the repairs that look best are followed to choose between them."""
 
 WINDOW = 24

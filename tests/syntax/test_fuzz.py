@@ -91,3 +91,27 @@ def test_one_slip_is_one_diagnostic(seed: int) -> None:
         near = abs(first.locate()[0][0] - line) <= 1
         outcomes["one" if len(diagnostics) == 1 and near else kind] += 1
     assert outcomes["one"] >= 0.95 * outcomes.total(), outcomes
+
+
+def test_several_slips_are_as_many_diagnostics() -> None:
+    """Five slips in a file of 40 lines, each of which is one diagnostic by itself, are five together."""
+    text = "\n".join(scene.replace("nsg 1;", "", 1) for scene in TEXTS)
+    source = SourceFile("sound.nsg", text)
+    tokens = scan(source, Report(source))
+    generator = random.Random(5)
+    right = 0
+    for _ in range(40):
+        chosen: dict[int, tuple[int, int, str]] = {}
+        while len(chosen) < 5:
+            index = generator.randrange(len(tokens.kinds) - 2)
+            start, end = tokens.starts[index], tokens.ends[index]
+            line = source.position(start)[0]
+            new = generator.choice(["", f"{generator.choice(INSERTED)} {text[start:end]}"])
+            alone = read(text[:start] + new + text[end:])[1]
+            if len(alone) == 1 and all(abs(line - other) > 3 for other in chosen):
+                chosen[line] = start, end, new
+        changed = text
+        for start, end, new in sorted(chosen.values(), reverse=True):
+            changed = changed[:start] + new + changed[end:]
+        right += len(read(changed)[1]) == 5
+    assert right >= 38
