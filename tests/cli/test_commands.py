@@ -61,6 +61,13 @@ def tiny_config(folder: Folder, **changes: object) -> str:
     return folder.write("tiny.json", json.dumps({**config, **changes}))
 
 
+@pytest.fixture
+def one_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was trained is measured on one scene of each set, not on many."""
+    monkeypatch.setattr("scenelang.evaluation.record.SCENES", 1)
+
+
+@pytest.mark.usefixtures("one_scene")
 def test_train(folder: Folder) -> None:
     arguments = ("train", tiny_config(folder), "-o", "run", "--device", "cpu", "--every", "2")
     result = folder.run(*arguments)
@@ -73,6 +80,7 @@ def test_train(folder: Folder) -> None:
     assert Path("run/weights.safetensors").stat().st_size == len(weights)
 
 
+@pytest.mark.usefixtures("one_scene")
 def test_train_stops_at_its_budget(folder: Folder) -> None:
     arguments = ("train", tiny_config(folder), "-o", "run", "--device", "cpu")
     result = folder.run(*arguments, "--budget", "1e-9")
@@ -82,6 +90,7 @@ def test_train_stops_at_its_budget(folder: Folder) -> None:
     assert folder.run(*arguments).stdout.startswith("done")
 
 
+@pytest.mark.usefixtures("one_scene")
 def test_train_usage(folder: Folder) -> None:
     name = tiny_config(folder, nonsense=1)
     assert "nonsense" in folder.run("train", name, "-o", "run").stderr
