@@ -2,17 +2,21 @@
 
 Each example becomes ``docs/pictures/NAME.png``, drawn by the network. ``gallery.png`` shows several, and
 ``chain-compared.png`` one beside the exact picture and the difference between the two.
+``worst-chains.png`` has the worst cases that ``docs/results/chains.json`` names.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 
 import numpy as np
 from PIL import Image as pillow
 
 import scenelang as nsg
+from scenelang.evaluation.run import Case, worst_sheet
+from scenelang.models.load import load_model
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
@@ -51,6 +55,17 @@ def tiled(pictures: list[pillow.Image], columns: int, side: tuple[int, int]) -> 
     return sheet
 
 
+def worst_cases(name: str, count: int) -> pillow.Image:
+    """The worst cases of an evaluation: network, exact picture, FLIP map."""
+    report = json.loads((DOCS / "results" / f"{name}.json").read_text("utf-8"))
+    cases = [
+        Case(c["index"], c["last"], 0, {"psnr": c["psnr"], "flip": c["flip"]}) for c in report["worst_cases"]
+    ]
+    sheet = worst_sheet(load_model("shapes2d"), name, report["seed"], cases, count).to_pil()
+    sheet.thumbnail((1100, 1100))
+    return sheet.quantize(128)
+
+
 def main() -> None:
     """Draw everything."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -62,6 +77,8 @@ def main() -> None:
         nsg.render(scene, backend=backend).to_pil().save(PICTURES / f"{name}.png", optimize=True)
     large = [over_white(nsg.render(enlarged(scenes[name], SHARPER), backend=backend)) for name in GALLERY]
     tiled(large, 4, (200, 200)).save(PICTURES / "gallery.png", optimize=True)
+
+    worst_cases("chains", 6).save(PICTURES / "worst-chains.png", optimize=True)
 
     scene = scenes[COMPARED]
     network, exact = nsg.render(scene, backend=backend), nsg.render(scene, backend="reference")

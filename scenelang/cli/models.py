@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 def command(name: str | None, kind: Literal["human", "json"]) -> None:
     """List the models, or tell all about the model NAME.
 
-    That is its manifest (what it can draw, which ranges it was trained on, what was measured), its
-    weights, and how they were trained.
+    That is its manifest (what it can draw, which ranges it was trained or measured in, what was
+    measured), its weights, and how they were trained.
     """
     from scenelang.models.manifest import available, load_manifest
 
@@ -56,7 +56,7 @@ def _text(facts: dict[str, Any]) -> str:
     lines += [f"{key:12} {manifest[key]}" for key in ("dimension", "renderer", "lifting")]
     words = ("geometries", "materials", "transforms", "material_ops")
     lines += [f"{key.replace('_', ' '):12} {', '.join(manifest[key])}" for key in words]
-    lines += [f"{'limits':12} {_pairs(manifest['limits'])}", "", "trained on"]
+    lines += [f"{'limits':12} {_pairs(manifest['limits'])}", "", "trained or measured in"]
     lines += [f"  {key:10} {low:g} to {high:g}" for key, (low, high) in manifest["trained"].items()]
     if manifest["measured"]:
         lines += ["", "measured", *_tree(manifest["measured"], "  ")]

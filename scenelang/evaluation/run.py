@@ -70,11 +70,15 @@ def draw_scene(model: Model, scene: Scene, threads: int = 1) -> tuple[Program, I
     return program, drawing.image
 
 
+def _worst(cases: list[Case], count: int = 12) -> list[Case]:
+    return sorted(cases, key=lambda c: c.figures["psnr"])[:count]
+
+
 def worst_sheet(model: Model, name: str, seed: int, cases: list[Case], count: int = 12) -> Image:
     """A contact sheet of the cases of a set with the lowest PSNR: network, reference, FLIP map."""
     scene_at = scenes_of(model, name, seed)
     rows = []
-    for case in sorted(cases, key=lambda c: c.figures["psnr"])[:count]:
+    for case in _worst(cases, count):
         scene = scene_at(case.index)
         label = f"#{case.index} {case.last} {case.figures['psnr']:.1f} dB FLIP {case.figures['flip']:.4f}"
         rows.append(side_by_side(draw_scene(model, scene)[1], reference_of(scene, model.manifest), label))
@@ -122,6 +126,7 @@ def evaluate_set(
         "machine": f"{platform.machine()}, {threads} thread(s)",
         "seconds": round(time.perf_counter() - started, 1),
         **summarise(cases),
+        "worst_cases": [{"index": c.index, "last": c.last, **c.figures} for c in _worst(cases)],
         "by_last_token": {
             word: summarise([c for c in cases if c.last == word])
             for word in (*TOKENS, "all_union")

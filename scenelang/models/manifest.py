@@ -26,7 +26,8 @@ class Manifest:
         transforms: geometry transforms it accepts.
         material_ops: texture and colour operations it accepts.
         limits: hard limits; beyond them a scene cannot be compiled for this model.
-        trained: ranges seen in training, ``name -> [low, high]``; beyond them is a warning.
+        trained: ranges that were trained or, where the network never sees the quantity because frames are
+            exact, measured to hold its figures, ``name -> [low, high]``; beyond them is a warning.
         measured: figures of its evaluation and stability suite.
     """
 

@@ -1,4 +1,4 @@
-"""Warnings where a scene lies outside what its model was trained on."""
+"""Warnings where a scene lies outside what its model was trained or measured in."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class _Worst:
 
 
 def check_trained(graph: Graph, context: Context) -> Graph:
-    """Warn once for each quantity that leaves the trained range, at the object furthest out.
+    """Warn once for each quantity outside its trained or measured range, at the object furthest out.
 
     Deformations are measured in the normal form, per unit length of the space they act in; the scale of an
     object is each of the two stretches of its affine maps.
@@ -47,11 +47,11 @@ def check_trained(graph: Graph, context: Context) -> Graph:
             if quantity != "scale":
                 subject = f"a `{quantity}` of {found.value:.3g} on {name}"
             others = f", as {found.count - 1:,} more are" if found.count > 1 else ""
-            _warn(context, quantity, f"{subject} is outside the trained range {{}}{others}", found.leaf)
+            _warn(context, quantity, f"{subject} is outside the measured range {{}}{others}", found.leaf)
     limits = manifest.trained.get("objects")
     if limits is not None and count > limits[1]:
         last = next((link.node for link in reversed(graph.root.links) if isinstance(link.node, Leaf)), None)
-        _warn(context, "objects", f"{count:,} objects are outside the trained range {{}}", last)
+        _warn(context, "objects", f"{count:,} objects are outside the measured range {{}}", last)
     return graph
 
 

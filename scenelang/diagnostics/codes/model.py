@@ -9,8 +9,8 @@ CODES: dict[str, str] = {
     "E0506": "an object has more deformations than the model holds",
     "E0507": "the canvas is larger than the model draws",
     "E0508": "no model fits the scene",
-    "W0501": "more objects than the model was trained on",
-    "W0502": "a twirl outside the trained range",
-    "W0503": "a bend outside the trained range",
-    "W0504": "an object outside the trained range of scales",
+    "W0501": "more objects than the model was measured with",
+    "W0502": "a twirl outside the measured range",
+    "W0503": "a bend outside the measured range",
+    "W0504": "an object outside the measured range of scales",
 }
