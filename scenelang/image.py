@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+
+from scenelang.files import write_whole
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -80,22 +80,6 @@ def image_format(path: str | os.PathLike[str]) -> str:
     if kind is None or kind not in pillow.SAVE:
         raise ValueError(f"no image format has the suffix '{suffix}'")
     return kind
-
-
-def write_whole(target: Path, data: bytes) -> None:
-    """Write to a temporary file beside ``target``, then rename it: whole or not at all."""
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)
-        os.replace(name, target)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(name)
-        raise
 
 
 def from_samples(colour: npt.NDArray[Any], alpha: npt.NDArray[Any] | None) -> Image:

@@ -14,6 +14,7 @@ PACKAGE = ROOT / "scenelang"
 
 # A module may import modules of its own line and of the lines above.
 ORDER = (
+    "scenelang.files",
     "scenelang.diagnostics",
     "scenelang.syntax",
     "scenelang.models.manifest",

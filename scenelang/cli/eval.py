@@ -53,7 +53,7 @@ def command(
     from scenelang.backend.errors import RenderError
     from scenelang.backend.neural import keep_memory
     from scenelang.evaluation.run import evaluate_set, worst_sheet
-    from scenelang.image import write_whole
+    from scenelang.files import write_whole
     from scenelang.models.load import ModelError, load_model
 
     try:

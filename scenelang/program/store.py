@@ -7,17 +7,15 @@ end column), all -1 where unknown. The header is the metadata entry ``scenelang`
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 import struct
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.files import write_whole
 from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
 
 FORMAT = 1
@@ -39,21 +37,7 @@ def save_program(program: Program, path: str | Path) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    target = Path(path)
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(program_bytes(program))
-            file.flush()
-            os.fsync(file.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)
-        os.replace(name, target)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(name)
-        raise
+    write_whole(Path(path), program_bytes(program))
 
 
 def program_bytes(program: Program) -> bytes:
