@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.scene.session import Session
-from scenelang.scene.suggest import did_you_mean, listing
 from scenelang.syntax import nodes
 
 Bound = list[nodes.Argument | None]

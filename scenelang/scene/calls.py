@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from scenelang.diagnostics.diagnostic import Label
+from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.scene.expressions import prepare
 from scenelang.scene.functions import FUNCTIONS
 from scenelang.scene.materials import prepare_value_use
@@ -12,7 +13,6 @@ from scenelang.scene.references import VALUES, lookup, unknown_member, wrong_kin
 from scenelang.scene.scope import Scope
 from scenelang.scene.settings import prepare_setting
 from scenelang.scene.statements import Action, Place, inner, prepare_block, states
-from scenelang.scene.suggest import did_you_mean, listing
 from scenelang.scene.transforms import GEOMETRY, TEXTURE
 from scenelang.scene.vocabulary import SETTINGS
 from scenelang.syntax import nodes

@@ -13,6 +13,7 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.diagnostics.suggest import listing
 from scenelang.models.manifest import Manifest
 from scenelang.scene import calls, params  # noqa: F401  (they register their statements)
 from scenelang.scene.build import Builder, make
@@ -21,7 +22,6 @@ from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
 from scenelang.scene.session import Halt, Session, deep_stack
 from scenelang.scene.spans import Place, SpanMap
-from scenelang.scene.suggest import listing
 from scenelang.scene.unit import Unit
 from scenelang.scene.vocabulary import Vocabulary, vocabulary
 from scenelang.syntax import nodes, parse

@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
+from scenelang.diagnostics.suggest import did_you_mean
 from scenelang.scene import operators
 from scenelang.scene.expressions import POISONED, Code, constant, folded, guarded, prepare, prepares
 from scenelang.scene.functions import number
 from scenelang.scene.scope import Env, Scope
-from scenelang.scene.suggest import did_you_mean
 from scenelang.scene.unit import Unit
 from scenelang.scene.values import UNITS, Angle, Problem, RangeValue, Time, Vec, describe, unpack
 from scenelang.syntax import nodes

@@ -7,6 +7,7 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.scene import spans
 from scenelang.scene.build import Builder, make
 from scenelang.scene.expressions import Code, constant, prepares
@@ -14,7 +15,6 @@ from scenelang.scene.references import value_of
 from scenelang.scene.schema import Material
 from scenelang.scene.scope import Binding, Env, Scope
 from scenelang.scene.statements import Action, Place, inner, misplaced, prepare_block, states
-from scenelang.scene.suggest import did_you_mean, listing
 from scenelang.scene.unit import Unit
 from scenelang.scene.values import POISON, MaterialValue, describe
 from scenelang.syntax import nodes

@@ -9,6 +9,7 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Label
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.diagnostics.suggest import listing, nearest
 from scenelang.scene.build import Builder
 from scenelang.scene.expressions import VARIES, Code, prepare
 from scenelang.scene.operators import equal, same_unit
@@ -16,7 +17,6 @@ from scenelang.scene.scope import Binding, Env
 from scenelang.scene.session import Session
 from scenelang.scene.settings import at_top_level
 from scenelang.scene.statements import Action, Place, define, states
-from scenelang.scene.suggest import listing, nearest
 from scenelang.scene.unit import Unit
 from scenelang.scene.values import POISON, UNITS, Angle, Problem, RangeValue, Time, Vec, describe, unpack
 from scenelang.syntax import nodes, parse

@@ -6,6 +6,7 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.suggest import did_you_mean, listing, nearest
 from scenelang.scene.arguments import Bound, bind
 from scenelang.scene.expressions import (
     POISONED,
@@ -22,7 +23,6 @@ from scenelang.scene.literals import member
 from scenelang.scene.scope import Binding, Definition, Env, Scope
 from scenelang.scene.session import MAX_DEPTH, UNBOUND
 from scenelang.scene.spans import Calls
-from scenelang.scene.suggest import did_you_mean, listing, nearest
 from scenelang.scene.unit import Unit
 from scenelang.scene.values import POISON
 from scenelang.syntax import nodes

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.scene.arguments import bind
 from scenelang.scene.build import Builder, make
 from scenelang.scene.expressions import prepare
@@ -15,7 +16,6 @@ from scenelang.scene.schema import Animation
 from scenelang.scene.scope import Env
 from scenelang.scene.session import Session
 from scenelang.scene.statements import Action, Place, misplaced, states
-from scenelang.scene.suggest import did_you_mean, listing
 from scenelang.scene.transforms import color
 from scenelang.scene.values import POISON, Problem, Time, Vec, describe, show
 from scenelang.syntax import nodes

@@ -11,6 +11,7 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.suggest import did_you_mean, nearest
 from scenelang.syntax import mistakes
 from scenelang.syntax.automaton import fits, reach, statement_depth
 from scenelang.syntax.lexer import UNIT_ALIASES, UNITS
@@ -18,6 +19,10 @@ from scenelang.syntax.repairs import FOLLOWED, MAX_REPLAY, Search
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
 
+_WORDS = (
+    *("nsg", "model", "param", "let", "fn", "module", "import", "for", "if", "material"),
+    *("group", "chain", "union", "smooth", "subtract", "intersect"),
+)
 _HEADS = ("let", "fn", "module", "param", "import", "for", "if", "group", "chain", "material", "union")
 
 
@@ -52,6 +57,9 @@ class Recovery:
         depth = statement_depth(states)
         first = self._index(values[depth]) if depth < len(values) else at
         known = self._head_mistake(states, first, at) if first < at else self._start_mistake(states, at)
+        if self._misspelt(states[: depth + 1], first, at):
+            del states[depth + 1 :], values[depth:]
+            return first
         if known or self._spaced_unit(at) or self._unseparated(states, at):
             return at
         search = Search(self.tokens, first, at)
@@ -123,6 +131,27 @@ class Recovery:
             return
         help = "a block belongs to a geometry, a module, `group`, `material`, `for`, `if` or a boolean word"
         self.report.add("E0129", "block without a head", tokens.starts[at], tokens.ends[at], help=help)
+
+    def _misspelt(self, stack: list[int], first: int, at: int) -> bool:
+        """A keyword with a slip at the head of a statement, which reads on once it is mended."""
+        tokens = self.tokens
+        if first >= at or at - first > MAX_REPLAY or tables().kinds[tokens.kinds[first]] != "NAME":
+            return False
+        start, end = tokens.starts[first], tokens.ends[first]
+        text = tokens.source.text[start:end]
+        rest = tokens.kinds[first + 1 : at + FOLLOWED]
+        read = {
+            word: reach(stack.copy(), [self.literals[word], *rest], 0, len(rest) + 1)
+            for word in _WORDS
+            if nearest(text, (word,)) is not None
+        }
+        word = max(read, key=read.__getitem__, default=None)
+        if word is None or read[word] <= at + 1 - first:
+            return False
+        help, fix = did_you_mean(text, (word,), Span(tokens.source, start, end))
+        self.report.add("E0132", f"unknown statement `{text}`", start, end, help=help, fix=fix)
+        tokens.kinds[first] = self.literals[word]
+        return True
 
     def _head_mistake(self, states: list[int], first: int, at: int) -> bool:
         """`for` and `if` without parentheses or braces."""

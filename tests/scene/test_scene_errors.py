@@ -11,7 +11,7 @@ from scene_cases import HERE, Outcome, mismatch, run_text
 from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.codes.names import CODES as NAMES
 from scenelang.diagnostics.codes.types import CODES as TYPES
-from scenelang.scene.suggest import nearest
+from scenelang.diagnostics.suggest import nearest
 
 CASES = [case.partition("\n")[::2] for case in (HERE / "errors.nsgs").read_text("utf-8").split("=== ")[1:]]
 MALFORMED = sorted((HERE / "malformed").glob("*.nsg"))

@@ -32,5 +32,6 @@ CODES: dict[str, str] = {
     "E0129": "block without a head",
     "E0130": "wrong punctuation",
     "E0131": "words in the wrong order",
+    "E0132": "misspelt keyword",
     "W0101": "stray semicolon",
 }
