@@ -50,9 +50,9 @@ def command(
     from scenelang.diagnostics.diagnostic import SceneError
 
     need_metrics()
-    found = read_input(scene, Request(defines, model, root, frame, size), Clock())
-    for item in unused_defines(Request(defines)):
-        found.diagnostics.items.append(item)
+    request = Request(defines, model, root, frame, size)
+    found = read_input(scene, request, Clock())
+    found.diagnostics.items += unused_defines(request)
     if found.scene is None or found.diagnostics.errors:
         say_diagnostics(found.diagnostics)
         ctx.exit(1)

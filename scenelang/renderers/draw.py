@@ -110,7 +110,7 @@ def _tile(stream: Stream, canvas: tuple[int, int], rows: range, adaptive: bool) 
         sampled, pairs = _four(stream, x, y, px)
         return sampled, pairs, x.numel()
     shade = stream.shade(x, y, CORNER * px, PixelRows(-y.cpu().numpy()))
-    picture = torch.cat([shade.colour * shade.coverage, shade.coverage[None]]).T.contiguous()
+    picture = shade.premultiplied().T.contiguous()
     near = (shade.edge < NEAR * px).nonzero()[:, 0]
     pairs = shade.evaluated
     if near.numel():
@@ -126,5 +126,5 @@ def _four(stream: Stream, x: Tensor, y: Tensor, px: float) -> tuple[Tensor, int]
     sx = (x[:, None, None] + offsets[None, None, :]).expand(-1, 2, 2).reshape(-1)
     sy = (y[:, None, None] + offsets[None, :, None]).expand(-1, 2, 2).reshape(-1)
     shade = stream.shade(sx, sy, 0.0, PixelRows(-y.cpu().numpy(), 4, 0.3 * px))
-    samples = torch.cat([shade.colour * shade.coverage, shade.coverage[None]])  # (4, 4 M)
+    samples = shade.premultiplied()  # (4, 4 M)
     return samples.view(4, -1, 4).mean(2).T.contiguous().cpu(), shade.evaluated

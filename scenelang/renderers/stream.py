@@ -60,6 +60,10 @@ class Shade:
     edge: Tensor
     evaluated: int
 
+    def premultiplied(self) -> Tensor:
+        """Colour times coverage, and coverage (4, M)."""
+        return torch.cat([self.colour * self.coverage, self.coverage[None]])
+
 
 @dataclass(frozen=True, slots=True)
 class PixelRows:
