@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -176,8 +177,10 @@ def test_every_picture_is_made_and_used() -> None:
 
 
 def test_every_page_is_linked() -> None:
-    """From the README, or from a page that it links."""
-    seen, todo = set(), [ROOT / "README.md"]
+    """From the README, the site's navigation, or a page that these link."""
+    nav = re.findall(r"^\s*- .*: ([\w-]+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
+    seen, todo = set(), [ROOT / "README.md", *(ROOT / "docs" / page for page in nav)]
+    todo = [page for page in todo if page.exists()]
     while todo:
         page = todo.pop()
         if page in seen:
@@ -186,3 +189,32 @@ def test_every_page_is_linked() -> None:
         targets = re.findall(r"\]\(([^)#\s]+\.md)", page.read_text("utf-8"))
         todo += [(page.parent / target).resolve() for target in targets]
     assert set(PAGES) <= seen
+
+
+def test_site_is_built(tmp_path: Path) -> None:
+    """Without a warning, and nothing in it is fetched from elsewhere."""
+    built = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "mkdocs",
+            "build",
+            "--strict",
+            "-q",
+            "-f",
+            ROOT / "mkdocs.yml",
+            "-d",
+            tmp_path,
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+    )
+    assert built.returncode == 0, built.stderr
+    for page in tmp_path.rglob("*.html"):
+        fetched = re.findall(
+            r"<(?:script|img|iframe|link)[^>]*(?:src|href)=\"?((?:https?:)?//[^\"> ]*)",
+            page.read_text("utf-8"),
+        )
+        assert not fetched, f"{page.name}: {fetched}"

@@ -1,0 +1,100 @@
+"""What mkdocs does for the site beyond turning ``docs/*.md`` into pages.
+
+- A page for each diagnostic, ``errors/E0401.html``, from ``scenelang/diagnostics/pages/E0401.md``, and the
+  changelog and the contributors' guide as pages.
+- The scenes of ``examples/`` as files to download.
+- Links of pages lead to files of the repository, as code hosts show them; here they lead to the same thing
+  inside the site, and where the site has no such thing they become plain text.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+ROOT = Path(__file__).parents[1]
+CODE_PAGES = "scenelang/diagnostics/pages"
+ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
+_LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
+_FENCE = re.compile(r"(^```.*?^```$)", re.MULTILINE | re.DOTALL)
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Leave pages that are not written yet out of the navigation."""
+    config.nav = _existing(config.nav or [])
+    return config
+
+
+def _existing(entries: list[Any]) -> list[Any]:
+    kept = []
+    for entry in entries:
+        ((title, goal),) = entry.items()
+        if isinstance(goal, list):
+            inner = _existing(goal)
+            kept += [{title: inner}] if inner else []
+        elif (ROOT / "docs" / goal).exists() or goal in ROOT_PAGES.values():
+            kept.append(entry)
+    return kept
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add what comes from elsewhere in the repository."""
+    made = {target: ROOT / source for source, target in ROOT_PAGES.items()}
+    made |= {f"errors/{path.name}": path for path in sorted((ROOT / CODE_PAGES).glob("[EW]*.md"))}
+    for path in sorted((ROOT / "examples").rglob("*")):
+        if path.suffix in (".nsg", ".py"):
+            made[path.relative_to(ROOT).as_posix()] = path
+    for target, path in made.items():
+        files.append(File.generated(config, target, content=path.read_bytes()))
+    return files
+
+
+def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Turn links into the repository into links into the site."""
+    place = _origin(page.file.src_uri).parent
+
+    def link(match: re.Match[str]) -> str:
+        text, target = match.groups()
+        if re.match(r"[a-z]+:|#", target):
+            return match[0]
+        path, hash_sign, anchor = target.partition("#")
+        goal = (ROOT / place / path).resolve()
+        inside = _in_site(goal)
+        if inside is None or files.get_file_from_path(inside) is None:
+            return text
+        up = "../" * page.file.src_uri.count("/")
+        return f"[{text}]({up}{inside}{hash_sign}{anchor})"
+
+    parts = _FENCE.split(markdown)
+    return "".join(part if part.startswith("```") else _LINK.sub(link, part) for part in parts)
+
+
+def _origin(uri: str) -> Path:
+    """Where in the repository a page of the site comes from."""
+    for source, target in ROOT_PAGES.items():
+        if uri == target:
+            return Path(source)
+    if re.fullmatch(r"errors/[EW]\d{4}\.md", uri):
+        return Path(CODE_PAGES) / Path(uri).name
+    return Path("docs") / uri
+
+
+def _in_site(goal: Path) -> str | None:
+    """Where in the site a file of the repository is."""
+    if not goal.is_relative_to(ROOT):
+        return None
+    path = goal.relative_to(ROOT)
+    if path.as_posix() == "README.md":
+        return "index.md"
+    if path.as_posix() in ROOT_PAGES:
+        return ROOT_PAGES[path.as_posix()]
+    if path.is_relative_to(CODE_PAGES):
+        return f"errors/{path.name}"
+    if path.is_relative_to("docs"):
+        return path.relative_to("docs").as_posix()
+    return path.as_posix()
