@@ -39,14 +39,14 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> nodes.File:
         from scenelang.syntax.braces import balance
 
         balance(tokens, report)
-    file = _run(tokens, report)
+    file = parse_tokens(tokens, report)
     if report.found and matching and not report.full:
         from scenelang.syntax.braces import balance_hidden
 
         again = Report(source)
         tokens = scan(source, again)
         if balance_hidden(tokens, again):
-            file, report = _run(tokens, again), again
+            file, report = parse_tokens(tokens, again), again
     report.flush(diagnostics)
     return file
 
@@ -65,7 +65,8 @@ def _unbalanced(tokens: Tokens) -> bool:
     return depth != 0
 
 
-def _run(tokens: Tokens, report: Report) -> nodes.File:
+def parse_tokens(tokens: Tokens, report: Report) -> nodes.File:
+    """The tree of tokens whose braces match; recovery edits them and reports to ``report``."""
     limit_nesting(tokens, report)
     language = tables()
     actions, gotos, final = language.actions, language.gotos, language.final
