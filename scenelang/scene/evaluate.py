@@ -20,8 +20,9 @@ from scenelang.scene.build import Builder, make
 from scenelang.scene.imports import Loader, Unreadable, prepare_file, read_source
 from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
-from scenelang.scene.session import Halt, Session, deep_stack
+from scenelang.scene.session import UNBOUND, Halt, Session, deep_stack
 from scenelang.scene.spans import Place, SpanMap
+from scenelang.scene.statements import Body
 from scenelang.scene.unit import Unit
 from scenelang.scene.vocabulary import Vocabulary, vocabulary
 from scenelang.syntax import nodes, parse
@@ -54,48 +55,106 @@ def evaluate(
     Returns:
         The Scene, or None if anything is wrong, and where its nodes were written.
     """
-    before = len(diagnostics.errors)
-    words = _choose(file, vocabulary(models), model, diagnostics)
-    session = Session(diagnostics, words, frame)
-    resolved = path.resolve() if path is not None else None
-    folder = root.resolve() if root is not None else resolved.parent if resolved is not None else None
-    loader = Loader(folder, [resolved] if resolved is not None else [])
-    inputs = defines if isinstance(defines, Defines) else Defines(defines or {})
-    unit = Unit(file.span.source, session, loader, inputs, resolved)
-    if not _animates(file):
-        session.animated[:] = [0.0, 0.0, 0.0, 1.0]
-        if frame != 0:
-            diagnostics.add("E0337", f"frame {frame} of a scene without animate(…)", None)
-    out = Builder()
-    with deep_stack():
-        try:
-            body = prepare_file(unit, file)
-            inputs.lost |= unit.lost
-            if inputs is not defines:
-                inputs.report_unused(diagnostics)
-            session.tick(body.weight, file.span)
-            for act in body.actions:
-                act(unit.root_env, out)
-        except Halt:
-            pass
-    if len(diagnostics.errors) > before:
-        return None, session.spans
-    settings = session.settings
-    scene = make(
-        Scene,
-        {
-            "version": 1,
-            "model": words.chosen.name if words.chosen else None,
-            "canvas": settings.canvas,
-            "background": settings.background,
-            "animation": settings.animation,
-            "nodes": tuple(out.children),
-        },
+    evaluation = Evaluation(
+        file,
+        diagnostics=diagnostics,
+        defines=defines,
+        models=models,
+        model=model,
+        root=root,
+        path=path,
+        frame=frame,
     )
-    written = settings.given.get("model")
-    if written is not None:
-        session.spans.record(scene, Place(written, written))
-    return scene, session.spans
+    return evaluation.run(frame)
+
+
+class Evaluation:
+    """A file prepared once, to be run for any number of frames.
+
+    Args:
+        file: the tree.
+        diagnostics: where mistakes go; each is reported for the first frame that has it.
+        defines, models, model, root, path: as for `evaluate`.
+        frame: the first frame that is run.
+        fps: frames a second, instead of those that ``animate`` names.
+        replays: run what no frame changes once.
+    """
+
+    def __init__(
+        self,
+        file: nodes.File,
+        *,
+        diagnostics: Diagnostics,
+        defines: Mapping[str, Any] | Defines | None = None,
+        models: Iterable[Manifest] | None = None,
+        model: str | None = None,
+        root: Path | None = None,
+        path: Path | None = None,
+        frame: int = 0,
+        fps: float | None = None,
+        replays: bool = False,
+    ) -> None:
+        self.file, self.diagnostics = file, diagnostics
+        self.animates = _animates(file)
+        self._errors = len(diagnostics.errors)
+        words = _choose(file, vocabulary(models), model, diagnostics)
+        self._session = session = Session(diagnostics, words, frame, fps, replays=replays and self.animates)
+        resolved = path.resolve() if path is not None else None
+        folder = root.resolve() if root is not None else resolved.parent if resolved is not None else None
+        loader = Loader(folder, [resolved] if resolved is not None else [])
+        self.inputs = inputs = defines if isinstance(defines, Defines) else Defines(defines or {})
+        self._unit = Unit(file.span.source, session, loader, inputs, resolved)
+        self._body: Body | None = None
+        if not self.animates:
+            session.animated[:] = [0.0, 0.0, 0.0, 1.0]
+        with deep_stack():
+            try:
+                self._body = prepare_file(self._unit, file)
+                inputs.lost |= self._unit.lost
+                if inputs is not defines:
+                    inputs.report_unused(diagnostics)
+            except Halt:
+                pass
+        self.wanted = tuple(loader.wanted)
+        """All files that it imports, also those that are not there."""
+        self.sources = (file.span.source, *(imported.span.source for imported in loader.parsed.values()))
+        """The text of the file and of all that it imports."""
+
+    def run(self, frame: int) -> tuple[Scene | None, SpanMap]:
+        """Evaluate a frame; the Scene is None if anything was wrong so far, in any frame."""
+        session = self._session
+        if not self.animates and frame != 0:
+            self.diagnostics.add("E0337", f"frame {frame} of a scene without animate(…)", None)
+        session.restart(frame)
+        if self.animates:
+            session.animated[:] = [UNBOUND] * 4
+        out = Builder()
+        with deep_stack():
+            try:
+                if self._body is not None:
+                    session.tick(self._body.weight, self.file.span)
+                    for act in self._body.actions:
+                        act(self._unit.root_env, out)
+            except Halt:
+                pass
+        if self._body is None or len(self.diagnostics.errors) > self._errors:
+            return None, session.spans
+        settings = session.settings
+        scene = make(
+            Scene,
+            {
+                "version": 1,
+                "model": session.vocabulary.chosen.name if session.vocabulary.chosen else None,
+                "canvas": settings.canvas,
+                "background": settings.background,
+                "animation": settings.animation,
+                "nodes": tuple(out.children),
+            },
+        )
+        written = settings.given.get("model")
+        if written is not None:
+            session.spans.record(scene, Place(written, written))
+        return scene, session.spans
 
 
 def _choose(file: nodes.File, words: Vocabulary, model: str | None, diagnostics: Diagnostics) -> Vocabulary:

@@ -67,6 +67,8 @@ class Loader:
     root: Path | None
     chain: list[Path] = field(default_factory=list)
     parsed: dict[Path, nodes.File] = field(default_factory=dict)
+    wanted: dict[Path, None] = field(default_factory=dict)
+    """All files that were asked for inside the root, there or not, as written and resolved."""
     count: int = 0
 
     def find(self, stmt: nodes.Import, unit: Unit) -> Path | None:
@@ -93,6 +95,7 @@ class Loader:
             help = f"imports stay inside {self.root}; --root sets another folder"
             session.error("E0215", f"'{text}' lies outside the import root", span, help=help)
             return None
+        self.wanted.update({Path(os.path.abspath(folder / text)): None, path: None})
         if path in self.chain:
             names = " → ".join(p.name for p in [*self.chain[self.chain.index(path) :], path])
             session.error("E0216", f"import cycle: {names}", span)

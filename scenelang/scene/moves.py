@@ -116,8 +116,8 @@ def _action(
         def repeat(env: Env, out: Builder) -> None:
             if not made:
                 made.append(construct(constants))
-                if made[0] is not None:
-                    session.spans.record(made[0], place)
+            if made[0] is not None:
+                session.spans.record(made[0], place)
             append(made[0], out)
 
         return repeat

@@ -60,7 +60,7 @@ def _param(stmt: nodes.Param, place: Place) -> Action | None:
     if not at_top_level(place, name.span, "a param"):
         define(name, Binding("poison", name.span), place)
         return None
-    if not define(name, Binding("param", name.span, place.scope.frame, slot), place):
+    if not define(name, Binding("param", name.span, place.scope.frame, slot, needs=session.needs), place):
         return None
     full = unit.prefix + name.text
     unit.defines.known[full] = name.span

@@ -33,6 +33,8 @@ VALUES = ("let", "param", "argument", "loop")
 def value_of(name: nodes.Name, binding: Binding, unit: Unit, scope: Scope) -> Code:
     """The value of a variable."""
     frame, slot = binding.frame, binding.slot
+    if binding.needs is not None:
+        unit.session.needs.on.append(binding.needs)
     if binding.kind == "poison" or frame is None:
         return POISONED
     session, span = unit.session, name.span
@@ -160,6 +162,7 @@ def _own_name(name: nodes.Name, unit: Unit, scope: Scope) -> Code:
             unknown(name, unit, scope)
         return POISONED
     index = ANIMATED.index(text)
+    session.needs.frame |= text != "frames"
     if session.animated[index] is not UNBOUND:
         return constant(session.animated[index])
 
@@ -293,6 +296,7 @@ def entering(
     """
     params = definition.node.params
     session, span = unit.session, name.span
+    session.needs.on.append(definition.needs)
     bound = bind(
         session,
         name.text,

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from scenelang.diagnostics.span import Span
 from scenelang.scene.session import UNBOUND
+from scenelang.scene.still import Needs
 from scenelang.syntax import nodes
 
 Env = list[Any]
@@ -62,6 +63,8 @@ class Definition:
     defaults: tuple[Any, ...] = ()
     slots: int = 1
     weight: int = 1
+    needs: Needs = field(default_factory=Needs)
+    """What its body depends on besides its arguments."""
 
 
 BindingKind = Literal["let", "param", "argument", "loop", "fn", "module", "import", "constant", "poison"]
@@ -78,6 +81,7 @@ class Binding:
         slot: its slot.
         value: a `Definition`, an imported file, or a constant's value.
         known: whether ``value`` is the value of a ``let`` that never changes.
+        needs: what the value of a ``let`` depends on.
     """
 
     kind: BindingKind
@@ -86,6 +90,7 @@ class Binding:
     slot: int = 0
     value: Any = None
     known: bool = False
+    needs: Needs | None = None
 
 
 @dataclass(slots=True)

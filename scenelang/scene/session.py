@@ -14,6 +14,7 @@ from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix, Label
 from scenelang.diagnostics.span import Span
 from scenelang.scene.schema import Animation
 from scenelang.scene.spans import Calls, SpanMap
+from scenelang.scene.still import Needs
 from scenelang.scene.values import Problem
 from scenelang.scene.vocabulary import Vocabulary
 from scenelang.syntax import nodes
@@ -96,11 +97,16 @@ class Session:
         diagnostics: where mistakes go.
         vocabulary: names that models offer.
         frame: number of the frame to evaluate.
+        fps: frames a second instead of those that ``animate`` names.
+        replays: run what no frame changes once; the evaluation is for several frames.
+        roots: the live slots of every file.
+        needs: collects what the statement being prepared depends on.
     """
 
     diagnostics: Diagnostics
     vocabulary: Vocabulary
     frame: int = 0
+    fps: float | None = None
     spans: SpanMap = field(default_factory=SpanMap)
     steps: int = 0
     objects: int = 0
@@ -110,6 +116,19 @@ class Session:
     calls: Calls | None = None
     animated: list[Any] = field(default_factory=lambda: [UNBOUND] * 4)
     settings: Settings = field(default_factory=Settings)
+    replays: bool = False
+    roots: list[list[Any]] = field(default_factory=list)
+    needs: Needs = field(default_factory=Needs)
+
+    def restart(self, frame: int) -> None:
+        """Forget what the last run left, to run what is prepared for another frame."""
+        self.frame = frame
+        self.spans = SpanMap()
+        self.steps = self.objects = self.parts = self.depth = self.node_depth = 0
+        self.calls = None
+        self.settings = Settings(given=self.settings.given)
+        for root in self.roots:
+            root[:] = [UNBOUND] * len(root)
 
     def call_labels(self) -> list[Label]:
         """Labels for the innermost calls that are running."""
@@ -162,7 +181,11 @@ class Session:
 
     def count_object(self, span: Span) -> None:
         """Count one object."""
-        self.objects += 1
+        self.count_objects(1, span)
+
+    def count_objects(self, number: int, span: Span) -> None:
+        """Count objects that a Scene will hold."""
+        self.objects += number
         if self.objects > MAX_OBJECTS:
             raise self.halt("E0320", f"more than {MAX_OBJECTS:,} objects in one scene", span)
 

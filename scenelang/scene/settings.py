@@ -154,6 +154,7 @@ def _animate(session: Session, span: Span, seconds: Any, fps: Any, loop: Any) ->
             raise Problem("E0311", f"a {what} of {show(value)} is not above 0", operand=operand)
     if loop is not LEFT_OUT and loop.__class__ is not bool:
         raise Problem("E0301", f"expected a boolean, found {describe(loop)}", operand=2)
+    rate = session.fps or rate
     if length * rate > MAX_FRAMES:
         raise Problem("E0311", f"an animation of more than {MAX_FRAMES:,} frames", operand=0)
     looping = loop is not False

@@ -45,6 +45,11 @@ class SpanMap:
         if id(old) in self._calls:
             self._calls[id(new)] = self._calls[id(old)]
 
+    def add(self, other: SpanMap) -> None:
+        """Take over all that ``other`` knows."""
+        self._places.update(other._places)
+        self._calls.update(other._calls)
+
     def span(self, node: object) -> Span | None:
         """The name or keyword that heads the statement of ``node``: what a caret points at."""
         place = self._places.get(id(node))

@@ -12,9 +12,10 @@ from scenelang.scene.expressions import VARIES, guarded, prepare
 from scenelang.scene.operations import condition
 from scenelang.scene.scope import Binding, Definition, Env, Frame, Scope
 from scenelang.scene.session import MAX_NESTING, UNBOUND
+from scenelang.scene.still import Needs, Still
 from scenelang.scene.unit import Unit
 from scenelang.scene.values import POISON, Problem, RangeValue, Vec, describe
-from scenelang.scene.vocabulary import LANGUAGE
+from scenelang.scene.vocabulary import LANGUAGE, SETTINGS
 from scenelang.syntax import nodes
 
 Kind = Literal["file", "group", "chain", "object", "material", "unknown"]
@@ -31,12 +32,14 @@ class Place(NamedTuple):
         scope: the names it sees.
         kind: the kind of block around it.
         nested: whether a ``for`` or ``if`` stands between it and that block's braces.
+        repeated: whether a ``for`` stands around it, however far out.
     """
 
     unit: Unit
     scope: Scope
     kind: Kind
     nested: bool = False
+    repeated: bool = False
 
 
 class Body(NamedTuple):
@@ -82,7 +85,7 @@ def prepare_block(statements: Sequence[nodes.Stmt], place: Place, span: Span) ->
     for stmt in statements:
         if isinstance(stmt, nodes.Let | nodes.Param):
             scope.later.setdefault(stmt.name.text, stmt.name.span)
-    prepared = [prepare_statement(stmt, place) for stmt in statements]
+    prepared = [_collected(stmt, place) for stmt in statements]
     scope.later.clear()
     actions = [action for action in prepared if action is not None]
     if any(bodies):
@@ -92,6 +95,29 @@ def prepare_block(statements: Sequence[nodes.Stmt], place: Place, span: Span) ->
             body()
     unit.nesting -= 1
     return Body(tuple(actions), 1 + len(actions) + (unit.weight - before) // 8)
+
+
+def _collected(stmt: nodes.Stmt, place: Place) -> Action | None:
+    """`prepare_statement`, noting what the statement depends on; one that no frame changes runs once.
+
+    That holds of statements of a file or its groups. Loops and modules run more than once in a frame.
+    """
+    session = place.unit.session
+    if not session.replays or place.repeated or place.scope.frame.root is None:
+        return prepare_statement(stmt, place)
+    around, session.needs = session.needs, Needs()
+    try:
+        action = prepare_statement(stmt, place)
+        needs = session.needs
+    finally:
+        around.on.append(session.needs)
+        session.needs = around
+    fills = isinstance(stmt, nodes.Call | nodes.Node | nodes.For | nodes.If)
+    if action is None or not fills or place.kind not in ("file", "group"):
+        return action
+    if isinstance(stmt, nodes.Call) and stmt.name.text in SETTINGS:
+        return action
+    return Still(action, needs, session, stmt.span)
 
 
 def _unbind(scope: Scope, place: Place) -> list[Action]:
@@ -111,8 +137,8 @@ def inner(place: Place, kind: Kind | None = None) -> Place:
     """The place inside a block: a new scope, and a new kind unless control flow passes it on."""
     scope = Scope(place.scope.frame, place.scope)
     if kind is None:
-        return Place(place.unit, scope, place.kind, True)
-    return Place(place.unit, scope, kind)
+        return Place(place.unit, scope, place.kind, True, place.repeated)
+    return Place(place.unit, scope, kind, False, place.repeated)
 
 
 def misplaced(place: Place, span: Span, message: str, help: str | None = None) -> bool:
@@ -150,7 +176,8 @@ def _let(stmt: nodes.Let, place: Place) -> Action | None:
     frame = place.scope.frame
     slot = frame.slot()
     known = code.value is not VARIES
-    binding = Binding("let", stmt.name.span, frame, slot, code.value if known else None, known)
+    value = code.value if known else None
+    binding = Binding("let", stmt.name.span, frame, slot, value, known, place.unit.session.needs)
     define(stmt.name, binding, place)
     get = code.run
 
@@ -194,6 +221,7 @@ def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: 
         define(param.name, Binding("argument", param.name.span, frame, slot), params)
     definition.defaults = tuple(defaults)
     before = unit.weight
+    around, unit.session.needs = unit.session.needs, definition.needs
     if isinstance(stmt, nodes.Fn):
         definition.run = prepare(stmt.body, unit, scope).run
         definition.weight = 1 + (unit.weight - before) // 8
@@ -201,6 +229,7 @@ def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: 
         body = prepare_block(stmt.body.statements, Place(unit, Scope(frame, scope), "group"), stmt.body.span)
         definition.run = body.actions
         definition.weight = body.weight
+    unit.session.needs = around
     definition.slots = frame.size
 
 
@@ -222,7 +251,7 @@ def _bad(stmt: nodes.BadStmt, place: Place) -> Action | None:
 def _for(stmt: nodes.For, place: Place) -> Action | None:
     unit = place.unit
     iterable = prepare(stmt.iterable, unit, place.scope)
-    loop = inner(place)
+    loop = inner(place)._replace(repeated=True)
     frame = loop.scope.frame
     slot = frame.slot()
     define(stmt.variable, Binding("loop", stmt.variable.span, frame, slot), loop)

@@ -47,6 +47,7 @@ class Unit:
 
     def __post_init__(self) -> None:
         self.scope = Scope(self.frame)
+        self.session.roots.append(self.root_env)
 
     @property
     def root_env(self) -> Env:
