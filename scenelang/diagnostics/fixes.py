@@ -1,0 +1,158 @@
+"""Fixes applied to text: which go together, in what order, and again until none is left.
+
+Everything here is pure: texts go in, texts come out. `scenelang check --fix` reads and writes the files; an
+editor sends the edits of one `Fix`, or what `settle` makes of its open buffers.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final, Generic, TypeVar
+
+from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix
+from scenelang.diagnostics.span import SourceFile, Span
+
+MAX_ROUNDS: Final = 50
+"""A fix may uncover the next mistake; a text that still changes after so many rounds is left there."""
+
+Key = TypeVar("Key", bound=Hashable)
+
+
+def apply_fixes(text: str, diagnostics: Iterable[Diagnostic]) -> tuple[str, tuple[Diagnostic, ...]]:
+    """Apply the fixes of some diagnostics of one text, as many as go together.
+
+    A fix is applied whole or not at all. Where two touch the same place, the one that stands first in the
+    text wins and the other waits for the next round. Equal fixes of two diagnostics are applied once.
+
+    Args:
+        text: the text in which the diagnostics were found. A fix for any other text is left out.
+        diagnostics: in any order, with or without fixes.
+
+    Returns:
+        The text with the fixes, and the diagnostics whose fixes went into it, in the order of the text.
+    """
+    candidates = [(d, d.fix.edits) for d in diagnostics if d.fix is not None and _fits(d.fix, text)]
+    candidates.sort(key=lambda c: [(e.span.start, e.span.end) for e in c[1]])
+    taken: list[Edit] = []  # in the order of the text, none touching another
+    done: list[Diagnostic] = []
+    whole: set[tuple[Edit, ...]] = set()
+    for diagnostic, edits in candidates:
+        if edits not in whole:
+            if any(_meets(taken, edit) for edit in edits):
+                continue
+            whole.add(edits)
+            for edit in edits:
+                taken.insert(_place(taken, edit), edit)
+        done.append(diagnostic)
+    return _edited(text, taken), tuple(done)
+
+
+def apply_fix(text: str, fix: Fix) -> str:
+    """The text with one fix, whose edits must not overlap; for previews and code actions."""
+    return _edited(text, sorted(fix.edits, key=lambda e: (e.span.start, e.span.end)))
+
+
+def removal(source: SourceFile, start: int, end: int) -> Fix:
+    """A fix that takes ``[start, end)`` away, with its line where nothing else stands on it."""
+    text = source.text
+    first = text.rfind("\n", 0, start) + 1
+    last = text.find("\n", end)
+    last = len(text) if last < 0 else last + 1
+    if not text[first:start].strip() and not text[end:last].strip():
+        start, end = first, last
+    else:
+        while text[end : end + 1] == " ":
+            end += 1
+    return Fix("remove it", (Edit(Span(source, start, end), ""),))
+
+
+def _fits(fix: Fix, text: str) -> bool:
+    """Whether a fix was made for this text and changes something."""
+    return any(e.span.text != e.replacement for e in fix.edits) and all(
+        (e.span.source.text is text or e.span.source.text == text)
+        and 0 <= e.span.start <= e.span.end <= len(text)
+        for e in fix.edits
+    )
+
+
+def _place(taken: list[Edit], edit: Edit) -> int:
+    return bisect_left(taken, (edit.span.start, edit.span.end), key=lambda e: (e.span.start, e.span.end))
+
+
+def _meets(taken: list[Edit], edit: Edit) -> bool:
+    """Whether an edit shares text with a neighbour, or an insertion its place: then order would matter."""
+    at = _place(taken, edit)
+    for other in taken[max(0, at - 1) : at + 1]:
+        first, second = sorted((edit.span, other.span), key=lambda s: (s.start, s.end))
+        empty = first.start == first.end or second.start == second.end
+        if second.start < first.end or (empty and second.start == first.end):
+            return True
+    return False
+
+
+def _edited(text: str, edits: Iterable[Edit]) -> str:
+    parts, at = [], 0
+    for edit in edits:
+        parts += [text[at : edit.span.start], edit.replacement]
+        at = edit.span.end
+    return "".join([*parts, text[at:]])
+
+
+# ---------------------------------------------------------------- until nothing changes
+
+
+@dataclass(frozen=True, slots=True)
+class Settled(Generic[Key]):
+    """Texts after all their fixes.
+
+    Args:
+        texts: what each file holds now.
+        applied: the diagnostics that were fixed, file by file, in the order of fixing.
+        left: what is still found.
+        stable: False where fixes undid each other and the last good texts are given.
+    """
+
+    texts: dict[Key, str]
+    applied: dict[Key, tuple[Diagnostic, ...]]
+    left: tuple[tuple[Key | None, Diagnostic], ...]
+    stable: bool
+
+
+def settle(
+    texts: Mapping[Key, str],
+    check: Callable[[Mapping[Key, str]], Iterable[tuple[Key | None, Diagnostic]]],
+) -> Settled[Key]:
+    """Apply fixes until none is left.
+
+    Args:
+        texts: the files that may change, by any key.
+        check: finds the diagnostics of such texts; each comes with the key of the file that it is in, None
+            for a file that may not change.
+
+    Returns:
+        The texts and what is left to mend by hand.
+    """
+    now = dict(texts)
+    applied: dict[Key, tuple[Diagnostic, ...]] = dict.fromkeys(now, ())
+    left = tuple(check(now))
+    seen = {tuple(now.values())}
+    for _ in range(MAX_ROUNDS):
+        after, fixed = dict(now), dict(applied)
+        for key in now:
+            after[key], done = apply_fixes(now[key], [d for k, d in left if k == key])
+            fixed[key] += done
+        if after == now:
+            return Settled(now, applied, left, True)
+        found = tuple(check(after))
+        if tuple(after.values()) in seen or (_unreadable(found) and not _unreadable(left)):
+            break
+        seen.add(tuple(after.values()))
+        now, applied, left = after, fixed, found
+    return Settled(now, applied, left, False)
+
+
+def _unreadable(found: Iterable[tuple[Key | None, Diagnostic]]) -> bool:
+    """Whether there are syntax errors; a fix that brings the first one is a bug, and its round is dropped."""
+    return any(d.code.startswith("E01") for _, d in found)
