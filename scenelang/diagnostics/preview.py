@@ -12,7 +12,10 @@ _MOST_LINES = 6
 
 def largest_line(fix: Fix) -> int:
     """The largest line number that a preview may show."""
-    return max((edit.span.locate()[1][0] + edit.replacement.count("\n") for edit in fix.edits), default=0)
+    return max(
+        (e.span.locate()[0][0] + max(e.span.text.count("\n"), e.replacement.count("\n")) for e in fix.edits),
+        default=0,
+    )
 
 
 def preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:

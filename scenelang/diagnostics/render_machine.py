@@ -9,8 +9,9 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
+from scenelang.diagnostics.cells import printable
 from scenelang.diagnostics.diagnostic import Diagnostic, Fix
-from scenelang.diagnostics.render_text import in_order, printable
+from scenelang.diagnostics.render_text import in_order
 from scenelang.diagnostics.span import Span
 
 JSON_VERSION = 1

@@ -41,7 +41,7 @@ class Mark:
 
 @dataclass(slots=True)
 class _Bar:
-    """A mark over several lines: its first line and cell, its last line and cell, its column of the margin."""
+    """A mark over several lines: where it begins and ends, and its column of the margin."""
 
     mark: Mark
     top: int
