@@ -17,6 +17,7 @@ from scenelang.syntax.tokens import Tokens
 _SLIP = 1.4  # a slip costs as much as so many lines at the wrong depth
 _WIDEST = 12  # further off than this is not searched
 _NEVER = 1e9
+_ASTRAY = 4  # so many lines at the wrong depth make hidden slips likely
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +51,8 @@ def find_hidden_slips(tokens: Tokens) -> list[Slip]:
     """
     lines = _lines(tokens)
     unit = _unit(lines)
+    if sum(line.indent != unit * line.depth for line in lines[:-1]) < _ASTRAY:
+        return []  # the search is not worth its time
     slips = _slips(lines)
     if not slips or any(abs(slip.shift) > 1 for slip in slips):
         return []
@@ -60,7 +63,7 @@ def find_hidden_slips(tokens: Tokens) -> list[Slip]:
             return []
         astray += line.indent != unit * line.depth
         left += line.indent != unit * (line.depth + offset)
-    return slips if astray >= 4 and 4 * left <= astray else []
+    return slips if astray >= _ASTRAY and 4 * left <= astray else []
 
 
 def _slips(lines: list[_Line]) -> list[Slip]:
