@@ -11,6 +11,7 @@ from typing import Final
 import click
 
 from scenelang.backend.errors import RenderError
+from scenelang.files import NotWritten
 
 # Command -> what `--help` says. Each lies in `scenelang/cli/<command>.py` as `command`, imported when called.
 COMMANDS: Final = {
@@ -68,11 +69,19 @@ class _Commands(click.Group):
             raise Trouble(describe(error)) from None
         except RenderError as error:
             raise Trouble(str(error)) from None
+        except Exception as error:
+            from scenelang.models.weights import ModelError
+
+            if isinstance(error, ModelError):
+                raise Trouble(str(error)) from None
+            raise
 
 
 def describe(error: OSError) -> str:
     """A system error in a line."""
     reason = (error.strerror or str(error) or "unreadable").lower()
+    if isinstance(error, NotWritten):
+        return f"cannot write '{error.filename}': {reason}"
     return f"{error.filename}: {reason}" if error.filename else reason
 
 

@@ -11,11 +11,10 @@ import torch
 from safetensors.torch import load
 
 from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.models.weights import Codes, read_header, weights_path
+from scenelang.models.weights import MOST_BYTES, Codes, read_header, read_weights, weights_path
 from scenelang.models.weights import ModelError as ModelError
 from scenelang.renderers.framed import Framed, FramedConfig
 
-MOST_BYTES = 64 * 1024 * 1024
 MOST_WIDTH = 1024
 
 
@@ -60,7 +59,9 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Framed
         config = FramedConfig(**sizes)
     except (KeyError, TypeError, AttributeError) as error:
         raise ModelError(f"bad network sizes: {error}") from None
-    if 4 * (config.code + 1) * config.decoder_width**2 > len(data):
+    decoder = (config.code + 1) * config.decoder_width * (config.decoder_width + config.features)
+    cell = (config.features + config.state) * config.cell_width + config.features * config.state
+    if 4 * max(decoder, cell) > len(data):
         raise ModelError("a network larger than its file")
     # Not on the meta device, which takes no memory but 1.8 s to import what it stands on.
     with torch.random.fork_rng(devices=[]):
@@ -86,8 +87,10 @@ def load_model(name: str, device: str = "cpu", path: Path | None = None) -> Mode
     """
     manifest = load_manifest(name)
     try:
-        data = (path or weights_path(name)).read_bytes()
+        data = read_weights(path or weights_path(name))
     except OSError as error:
-        raise ModelError(f"cannot read the weights of '{name}': {error.strerror}") from None
+        raise ModelError(
+            f"cannot read the weights of '{name}': {(error.strerror or str(error)).lower()}"
+        ) from None
     network = load_network(data, manifest, device)
     return Model(manifest, network, hashlib.sha256(data).hexdigest(), read_header(data))

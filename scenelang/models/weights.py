@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import struct
 from dataclasses import dataclass
@@ -11,7 +10,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from scenelang.models.manifest import ROOT, load_manifest
+from scenelang.files import read_json, read_regular
+from scenelang.models.manifest import ROOT, Manifest, load_manifest
+
+MOST_BYTES = 64 << 20
+_MOST_HEADER = 1 << 20
 
 
 class ModelError(Exception):
@@ -55,17 +58,43 @@ def weights_path(name: str) -> Path:
     return ROOT / name / "weights.safetensors"
 
 
+def read_weights(path: Path) -> bytes:
+    """The bytes of a weights file.
+
+    Raises:
+        OSError: it cannot be read.
+        ModelError: it is larger than any.
+    """
+    data = read_regular(path, MOST_BYTES)
+    if len(data) > MOST_BYTES:
+        raise ModelError(f"weights of more than {MOST_BYTES >> 20} MB")
+    return data
+
+
 def read_header(data: bytes) -> dict[str, Any]:
     """The training header of a weights file; raises ModelError where there is none."""
+    metadata = _outer(data).get("__metadata__")
     try:
-        (length,) = struct.unpack("<Q", data[:8])
-        outer = json.loads(data[8 : 8 + length])
-        header = json.loads(outer["__metadata__"]["scenelang"])
-    except (struct.error, ValueError, KeyError, TypeError, RecursionError) as error:
+        header = read_json(metadata["scenelang"].encode())  # type: ignore[index]
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ModelError(f"no training header: {error}") from None
     if not isinstance(header, dict) or header.get("format") != 1:
         raise ModelError("not a weights file of format 1")
     return header
+
+
+def _outer(data: bytes) -> dict[str, Any]:
+    """The safetensors header of a file: tensors by name, and the metadata."""
+    try:
+        (length,) = struct.unpack("<Q", data[:8])
+        if length > min(_MOST_HEADER, len(data) - 8):
+            raise ValueError(f"a header of {length:,} bytes")
+        outer = read_json(data[8 : 8 + length])
+    except (struct.error, ValueError) as error:
+        raise ModelError(f"damaged weights: {error}") from None
+    if not isinstance(outer, dict):
+        raise ModelError("damaged weights: the header is no object")
+    return outer
 
 
 def read_facts(name: str) -> Facts:
@@ -75,10 +104,9 @@ def read_facts(name: str) -> Facts:
         OSError: it cannot be read.
         ModelError: it is damaged.
     """
-    data = weights_path(name).read_bytes()
+    data = read_weights(weights_path(name))
     training = read_header(data)
-    (length,) = struct.unpack("<Q", data[:8])
-    tensors = {k: v for k, v in json.loads(data[8 : 8 + length]).items() if k != "__metadata__"}
+    tensors = {k: v for k, v in _outer(data).items() if k != "__metadata__"}
     try:
         parameters = sum(math.prod(entry["shape"]) for entry in tensors.values())
     except (KeyError, TypeError) as error:
@@ -93,21 +121,37 @@ def load_codes(name: str) -> Codes:
     Raises:
         KeyError: there is no such model.
         FileNotFoundError: it has no weights.
+        ModelError: its weights are damaged.
     """
+    return codes_of(load_manifest(name), read_weights(weights_path(name)))
+
+
+def codes_of(manifest: Manifest, data: bytes) -> Codes:
+    """The codes that a weights file holds.
+
+    Raises:
+        ModelError: it is damaged, or not of this model.
+    """
+    from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    manifest = load_manifest(name)
-    data = weights_path(name).read_bytes()
-    tensors = load(data)
+    _outer(data)  # says things once, which safetensors does not ask for
+    try:
+        tensors = load(data)
+    except (SafetensorError, ValueError, KeyError, TypeError) as error:
+        raise ModelError(f"damaged weights: {error}") from None
     return Codes(
-        geometry=_rows(manifest.geometries, tensors["codes"]),
-        material=_rows(manifest.materials, tensors["material_codes"]),
+        geometry=_rows(manifest.geometries, tensors.get("codes")),
+        material=_rows(manifest.materials, tensors.get("material_codes")),
         digest=hashlib.sha256(data).hexdigest(),
     )
 
 
-def _rows(names: tuple[str, ...], table: object) -> dict[str, tuple[float, ...]]:
-    rows = table.tolist()  # type: ignore[attr-defined]
-    if len(rows) != len(names):
-        raise ValueError(f"{len(rows)} codes for {len(names)} names")
+def _rows(names: tuple[str, ...], table: Any) -> dict[str, tuple[float, ...]]:
+    if table is None or table.dtype != "float32" or table.ndim != 2 or len(table) != len(names):
+        found = "no codes" if table is None else f"codes {table.dtype} {list(table.shape)}"
+        raise ModelError(f"{found}, where {len(names)} rows of float32 are needed")
+    rows: list[list[float]] = table.tolist()
+    if not all(math.isfinite(number) for row in rows for number in row):
+        raise ModelError("codes that are not finite")
     return {name: tuple(row) for name, row in zip(names, rows, strict=True)}

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import write_whole
+from scenelang.files import read_json, read_regular, write_whole
 from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
 
 FORMAT = 1
@@ -81,9 +81,7 @@ def load_program(path: str | Path, *, weights: str | None = None) -> Program:
         ProgramError: the file is damaged, foreign or hostile, or was compiled for other weights.
         OSError: the file cannot be read.
     """
-    with open(path, "rb") as file:
-        data = file.read(MOST_BYTES + 1)
-    program = parse_program(data)
+    program = parse_program(read_regular(path, MOST_BYTES))
     expected = weights if weights is not None else _shipped(program.model)
     if program.weights != expected:
         raise ProgramError(
@@ -177,9 +175,9 @@ def _header(data: bytes) -> dict[str, Any]:
 
 def _json(data: bytes) -> Any:
     try:
-        return json.loads(data)
-    except (ValueError, RecursionError):
-        raise ProgramError("not a program: a header is no JSON") from None
+        return read_json(data)
+    except ValueError as error:
+        raise ProgramError(f"not a program: a damaged header, {str(error).lower()}") from None
 
 
 def _names(header: dict[str, Any], key: str) -> list[str]:

@@ -8,6 +8,7 @@ from pathlib import Path, PureWindowsPath
 from typing import Final
 
 from scenelang.diagnostics.span import SourceFile
+from scenelang.files import read_regular
 from scenelang.scene.build import Builder
 from scenelang.scene.scope import Binding, Env
 from scenelang.scene.session import MAX_BYTES
@@ -31,15 +32,13 @@ class Unreadable(Exception):
 
 
 def read_source(path: Path, name: str) -> SourceFile:
-    """The text of a file or pipe.
+    """The text of a file.
 
     Raises:
         Unreadable: too large, or not UTF-8.
-        OSError: as the system says.
+        OSError: as the system says, or that it is no regular file.
     """
-    with path.open("rb") as stream:
-        data = stream.read(MAX_BYTES + 1)
-    return decode_source(data, name)
+    return decode_source(read_regular(path, MAX_BYTES), name)
 
 
 def decode_source(data: bytes, name: str) -> SourceFile:
@@ -114,8 +113,6 @@ class Loader:
         name = os.path.normpath(os.path.join(os.path.dirname(unit.source.name), stmt.path.value))
         text, span, session = stmt.path.value, stmt.path.span, unit.session
         try:
-            if not path.is_file() and path.exists():  # opening a pipe would wait for a writer
-                raise Unreadable("E0214", "it is not a regular file")
             source = read_source(path, name)
         except Unreadable as error:
             session.error(error.code, f"cannot read '{text}': {error}", span)

@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import safe_open
-from safetensors.torch import save
+from safetensors import SafetensorError
+from safetensors.torch import load, save
 from torch import Tensor, nn
 
-from scenelang.files import write_whole
+from scenelang.files import read_regular, write_whole
+from scenelang.models.weights import ModelError, read_header
+
+_MOST_BYTES = 1 << 30
 
 
 def save_tensors(path: Path, tensors: dict[str, Tensor], header: dict[str, Any]) -> None:
@@ -21,10 +24,20 @@ def save_tensors(path: Path, tensors: dict[str, Tensor], header: dict[str, Any])
 
 
 def load_tensors(path: Path, device: str = "cpu") -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """Tensors and header of a file that `save_tensors` wrote."""
-    with safe_open(path, "pt", device=device) as file:
-        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (not a dict)
-        header = json.loads((file.metadata() or {}).get("scenelang", "{}"))
+    """Tensors and header of a file that `save_tensors` wrote.
+
+    Raises:
+        OSError: it cannot be read.
+        ModelError: it is no such file, or a damaged one.
+    """
+    data = read_regular(path, _MOST_BYTES)
+    if len(data) > _MOST_BYTES:
+        raise ModelError(f"'{path}' has more than {_MOST_BYTES:,} bytes")
+    header = read_header(data)
+    try:
+        tensors = {key: tensor.to(device) for key, tensor in load(data).items()}
+    except (SafetensorError, ValueError) as error:
+        raise ModelError(f"'{path}' is damaged: {error}") from None
     return tensors, header
 
 

@@ -9,10 +9,12 @@ from typing import Any
 from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass as checked
 
+from scenelang.files import read_regular
 from scenelang.renderers.framed import FramedConfig
 from scenelang.training.scenes import SceneConfig
 
 CONFIGS = Path(__file__).parent / "configs"
+_MOST_BYTES = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +66,10 @@ def read_config(name: str) -> TrainConfig:
     """Read a configuration by path or by the name of a shipped one.
 
     Raises:
-        FileNotFoundError: there is no such file.
+        OSError: there is no such file, or it cannot be read.
         pydantic.ValidationError: a key is unknown or a value has the wrong type.
     """
     path = Path(name)
     if not path.suffix and (CONFIGS / f"{name}.json").exists():
         path = CONFIGS / f"{name}.json"
-    return TypeAdapter(TrainConfig).validate_json(path.read_text("utf-8"))
+    return TypeAdapter(TrainConfig).validate_json(read_regular(path, _MOST_BYTES))
