@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
     from scenelang.diagnostics.diagnostic import Diagnostics as Diagnostics
     from scenelang.diagnostics.diagnostic import SceneError as SceneError
+    from scenelang.formatting.format import format_text as format_text
     from scenelang.image import Image as Image
     from scenelang.program.compile import compile as compile
     from scenelang.program.program import Place as Place
@@ -52,6 +53,7 @@ _HOME: Final = {
     "scenelang.backend.errors": ("RenderError",),
     "scenelang.backend.render": ("render",),
     "scenelang.diagnostics.diagnostic": ("Diagnostic", "Diagnostics", "SceneError"),
+    "scenelang.formatting.format": ("format_text",),
     "scenelang.image": ("Image",),
     "scenelang.program.compile": ("compile",),
     "scenelang.program.program": ("Place", "Program", "ProgramError"),
@@ -114,6 +116,7 @@ __all__ = [
     "Twirl",
     "Twist",
     "compile",
+    "format_text",
     "load",
     "load_program",
     "loads",

@@ -17,6 +17,7 @@ ORDER = (
     "scenelang.files",
     "scenelang.diagnostics",
     "scenelang.syntax",
+    "scenelang.formatting",
     "scenelang.models.manifest",
     "scenelang.scene",
     "scenelang.models.choose",

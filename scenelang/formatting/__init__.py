@@ -1,0 +1,5 @@
+"""Scene text in one canonical layout: same tokens, same comments, the line breaks of nobody's taste."""
+
+from scenelang.formatting.format import format_text as format_text
+
+__all__ = ["format_text"]

@@ -1,0 +1,216 @@
+"""Documents: text with places where lines may break, and the printer that chooses among them.
+
+After Philip Wadler, *A prettier printer*, in The Fun of Programming (2003): a group is printed on one line if
+it fits, otherwise its own line breaks are taken and the groups inside are tried. Two things are different.
+Every document knows its text on one line beforehand, so that whatever fits is written at once; and a
+document keeps the comments at its two ends apart from itself, so that whoever puts documents together
+decides where they go (behind a comma, for example).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final, TypeVar
+
+from scenelang.formatting.trivia import Comment
+
+WIDTH: Final = 100
+"""Columns of a line, where breaking lines can achieve that."""
+INDENT: Final = 2
+
+AnyDoc = TypeVar("AnyDoc", bound="Doc")
+
+
+class Doc:
+    """A piece of layout.
+
+    Args:
+        flat: its text on one line; None if it cannot be on one line or is wider than any line.
+    """
+
+    __slots__ = ("after", "before", "blank", "flat")
+
+    def __init__(self, flat: str | None) -> None:
+        self.flat = flat
+        self.before: Sequence[Comment] = ()  # on lines of their own before it
+        self.after: Sequence[Comment] = ()  # behind it; the line must end there
+        self.blank = False  # a blank line stands before it, after the comments of `before`
+
+
+Part = Doc | str
+"""A bare string is a short text that never breaks, without comments around it."""
+
+
+class Word(Doc):
+    """Text that stands as it is, with comments around it."""
+
+    __slots__ = ()
+    flat: str
+
+
+class Break(Doc):
+    """A place where the line breaks once the group around it does not fit."""
+
+    __slots__ = ()
+
+
+class Blank(Doc):
+    """A line break with a blank line after it."""
+
+    __slots__ = ()
+
+
+class Concat(Doc):
+    """Parts one after another."""
+
+    __slots__ = ("parts",)
+
+    def __init__(self, flat: str | None, parts: Sequence[Part]) -> None:
+        super().__init__(flat)
+        self.parts = parts
+
+
+class Group(Doc):
+    """What is on one line if it fits, and otherwise what ``make`` says.
+
+    Args:
+        flat: see `Doc`.
+        make: called at most once, and only if it does not fit.
+    """
+
+    __slots__ = ("_made", "make")
+
+    def __init__(self, flat: str | None, make: Callable[[], Part]) -> None:
+        super().__init__(flat)
+        self.make = make
+        self._made: Part | None = None
+
+    def broken(self) -> Part:
+        if self._made is None:
+            self._made = self.make()
+        return self._made
+
+
+class Indent(Doc):
+    """Breaks inside go deeper by a step."""
+
+    __slots__ = ("part",)
+
+    def __init__(self, part: Part) -> None:
+        super().__init__(None)
+        self.part = part
+
+
+class Fill(Doc):
+    """Short texts with commas, as many on each line as fit."""
+
+    __slots__ = ("texts",)
+
+    def __init__(self, texts: Sequence[str]) -> None:
+        super().__init__(None)
+        self.texts = texts
+
+
+class Comments(Doc):
+    """Comments after which the line ends.
+
+    Args:
+        comments: in order.
+        inside: they stand in the middle of something, so what follows is indented.
+    """
+
+    __slots__ = ("comments", "inside")
+
+    def __init__(self, comments: Sequence[Comment], inside: bool = False) -> None:
+        super().__init__(None)
+        self.comments = comments
+        self.inside = inside
+
+
+LINE: Final = Break(" ")
+SOFT: Final = Break("")
+BLANK: Final = Blank(None)
+
+
+def sequence(parts: Iterable[Part]) -> Part:
+    """Parts one after another; comments between them stay there, those at the ends become its own."""
+    inside: list[Part] = []
+    flat: str | None = ""
+    before: Sequence[Comment] = ()
+    after: Sequence[Comment] = ()
+    blank = False
+    for part in parts:
+        if after:
+            inside.append(Comments(after, inside=True))
+            flat, after = None, ()
+        if isinstance(part, str):
+            inside.append(part)
+            if flat is not None:
+                flat += part
+            continue
+        if not inside:
+            before, blank = part.before, part.blank
+        elif part.before:
+            inside.append(Comments(part.before, inside=True))
+            flat = None
+        inside.append(part)
+        after = part.after
+        if flat is not None:
+            flat = None if part.flat is None else flat + part.flat
+    if flat is not None and len(flat) > WIDTH:
+        flat = None
+    doc = Concat(flat, inside)
+    doc.before, doc.after, doc.blank = before, after, blank
+    return doc
+
+
+def before_of(part: Part) -> Sequence[Comment]:
+    return () if isinstance(part, str) else part.before
+
+
+def after_of(part: Part) -> Sequence[Comment]:
+    return () if isinstance(part, str) else part.after
+
+
+def plain(part: Part, before: bool = False, after: bool = False) -> Part:
+    """A part without the comments at its ends, or with those of one end; the others the caller places."""
+    if isinstance(part, str) or not (part.before or part.after):
+        return part
+    doc = Concat(part.flat, [part])
+    doc.before = part.before if before else ()
+    doc.after = part.after if after else ()
+    return doc
+
+
+def own_after_first(comments: Sequence[Comment]) -> Sequence[Comment]:
+    """Comments of which each after one that ends its line stands on a line of its own."""
+    placed: list[Comment] = []
+    for comment in comments:
+        placed.append(comment._replace(own_line=True) if placed and placed[-1].ends_line else comment)
+    return placed
+
+
+def flat_of(part: Part) -> str | None:
+    return part if isinstance(part, str) else part.flat
+
+
+def joined(parts: Sequence[Part]) -> str | None:
+    """The parts on one line; None if they cannot be."""
+    flat = ""
+    for index, part in enumerate(parts):
+        if isinstance(part, str):
+            flat += part
+        elif part.flat is None or (index and part.before) or (part.after and index < len(parts) - 1):
+            return None
+        else:
+            flat += part.flat
+    return flat if len(flat) <= WIDTH else None
+
+
+def ends_of(doc: AnyDoc, first: Part, last: Part) -> AnyDoc:
+    """``doc`` with the comments before its first part and after its last."""
+    if not isinstance(first, str):
+        doc.before, doc.blank = first.before, first.blank
+    if not isinstance(last, str):
+        doc.after = last.after
+    return doc

@@ -1,0 +1,263 @@
+"""Callbacks of the grammar that lay out names, lists and expressions; statements are in `layout`.
+
+They take the place of those that build the tree (`scenelang.syntax.expressions`): a token comes as its index,
+everything else as the part that another callback has made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from scenelang.formatting.documents import (
+    LINE,
+    Comments,
+    Concat,
+    Group,
+    Indent,
+    Part,
+    Word,
+    after_of,
+    before_of,
+    ends_of,
+    flat_of,
+    joined,
+    own_after_first,
+    sequence,
+)
+from scenelang.formatting.lists import Bracketed, Item, broken, inline
+from scenelang.formatting.trivia import Notes
+from scenelang.syntax.tokens import Tokens
+
+_LEVELS = {"*": 5, "/": 5, "%": 5, "+": 4, "-": 4, "<": 3, "<=": 3, ">": 3, ">=": 3, "==": 2, "!=": 2}
+_LEVELS |= {"&&": 1, "||": 0}
+
+
+class Operation(Group):
+    """Operands of one level with the operators between them.
+
+    Args:
+        operands: from left to right.
+        operators: one less.
+        level: how tight they bind; operands of the same level on the left are taken in.
+    """
+
+    __slots__ = ("level", "operands", "operators")
+
+    def __init__(self, flat: str | None, operands: list[Part], operators: list[Part], level: int) -> None:
+        super().__init__(flat, self.lines)
+        self.operands = operands
+        self.operators = operators
+        self.level = level
+
+    def lines(self) -> Part:
+        first = self.operands[0]
+        parts: list[Part] = [first]
+        after = [*after_of(first)]
+        for operator, operand in zip(self.operators, self.operands[1:], strict=True):
+            # A comment after an operator belongs to what stands before: the operator begins the next line.
+            if before_of(operator):
+                after += [*before_of(operator), *after_of(operator)]
+            else:
+                after += after_of(operator)
+            if after:
+                parts.append(Comments(own_after_first(after)))
+            if before_of(operand):
+                parts += [LINE, Comments(before_of(operand))]
+            parts += [LINE, operator, " ", operand]
+            after = [*after_of(operand)]
+        return Concat(None, parts)
+
+
+class Choice(Group):
+    """``c ? a : b``, with the choices in its last place taken in."""
+
+    __slots__ = ("clauses",)
+
+    def __init__(self, flat: str | None, clauses: list[tuple[Part, ...]]) -> None:
+        super().__init__(flat, self.lines)
+        self.clauses = clauses  # (condition, ?, value, :) each, and (value,) as the last one
+
+    def lines(self) -> Part:
+        *chosen, (otherwise,) = self.clauses
+        if len(chosen) == 1:
+            condition, mark, value, colon = chosen[0]
+            tail = [LINE, mark, " ", value, LINE, colon, " ", otherwise]
+            return sequence([condition, Indent(sequence(tail))])
+        parts: list[Part] = []
+        lead: list[Part] = []
+        for condition, mark, value, colon in chosen:
+            parts += [*lead, condition, " ", mark, " ", value]
+            lead = [LINE, colon, " "]
+        return sequence([*parts, *lead, otherwise])
+
+
+class ExpressionLayout:
+    """Lays out the expressions of one file.
+
+    Args:
+        tokens: what was read, without mistakes.
+        notes: the comments and blank lines around them.
+    """
+
+    def __init__(self, tokens: Tokens, notes: Mapping[int, Notes]) -> None:
+        self.tokens = tokens
+        self.notes = notes
+        self.text = tokens.source.text
+        self.starts = tokens.starts
+        self.ends = tokens.ends
+
+    def word(self, token: int) -> Part:
+        """A token with what stands around it."""
+        text = self.text[self.starts[token] : self.ends[token]]
+        if token not in self.notes:
+            return text
+        note = self.notes[token]
+        if note.leading:
+            text = f"{note.leading} {text}"
+        if note.trailing:
+            text = f"{text} {note.trailing}"
+        if not (note.before or note.after or note.blank):
+            return text
+        word = Word(text)
+        word.before, word.after, word.blank = note.before, note.after, note.blank
+        return word
+
+    # ------------------------------------------------------------ lists
+
+    def first(self, item: Part) -> list[Item]:
+        return [Item(item)]
+
+    def listed(self, items: list[Item], comma: int, item: Part) -> list[Item]:
+        self._comma(items, comma)
+        items.append(Item(item))
+        return items
+
+    def _comma(self, items: list[Item], comma: int) -> None:
+        if comma in self.notes:
+            note = self.notes[comma]
+            behind = f" {note.trailing}" if note.trailing else ""
+            items[-1] = Item(items[-1].part, behind, [*note.before, *note.after])
+
+    def empty(self, opening: int, closing: int) -> Part:
+        return self._bracketed(Group, opening, [], (closing,))
+
+    def filled(self, opening: int, items: list[Item], *closing: int) -> Part:
+        return self._bracketed(Group, opening, items, closing)
+
+    def _bracketed(
+        self,
+        form: Callable[[str | None, Callable[[], Part]], Group],
+        opening: int,
+        items: list[Item],
+        closing: Sequence[int],
+    ) -> Part:
+        left, right = self.word(opening), self.word(closing[-1])
+        if len(closing) > 1:
+            self._comma(items, closing[0])
+        flat: str | None = None
+        if not (after_of(left) or before_of(right)):
+            flat = joined([left, *inline(items), right])
+        doc = form(flat, lambda: broken(left, items, right))
+        return ends_of(doc, left, right)
+
+    # ------------------------------------------------------------ names
+
+    def name(self, token: int) -> Part:
+        return self.word(token)
+
+    def path(self, left: Part, dot: int, right: Part) -> Part:
+        return self._glued(left, self.word(dot), right)
+
+    def _glued(self, *parts: Part) -> Part:
+        """Parts without space between them; a string if all of them are."""
+        if all(isinstance(part, str) for part in parts):
+            return "".join(map(str, parts))
+        return sequence(parts)
+
+    # ------------------------------------------------------------ expressions
+
+    def argument(self, value: Part) -> Part:
+        return value
+
+    def argument_named(self, name: Part, equal: int, value: Part) -> Part:
+        named = sequence([name, " ", self.word(equal), " ", value])
+        if isinstance(value, Bracketed) and isinstance(named, Concat):
+            # Keeps being told apart as something that opens on the line of a call it is alone in.
+            hugging = Bracketed(named.flat, lambda: Concat(None, named.parts))
+            hugging.before, hugging.after, hugging.blank = named.before, named.after, named.blank
+            return hugging
+        return named
+
+    def _range(self, start: Part, dots: int, stop: Part) -> list[Part]:
+        loose = isinstance(start, (Operation, Choice)) or isinstance(stop, (Operation, Choice))
+        left = flat_of(start)
+        space = " " if loose or (left is not None and left.endswith(".")) else ""
+        return [start, space, self.word(dots), " " if loose else "", stop]
+
+    def range(self, start: Part, dots: int, stop: Part) -> Part:
+        return sequence(self._range(start, dots, stop))
+
+    def range_step(self, start: Part, dots: int, stop: Part, word: int, step: Part) -> Part:
+        return sequence([*self._range(start, dots, stop), " ", self.word(word), " ", step])
+
+    range_open = range
+    range_open_step = range_step
+
+    def conditional(self, condition: Part, mark: int, then: Part, colon: int, otherwise: Part) -> Part:
+        head = (condition, self.word(mark), then, self.word(colon))
+        flat = joined([condition, " ", head[1], " ", then, " ", head[3], " ", otherwise])
+        tail = otherwise.clauses if isinstance(otherwise, Choice) else [(otherwise,)]
+        return ends_of(Choice(flat, [head, *tail]), condition, otherwise)
+
+    def binary(self, left: Part, op: int, right: Part) -> Part:
+        operator = self.word(op)
+        flat = joined([left, " ", operator, " ", right])
+        level = _LEVELS.get(self.text[self.starts[op] : self.ends[op]], -1)
+        if isinstance(left, Operation) and left.level == level >= 0:
+            operands, operators = left.operands, left.operators
+        else:
+            operands, operators = [left], []
+        operands.append(right)
+        operators.append(operator)
+        return ends_of(Operation(flat, operands, operators, level), left, right)
+
+    def unary(self, op: int, operand: Part) -> Part:
+        return self._glued(self.word(op), operand)
+
+    def material(self, word: int, name: Part) -> Part:
+        return sequence([self.word(word), " ", name])
+
+    def index(self, value: Part, opening: int, index: Part, closing: int) -> Part:
+        return self._glued(value, self.word(opening), index, self.word(closing))
+
+    def member(self, value: Part, dot: int, name: Part) -> Part:
+        flat = flat_of(value)
+        space = " " if flat is not None and flat.endswith(".") else ""
+        return self._glued(value, space, self.word(dot), name)
+
+    def method(self, value: Part, dot: int, name: Part, args: Part) -> Part:
+        return sequence([value, self.word(dot), name, args])
+
+    def call_expr(self, name: Part, args: Part) -> Part:
+        return sequence([name, args])
+
+    def parenthesised(self, opening: int, value: Part, closing: int) -> Part:
+        left, right = self.word(opening), self.word(closing)
+        flat = joined([left, value, right])
+        inside = [Item(value)]
+        doc = Group(flat, lambda: broken(left, inside, right, comma=""))
+        return ends_of(doc, left, right)
+
+    def vector_empty(self, opening: int, closing: int) -> Part:
+        return self._bracketed(Bracketed, opening, [], (closing,))
+
+    def vector(self, opening: int, items: list[Item], *closing: int) -> Part:
+        return self._bracketed(Bracketed, opening, items, closing)
+
+    def name_ref(self, name: Part) -> Part:
+        return name
+
+    def _literal(self, token: int) -> Part:
+        return self.word(token)
+
+    number = string = color = true = false = _literal

@@ -1,0 +1,102 @@
+"""Text to text: `format_text`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.span import SourceFile
+from scenelang.formatting.documents import Part
+from scenelang.formatting.layout import Layout
+from scenelang.formatting.printer import render
+from scenelang.formatting.trivia import attach, comments_of
+from scenelang.syntax import parse
+from scenelang.syntax.lexer import scan
+from scenelang.syntax.tables import tables
+from scenelang.syntax.tokens import Report, Tokens
+
+_BOM = "\ufeff"
+
+
+def format_text(text: str, *, name: str = "<text>") -> str:
+    """Lay a scene's text out in the canonical way.
+
+    Args:
+        text: the whole text of a file. A byte order mark at its beginning is kept; all lines end as the
+            first one does, in LF or CRLF.
+        name: what errors call it.
+
+    Returns:
+        The same tokens and comments in the canonical layout; equal to ``text`` if it has that already.
+
+    Raises:
+        SceneError: the text has syntax errors.
+    """
+    diagnostics = Diagnostics()
+    parse(SourceFile(name, text), diagnostics)
+    if diagnostics.errors:
+        raise SceneError(diagnostics)
+    mark = _BOM if text.startswith(_BOM) else ""
+    first = text.find("\n")
+    newline = "\r\n" if first > 0 and text[first - 1] == "\r" else "\n"
+    tokens = _tokens(text.replace("\r\n", "\n"))
+    lines = render(_document(tokens))
+    result = "".join(line + "\n" for line in lines)
+    _compare(tokens, _tokens(result))
+    return mark + result.replace("\n", newline)
+
+
+def _tokens(text: str) -> Tokens:
+    source = SourceFile("", text)
+    return scan(source, Report(source))
+
+
+def _document(tokens: Tokens) -> Part:
+    """The document of a text without mistakes: the parser's loop with callbacks that lay out."""
+    language = tables()
+    layout = Layout(tokens, attach(tokens))
+    actions, gotos, final = language.actions, language.gotos, language.final
+    rules = [
+        (length, origin, call)
+        for (length, origin, _), call in zip(language.rules, layout.callbacks(), strict=True)
+    ]
+    kinds = tokens.kinds
+    states = [language.start]
+    values: list[Any] = []
+    state = language.start
+    at = 0
+    while True:
+        action = actions[state][kinds[at]]
+        if action >= 0:
+            states.append(action)
+            values.append(at)
+            state = action
+            at += 1
+            continue
+        length, origin, call = rules[~action]
+        if call is not None:
+            parts = values[len(values) - length :]
+            del values[len(values) - length :]
+            values.append(call(*parts))
+        del states[len(states) - length :]
+        state = gotos[states[-1]][origin]
+        states.append(state)
+        if state == final:
+            document: Part = values[0]
+            return document
+
+
+def _compare(before: Tokens, after: Tokens) -> None:
+    """Fail if formatting would change anything but the layout: a bug, and no file is to suffer from it."""
+    if _significant(before) != _significant(after) or comments_of(before) != comments_of(after):
+        raise AssertionError("formatting changed the text's tokens or comments")
+
+
+def _significant(tokens: Tokens) -> list[str]:
+    """The texts of the tokens but for commas before a closing bracket, which make no difference."""
+    texts = [tokens.source.text[s:e] for s, e in zip(tokens.starts, tokens.ends, strict=True)]
+    return [
+        word
+        for word, following in zip(texts, [*texts[1:], ""], strict=True)
+        if word != "," or following not in (")", "]")
+    ]

@@ -1,0 +1,290 @@
+"""Callbacks of the grammar that lay out statements and blocks.
+
+Which blocks may stand on one line:
+
+- that of an object, a material or a call, if its statements are calls and such blocks themselves;
+- that of a `module`, `for`, `if`, `group`, `chain` or boolean node, if no statement in it has a block, or
+  if its only statement has one without further blocks.
+
+A comment that ends its line, or a blank line inside, opens a block; so does a line that would be too long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from scenelang.formatting.documents import (
+    BLANK,
+    LINE,
+    Comments,
+    Concat,
+    Group,
+    Indent,
+    Part,
+    after_of,
+    before_of,
+    ends_of,
+    flat_of,
+    joined,
+    own_after_first,
+    plain,
+    sequence,
+)
+from scenelang.formatting.expressions import Choice, ExpressionLayout, Operation
+from scenelang.formatting.lists import Bracketed, Item, blank_before, comment_lines, comments_before
+from scenelang.formatting.trivia import Comment
+from scenelang.syntax.tables import tables
+
+
+class Statement(Group):
+    """A statement.
+
+    Args:
+        flat, make: see `Group`.
+        depth: how many blocks it has within each other, empty ones not counted.
+        simple: it may stand in a block that is on one line.
+    """
+
+    __slots__ = ("depth", "simple")
+
+    def __init__(self, flat: str | None, make: Callable[[], Part], depth: int, simple: bool) -> None:
+        super().__init__(flat, make)
+        self.depth = depth
+        self.simple = simple
+
+
+class Block:
+    """``{ … }``, whose place in a line is for the statement around it to say.
+
+    Args:
+        opening: its first brace.
+        statements: what it holds.
+        closing: its last brace.
+    """
+
+    __slots__ = ("closing", "depth", "flat", "opening", "statements")
+
+    def __init__(self, opening: Part, statements: Sequence[Item], closing: Part) -> None:
+        self.opening = opening
+        self.closing = closing
+        self.statements = statements
+        self.depth = 0
+        self.flat: str | None = None
+        simple = not (before_of(opening) or after_of(opening) or before_of(closing))
+        for index, item in enumerate(statements):
+            stmt = item.part
+            assert isinstance(stmt, Statement)
+            self.depth = max(self.depth, stmt.depth + 1)
+            simple = simple and stmt.simple and not (stmt.before or stmt.after or (index and stmt.blank))
+        if simple:
+            self.flat = self._one_line()
+
+    def _one_line(self) -> str | None:
+        opening, closing = flat_of(self.opening), flat_of(self.closing)
+        if not self.statements and opening == "{":
+            return f"{{{closing}"
+        parts: list[Part] = [self.opening]
+        for item in self.statements:
+            parts += [" ", item.part]
+        return joined([*parts, " ", self.closing])
+
+    def structural(self) -> str | None:
+        """Its one line where it is the block of something that is no object."""
+        few = self.depth <= 1 or (self.depth == 2 and len(self.statements) == 1)
+        return self.flat if few else None
+
+    def open(self, behind: Sequence[Comment] = ()) -> list[Part]:
+        """The block on lines of its own; ``behind`` are comments that stood before its opening brace."""
+        opened = [*behind, *before_of(self.opening), *after_of(self.opening)]
+        inside = entries(self.statements, before_of(self.closing))
+        if not inside and not opened:
+            return [self.flat or "{}"]
+        first = [Comments(own_after_first(opened))] if opened else []
+        return [plain(self.opening), Indent(Concat(None, [*first, *inside])), LINE, plain(self.closing)]
+
+
+def entries(statements: Sequence[Item], dangling: Sequence[Comment]) -> list[Part]:
+    """Statements and the comments between them, each on a new line, blank lines kept."""
+    parts: list[Part] = []
+    for item in statements:
+        stmt = item.part
+        parts.append(BLANK if parts and blank_before(stmt) else LINE)
+        parts += comments_before(stmt)
+        parts.append(stmt)
+        if after := after_of(stmt):
+            parts.append(Comments(own_after_first(after)))
+    return [*parts, *comment_lines(dangling, begun=bool(parts))]
+
+
+class Layout(ExpressionLayout):
+    """Lays out one file."""
+
+    def callbacks(self) -> list[Callable[..., Any] | None]:
+        """The callback of every rule, in the order of `Tables.rules`; None passes the value on.
+
+        Rules that only recovery uses have none: what is laid out has no mistakes.
+        """
+        names = (name for _, _, name in tables().rules)
+        return [None if not name or name.startswith("bad_") else getattr(self, name) for name in names]
+
+    def file(self, statements: list[Item] | None = None) -> Part:
+        last = self.notes.get(len(self.tokens.kinds) - 1)
+        parts = entries(statements or [], last.before if last else [])
+        return Concat(None, parts[1:])
+
+    def following(self, items: list[Item], item: Part) -> list[Item]:
+        items.append(Item(item))
+        return items
+
+    def keyword(self, token: int) -> Part:
+        return self.word(token)
+
+    # ------------------------------------------------------------ statements without a block
+
+    def _ended(self, parts: Sequence[Part], last: int, simple: bool = False) -> Statement:
+        """A statement that ends with ``;``; comments before that go behind it."""
+        semicolon = self.word(last)
+        whole = [*parts[:-1], plain(parts[-1], before=len(parts) > 1), plain(semicolon)]
+        stmt = Statement(joined(whole), lambda: sequence(whole), 0, simple)
+        ends_of(stmt, parts[0], "")
+        stmt.after = [*after_of(parts[-1]), *before_of(semicolon), *after_of(semicolon)]
+        return stmt
+
+    def _assigned(self, value: Part) -> Part:
+        """What stands after ``=``: operations go to a line of their own before they are broken."""
+        if isinstance(value, (Operation, Choice)) and not value.before:
+            flat = None if value.flat is None else " " + value.flat
+            doc = Group(flat, lambda: Indent(Concat(None, [LINE, value])))
+            doc.after = value.after
+            return doc
+        return sequence([" ", value])
+
+    def version(self, word: int, number: int, last: int) -> Part:
+        return self._ended([self.word(word), " ", self.word(number)], last)
+
+    def model(self, word: int, name: Part, last: int) -> Part:
+        return self._ended([self.word(word), " ", name], last)
+
+    def param(self, word: int, name: Part, equal: int, default: Part, last: int) -> Part:
+        return self.let(word, name, equal, default, last)
+
+    def param_in(
+        self, word: int, name: Part, equal: int, default: Part, within: int, range: Part, last: int
+    ) -> Part:
+        head = [self.word(word), " ", name, " ", self.word(equal), self._assigned(default)]
+        return self._ended([*head, " ", self.word(within), " ", range], last)
+
+    def let(self, word: int, name: Part, equal: int, value: Part, last: int) -> Part:
+        head = [self.word(word), " ", name, " ", self.word(equal)]
+        return self._ended([*head, self._assigned(value)], last)
+
+    def fn(self, word: int, name: Part, params: Part, equal: int, body: Part, last: int) -> Part:
+        head = [self.word(word), " ", name, params, " ", self.word(equal)]
+        return self._ended([*head, self._assigned(body)], last)
+
+    def import_(self, word: int, path: int, as_: int, alias: Part, last: int) -> Part:
+        return self._ended([self.word(word), " ", self.word(path), " ", self.word(as_), " ", alias], last)
+
+    def material_use(self, word: int, name: Part, last: int) -> Part:
+        return self._ended([self.word(word), " ", name], last, simple=True)
+
+    def call_bare(self, name: Part, last: int) -> Part:
+        return self._ended([name], last, simple=True)
+
+    def call_args(self, name: Part, args: Part, last: int) -> Part:
+        return self._ended([name, args], last, simple=True)
+
+    def parameter(self, name: Part) -> Part:
+        return name
+
+    def parameter_default(self, name: Part, equal: int, default: Part) -> Part:
+        return sequence([name, " ", self.word(equal), " ", default])
+
+    # ------------------------------------------------------------ statements with a block
+
+    def block_empty(self, opening: int, closing: int) -> Block:
+        return Block(self.word(opening), [], self.word(closing))
+
+    def block(self, opening: int, statements: list[Item], closing: int) -> Block:
+        return Block(self.word(opening), statements, self.word(closing))
+
+    def _blocked(self, head: Sequence[Part], body: Block, one_line: str | None, simple: bool) -> Statement:
+        """A statement that ends with a block."""
+        begun = [*head[:-1], plain(head[-1], before=len(head) > 1)]
+        flat = None if one_line is None or after_of(head[-1]) else joined([*begun, " ", one_line])
+        stmt = Statement(
+            flat,
+            lambda: sequence([*begun, " ", *body.open(after_of(head[-1]))]),
+            body.depth,
+            simple and one_line is not None,
+        )
+        return ends_of(stmt, head[0], body.closing)
+
+    def _object(self, head: Sequence[Part], body: Block) -> Statement:
+        return self._blocked(head, body, body.flat, simple=True)
+
+    def _structure(self, head: Sequence[Part], body: Block) -> Statement:
+        return self._blocked(head, body, body.structural(), simple=False)
+
+    def module(self, word: int, name: Part, params: Part, body: Block) -> Part:
+        return self._structure([self.word(word), " ", name, params], body)
+
+    def for_(
+        self, word: int, opening: int, variable: Part, within: int, iterable: Part, closing: int, body: Block
+    ) -> Part:
+        inside = sequence([variable, " ", self.word(within), " ", iterable])
+        return self._structure([self.word(word), " ", self.parenthesised(opening, inside, closing)], body)
+
+    def if_then(self, word: int, opening: int, condition: Part, closing: int, then: Block) -> Statement:
+        return self._structure([self.word(word), " ", self.parenthesised(opening, condition, closing)], then)
+
+    def if_else(
+        self,
+        word: int,
+        opening: int,
+        condition: Part,
+        closing: int,
+        then: Block,
+        else_: int,
+        otherwise: Block | Statement,
+    ) -> Part:
+        begun = self.if_then(word, opening, condition, closing, then)
+        turn = self.word(else_)
+        between = [*after_of(then.closing), *before_of(turn)]
+        first = otherwise.opening if isinstance(otherwise, Block) else otherwise
+        rest = otherwise.structural() if isinstance(otherwise, Block) else otherwise.flat
+        flat = None
+        if rest is not None and not (between or after_of(turn) or before_of(first)):
+            flat = joined([begun, " ", turn, " ", rest])
+
+        def broken() -> Part:
+            parts = [begun.broken(), *([Comments(own_after_first(between)), LINE] if between else [" "])]
+            if isinstance(otherwise, Block):
+                return sequence([*parts, plain(turn), " ", *otherwise.open(after_of(turn))])
+            return sequence([*parts, plain(turn, after=True), " ", otherwise.broken()])
+
+        last = otherwise.closing if isinstance(otherwise, Block) else otherwise
+        depth = max(then.depth, otherwise.depth)
+        return ends_of(Statement(flat, broken, depth, simple=False), begun, last)
+
+    def node(self, kind: Part, body: Block) -> Part:
+        return self._structure([kind], body)
+
+    def combined(self, op: Part, child: Statement) -> Part:
+        parts = [op, " ", child]
+        stmt = Statement(joined(parts), lambda: sequence(parts), child.depth, child.simple)
+        return ends_of(stmt, op, child)
+
+    def material_use_block(self, word: int, name: Part, body: Block) -> Part:
+        return self._object([self.word(word), " ", name], body)
+
+    def call_block(self, name: Part, body: Block) -> Part:
+        return self._object([name], body)
+
+    def call_args_block(self, name: Part, args: Part, body: Block) -> Part:
+        return self._object([name, args], body)
+
+    def material_block(self, word: int, name: Part, body: Block) -> Part:
+        stmt = self._object([self.word(word), " ", name], body)
+        return ends_of(Bracketed(stmt.flat, stmt.make), stmt, stmt)

@@ -1,0 +1,165 @@
+"""Comments and blank lines: which token each of them belongs to.
+
+The rules are chosen so that text laid out by this package reads back the same way: whatever a comment is
+attached to, it is printed where the same rule attaches it again. That is what makes formatting idempotent.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from scenelang.syntax.tables import END, tables
+from scenelang.syntax.tokens import Tokens
+
+_COMMENT = re.compile(r"//[^\n]*|/\*[\s\S]*?\*/")
+
+
+class Comment(NamedTuple):
+    """One comment.
+
+    Args:
+        text: from its first sign to its last, trailing white space of its lines taken off.
+        column: code points before it on its line; None where tabs make that meaningless.
+        ends_line: nothing may follow it on its last line: it is a line comment or has several lines.
+        own_line: it stands on lines of its own.
+        blank: a blank line stands before it.
+    """
+
+    text: str
+    column: int | None
+    ends_line: bool
+    own_line: bool = False
+    blank: bool = False
+
+
+@dataclass(slots=True)
+class Notes:
+    """What stands around one token.
+
+    Args:
+        before: comments on lines of their own before it.
+        leading: block comments before it on its line, each with a space after it.
+        trailing: block comments after it on its line, each with a space before it.
+        after: comments behind it after which its line must end.
+        blank: a blank line stands right before it, or before its leading comments.
+    """
+
+    before: list[Comment] = field(default_factory=list)
+    leading: str = ""
+    trailing: str = ""
+    after: list[Comment] = field(default_factory=list)
+    blank: bool = False
+
+
+def attach(tokens: Tokens) -> dict[int, Notes]:
+    """The notes of every token that has any, by index; those of the end of the text go with the last one."""
+    text = tokens.source.text
+    notes: dict[int, Notes] = {}
+    end = 0
+    for index, start in enumerate(tokens.starts):
+        if start - end > 1:
+            gap = text[end:start]
+            if "/" in gap or gap.count("\n") > 1:
+                _Gap(tokens, notes, index).attach(end, start)
+        end = tokens.ends[index]
+    return notes
+
+
+def comments_of(tokens: Tokens) -> list[str]:
+    """The texts of all comments, in order."""
+    text = tokens.source.text
+    found: list[str] = []
+    end = 0
+    for start, stop in zip(tokens.starts, tokens.ends, strict=True):
+        if start - end > 1:
+            found += map(_stripped, _COMMENT.findall(text, end, start))
+        end = stop
+    return found
+
+
+def _stripped(text: str) -> str:
+    return "\n".join(line.rstrip() for line in text.split("\n"))
+
+
+class _Gap:
+    """What stands between the token before ``index`` and that token."""
+
+    def __init__(self, tokens: Tokens, notes: dict[int, Notes], index: int) -> None:
+        self.tokens = tokens
+        self.notes = notes
+        self.index = index
+
+    def _note(self, index: int) -> Notes:
+        return self.notes.setdefault(index, Notes())
+
+    def attach(self, start: int, end: int) -> None:
+        comments, newlines = self._read(start, end)
+        if not comments:
+            self._note(self.index).blank = newlines[0] > 1
+            return
+        count = self._behind(comments, newlines) if self.index else 0
+        self._ahead(comments[count:], newlines[count:])
+
+    def _read(self, start: int, end: int) -> tuple[list[Comment], list[int]]:
+        """The comments, and how many newlines stand before each of them and after the last."""
+        text = self.tokens.source.text
+        comments: list[Comment] = []
+        newlines: list[int] = []
+        at = start
+        for match in _COMMENT.finditer(text, start, end):
+            begins = match.start()
+            newlines.append(text.count("\n", at, begins))
+            at = match.end()
+            line = text[text.rfind("\n", 0, begins) + 1 : begins]
+            words = _stripped(match[0])
+            ends_line = words.startswith("//") or "\n" in words
+            comments.append(Comment(words, None if "\t" in line else len(line), ends_line))
+        newlines.append(text.count("\n", at, end))
+        return comments, newlines
+
+    def _behind(self, comments: Sequence[Comment], newlines: Sequence[int]) -> int:
+        """Attach the comments that follow the token before on its line; how many have been placed."""
+        count = 0
+        for comment, lines in zip(comments, newlines, strict=False):
+            if lines:
+                break
+            count += 1
+            if comment.ends_line:
+                break
+        if not count:
+            return 0
+        here = comments[:count]
+        words = " ".join(comment.text for comment in here)
+        before = self._note(self.index - 1)
+        if here[-1].ends_line or count < len(comments):
+            before.after += here
+        elif self._closes(self.index) or (newlines[count] and self._separates(self.index - 1)):
+            before.trailing = words
+        else:
+            self._note(self.index).leading = words
+            self._note(self.index).blank = False
+        return count
+
+    def _ahead(self, comments: Sequence[Comment], newlines: Sequence[int]) -> None:
+        """Attach the other comments to the token."""
+        here = self._note(self.index)
+        first = len(comments)
+        if not self._closes(self.index):
+            while first and not newlines[first] and not comments[first - 1].ends_line:
+                first -= 1
+        if comments[first:]:
+            here.leading = " ".join(comment.text for comment in comments[first:])
+        if not here.leading or comments[first:]:
+            here.blank = newlines[first] > 1
+        for comment, lines in zip(comments[:first], newlines, strict=False):
+            here.before.append(comment._replace(own_line=True, blank=lines > 1))
+
+    def _closes(self, index: int) -> bool:
+        kind = self.tokens.kinds[index]
+        return kind == END or tables().kinds[kind] in {")", "]", "}", ",", ";"}
+
+    def _separates(self, index: int) -> bool:
+        return tables().kinds[self.tokens.kinds[index]] in {",", ";", "{", "}"}
