@@ -16,12 +16,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from scenelang.diagnostics.cells import Canvas, in_cells, paint, printable, window
+from scenelang.diagnostics.cells import Canvas, Line, in_cells, paint, printable, window
 from scenelang.diagnostics.span import SourceFile, Span
 
 _LEAST_WIDTH = 30
 _HEAD, _TAIL = 2, 1
 """Of a mark over many lines so many are shown after its first line and before its last."""
+_BEFORE, _LONGEST = 500, 4000
+"""Of a line with more code points than the second, only so many are laid out, from the first before its marks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +84,11 @@ class Snippet:
         self.gutter = gutter
         self.notes: dict[int, list[_Note]] = {}
         self.bars: list[_Bar] = []
+        self.laid: dict[int, tuple[Line, int]] = {}
+        self.columns: dict[int, int] = {}
+        for mark in marks:
+            for line, column in mark.span.locate():
+                self.columns[line] = min(column, self.columns.get(line, column))
         for mark in marks:
             self._sort_in(mark)
         self._give_columns()
@@ -93,13 +100,30 @@ class Snippet:
         if bottom > top and last == 1:  # it ends with a line break
             bottom -= 1
             last = len(self.source.line(bottom)) + 1
-        start = in_cells(self.source.line(top)).cell(first)
-        end = in_cells(self.source.line(bottom)).cell(last)
+        start, end = self._cell(top, first), self._cell(bottom, last)
         if top == bottom:
             note = _Note(start, max(end, start + 1), mark, printable(mark.words))
             self.notes.setdefault(top, []).append(note)
         else:
             self.bars.append(_Bar(mark, top, start, bottom, max(end, 1)))
+
+    def _lay(self, number: int) -> tuple[Line, int]:
+        """A line in cells, and how many of its code points are left out in front.
+
+        A file of one line may have 10 MB and 200 mistakes.
+        """
+        if number not in self.laid:
+            text = self.source.line(number)
+            cut = 0
+            if len(text) > _LONGEST:
+                cut = max(0, self.columns.get(number, 1) - 1 - _BEFORE)
+            self.laid[number] = in_cells(text[cut : cut + _LONGEST]), cut
+        return self.laid[number]
+
+    def _cell(self, number: int, column: int) -> int:
+        """The cell of a place; what is left out in front takes none."""
+        line, cut = self._lay(number)
+        return line.cell(max(1, column - cut))
 
     def _give_columns(self) -> None:
         """Bars that share a line stand in different columns, the outer ones further to the left."""
@@ -107,11 +131,11 @@ class Snippet:
         for index, bar in enumerate(self.bars):
             taken = {b.column for b in self.bars[:index] if b.bottom >= bar.top}
             bar.column = next(c for c in range(len(self.bars)) if c not in taken)
-            line = self.source.line(bar.top)
+            line, cut = self._lay(bar.top)
             alone = bar.top not in self.notes and all(
                 b is bar or bar.top not in (b.top, b.bottom) for b in self.bars
             )
-            bar.slash = alone and not "".join(in_cells(line).cells[: bar.left]).strip()
+            bar.slash = alone and not cut and not "".join(line.cells[: bar.left]).strip()
         for bar in self.bars:
             if not bar.slash:
                 note = _Note(bar.left, bar.left + 1, bar.mark, "", bar)
@@ -165,7 +189,7 @@ class Snippet:
             if bar.top == number and bar.slash:
                 canvas.put(0, bar.column, "/", self._style(bar.mark))
         notes = sorted(self.notes.get(number, ()), key=lambda note: (note.left, note.right))
-        line = in_cells(self.source.line(number))
+        line, _ = self._lay(number)
         first = min((note.left for note in notes), default=0)
         last = max((note.right for note in notes), default=0)
         words = len(notes[-1].words) + 1 if notes else 0
