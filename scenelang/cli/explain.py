@@ -1,26 +1,140 @@
-"""``scenelang explain``: what a diagnostic's code stands for."""
+"""``scenelang explain``: the page of a diagnostic's code."""
 
 from __future__ import annotations
 
+import re
+import shutil
+import sys
+import textwrap
+from typing import TYPE_CHECKING
+
 import click
 
-_AREAS = {
-    "01": "syntax",
-    "02": "names",
-    "03": "types and values",
-    "04": "graph and booleans",
-    "05": "what a model can do",
-}
+from scenelang.cli import options
+
+if TYPE_CHECKING:
+    from scenelang.diagnostics.pages import Page
+
+_WIDEST = 96
 
 
 @click.command("explain")
-@click.argument("code")
-def command(code: str) -> None:
-    """Say what CODE means, such as E0401."""
+@click.argument("code", required=False)
+@click.option("--list", "listed", is_flag=True, help="List all codes, as without a CODE.")
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice(["human", "json"]),
+    default="human",
+    show_default=True,
+    help="How pages are written.",
+)
+@options.color
+def command(code: str | None, listed: bool, kind: str, color: options.Color) -> None:
+    """Say what CODE means, such as E0401, with an example and what to write instead.
+
+    A word instead of a code lists the codes that are about it.
+    """
+    from scenelang.cli.say import wants_color
     from scenelang.diagnostics.codes import CODES
 
-    wanted = code.strip().upper()
-    if wanted not in CODES:
-        raise click.UsageError(f"No code '{code}'; codes look like E0401 and W0501.")
-    severity = "warning" if wanted.startswith("W") else "error"
-    click.echo(f"{severity} {wanted} ({_AREAS[wanted[1:3]]}): {CODES[wanted]}")
+    paint = wants_color(sys.stdout, color)
+    if code is None or listed:
+        _print_list(list(CODES), kind, paint)
+        return
+    found = re.search(r"[EWew]\d{4}", code)
+    wanted = found.group().upper() if found else code.strip()
+    if wanted in CODES:
+        from scenelang.diagnostics.pages import read_page
+
+        _print_page(read_page(wanted), kind, paint)
+        return
+    about = [known for known, title in CODES.items() if wanted.lower() in title.lower()]
+    if not about or len(wanted) < 3:
+        raise click.UsageError(f"No code '{code}'.{_advice(wanted, list(CODES))}")
+    _print_list(about, kind, paint)
+
+
+def _advice(wanted: str, known: list[str]) -> str:
+    """Codes near a mistyped one."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(wanted.upper(), known, 3, 0.7)
+    if near:
+        return f" Did you mean {' or '.join(near)}?"
+    return " Codes look like E0401 and W0501; `scenelang explain --list` shows all."
+
+
+def _print_list(codes: list[str], kind: str, paint: bool) -> None:
+    from scenelang.diagnostics.codes import CODES
+    from scenelang.diagnostics.pages import AREAS, severity_of
+
+    if kind == "json":
+        import json
+
+        data = [{"code": c, "severity": severity_of(c), "title": CODES[c]} for c in codes]
+        click.echo(json.dumps({"version": 1, "codes": data}, indent=2))
+        return
+    sections = []
+    for area, name in AREAS.items():
+        own = [f"  {_styled(c, severity_of(c), paint)}  {CODES[c]}" for c in codes if c[1:3] == area]
+        if own:
+            sections.append("\n".join([_styled(name, "bold", paint), *own]))
+    click.echo("\n\n".join(sections), color=True)
+
+
+def _print_page(page: Page, kind: str, paint: bool) -> None:
+    if kind == "json":
+        import json
+
+        data = {
+            "version": 1,
+            "code": page.code,
+            "severity": page.severity,
+            "area": page.area,
+            "title": page.title,
+            "text": page.text,
+            "examples": [
+                {"kind": e.kind, "language": e.language, "text": e.text, "options": list(e.options)}
+                for e in page.examples
+            ],
+            "files": dict(page.files),
+        }
+        click.echo(json.dumps(data, indent=2, ensure_ascii=False))
+        return
+    width = min(shutil.get_terminal_size((_WIDEST, 24)).columns, _WIDEST)
+    click.echo(in_terminal(page, max(width, 40), paint), nl=False, color=True)
+
+
+def _styled(text: str, style: str, paint: bool) -> str:
+    from scenelang.diagnostics import cells
+
+    return cells.paint(style, text, paint)
+
+
+def in_terminal(page: Page, width: int, paint: bool) -> str:
+    """A page without its Markdown: headings alone, code indented, paragraphs wrapped.
+
+    Args:
+        page: what to print.
+        width: cells of a line.
+        paint: with ANSI colours.
+    """
+    head = f"{page.severity}[{page.code}]"
+    blocks = [_styled(head, page.severity, paint) + _styled(f": {page.title}", "bold", paint)]
+    text = re.sub(r"^<!--.*-->\n", "", page.text.partition("\n")[2], flags=re.MULTILINE)
+    for part in re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL):
+        if part.startswith("```"):
+            info, _, code = part.removesuffix("```").partition("\n")
+            title = re.search(r'title="([^"]+)"', info)
+            named = f"    {_styled(title[1] + ':', 'frame', paint)}\n" if title else ""
+            blocks.append(named + textwrap.indent(code.rstrip("\n"), "    "))
+            continue
+        for paragraph in part.strip().split("\n\n"):
+            if paragraph.startswith("## "):
+                blocks.append(_styled(paragraph[3:], "bold", paint))
+            elif paragraph:
+                plain = re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", paragraph)
+                filled = textwrap.fill(plain, width, break_long_words=False, break_on_hyphens=False)
+                blocks.append(re.sub(r"`[^`\n]+`", lambda code: _styled(code[0], "frame", paint), filled))
+    return "\n\n".join(blocks) + "\n"

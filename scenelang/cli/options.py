@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 if TYPE_CHECKING:
     from scenelang.scene.params import Defines
+
+Color = Literal["auto", "always", "never"]
 
 
 def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
@@ -54,6 +56,13 @@ size = click.option(
 )
 frame = click.option(
     "--frame", type=click.IntRange(0), default=0, metavar="N", help="Frame of the animation, from 0."
+)
+color = click.option(
+    "--color",
+    type=click.Choice(["auto", "always", "never"]),
+    default="auto",
+    show_default=True,
+    help="Colour what is printed; auto does so on terminals, unless NO_COLOR is set.",
 )
 strict = click.option("--strict", is_flag=True, help="Count warnings as errors.")
 device = click.option(

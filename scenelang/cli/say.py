@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Iterable
 from typing import IO, Any
@@ -12,16 +13,33 @@ import click
 from scenelang.diagnostics.diagnostic import Diagnostic
 
 
-def wants_color(stream: IO[Any]) -> bool:
-    """Whether a stream is a terminal whose user has not switched colours off (https://no-color.org)."""
-    return stream.isatty() and not os.environ.get("NO_COLOR")
+def wants_color(stream: IO[Any], choice: str = "auto") -> bool:
+    """Whether to colour what goes to a stream.
+
+    Args:
+        stream: where it goes.
+        choice: ``always``, ``never``, or ``auto``: a terminal that can, whose user has not switched colours
+            off (https://no-color.org).
+    """
+    if choice != "auto":
+        return choice == "always"
+    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def width_of(stream: IO[Any]) -> int:
+    """Cells of a line: the terminal's, or enough for most where there is none."""
+    from scenelang.diagnostics.render_text import WIDTH
+
+    if not stream.isatty():
+        return WIDTH
+    return shutil.get_terminal_size((WIDTH, 24)).columns
 
 
 def say_diagnostics(diagnostics: Iterable[Diagnostic]) -> None:
     """Print diagnostics for people, with carets, to standard error."""
     from scenelang.diagnostics.render_text import render_text
 
-    text = render_text(diagnostics, wants_color(sys.stderr))
+    text = render_text(diagnostics, wants_color(sys.stderr), width=width_of(sys.stderr))
     if text:
         click.echo(text, err=True, nl=False, color=True)
 

@@ -1,0 +1,126 @@
+"""A page for every code, ``E0101.md``: what it means, why, an example, and what to write instead.
+
+A page is plain Markdown with a fixed shape, so that it serves three readers: `scenelang explain`, the
+documentation site (which renders each file of this folder as ``errors/CODE.html``; ``docs/errors.md`` is the
+index), and the tests, which run every example.
+
+- The first line is ``# CODE: title`` with the title of `diagnostics.codes`.
+- The sections ``## Why``, ``## Example`` and ``## Instead`` follow the paragraph that says what it is.
+- A fence ``nsg {.bad}`` gives exactly this code, ``nsg {.good}`` nothing at all; ``json`` is a Scene for
+  `scenelang.scene.data`, ``python`` is run and raises `SceneError`.
+- A fence ``nsg title="parts.nsg"`` is a file beside all examples of the page, which are ``scene.nsg``.
+- A ``sh`` fence behind an example is the command that checks it; its options count.
+- ``<!-- with scenelang.module.LIMIT = 3 -->`` before an example lowers limits that it is too short to reach.
+
+Nothing is read before it is asked for.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Final, Literal
+
+from scenelang.diagnostics.codes import CODES
+
+AREAS: Final = {
+    "01": "syntax",
+    "02": "names",
+    "03": "types and values",
+    "04": "graph and booleans",
+    "05": "what a model can do",
+}
+_FENCE: Final = re.compile(
+    r"(?:^<!-- with (?P<limits>[^\n]*) -->\n)?^```(?P<info>[^\n]*)\n(?P<text>.*?)^```$",
+    re.MULTILINE | re.DOTALL,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Example:
+    """A scene of a page.
+
+    Args:
+        kind: ``bad`` gives the page's code and nothing else, ``good`` nothing.
+        language: ``nsg``, ``json`` or ``python``.
+        text: the scene.
+        options: what `scenelang check` is told besides, as words.
+        limits: limits that are lowered for it, by their dotted names.
+    """
+
+    kind: Literal["bad", "good"]
+    language: str
+    text: str
+    options: tuple[str, ...] = ()
+    limits: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """What there is to know about a code.
+
+    Args:
+        code: such as ``E0302``.
+        text: the Markdown, with its first line.
+        examples: in the order of the page.
+        files: names and texts of files beside the examples.
+    """
+
+    code: str
+    text: str
+    examples: tuple[Example, ...]
+    files: tuple[tuple[str, str], ...]
+
+    @property
+    def title(self) -> str:
+        return CODES[self.code]
+
+    @property
+    def severity(self) -> str:
+        return severity_of(self.code)
+
+    @property
+    def area(self) -> str:
+        return AREAS[self.code[1:3]]
+
+
+def severity_of(code: str) -> str:
+    """``error`` or ``warning``."""
+    return "warning" if code.startswith("W") else "error"
+
+
+@cache
+def read_page(code: str) -> Page:
+    """The page of a code.
+
+    Raises:
+        KeyError: there is no such code.
+    """
+    if code not in CODES:
+        raise KeyError(code)
+    text = (files(__name__) / f"{code}.md").read_text("utf-8")
+    examples: list[Example] = []
+    beside: list[tuple[str, str]] = []
+    for fence in _FENCE.finditer(text):
+        language, _, info = fence["info"].partition(" ")
+        if title := re.fullmatch(r'title="([^"]+)"', info):
+            beside.append((title[1], fence["text"]))
+        elif info in ("{.bad}", "{.good}"):
+            limits = [item.split("=") for item in (fence["limits"] or "").split(",") if item]
+            examples.append(
+                Example(
+                    "bad" if info == "{.bad}" else "good",
+                    language,
+                    fence["text"],
+                    (),
+                    tuple((name.strip(), int(value)) for name, value in limits),
+                )
+            )
+        elif language == "sh" and examples:
+            last = examples[-1]
+            options = tuple(shlex.split(fence["text"])[3:])
+            examples[-1] = Example(last.kind, last.language, last.text, options, last.limits)
+    return Page(code, text, tuple(examples), tuple(beside))

@@ -1,0 +1,84 @@
+"""`scenelang explain`: pages, lists, near codes, JSON."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from scenelang.cli.explain import in_terminal
+from scenelang.diagnostics.codes import CODES
+from scenelang.diagnostics.pages import read_page
+from tests.cli.conftest import Folder
+
+
+def test_a_page(folder: Folder) -> None:
+    result = folder.run("explain", "E0302")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("error[E0302]: bare number where an angle is wanted\n\n")
+    assert "\n    square { rotate(45); }\n" in result.stdout
+    assert "```" not in result.stdout
+    assert "#" not in result.stdout
+    assert "\x1b" not in result.stdout
+
+
+@pytest.mark.parametrize("given", ["e0302", " E0302", "error[E0302]", "[E0302]:"])
+def test_a_code_as_it_was_printed(folder: Folder, given: str) -> None:
+    assert folder.run("explain", given).stdout == folder.run("explain", "E0302").stdout
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_page_reads_well_in_a_terminal(code: str) -> None:
+    page = read_page(code)
+    text = in_terminal(page, 60, False)
+    assert not re.search(r"```|^#|<!--|\]\(|[ \t]$", text, re.MULTILINE)
+    prose = [line for line in text.splitlines()[1:] if not line.startswith("    ")]
+    assert all(len(line) <= 60 for line in prose if " " in line)
+    for example in page.examples:
+        assert example.text.splitlines()[0] in text
+    colored = in_terminal(page, 60, True)
+    assert re.sub(r"\x1b\[[\d;]*m", "", colored) == text
+
+
+def test_files_beside_an_example_are_named(folder: Folder) -> None:
+    assert "\n    parts.nsg:\n    import" in folder.run("explain", "E0216").stdout
+
+
+@pytest.mark.parametrize("arguments", [(), ("--list",), ("E0302", "--list")])
+def test_all_codes(folder: Folder, arguments: tuple[str, ...]) -> None:
+    shown = folder.run("explain", *arguments).stdout
+    assert re.findall(r"^  ([EW]\d{4})  ", shown, re.MULTILINE) == sorted(
+        CODES, key=lambda c: (c[1:3], c[0], c)
+    )
+    assert shown.startswith("syntax\n  E0101")
+
+
+def test_codes_about_a_word(folder: Folder) -> None:
+    shown = folder.run("explain", "semicolon").stdout
+    assert re.findall(r"[EW]\d{4}", shown) == ["E0102", "W0101"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "advice"), [("E9302", "Did you mean"), ("rumba", "--list"), ("", "--list")]
+)
+def test_an_unknown_code(folder: Folder, wrong: str, advice: str) -> None:
+    result = folder.run("explain", wrong)
+    assert result.exit_code == 2
+    assert advice in result.stderr
+
+
+def test_json(folder: Folder) -> None:
+    data = json.loads(folder.run("explain", "E0309", "--format", "json").stdout)
+    assert (data["version"], data["code"], data["severity"]) == (1, "E0309", "error")
+    assert data["title"] == CODES["E0309"]
+    assert data["text"].startswith("# E0309: ")
+    assert [example["kind"] for example in data["examples"]] == ["bad", "good"]
+    assert data["examples"][0]["options"] == ["-D", "size=7"]
+    listed = json.loads(folder.run("explain", "--format", "json").stdout)
+    assert [item["code"] for item in listed["codes"]] == list(CODES)
+
+
+def test_colour(folder: Folder) -> None:
+    assert "\x1b[1;31m" in folder.run("explain", "E0302", "--color", "always").stdout
+    assert "\x1b" not in folder.run("explain", "E0302", "--color", "never").stdout

@@ -1,0 +1,124 @@
+"""Every code has a page; its bad examples give exactly that code, and its good ones nothing at all."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import scenelang
+from scenelang.diagnostics.codes import CODES
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
+from scenelang.diagnostics.pages import AREAS, Example, Page, read_page
+from scenelang.diagnostics.span import SourceFile
+from scenelang.models.manifest import Manifest, available, load_manifest
+from scenelang.passes import check_scene
+from scenelang.scene.data import from_json
+from scenelang.scene.evaluate import load_source
+from scenelang.scene.params import Defines
+from scenelang.scene.schema import Scene
+
+PAGES = Path(scenelang.__file__).parent / "diagnostics/pages"
+ROOT = Path(__file__).parents[2]
+
+# A 3D model as `language.md` has it: pages about what models lack need a second one.
+SOLIDS = Manifest(
+    name="solids3d",
+    summary="sphere and torus under a point light",
+    dimension=3,
+    renderer="framed",
+    lifting="exact",
+    geometries=("sphere", "torus"),
+    materials=("diffuse", "volumetric"),
+    default_material="diffuse",
+    transforms=("translate", "rotate", "scale", "shear", "matrix", "twist", "displace"),
+    material_ops=("color", "grayscale", "hue"),
+    limits={"canvas": 2048},
+    trained={},
+    measured={},
+)
+MODELS = [SOLIDS, *(load_manifest(name) for name in available() if name != SOLIDS.name)]
+
+
+def manifest_for(scene: Scene, found: Diagnostics) -> Manifest | None:
+    """As the compiler picks it, from `MODELS`."""
+    from scenelang.models.choose import choose_model
+
+    if scene.model is not None:
+        return next(m for m in MODELS if m.name == scene.model)
+    chosen = choose_model(scene, MODELS)
+    if chosen is None:
+        found.add("E0508", "no model fits", None)
+    return chosen
+
+
+def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
+    """What there is to say about an example."""
+    found = Diagnostics()
+    if example.language == "python":
+        try:
+            exec(compile(example.text, page.code, "exec"), {})
+        except SceneError as error:
+            return list(error.diagnostics)
+        return []
+    spans = None
+    if example.language == "json":
+        try:
+            scene: Scene | None = from_json(example.text)
+        except SceneError as error:
+            return list(error.diagnostics)
+    else:
+        for name, text in (("scene.nsg", example.text), *page.files):
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text(text, "utf-8")
+        told = {"-D": [], "--frame": ["0"]}
+        for name, value in zip(example.options[::2], example.options[1::2], strict=True):
+            told[name].append(value)
+        defines = Defines(dict(item.split("=", 1) for item in told["-D"]))
+        source = SourceFile("scene.nsg", example.text)
+        path = folder / "scene.nsg"
+        frame = int(told["--frame"][-1])
+        scene, spans = load_source(
+            source, diagnostics=found, defines=defines, path=path, models=MODELS, frame=frame
+        )
+        defines.report_unused(found)
+    if scene is not None and (manifest := manifest_for(scene, found)):
+        check_scene(scene, spans, found, manifest)
+    return list(found)
+
+
+EXAMPLES = [
+    pytest.param(example, page, id=f"{page.code}-{example.kind}{index}")
+    for page in map(read_page, CODES)
+    for index, example in enumerate(page.examples)
+]
+
+
+@pytest.mark.parametrize(("example", "page"), EXAMPLES)
+def test_example(example: Example, page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in example.limits:
+        monkeypatch.setattr(name, value)
+    found = check(example, page, tmp_path)
+    wanted = [page.code] if example.kind == "bad" else []
+    assert [d.code for d in found] == wanted, [(d.message, d.span) for d in found]
+
+
+def test_pages_and_codes_belong_together() -> None:
+    assert {path.stem for path in PAGES.glob("*.md")} == set(CODES)
+
+
+@pytest.mark.parametrize("page", [*map(read_page, CODES)], ids=lambda page: page.code)
+def test_shape_of_a_page(page: Page) -> None:
+    assert page.text.startswith(f"# {page.code}: {page.title}\n\n")
+    assert re.findall(r"^## (.*)$", page.text, re.MULTILINE) == ["Why", "Example", "Instead"]
+    kinds = [example.kind for example in page.examples]
+    assert kinds == sorted(kinds), "bad examples come before good ones"
+    assert set(kinds) == {"bad", "good"}
+    assert page.text.count("```") == 2 * (
+        len(page.examples) + len(page.files) + sum(bool(e.options) for e in page.examples)
+    ), "a fence that means nothing"
+    prose = re.sub(r"```.*?```", "", page.text, flags=re.DOTALL)
+    assert 200 < len(prose) < 1500
+    assert all(len(line) <= 110 for line in page.text.splitlines())
+    assert page.area in AREAS.values()
