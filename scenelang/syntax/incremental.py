@@ -1,0 +1,337 @@
+"""Parsing again after an edit: only the top-level statements near it; the rest of the tree is kept.
+
+What comes out equals a parse of the whole text: tree, spans and diagnostics. That rests on three facts.
+
+- At a boundary between two top-level statements the parser's stack holds nothing but the statements
+  read so far, so what follows depends on the tokens that follow alone.
+- Recovery looks at most `_REACH` tokens past a mistake, and before its statement at the one token there.
+  So a statement with a mistake is kept only that far from the edit, and what is read again after a mistake
+  goes on that far.
+- What looks at the whole text (braces that do not match, an open comment, too many mistakes, too deep
+  nesting) is told apart, and such a text is parsed as a whole.
+
+Kept trees stand at their old places until somebody asks for them: an edit near the top of a long file
+moves everything after it and costs nothing where nobody looks.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final
+
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.syntax import nodes
+from scenelang.syntax.lexer import scan
+from scenelang.syntax.move import move_diagnostic, move_node
+from scenelang.syntax.parser import parse, parse_tokens
+from scenelang.syntax.repairs import FOLLOWED
+from scenelang.syntax.tables import tables
+from scenelang.syntax.tokens import Report, Tokens
+
+_REACH: Final = 3 * FOLLOWED
+_MOST_MISTAKES: Final = 50  # with more of them the whole text is read: some limit may be near
+_OLDEST: Final = 32  # a kept tree may hold on to the text of so many edits ago, whose part there is the same
+_MOVED: Final = -_OLDEST - 1  # the version of a tree that something before it has been edited since
+_GLOBAL: Final = ("E0115", "E0120", "E0121")  # open comment, nesting, too many: no matter of one statement
+
+
+@dataclass(slots=True)
+class _Piece:
+    """A top-level statement where it was last parsed or moved to, and the version of the text then."""
+
+    node: nodes.Stmt
+    version: int
+
+
+@dataclass(frozen=True)
+class Edit:
+    """``old[start:old_end]`` became ``new[start:new_end]``; offsets in code points."""
+
+    start: int
+    old_end: int
+    new_end: int
+
+    @property
+    def delta(self) -> int:
+        return self.new_end - self.old_end
+
+
+@dataclass
+class Parsed:
+    """A text and its tree, ready to be edited.
+
+    Args:
+        source: the text.
+        starts: where each top-level statement begins.
+        ends: where it ends.
+        tokens: the text's tokens, as they were before recovery.
+        diagnostics: all syntax mistakes, in the order of the text.
+        pieces: the statements, perhaps at older places.
+        reparsed: how many statements were read to get here.
+        version: the number of edits so far.
+    """
+
+    source: SourceFile
+    starts: list[int]
+    ends: list[int]
+    tokens: Tokens
+    diagnostics: tuple[Diagnostic, ...]
+    pieces: list[_Piece] = field(repr=False)
+    reparsed: int = 0
+    version: int = 0
+
+    def statement(self, index: int) -> nodes.Stmt:
+        """Top-level statement number ``index``, at its place in this text.
+
+        One that has not moved may keep the source of an older version, the same up to its end.
+        """
+        piece = self.pieces[index]
+        delta = self.starts[index] - piece.node.span.start
+        if self.version - piece.version > _OLDEST:
+            # A new piece: the old one may belong to an older text that somebody still reads.
+            piece = _Piece(move_node(piece.node, delta, self.source), self.version)
+            self.pieces[index] = piece
+        return piece.node
+
+    def heads(self) -> list[nodes.Stmt]:
+        """All top-level statements, *not* at their places: for names and kinds only."""
+        return [piece.node for piece in self.pieces]
+
+    def at(self, offset: int) -> int | None:
+        """Index of the statement that holds ``offset``, its end included; None between statements."""
+        index = bisect_right(self.starts, offset) - 1
+        return index if index >= 0 and offset <= self.ends[index] else None
+
+    @cached_property
+    def file(self) -> nodes.File:
+        """The whole tree."""
+        statements = tuple(self.statement(index) for index in range(len(self.pieces)))
+        return nodes.File(statements, Span(self.source, 0, len(self.source.text)))
+
+    @cached_property
+    def is_local(self) -> bool:
+        """Whether every mistake concerns its own statement alone."""
+        found = self.diagnostics
+        if len(found) > _MOST_MISTAKES or any(d.code in _GLOBAL for d in found):
+            return False
+        kinds = self.tokens.kinds
+        return not self.tokens.cut and _settled(kinds) and not (found and _mended_by_layout(self.tokens))
+
+
+def parse_whole(source: SourceFile) -> Parsed:
+    """Parse a text from scratch."""
+    diagnostics = Diagnostics()
+    file = parse(source, diagnostics)
+    tokens = scan(source, Report(source))
+    return Parsed(
+        source,
+        [stmt.span.start for stmt in file.statements],
+        [stmt.span.end for stmt in file.statements],
+        tokens,
+        tuple(diagnostics),
+        [_Piece(stmt, 0) for stmt in file.statements],
+        len(file.statements),
+    )
+
+
+def parse_edited(old: Parsed, source: SourceFile, edit: Edit) -> Parsed:
+    """Parse a text of which an older version is known.
+
+    Args:
+        old: the older version.
+        source: the new text.
+        edit: the one difference between the two.
+
+    Returns:
+        What `parse_whole` gives, for less work.
+    """
+    if old.pieces and old.is_local:
+        for reach in (1, _REACH):
+            new = _Splice(old, source, edit).run(reach)
+            if new is not None:
+                return new
+    return parse_whole(source)
+
+
+class _Splice:
+    """One attempt to replace a run of statements."""
+
+    def __init__(self, old: Parsed, source: SourceFile, edit: Edit) -> None:
+        self.old = old
+        self.source = source
+        self.edit = edit
+
+    def run(self, reach: int) -> Parsed | None:
+        """The new version, or None where reading so little does not tell.
+
+        Args:
+            reach: how many unchanged tokens to read after the edit; `_REACH` allows for mistakes.
+        """
+        old, delta = self.old, self.edit.delta
+        first = self._first()
+        last = self._last(reach)
+        to_end = last == len(old.pieces)
+        begin = old.starts[first] if first else 0
+        end = len(self.source.text) if to_end else old.ends[last] + delta
+        report = Report(self.source)
+        tokens = scan(self.source, report, begin, end)
+        if tokens.cut or not _settled(tokens.kinds):
+            return None
+        pristine = _copy(tokens)
+        file = parse_tokens(tokens, report)
+        found = Diagnostics()
+        report.flush(found)
+        if not self._is_sound(found, reach, pristine, end, to_end):
+            return None
+        fresh = file.statements
+        kept = [] if to_end else [_Piece(piece.node, _MOVED) for piece in old.pieces[last + 1 :]]
+        if not to_end:
+            # The statement that was read again to be sure has come out as it was.
+            before = old.pieces[last].node
+            if not fresh or fresh[-1].span.end != end:
+                return None
+            if fresh[-1] != move_node(before, fresh[-1].span.start - before.span.start, self.source):
+                return None
+        return self._joined(first, last, pristine, found, fresh, kept, begin, end, to_end)
+
+    def _first(self) -> int:
+        """Index of the first statement to read: a sound one before the edit, after one that is."""
+        old, start = self.old, self.edit.start
+        index = bisect_left(old.ends, start)  # statements before this one end before the edit
+        index = max(0, index - 1)
+        touched = bisect_left(old.tokens.starts, start)
+        near = old.tokens.starts[max(0, touched - _REACH)] if old.tokens.starts else 0
+        for d in old.diagnostics:
+            if d.span is not None and d.span.start >= near:
+                index = min(index, max(0, bisect_left(old.ends, d.span.start) - 1))
+                break
+        while index and not (self._is_clean(index) and self._is_clean(index - 1)):
+            index -= 1
+        return index
+
+    def _last(self, reach: int) -> int:
+        """Index of the last statement to read: a sound one, far enough after the edit."""
+        old, end = self.old, self.edit.old_end
+        index = bisect_right(old.starts, end)  # statements from here on begin after the edit
+        if index < len(old.starts):
+            token = bisect_left(old.tokens.starts, old.starts[index])
+            far = min(token + reach, len(old.tokens.starts) - 1)
+            index = bisect_left(old.ends, old.tokens.starts[far])
+        while index < len(old.pieces) and not self._is_clean(index):
+            index += 1
+        return index
+
+    def _is_clean(self, index: int) -> bool:
+        """Whether no mistake touches a statement or what stands before it."""
+        low = self.old.ends[index - 1] if index else 0
+        high = self.old.ends[index]
+        return not any(
+            d.span is not None and d.span.start <= high and d.span.end >= low for d in self.old.diagnostics
+        )
+
+    def _is_sound(self, found: Diagnostics, reach: int, tokens: Tokens, end: int, to_end: bool) -> bool:
+        """Whether the mistakes found are those that a parse of the whole text finds there."""
+        if not found.items:
+            return True
+        others = len(self.old.diagnostics)
+        if reach < _REACH or len(found) + others > _MOST_MISTAKES or any(d.code in _GLOBAL for d in found):
+            return False
+        if to_end:
+            return True
+        furthest = max(d.span.end for d in found if d.span is not None)
+        behind = len(tokens.starts) - bisect_left(tokens.starts, furthest)
+        # A string that is not closed might be closed further on in its line.
+        return behind >= _REACH and "\n" in self.source.text[furthest:end]
+
+    def _joined(
+        self,
+        first: int,
+        last: int,
+        tokens: Tokens,
+        found: Diagnostics,
+        fresh: tuple[nodes.Stmt, ...],
+        kept: list[_Piece],
+        begin: int,
+        end: int,
+        to_end: bool,
+    ) -> Parsed | None:
+        old, delta, source = self.old, self.edit.delta, self.source
+        rest = slice(last + 1, None)
+        before = [d for d in old.diagnostics if d.span is not None and d.span.start < begin]
+        after = [d for d in old.diagnostics if d.span is not None and d.span.start > end - delta]
+        everything = Diagnostics()
+        for part in (
+            (move_diagnostic(d, 0, source) for d in before),
+            found,
+            (move_diagnostic(d, delta, source) for d in after if not to_end),
+        ):
+            for d in part:
+                everything.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
+        new = Parsed(
+            source,
+            [
+                *old.starts[:first],
+                *(s.span.start for s in fresh),
+                *(s + delta for s in old.starts[rest]),
+            ],
+            [*old.ends[:first], *(s.span.end for s in fresh), *(e + delta for e in old.ends[rest])],
+            _spliced(old.tokens, tokens, source, begin, end - delta, delta),
+            tuple(everything),
+            [*old.pieces[:first], *(_Piece(stmt, old.version + 1) for stmt in fresh), *kept],
+            len(fresh),
+            old.version + 1,
+        )
+        return new if new.is_local else None
+
+
+def _copy(tokens: Tokens) -> Tokens:
+    copy = Tokens(tokens.source)
+    copy.kinds, copy.starts, copy.ends = tokens.kinds.copy(), tokens.starts.copy(), tokens.ends.copy()
+    copy.reported, copy.cut = tokens.reported.copy(), tokens.cut
+    return copy
+
+
+def _spliced(old: Tokens, new: Tokens, source: SourceFile, begin: int, old_end: int, delta: int) -> Tokens:
+    """The old tokens with those in ``[begin, old_end)`` replaced by the new ones, and moved after them."""
+    low, high = bisect_left(old.starts, begin), bisect_left(old.starts, old_end)
+    whole = Tokens(source)
+    inner = len(new.kinds) - 1  # without its end of text
+    whole.kinds = [*old.kinds[:low], *new.kinds[:inner], *old.kinds[high:]]
+    whole.starts = [*old.starts[:low], *new.starts[:inner], *(at + delta for at in old.starts[high:])]
+    whole.ends = [*old.ends[:low], *new.ends[:inner], *(at + delta for at in old.ends[high:])]
+    whole.reported = {at for at in old.reported if at < begin} | new.reported
+    whole.reported |= {at + delta for at in old.reported if at >= old_end}
+    return whole
+
+
+def _settled(kinds: list[int]) -> bool:
+    """Whether all braces match and no statement at top level leaves a bracket open behind it."""
+    literals = tables().literals
+    opening, closing, semicolon = literals["{"], literals["}"], literals[";"]
+    ups, downs = {literals["("], literals["["]}, {literals[")"], literals["]"]}
+    depth = brackets = 0
+    for kind in kinds:
+        if kind == opening:
+            depth += 1
+        elif kind == closing:
+            depth -= 1
+            if depth < 0 or (depth == 0 and brackets):
+                return False
+        elif depth == 0:
+            if kind in ups:
+                brackets += 1
+            elif kind in downs:
+                brackets -= brackets > 0
+            elif kind == semicolon:
+                brackets = 0
+    return depth == 0 and brackets == 0
+
+
+def _mended_by_layout(tokens: Tokens) -> bool:
+    """Whether the parser would take the layout's word against that of the braces."""
+    from scenelang.syntax.braces import balance_hidden
+
+    return balance_hidden(_copy(tokens), Report(tokens.source))
