@@ -7,25 +7,30 @@ many nested models, while a Scene may nest 400 nodes: deeper ones are taken apar
 from __future__ import annotations
 
 import json
-import re
+from difflib import get_close_matches
 from typing import Any, Final
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
-from pydantic_core import PydanticSerializationError
+from pydantic_core import ErrorDetails, PydanticSerializationError
 
-from scenelang.diagnostics.diagnostic import Diagnostic, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.scene import schema
+from scenelang.scene.json_places import Key, Value, follow, read_places, record_places, too_deep
 from scenelang.scene.schema import Scene, SceneNode
 from scenelang.scene.session import MAX_NODE_DEPTH, deep_stack
+from scenelang.scene.spans import SpanMap
 
 MAX_CHARS: Final = 200_000_000
 _BRACKETS_PER_NODE: Final = 3  # a link of a chain: list, link, node
 _PLAIN_DEPTH: Final = 150  # brackets that pydantic reads by itself
-_TOKENS: Final = re.compile(r'"(?:[^"\\]|\\.)*"|[\[{]|[\]}]', re.DOTALL)
 _MAX_SHOWN: Final = 20
+_MAX_PATH: Final = 80
+_WIDTH: Final = 110
 
 
 def to_json(scene: Scene) -> str:
-    """JSON of a Scene."""
+    """JSON of a Scene, on one line."""
     try:
         return scene.model_dump_json()
     except PydanticSerializationError:
@@ -33,10 +38,39 @@ def to_json(scene: Scene) -> str:
             return json.dumps(_plain(scene), separators=(",", ":"), allow_nan=False)
 
 
-def _plain(value: Any) -> Any:
+def to_readable_json(scene: Scene) -> str:
+    """JSON of a Scene for people: what differs from the defaults, indented, short values on one line."""
+    with deep_stack():
+        return _laid_out(_plain(scene, brief=True), "") + "\n"
+
+
+def _plain(value: Any, *, brief: bool = False) -> Any:
     if isinstance(value, BaseModel):
-        return {name: _plain(item) for name, item in value.__dict__.items()}
-    return [_plain(item) for item in value] if isinstance(value, tuple) else value
+        fields = type(value).model_fields
+        return {
+            name: _plain(item, brief=brief)
+            for name, item in value.__dict__.items()
+            if not brief
+            or name in ("kind", "version")
+            or fields[name].is_required()
+            or item != fields[name].default
+        }
+    return [_plain(item, brief=brief) for item in value] if isinstance(value, tuple) else value
+
+
+def _laid_out(value: Any, margin: str) -> str:
+    """JSON text whose lists and objects go over several lines where one is too short for them."""
+    if not isinstance(value, dict | list) or not value:
+        return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    inner = margin + "  "
+    if isinstance(value, dict):
+        parts = [f"{json.dumps(key)}: {_laid_out(item, inner)}" for key, item in value.items()]
+    else:
+        parts = [_laid_out(item, inner) for item in value]
+    start, end = "{}" if isinstance(value, dict) else "[]"
+    if sum(map(len, parts)) + 2 * len(parts) + len(margin) <= _WIDTH and not any("\n" in p for p in parts):
+        return f"{start}{', '.join(parts)}{end}"
+    return f"{start}\n{inner}" + f",\n{inner}".join(parts) + f"\n{margin}{end}"
 
 
 def from_json(text: str | bytes) -> Scene:
@@ -47,73 +81,144 @@ def from_json(text: str | bytes) -> Scene:
     """
     if isinstance(text, bytes):
         try:
-            text = text.decode("utf-8")
+            text = text.decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            raise _failure(f"not UTF-8 text: byte {error.start}") from None
+            found = [Diagnostic("E0313", f"not UTF-8 text: byte {error.start}", None)]
+            raise SceneError(found) from None
+    return _read(SourceFile("<json>", text))
+
+
+def load_json(source: SourceFile, diagnostics: Diagnostics) -> tuple[Scene | None, SpanMap]:
+    """A Scene from JSON text, and where its nodes are written there.
+
+    Args:
+        source: the text.
+        diagnostics: receives E0313.
+
+    Returns:
+        The Scene, or None if anything is wrong.
+    """
+    spans = SpanMap()
+    try:
+        scene = _read(source)
+    except SceneError as error:
+        for d in error.diagnostics:
+            diagnostics.add(d.code, d.message, d.span, help=d.help)
+        return None, spans
+    record_places(scene, read_places(source.text), source, spans)
+    return scene, spans
+
+
+def _read(source: SourceFile) -> Scene:
+    text = source.text
     if len(text) > MAX_CHARS:
         raise _failure(f"more than {MAX_CHARS:,} characters of JSON")
-    depth = _depth(text)
-    if depth > (MAX_NODE_DEPTH + 4) * _BRACKETS_PER_NODE:
-        raise _failure(f"nodes nested deeper than {MAX_NODE_DEPTH}")
+    bracket = too_deep(text, (MAX_NODE_DEPTH + 4) * _BRACKETS_PER_NODE)
+    if bracket is not None:
+        raise _failure(f"nodes nested deeper than {MAX_NODE_DEPTH}", Span(source, bracket, bracket + 1))
     try:
-        if depth <= _PLAIN_DEPTH:
+        if too_deep(text, _PLAIN_DEPTH) is None:
             return Scene.model_validate_json(text)
         with deep_stack():
-            return _read_deep(text)
+            return _read_deep(source)
     except ValidationError as error:
-        raise SceneError(_problems(error)) from None
+        raise SceneError(_problems(error, source)) from None
+    except UnicodeEncodeError as error:
+        raise _failure(
+            f"half of a character at {error.start}", Span(source, error.start, error.end)
+        ) from None
 
 
-def _depth(text: str) -> int:
-    """How deep brackets nest, those in strings left out."""
-    depth = deepest = 0
-    for token in _TOKENS.finditer(text):
-        first = token.group()[0]
-        if first in "[{":
-            depth += 1
-            deepest = max(deepest, depth)
-        elif first in "]}":
-            depth -= 1
-    return deepest
-
-
-def _read_deep(text: str) -> Scene:
-    def refuse(constant: str) -> float:
-        raise ValueError(f"{constant} is no JSON number")
-
+def _read_deep(source: SourceFile) -> Scene:
     try:
-        data = json.loads(text, parse_constant=refuse)
+        data = json.loads(source.text, parse_constant=_refuse)
     except ValueError as error:
-        raise _failure(f"not JSON: {str(error).lower()}") from None
+        raise _no_json(error, source) from None
     if isinstance(data, dict) and isinstance(data.get("nodes"), list):
         adapter: TypeAdapter[Any] = TypeAdapter(SceneNode)
-        data = {**data, "nodes": [_build(node, adapter) for node in data["nodes"]]}
+        nodes = [_build(node, adapter, source, ("nodes", at)) for at, node in enumerate(data["nodes"])]
+        data = {**data, "nodes": nodes}
     return Scene.model_validate(data)
 
 
-def _build(data: Any, adapter: TypeAdapter[Any]) -> Any:
+def _build(data: Any, adapter: TypeAdapter[Any], source: SourceFile, path: tuple[Key, ...]) -> Any:
     """A node whose children are validated before it, so that no validation goes deep."""
     if isinstance(data, dict) and isinstance(data.get("children"), list):
+        inside = [(*path, "children", at) for at in range(len(data["children"]))]
         children = [
-            {**child, "node": _build(child["node"], adapter)}
+            {**child, "node": _build(child["node"], adapter, source, (*here, "node"))}
             if data.get("kind") == "chain" and isinstance(child, dict) and "node" in child
-            else _build(child, adapter)
-            for child in data["children"]
+            else _build(child, adapter, source, here)
+            for child, here in zip(data["children"], inside, strict=True)
         ]
         data = {**data, "children": children}
-    return adapter.validate_python(data)
+    try:
+        return adapter.validate_python(data)
+    except ValidationError as error:
+        raise SceneError(_problems(error, source, path)) from None
 
 
-def _failure(message: str) -> SceneError:
-    return SceneError([Diagnostic("E0313", message, None)])
+def _refuse(constant: str) -> float:
+    raise ValueError(f"{constant} is no JSON number")
 
 
-def _problems(error: ValidationError) -> list[Diagnostic]:
+def _failure(message: str, span: Span | None = None, help: str | None = None) -> SceneError:
+    return SceneError([Diagnostic("E0313", message, span, help=help)])
+
+
+def _no_json(error: ValueError, source: SourceFile) -> SceneError:
+    if isinstance(error, json.JSONDecodeError):
+        said = error.msg[:1].lower() + error.msg[1:]
+        return _failure(f"not JSON: {said}", Span(source, error.pos, min(error.pos + 1, len(source.text))))
+    reason = str(error).partition(":")[0]
+    return _failure(f"not JSON: {reason[:1].lower()}{reason[1:]}")
+
+
+def _problems(error: ValidationError, source: SourceFile, path: tuple[Key, ...] = ()) -> list[Diagnostic]:
     """One diagnostic for each place that does not fit."""
-    found = []
-    for item in error.errors(include_url=False, include_input=False)[:_MAX_SHOWN]:
-        where = ".".join(str(part) for part in item["loc"])
-        said = item["msg"].removeprefix("Value error, ")
-        said = said[:1].lower() + said[1:]
-        found.append(Diagnostic("E0313", f"{where}: {said}" if where else said, None))
-    return found
+    found = error.errors(include_url=False, include_input=False)[:_MAX_SHOWN]
+    if found[0]["type"] == "json_invalid":
+        try:
+            json.loads(source.text, parse_constant=_refuse)
+        except ValueError as wrong:
+            return list(_no_json(wrong, source).diagnostics)
+        return [Diagnostic("E0313", found[0]["msg"].lower(), None)]
+    root = read_places(source.text)
+    return [_problem(item, (*path, *item["loc"]), root, source) for item in found]
+
+
+def _problem(item: ErrorDetails, location: tuple[Key, ...], root: Value, source: SourceFile) -> Diagnostic:
+    value, path = follow(root, location)
+    said, help = item["msg"].removeprefix("Value error, "), None
+    said = (said[:1].lower() + said[1:]).removeprefix("input ")
+    match item["type"]:
+        case "string_pattern_mismatch":
+            said = "not a possible name"
+        case "missing":
+            said = "is missing"
+        case "union_tag_not_found":
+            said, path = "is missing", f"{path}.kind" if path else "kind"
+        case "union_tag_invalid":
+            context = item["ctx"]
+            words = context["expected_tags"].replace("'", "")
+            near = get_close_matches(str(context["tag"]), words.split(", "), 1)
+            said, path = f"no such kind, `{str(context['tag'])[:40]}`", f"{path}.kind" if path else "kind"
+            help = f"did you mean `{near[0]}`? there are {words}" if near else f"there are {words}"
+            value = value.get("kind")
+        case "extra_forbidden":
+            said = "unknown key"
+            near = get_close_matches(str(location[-1]), _FIELDS, 1)
+            help = f"did you mean `{near[0]}`?" if near else None
+    path = path if len(path) <= _MAX_PATH else f"…{path[-_MAX_PATH:]}"
+    return Diagnostic("E0313", f"{path}: {said}" if path else said, value.span(source), help=help)
+
+
+_FIELDS: Final = sorted(
+    {
+        name
+        for model in vars(schema).values()
+        if isinstance(model, type) and issubclass(model, BaseModel)
+        for name in model.__annotations__
+        if not name.startswith(("_", "model_"))
+    }
+)

@@ -7,22 +7,59 @@ live here: the evaluator returns a `SpanMap` beside the Scene, keyed by `id()` o
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Rgb = tuple[Finite, Finite, Finite]
-Row = tuple[Finite, Finite, Finite, Finite]
-Word = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
-"""A name that text can spell."""
-Combine = Literal["union", "smooth", "subtract", "intersect"]
+from scenelang.scene.fields import (
+    Affine,
+    Axis,
+    Factor,
+    Finite,
+    Length,
+    Pixels,
+    Radians,
+    Rate,
+    Rgb,
+    Row,
+    Word,
+    first_joins_by_union,
+)
+from scenelang.scene.fields import (
+    Combine as Combine,
+)
+
+
+def _kind_is_required(schema: dict[str, Any]) -> None:
+    """In data the kind tells nodes apart, while Python's constructors know it."""
+    if "kind" in schema["properties"]:
+        schema["required"] = ["kind", *schema.get("required", ())]
 
 
 class _Node(BaseModel):
     # Validators are built when first used: a scene evaluated from text needs none.
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        defer_build=True,
+        json_schema_extra=_kind_is_required,
+    )
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """What differs from the defaults: the code that makes it."""
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            if field.is_required() or value != field.default:
+                yield name, value
+
+    def __repr__(self) -> str:
+        try:
+            return super().__repr__()
+        except RecursionError:  # nested deeper than Python likes to recurse
+            return f"{type(self).__name__}(…)"
 
 
 def singular(rows: Sequence[Sequence[float]]) -> bool:
@@ -43,18 +80,20 @@ def singular(rows: Sequence[Sequence[float]]) -> bool:
 
 
 class Translate(_Node):
+    """A move; z is for 3D models."""
+
     kind: Literal["translate"] = "translate"
-    x: float
-    y: float
-    z: float = 0.0
+    x: Length
+    y: Length
+    z: Length = 0.0
 
 
 class Rotate(_Node):
     """A turn by ``angle`` radians, counter-clockwise, about ``axis`` (any length but 0)."""
 
     kind: Literal["rotate"] = "rotate"
-    angle: float
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    angle: Radians
+    axis: Axis = (0.0, 0.0, 1.0)
 
     @classmethod
     def degrees(cls, angle_deg: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Rotate:
@@ -70,10 +109,12 @@ class Rotate(_Node):
 
 
 class Scale(_Node):
+    """Factors along the axes; z is 1 in a 2D scene unless the scale is uniform."""
+
     kind: Literal["scale"] = "scale"
-    x: float
-    y: float
-    z: float
+    x: Factor
+    y: Factor
+    z: Factor
 
     @field_validator("x", "y", "z")
     @classmethod
@@ -93,14 +134,14 @@ class Shear(_Node):
 
     kind: Literal["shear"] = "shear"
     axes: Literal["xy", "xz", "yx", "yz", "zx", "zy"]
-    k: float
+    k: Finite
 
 
 class Matrix(_Node):
     """A 4 x 4 affine, rows, for column vectors; the last row is 0 0 0 1."""
 
     kind: Literal["matrix"] = "matrix"
-    rows: tuple[Row, Row, Row, Row]
+    rows: Affine
 
     @field_validator("rows")
     @classmethod
@@ -113,35 +154,46 @@ class Matrix(_Node):
 
 
 class Twirl(_Node):
+    """A turn that grows with the distance from the origin."""
+
     kind: Literal["twirl"] = "twirl"
-    k: float
+    k: Rate
 
 
 class Bend(_Node):
+    """A turn that grows along x."""
+
     kind: Literal["bend"] = "bend"
-    k: float
+    k: Rate
 
 
 class Twist(_Node):
+    """A turn of (x, z) that grows along y; for 3D models."""
+
     kind: Literal["twist"] = "twist"
-    k: float
+    k: Rate
 
 
 class Displace(_Node):
+    """Adds ``amount`` sin(f x) sin(f y) sin(f z) to the distance, f being ``frequency``; for 3D models."""
+
     kind: Literal["displace"] = "displace"
-    amount: float
-    frequency: float
+    amount: Length
+    frequency: Annotated[Finite, Field(description="radians per world unit")]
 
 
 Transform = Annotated[
     Translate | Rotate | Scale | Shear | Matrix | Twirl | Bend | Twist | Displace,
     Field(discriminator="kind"),
 ]
+Transforms = Annotated[tuple[Transform, ...], Field(description="in order, nearest the leaf first")]
 
 # ---------------------------------------------------------------- materials
 
 
 class Flip(_Node):
+    """x to -x."""
+
     kind: Literal["flip"] = "flip"
 
 
@@ -151,17 +203,28 @@ class Color(_Node):
     kind: Literal["color"] = "color"
     rgb: Rgb
 
+    @classmethod
+    def hex(cls, text: str) -> Color:
+        """A colour as text writes it: ``#d33`` or ``#dd3333``."""
+        if not re.fullmatch(r"#([0-9a-fA-F]{3}){1,2}", text):
+            raise ValueError(f"{text!r} is no colour such as '#d33' or '#dd3333'")
+        digits = text[1:] if len(text) == 7 else "".join(digit * 2 for digit in text[1:])
+        red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
+        return cls(rgb=(red, green, blue))
+
 
 class Grayscale(_Node):
+    """Mixes with the luma."""
+
     kind: Literal["grayscale"] = "grayscale"
-    amount: float
+    amount: Annotated[Finite, Field(description="0 keeps the colour, 1 is grey")]
 
 
 class Hue(_Node):
     """An HSV hue shift by ``angle`` radians."""
 
     kind: Literal["hue"] = "hue"
-    angle: float
+    angle: Radians
 
 
 MaterialOp = Annotated[
@@ -173,8 +236,12 @@ MaterialOp = Annotated[
 class Material(_Node):
     """A material of the model, with its texture and colour operations in order."""
 
-    name: Word
-    ops: tuple[MaterialOp, ...] = ()
+    name: Annotated[Word, Field(description="a material of the model")]
+    ops: Annotated[tuple[MaterialOp, ...], Field(description="in order, nearest the leaf first")] = ()
+
+    def __init__(self, name: str | None = None, /, **data: Any) -> None:
+        """A material; its name may be given alone: ``Material("flat", ops=…)``."""
+        super().__init__(**(data if name is None else {"name": name, **data}))
 
 
 # ---------------------------------------------------------------- nodes
@@ -184,8 +251,8 @@ class Object(_Node):
     """A leaf geometry, its transforms nearest the leaf first, and its material."""
 
     kind: Literal["object"] = "object"
-    geometry: Word
-    transforms: tuple[Transform, ...] = ()
+    geometry: Annotated[Word, Field(description="a leaf geometry of the model")]
+    transforms: Transforms = ()
     material: Material | None = None
 
     def __init__(self, geometry: str | None = None, /, **data: Any) -> None:
@@ -198,7 +265,7 @@ class Group(_Node):
 
     kind: Literal["group"] = "group"
     children: tuple[SceneNode, ...] = ()
-    transforms: tuple[Transform, ...] = ()
+    transforms: Transforms = ()
     material: Material | None = None
 
 
@@ -208,7 +275,7 @@ class Boolean(_Node):
     kind: Literal["boolean"] = "boolean"
     op: Combine
     children: tuple[SceneNode, ...] = ()
-    transforms: tuple[Transform, ...] = ()
+    transforms: Transforms = ()
     material: Material | None = None
 
 
@@ -223,8 +290,8 @@ class Chain(_Node):
     """The streamed form: children in order, each with its boolean word."""
 
     kind: Literal["chain"] = "chain"
-    children: tuple[Link, ...] = ()
-    transforms: tuple[Transform, ...] = ()
+    children: Annotated[tuple[Link, ...], Field(json_schema_extra=first_joins_by_union)] = ()
+    transforms: Transforms = ()
     material: Material | None = None
 
     @field_validator("children")
@@ -241,9 +308,9 @@ SceneNode = Annotated[Object | Group | Boolean | Chain, Field(discriminator="kin
 class Animation(_Node):
     """``animate(seconds, fps, loop)``."""
 
-    seconds: Annotated[float, Field(gt=0)]
-    fps: Annotated[float, Field(gt=0)]
-    loop: bool = True
+    seconds: Annotated[Finite, Field(gt=0)]
+    fps: Annotated[Finite, Field(gt=0, description="frames per second")]
+    loop: Annotated[bool, Field(strict=True, description="the last frame is followed by the first")] = True
 
     @property
     def frames(self) -> int:
@@ -254,12 +321,21 @@ class Animation(_Node):
 class Scene(_Node):
     """A whole scene: settings and top-level nodes, which form a union in file order."""
 
-    version: Literal[1] = 1
-    model: Annotated[str, Field(pattern=r'^[^"\\\x00-\x1f]+$')] | None = None
-    canvas: tuple[Annotated[int, Field(ge=1, le=8192)], Annotated[int, Field(ge=1, le=8192)]] = (256, 256)
-    background: Rgb | None = (1.0, 1.0, 1.0)
-    animation: Animation | None = None
-    nodes: tuple[SceneNode, ...] = ()
+    version: Annotated[Literal[1], Field(description="of the language")] = 1
+    model: Annotated[
+        str | None,
+        Field(
+            pattern=r'^[^"\\\x00-\x1f]+$', description="the model to draw with; null: the smallest that fits"
+        ),
+    ] = None
+    canvas: Annotated[tuple[Pixels, Pixels], Field(description="width and height in pixels")] = (256, 256)
+    background: Annotated[
+        Rgb | None, Field(description="as colours are written; null gives an image with alpha")
+    ] = (1.0, 1.0, 1.0)
+    animation: Annotated[
+        Animation | None, Field(description="the animation that this Scene is one frame of")
+    ] = None
+    nodes: Annotated[tuple[SceneNode, ...], Field(description="a union, the last on top")] = ()
 
     def to_nsg(self) -> str:
         """Canonical text that evaluates back to an equal Scene."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from scenelang.scene.fields import Rgb
 from scenelang.scene.schema import (
     Boolean,
     Chain,
     Material,
     MaterialOp,
     Object,
-    Rgb,
     Scene,
     SceneNode,
     Transform,

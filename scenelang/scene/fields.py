@@ -1,0 +1,56 @@
+"""Types of the numbers and words in a Scene: what they mean, in which unit, and what is refused.
+
+The descriptions and the `json_schema_extra` parts go into the JSON Schema, which says what it can of what
+the validators check.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+_NOT_0: dict[str, Any] = {"not": {"const": 0}}
+_NOT_000: dict[str, Any] = {"not": {"const": [0, 0, 0]}}
+
+# Strict: text such as "0.5" is no number. Integers are.
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Length = Annotated[Finite, Field(description="world units; the shorter side of the canvas spans 2")]
+Radians = Annotated[Finite, Field(description="radians, counter-clockwise")]
+Rate = Annotated[Finite, Field(description="radians per world unit")]
+Factor = Annotated[Finite, Field(description="not 0", json_schema_extra=_NOT_0)]
+Axis = Annotated[
+    tuple[Finite, Finite, Finite], Field(description="of any length but 0", json_schema_extra=_NOT_000)
+]
+Rgb = Annotated[
+    tuple[Finite, Finite, Finite],
+    Field(description="red, green, blue as written (sRGB-encoded); 0 is none, 1 is full"),
+]
+Row = tuple[Finite, Finite, Finite, Finite]
+Word = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+"""A name that text can spell."""
+Combine = Literal["union", "smooth", "subtract", "intersect"]
+
+
+def _whole(value: Any) -> Any:
+    """256.0 is an integer, as in JSON Schema."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), BeforeValidator(_whole)]
+
+
+def _last_row(schema: dict[str, Any]) -> None:
+    schema["prefixItems"][3] = {"const": [0, 0, 0, 1]}
+
+
+def first_joins_by_union(schema: dict[str, Any]) -> None:
+    """Say of a chain's children what `Chain` checks."""
+    first = {"properties": {"op": {"const": "union"}}}
+    schema["prefixItems"] = [{"allOf": [schema["items"], first]}]
+
+
+Affine = Annotated[
+    tuple[Row, Row, Row, Row],
+    Field(description="four rows; the last is 0, 0, 0, 1", json_schema_extra=_last_row),
+]
