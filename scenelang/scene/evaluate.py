@@ -20,7 +20,7 @@ from scenelang.scene.build import Builder, make
 from scenelang.scene.imports import Loader, Unreadable, prepare_file, read_source
 from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
-from scenelang.scene.session import UNBOUND, Halt, Session, deep_stack
+from scenelang.scene.session import UNBOUND, Halt, Session, Watch, deep_stack
 from scenelang.scene.spans import Place, SpanMap
 from scenelang.scene.statements import Body
 from scenelang.scene.unit import Unit
@@ -38,6 +38,7 @@ def evaluate(
     root: Path | None = None,
     path: Path | None = None,
     frame: int = 0,
+    texts: Mapping[Path, str] | None = None,
 ) -> tuple[Scene | None, SpanMap]:
     """Evaluate a syntax tree.
 
@@ -51,6 +52,7 @@ def evaluate(
         root: folder that imports cannot leave; by default that of ``path``.
         path: file that the tree was read from.
         frame: frame of the animation, from 0.
+        texts: what imported files hold, by their resolved paths, instead of what is on the disk.
 
     Returns:
         The Scene, or None if anything is wrong, and where its nodes were written.
@@ -64,6 +66,7 @@ def evaluate(
         root=root,
         path=path,
         frame=frame,
+        texts=texts,
     )
     return evaluation.run(frame)
 
@@ -74,10 +77,11 @@ class Evaluation:
     Args:
         file: the tree.
         diagnostics: where mistakes go; each is reported for the first frame that has it.
-        defines, models, model, root, path: as for `evaluate`.
+        defines, models, model, root, path, texts: as for `evaluate`.
         frame: the first frame that is run.
         fps: frames a second, instead of those that ``animate`` names.
         replays: run what no frame changes once.
+        parsed, watch: as for `evaluate`.
     """
 
     def __init__(
@@ -93,15 +97,17 @@ class Evaluation:
         frame: int = 0,
         fps: float | None = None,
         replays: bool = False,
+        texts: Mapping[Path, str] | None = None,
     ) -> None:
         self.file, self.diagnostics = file, diagnostics
         self.animates = _animates(file)
         self._errors = len(diagnostics.errors)
         words = _choose(file, vocabulary(models), model, diagnostics)
         self._session = session = Session(diagnostics, words, frame, fps, replays=replays and self.animates)
+        session.watch = watch
         resolved = path.resolve() if path is not None else None
         folder = root.resolve() if root is not None else resolved.parent if resolved is not None else None
-        loader = Loader(folder, [resolved] if resolved is not None else [])
+        loader = Loader(folder, [resolved] if resolved is not None else [], texts=texts or {})
         self.inputs = inputs = defines if isinstance(defines, Defines) else Defines(defines or {})
         self._unit = Unit(file.span.source, session, loader, inputs, resolved)
         self._body: Body | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 from typing import Final
@@ -10,6 +11,7 @@ from typing import Final
 from scenelang.diagnostics.span import SourceFile
 from scenelang.files import read_regular
 from scenelang.scene.build import Builder
+from scenelang.scene.damage import find_damage
 from scenelang.scene.scope import Binding, Env
 from scenelang.scene.session import MAX_BYTES
 from scenelang.scene.settings import at_top_level
@@ -61,6 +63,8 @@ class Loader:
 
     Args:
         root: the folder that imports cannot leave, resolved; None where there is none.
+        texts: what to read instead of some files, by their resolved paths: an editor's unsaved buffers, or
+            fixes that are not written yet.
     """
 
     root: Path | None
@@ -69,6 +73,7 @@ class Loader:
     wanted: dict[Path, None] = field(default_factory=dict)
     """All files that were asked for inside the root, there or not, as written and resolved."""
     count: int = 0
+    texts: Mapping[Path, str] = field(default_factory=dict)
 
     def find(self, stmt: nodes.Import, unit: Unit) -> Path | None:
         """The file that an import means; None after a report."""
@@ -113,7 +118,8 @@ class Loader:
         name = os.path.normpath(os.path.join(os.path.dirname(unit.source.name), stmt.path.value))
         text, span, session = stmt.path.value, stmt.path.span, unit.session
         try:
-            source = read_source(path, name)
+            given = self.texts.get(path)
+            source = read_source(path, name) if given is None else SourceFile(name, given)
         except Unreadable as error:
             session.error(error.code, f"cannot read '{text}': {error}", span)
             return None
@@ -162,7 +168,9 @@ def _import(stmt: nodes.Import, place: Place) -> Action | None:
 
 def prepare_file(unit: Unit, file: nodes.File, *, imported: bool = False) -> Body:
     """Prepare a file's statements; of an imported one only what it brings."""
-    unit.find_lost(file)
+    unit.damage = find_damage(file, unit.session.diagnostics)
+    if unit.damage:
+        unit.session.damaged[id(unit.source)] = unit.damage
     unit.first = file.statements[0] if file.statements else None
     statements = [s for s in file.statements if not imported or isinstance(s, _BROUGHT)]
     return prepare_block(statements, Place(unit, unit.scope, "file"), file.span)

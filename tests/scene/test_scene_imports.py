@@ -10,7 +10,9 @@ import pytest
 from scene_cases import MODELS, Outcome, transform
 
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.scene.evaluate import load_scene
+from scenelang.diagnostics.span import SourceFile
+from scenelang.scene.evaluate import evaluate, load_scene
+from scenelang.syntax import parse
 
 
 def write(folder: Path, **files: str) -> None:
@@ -157,3 +159,16 @@ def test_large_and_odd_files(tmp_path: Path) -> None:
         load(tmp_path / "none.nsg")
     with pytest.raises(IsADirectoryError):
         load(tmp_path)
+
+
+def test_texts_instead_of_files(tmp_path: Path) -> None:
+    """What is not saved yet counts; the first file's imports and those of imports too."""
+    (tmp_path / "lib.nsg").write_text("let a = 1;")
+    given = {(tmp_path / "lib.nsg").resolve(): 'import "new.nsg" as new; let a = new.b;'}
+    given[(tmp_path / "new.nsg").resolve()] = "let b = 0.25;"
+    found = Diagnostics()
+    text = 'import "lib.nsg" as lib; square { translate(lib.a, 0); }'
+    tree = parse(SourceFile("a.nsg", text), found)
+    scene, _ = evaluate(tree, diagnostics=found, path=tmp_path / "a.nsg", texts=given)
+    assert scene is not None, list(found)
+    assert scene.nodes[0].transforms[0].x == 0.25
