@@ -71,24 +71,35 @@ class Concat(Doc):
 
 
 class Group(Doc):
-    """What is on one line if it fits, and otherwise what ``make`` says.
+    """What is on one line if it fits, and otherwise as `make` says, which is asked at most once."""
 
-    Args:
-        flat: see `Doc`.
-        make: called at most once, and only if it does not fit.
-    """
+    __slots__ = ("_made",)
 
-    __slots__ = ("_made", "make")
-
-    def __init__(self, flat: str | None, make: Callable[[], Part]) -> None:
+    def __init__(self, flat: str | None) -> None:
         super().__init__(flat)
-        self.make = make
         self._made: Part | None = None
 
     def broken(self) -> Part:
+        """What it is where it does not fit on a line."""
         if self._made is None:
             self._made = self.make()
         return self._made
+
+    def make(self) -> Part:
+        raise NotImplementedError
+
+
+class Choose(Group):
+    """A group that is made by a function of no arguments."""
+
+    __slots__ = ("maker",)
+
+    def __init__(self, flat: str | None, maker: Callable[[], Part]) -> None:
+        super().__init__(flat)
+        self.maker = maker
+
+    def make(self) -> Part:
+        return self.maker()
 
 
 class Indent(Doc):

@@ -6,10 +6,12 @@ everything else as the part that another callback has made.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence
 
 from scenelang.formatting.documents import (
     LINE,
+    Choose,
     Comments,
     Concat,
     Group,
@@ -28,6 +30,10 @@ from scenelang.formatting.lists import Bracketed, Item, broken, inline
 from scenelang.formatting.trivia import Notes
 from scenelang.syntax.tokens import Tokens
 
+_PATH = re.compile(r"\w+(\.\w+)*")
+_SURE_DIGITS = 300
+"""A number of so many signs without an exponent is finite."""
+_UNIT_LETTERS = "adegmnrstu"
 _LEVELS = {"*": 5, "/": 5, "%": 5, "+": 4, "-": 4, "<": 3, "<=": 3, ">": 3, ">=": 3, "==": 2, "!=": 2}
 _LEVELS |= {"&&": 1, "||": 0}
 
@@ -44,12 +50,12 @@ class Operation(Group):
     __slots__ = ("level", "operands", "operators")
 
     def __init__(self, flat: str | None, operands: list[Part], operators: list[Part], level: int) -> None:
-        super().__init__(flat, self.lines)
+        super().__init__(flat)
         self.operands = operands
         self.operators = operators
         self.level = level
 
-    def lines(self) -> Part:
+    def make(self) -> Part:
         first = self.operands[0]
         parts: list[Part] = [first]
         after = [*after_of(first)]
@@ -74,10 +80,10 @@ class Choice(Group):
     __slots__ = ("clauses",)
 
     def __init__(self, flat: str | None, clauses: list[tuple[Part, ...]]) -> None:
-        super().__init__(flat, self.lines)
+        super().__init__(flat)
         self.clauses = clauses  # (condition, ?, value, :) each, and (value,) as the last one
 
-    def lines(self) -> Part:
+    def make(self) -> Part:
         *chosen, (otherwise,) = self.clauses
         if len(chosen) == 1:
             condition, mark, value, colon = chosen[0]
@@ -97,6 +103,9 @@ class ExpressionLayout:
     Args:
         tokens: what was read, without mistakes.
         notes: the comments and blank lines around them.
+
+    `doubtful` becomes true at what only the builder of the tree can refuse: an escape in a string, a number
+    that may be too large, a call of what may be no name.
     """
 
     def __init__(self, tokens: Tokens, notes: Mapping[int, Notes]) -> None:
@@ -105,6 +114,7 @@ class ExpressionLayout:
         self.text = tokens.source.text
         self.starts = tokens.starts
         self.ends = tokens.ends
+        self.doubtful = False
 
     def word(self, token: int) -> Part:
         """A token with what stands around it."""
@@ -139,14 +149,14 @@ class ExpressionLayout:
             items[-1] = Item(items[-1].part, behind, [*note.before, *note.after])
 
     def empty(self, opening: int, closing: int) -> Part:
-        return self._bracketed(Group, opening, [], (closing,))
+        return self._bracketed(Choose, opening, [], (closing,))
 
     def filled(self, opening: int, items: list[Item], *closing: int) -> Part:
-        return self._bracketed(Group, opening, items, closing)
+        return self._bracketed(Choose, opening, items, closing)
 
     def _bracketed(
         self,
-        form: Callable[[str | None, Callable[[], Part]], Group],
+        form: type[Choose],
         opening: int,
         items: list[Item],
         closing: Sequence[int],
@@ -236,6 +246,8 @@ class ExpressionLayout:
         return self._glued(value, space, self.word(dot), name)
 
     def method(self, value: Part, dot: int, name: Part, args: Part) -> Part:
+        if not _PATH.fullmatch(flat_of(value) or ""):
+            self.doubtful = True
         return sequence([value, self.word(dot), name, args])
 
     def call_expr(self, name: Part, args: Part) -> Part:
@@ -245,7 +257,7 @@ class ExpressionLayout:
         left, right = self.word(opening), self.word(closing)
         flat = joined([left, value, right])
         inside = [Item(value)]
-        doc = Group(flat, lambda: broken(left, inside, right, comma=""))
+        doc = Choose(flat, lambda: broken(left, inside, right, comma=""))
         return ends_of(doc, left, right)
 
     def vector_empty(self, opening: int, closing: int) -> Part:
@@ -260,4 +272,15 @@ class ExpressionLayout:
     def _literal(self, token: int) -> Part:
         return self.word(token)
 
-    number = string = color = true = false = _literal
+    def number(self, token: int) -> Part:
+        text = self.text[self.starts[token] : self.ends[token]]
+        if len(text) > _SURE_DIGITS or "E" in text or "e" in text.rstrip(_UNIT_LETTERS):
+            self.doubtful = True
+        return self.word(token)
+
+    def string(self, token: int) -> Part:
+        if self.text.find("\\", self.starts[token], self.ends[token]) >= 0:
+            self.doubtful = True
+        return self.word(token)
+
+    color = true = false = _literal

@@ -12,6 +12,7 @@ from scenelang.formatting.printer import render
 from scenelang.formatting.trivia import attach, comments_of
 from scenelang.syntax import parse
 from scenelang.syntax.lexer import scan
+from scenelang.syntax.nesting import limit_nesting
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
 
@@ -32,53 +33,63 @@ def format_text(text: str, *, name: str = "<text>") -> str:
     Raises:
         SceneError: the text has syntax errors.
     """
-    diagnostics = Diagnostics()
-    parse(SourceFile(name, text), diagnostics)
-    if diagnostics.errors:
-        raise SceneError(diagnostics)
     mark = _BOM if text.startswith(_BOM) else ""
     first = text.find("\n")
     newline = "\r\n" if first > 0 and text[first - 1] == "\r" else "\n"
-    tokens = _tokens(text.replace("\r\n", "\n"))
-    lines = render(_document(tokens))
-    result = "".join(line + "\n" for line in lines)
-    _compare(tokens, _tokens(result))
+    source = SourceFile(name, text.replace("\r\n", "\n"))
+    report = Report(source)
+    tokens = scan(source, report)
+    limit_nesting(tokens, report)
+    layout = Layout(tokens, attach(tokens))
+    document = None if report.found else _document(layout)
+    if document is None or layout.doubtful:
+        diagnostics = Diagnostics()
+        parse(SourceFile(name, text), diagnostics)
+        if diagnostics.errors:
+            raise SceneError(diagnostics)
+    assert document is not None, "a text without mistakes that the tables do not read"
+    result = "".join(line + "\n" for line in render(document))
+    _compare(tokens, result)
     return mark + result.replace("\n", newline)
 
 
-def _tokens(text: str) -> Tokens:
-    source = SourceFile("", text)
-    return scan(source, Report(source))
-
-
-def _document(tokens: Tokens) -> Part:
-    """The document of a text without mistakes: the parser's loop with callbacks that lay out."""
+def _document(layout: Layout) -> Part | None:
+    """The document of a text: the parser's loop with callbacks that lay out; None at a mistake."""
     language = tables()
-    layout = Layout(tokens, attach(tokens))
     actions, gotos, final = language.actions, language.gotos, language.final
     rules = [
         (length, origin, call)
         for (length, origin, _), call in zip(language.rules, layout.callbacks(), strict=True)
     ]
-    kinds = tokens.kinds
+    kinds = layout.tokens.kinds
     states = [language.start]
     values: list[Any] = []
     state = language.start
     at = 0
+    kind = kinds[0]
     while True:
-        action = actions[state][kinds[at]]
+        action = actions[state].get(kind)
+        if action is None:
+            return None
         if action >= 0:
             states.append(action)
             values.append(at)
             state = action
             at += 1
+            kind = kinds[at]
             continue
         length, origin, call = rules[~action]
-        if call is not None:
-            parts = values[len(values) - length :]
-            del values[len(values) - length :]
+        if call is None:
+            states.pop()
+        elif length == 1:
+            states.pop()
+            values[-1] = call(values[-1])
+        elif length:
+            parts = values[-length:]
+            del values[-length:], states[-length:]
             values.append(call(*parts))
-        del states[len(states) - length :]
+        else:
+            values.append(call())
         state = gotos[states[-1]][origin]
         states.append(state)
         if state == final:
@@ -86,8 +97,10 @@ def _document(tokens: Tokens) -> Part:
             return document
 
 
-def _compare(before: Tokens, after: Tokens) -> None:
+def _compare(before: Tokens, result: str) -> None:
     """Fail if formatting would change anything but the layout: a bug, and no file is to suffer from it."""
+    source = SourceFile("", result)
+    after = scan(source, Report(source))
     if _significant(before) != _significant(after) or comments_of(before) != comments_of(after):
         raise AssertionError("formatting changed the text's tokens or comments")
 

@@ -17,9 +17,9 @@ from typing import Any
 from scenelang.formatting.documents import (
     BLANK,
     LINE,
+    Choose,
     Comments,
     Concat,
-    Group,
     Indent,
     Part,
     after_of,
@@ -37,19 +37,19 @@ from scenelang.formatting.trivia import Comment
 from scenelang.syntax.tables import tables
 
 
-class Statement(Group):
+class Statement(Choose):
     """A statement.
 
     Args:
-        flat, make: see `Group`.
+        flat, maker: see `Choose`.
         depth: how many blocks it has within each other, empty ones not counted.
         simple: it may stand in a block that is on one line.
     """
 
     __slots__ = ("depth", "simple")
 
-    def __init__(self, flat: str | None, make: Callable[[], Part], depth: int, simple: bool) -> None:
-        super().__init__(flat, make)
+    def __init__(self, flat: str | None, maker: Callable[[], Part], depth: int, simple: bool) -> None:
+        super().__init__(flat, maker)
         self.depth = depth
         self.simple = simple
 
@@ -155,13 +155,13 @@ class Layout(ExpressionLayout):
         """What stands after ``=``: operations go to a line of their own before they are broken."""
         if isinstance(value, (Operation, Choice)) and not value.before:
             flat = None if value.flat is None else " " + value.flat
-            doc = Group(flat, lambda: Indent(Concat(None, [LINE, value])))
+            doc = Choose(flat, lambda: Indent(Concat(None, [LINE, value])))
             doc.after = value.after
             return doc
         return sequence([" ", value])
 
     def version(self, word: int, number: int, last: int) -> Part:
-        return self._ended([self.word(word), " ", self.word(number)], last)
+        return self._ended([self.word(word), " ", self.number(number)], last)
 
     def model(self, word: int, name: Part, last: int) -> Part:
         return self._ended([self.word(word), " ", name], last)
@@ -184,7 +184,7 @@ class Layout(ExpressionLayout):
         return self._ended([*head, self._assigned(body)], last)
 
     def import_(self, word: int, path: int, as_: int, alias: Part, last: int) -> Part:
-        return self._ended([self.word(word), " ", self.word(path), " ", self.word(as_), " ", alias], last)
+        return self._ended([self.word(word), " ", self.string(path), " ", self.word(as_), " ", alias], last)
 
     def material_use(self, word: int, name: Part, last: int) -> Part:
         return self._ended([self.word(word), " ", name], last, simple=True)
@@ -287,4 +287,4 @@ class Layout(ExpressionLayout):
 
     def material_block(self, word: int, name: Part, body: Block) -> Part:
         stmt = self._object([self.word(word), " ", name], body)
-        return ends_of(Bracketed(stmt.flat, stmt.make), stmt, stmt)
+        return ends_of(Bracketed(stmt.flat, stmt.maker), stmt, stmt)
