@@ -32,6 +32,7 @@ ORDER = (
     "scenelang.models.load",
     "scenelang.training",
     "scenelang.backend",
+    "scenelang.animation",
     "scenelang.evaluation",
     "scenelang.cli",
 )
@@ -45,6 +46,7 @@ MAY_BE_HEAVY = (
     "scenelang.models.load",
     "scenelang.training",
     "scenelang.backend",
+    "scenelang.animation",
     "scenelang.evaluation",
     "scenelang.cli",
 )

@@ -19,8 +19,9 @@ import torch
 
 from scenelang.backend.errors import RenderError
 from scenelang.models.load import Model, ModelError, load_model
-from scenelang.program.program import Program
+from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing, draw
+from scenelang.renderers.kept import Kept
 
 KEEP_BYTES = 256 << 20
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
@@ -113,6 +114,8 @@ def draw_program(
     model: Model,
     *,
     threads: int | None = None,
+    split: int | None = None,
+    kept: Kept | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Drawing:
     """Draw a Program.
@@ -123,10 +126,13 @@ def draw_program(
         program: compiled for this model's weights.
         model: from `open_model`.
         threads: tiles drawn at the same time; by default one for each usable core.
+        split: how many threads the picture is split for, which shows in the last bits; by default ``threads``.
+        kept: the picture before this one, of which tiles that show the same are taken over.
         progress: called with the share done, in [0, 1], from any thread.
 
     Raises:
-        RenderError: the Program was compiled for another model or other weights.
+        RenderError: the Program was compiled for another model or other weights, or its vectors are none
+            that a compiler makes.
     """
     if program.model != model.manifest.name:
         raise RenderError(f"a program for model `{program.model}`, not `{model.manifest.name}`")
@@ -135,15 +141,21 @@ def draw_program(
             f"the program was compiled for weights {program.weights[:12]}… of model `{program.model}`, "
             f"these are {model.digest[:12]}…: compile the scene again"
         )
+    threads = usable_cores() if threads is None else threads
     if model.network.codes.device.type != "cpu":
-        threads = 1  # the device is busy with one tile
+        threads, split = 1, 1  # the device is busy with one tile
     with _drawing, _one_torch_thread():
-        return draw(
-            model.network,
-            program.vectors,
-            program.tokens,
-            program.canvas,
-            program.background,
-            threads=usable_cores() if threads is None else threads,
-            progress=progress,
-        )
+        try:
+            return draw(
+                model.network,
+                program.vectors,
+                program.tokens,
+                program.canvas,
+                program.background,
+                threads=threads,
+                split=split,
+                kept=kept,
+                progress=progress,
+            )
+        except ProgramError as error:
+            raise RenderError(f"a damaged program: {error}") from None

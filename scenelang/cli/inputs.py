@@ -56,22 +56,39 @@ class Input:
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
 
 
-def read_input(name: str, request: Request, clock: Clock) -> Input:
+def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
+    """The text of a scene; None after a report that it is none.
+
+    Raises:
+        OSError: it cannot be opened.
+    """
+    try:
+        if name == STDIN:
+            return decode_source(sys.stdin.buffer.read(MAX_BYTES + 1), "<stdin>")
+        return read_source(Path(name), name)
+    except Unreadable as error:
+        empty = SourceFile(name, "")
+        diagnostics.add(error.code, f"cannot read '{name}': {error}", Span(empty, 0, 0))
+        return None
+
+
+def read_input(name: str, request: Request, clock: Clock, source: SourceFile | None = None) -> Input:
     """Parse and evaluate one scene.
+
+    Args:
+        name: as the user wrote it.
+        request: what the command line says about every scene.
+        clock: takes the time.
+        source: its text, where it was read before.
 
     Raises:
         OSError: it cannot be opened.
     """
     found = Input(name)
     path = None if name == STDIN else Path(name)
-    try:
-        if path is None:
-            source = decode_source(sys.stdin.buffer.read(MAX_BYTES + 1), "<stdin>")
-        else:
-            source = read_source(path, name)
-    except Unreadable as error:
-        empty = SourceFile(name, "")
-        found.diagnostics.add(error.code, f"cannot read '{name}': {error}", Span(empty, 0, 0))
+    if source is None:
+        source = read_text(name, found.diagnostics)
+    if source is None:
         return found
     with clock("parse"):
         tree = parse(source, found.diagnostics)

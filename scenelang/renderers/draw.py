@@ -17,7 +17,9 @@ import torch
 from torch import Tensor
 
 from scenelang.image import Image, from_samples
+from scenelang.program.program import ProgramError
 from scenelang.renderers.framed import Framed
+from scenelang.renderers.kept import Kept
 from scenelang.renderers.stream import PixelRows, Stream
 
 TILE = 1 << 15  # pixels that are drawn at a time
@@ -48,6 +50,8 @@ def draw(
     background: tuple[float, float, float] | None,
     *,
     threads: int = 1,
+    split: int | None = None,
+    kept: Kept | None = None,
     skip: bool = True,
     adaptive: bool = True,
     tile: int = TILE,
@@ -62,23 +66,34 @@ def draw(
         canvas: width and height in pixels.
         background: colour as written, or None for alpha.
         threads: tiles drawn at the same time.
+        split: tiles are as high as for so many threads; by default ``threads``.
+        kept: the picture before this one, of which tiles that show the same are taken over.
         skip: leave out points that an object cannot reach.
         adaptive: sample once where no outline is near, instead of four times everywhere.
         tile: pixels at a time, at least one row.
         progress: called with the share done, from any thread.
+
+    Raises:
+        ProgramError: an object's vector holds no way from the world to a leaf, or numbers out of all
+            proportion; no compiled scene has such.
     """
     width, height = canvas
     stream = Stream(network, vectors, tokens, skip=skip)
-    rows = max(1, min(tile // width, -(-height // threads)))
+    rows = max(1, min(tile // width, -(-height // (split or threads))))
     tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     out = np.empty((height, width, 4), np.float32)
     pairs, refined = [0] * len(tiles), [0] * len(tiles)
     finished: list[int] = []
 
+    shown = kept.compare(stream, canvas, tiles) if kept is not None and skip and adaptive else None
+
     def one(index: int) -> None:
         band = tiles[index]
-        picture, pairs[index], refined[index] = _tile(stream, canvas, band, adaptive)
-        out[band.start : band.stop] = picture.reshape(len(band), width, 4)
+        if shown is not None and shown.same[index]:
+            out[band.start : band.stop] = shown.before[band.start : band.stop]
+        else:
+            picture, pairs[index], refined[index] = _tile(stream, canvas, band, adaptive)
+            out[band.start : band.stop] = picture.reshape(len(band), width, 4)
         finished.append(index)
         if progress is not None:
             progress(len(finished) / len(tiles))
@@ -90,6 +105,10 @@ def draw(
         # every worker computes on one core; torch would otherwise split each small product again
         with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
             list(pool.map(one, range(len(tiles))))
+    if kept is not None and shown is not None:
+        kept.keep(out, shown)
+    if not np.isfinite(out).all():
+        raise ProgramError("numbers that the network cannot draw with")
     colour, alpha = out[..., :3], out[..., 3]
     if background is None:
         return Drawing(from_samples(colour, alpha), sum(pairs), sum(refined))

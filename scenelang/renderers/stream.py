@@ -14,7 +14,7 @@ from torch import Tensor
 
 from scenelang.lifting import exact
 from scenelang.renderers.framed import EMPTY, RADIUS, SHARPEN, Framed
-from scenelang.renderers.frames import BLEND_REACH, ObjectFrame, local_points, read_frame
+from scenelang.renderers.frames import BLEND_REACH, FAR, ObjectFrame, local_points, read_frame
 
 UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
 CHUNK = 4096  # points that go through the network at once; their activations stay in the L2 cache
@@ -94,6 +94,9 @@ class Stream:
         vectors: (N, 64) float32, geometry and material vectors.
         tokens: (N,) boolean tokens 0 to 3.
         skip: leave out the points that an object cannot reach.
+
+    Raises:
+        ProgramError: an object's vector holds no way from the world to a leaf.
     """
 
     @torch.no_grad()
@@ -119,6 +122,8 @@ class Stream:
         self.unit = float(self.cells[UNION].candidate[0].norm())  # growth of the margin per world unit
         self.sharpen = [float(s) for s in SHARPEN]
         self.far = network.far[:, None]
+        self.vectors = vectors
+        self.codes = np.unique(vectors[:, exact.CODE], axis=0)  # of the leaves in use
         self.rows = self._rows(vectors, tokens)
 
     def _rows(self, vectors: np.ndarray, tokens: np.ndarray) -> list[_Row]:
@@ -214,7 +219,8 @@ class Stream:
             if i < 2:
                 x.relu_()
         x += (radius - RADIUS).clamp_min_(0.0) * self.far
-        return x.mul_(row.frame.scale)
+        x.mul_(row.frame.scale)
+        return x.clamp_(-FAR, FAR) if row.frame.wild else x
 
     def _step(self, old: Tensor, row: _Row, s: int) -> tuple[Tensor, Tensor]:
         """The cell (`Framed.step`) on [features, state, colour] (F + S + 3, m)."""

@@ -1,0 +1,162 @@
+"""An animation's frames, compiled one after another.
+
+A file is read, parsed and prepared once. A frame runs only the statements that ``t``, ``u`` or ``frame``
+reach, and where its nodes are those of the frame before, so is its Program.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.scene.evaluate import Evaluation
+from scenelang.scene.imports import Unreadable, read_source
+from scenelang.scene.params import Defines
+from scenelang.scene.schema import Animation, Scene
+from scenelang.scene.spans import SpanMap
+from scenelang.syntax import parse
+
+if TYPE_CHECKING:
+    from scenelang.program.program import Program
+
+STILL = Animation(seconds=1.0, fps=1.0)
+"""What a scene without ``animate`` is: one frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One frame.
+
+    Args:
+        number: from 0.
+        scene: evaluated.
+        spans: where its nodes were written.
+    """
+
+    number: int
+    scene: Scene
+    spans: SpanMap
+
+
+class Clip:
+    """A scene to be evaluated and compiled frame by frame.
+
+    Args:
+        source: its text.
+        path: where it was read from.
+        diagnostics: collects what is found, in each frame; a mistake in any frame ends the clip.
+        defines: values for params.
+        model: name of the model to draw with, instead of the scene's.
+        root: folder that imports cannot leave; by default that of ``path``.
+        size: canvas in pixels, instead of the scene's.
+        fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
+            seconds × fps frames, and t and u follow.
+        reuse: keep what frames share; without it each frame is worked out by itself.
+
+    Raises:
+        SceneError: the scene has errors.
+    """
+
+    def __init__(
+        self,
+        source: SourceFile,
+        *,
+        path: Path | None = None,
+        diagnostics: Diagnostics | None = None,
+        defines: Mapping[str, Any] | Defines | None = None,
+        model: str | None = None,
+        root: Path | None = None,
+        size: tuple[int, int] | None = None,
+        fps: float | None = None,
+        reuse: bool = True,
+    ) -> None:
+        self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
+        self.model, self.size, self.reuse = model, size, reuse
+        self._evaluation = Evaluation(
+            parse(source, self.diagnostics),
+            diagnostics=self.diagnostics,
+            defines=defines,
+            model=model,
+            root=root,
+            path=path,
+            fps=fps,
+            replays=reuse,
+        )
+        self._last: tuple[Shot, Program] | None = None
+        self.wanted = self._evaluation.wanted
+        """All files that it imports, also those that are not there."""
+        self.first = self.shot(0)
+
+    @property
+    def animates(self) -> bool:
+        """Whether the scene has ``animate(…)``."""
+        return self._evaluation.animates
+
+    @property
+    def animation(self) -> Animation:
+        """Length, frames a second and whether it is a loop."""
+        return self.first.scene.animation or STILL
+
+    def shot(self, number: int) -> Shot:
+        """Evaluate a frame.
+
+        Raises:
+            SceneError: it has errors.
+        """
+        scene, spans = self._evaluation.run(number)
+        if scene is None or self.diagnostics.errors:
+            raise SceneError(self.diagnostics)
+        if self.size is not None:
+            sized = scene.model_copy(update={"canvas": self.size})
+            if spans.span(scene) is not None:
+                spans.copy(scene, sized)
+            scene = sized
+        return Shot(number, scene, spans)
+
+    def program(self, shot: Shot) -> Program:
+        """Compile a frame.
+
+        Raises:
+            SceneError: it has errors.
+            FileNotFoundError: the model has no weights.
+        """
+        from scenelang.program.compile import compile_scene
+
+        if self.reuse and self._last is not None and _same(self._last[0].scene, shot.scene):
+            return self._last[1]
+        program = compile_scene(shot.scene, spans=shot.spans, diagnostics=self.diagnostics, model=self.model)
+        self._last = shot, program
+        return program
+
+
+def _same(a: Scene, b: Scene) -> bool:
+    """Whether two frames are made of the very same nodes."""
+    return (
+        len(a.nodes) == len(b.nodes)
+        and a.canvas == b.canvas
+        and a.background == b.background
+        and all(x is y for x, y in zip(a.nodes, b.nodes, strict=True))
+    )
+
+
+def open_clip(path: str | os.PathLike[str], **options: Any) -> Clip:
+    """A clip of a scene file; ``options`` as for `Clip`.
+
+    Raises:
+        SceneError: the scene has errors.
+        OSError: the file cannot be opened.
+    """
+    where = Path(path)
+    name = os.fspath(path)
+    try:
+        source = read_source(where, name)
+    except Unreadable as error:
+        found = options.get("diagnostics") or Diagnostics()
+        found.add(error.code, f"cannot read '{where.name}': {error}", Span(SourceFile(name, ""), 0, 0))
+        raise SceneError(found) from None
+    return Clip(source, path=where, **options)

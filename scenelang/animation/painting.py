@@ -1,0 +1,140 @@
+"""Frames to pictures, in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+from scenelang.animation.clip import Clip, Shot
+from scenelang.animation.store import frame_key
+
+if TYPE_CHECKING:
+    from scenelang.backend.render import Backend, Device
+    from scenelang.image import Image
+    from scenelang.program.program import Program
+    from scenelang.renderers.kept import Kept
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawable:
+    """A frame ready to be drawn.
+
+    Args:
+        number: from 0.
+        key: digest of all that decides its pixels.
+        shot: the frame.
+        program: what the network draws; None for the reference.
+    """
+
+    number: int
+    key: str
+    shot: Shot
+    program: Program | None
+
+
+@dataclass(slots=True)
+class Painter:
+    """Draws a clip's frames.
+
+    Args:
+        clip: the animation.
+        backend: ``"neural"`` or ``"reference"``.
+        device: where the network runs.
+        threads: tiles drawn at the same time; by default one for each usable core.
+    """
+
+    clip: Clip
+    backend: Backend = "neural"
+    device: Device = "auto"
+    threads: int | None = None
+    _kept: Kept | None = field(default=None, repr=False)
+
+    def prepare(self, shot: Shot) -> Drawable:
+        """Compile a frame and say what its picture depends on.
+
+        Raises:
+            SceneError: it has errors.
+            RenderError: there is no such device.
+        """
+        if self.backend == "reference":
+            scene = shot.scene.model_copy(update={"animation": None})
+            key = frame_key("reference", version("scenelang"), self.clip.model, scene.to_json())
+            return Drawable(shot.number, key, shot, None)
+        program = self.clip.program(shot)
+        key = frame_key(
+            "neural", version("scenelang"), version("torch"), self.place, self.split, program.digest()
+        )
+        return Drawable(shot.number, key, shot, program)
+
+    @property
+    def place(self) -> str:
+        """The torch device."""
+        if self.device == "cpu":
+            return "cpu"
+        from scenelang.backend.neural import choose_device
+
+        return choose_device(self.device)
+
+    @property
+    def split(self) -> int:
+        """How many threads a picture is split for, which shows in the last bits of its pixels."""
+        if self.threads is not None:
+            return self.threads
+        from scenelang.backend.neural import usable_cores
+
+        return usable_cores()
+
+    def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
+        """Draw a frame; the same picture as `scenelang.render` gives for it alone, bit for bit.
+
+        Raises:
+            SceneError, RenderError: as for `scenelang.render`.
+        """
+        if frame.program is None:
+            from scenelang.backend.exact import draw_exact
+
+            return draw_exact(frame.shot.scene, spans=frame.shot.spans, model=self.clip.model)
+        from scenelang.renderers.kept import Kept
+
+        if self._kept is None and self.clip.reuse:
+            self._kept = Kept()
+        return paint(
+            frame.program,
+            self.place,
+            threads=self.split,
+            split=self.split,
+            kept=self._kept,
+            progress=progress,
+        )
+
+
+def paint(
+    program: Program,
+    place: str,
+    *,
+    threads: int,
+    split: int,
+    kept: Kept | None,
+    progress: Progress | None = None,
+) -> Image:
+    """Draw a Program.
+
+    Args:
+        program: a compiled frame.
+        place: a torch device.
+        threads: tiles drawn at the same time.
+        split: how many threads the picture is split for.
+        kept: the picture before it.
+        progress: called with the share done, from any thread.
+
+    Raises:
+        RenderError: as for `scenelang.render`.
+    """
+    from scenelang.backend.neural import draw_program, open_model
+
+    model = open_model(program.model, place)
+    return draw_program(program, model, threads=threads, split=split, kept=kept, progress=progress).image

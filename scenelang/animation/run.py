@@ -1,0 +1,255 @@
+"""From a clip to files: draw what is missing, encode, put in place."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from scenelang.animation.painting import Painter
+from scenelang.animation.pictures import Film
+from scenelang.animation.store import Store, deliver
+from scenelang.animation.targets import Target
+
+if TYPE_CHECKING:
+    from scenelang.animation.gif import Palette
+    from scenelang.animation.workers import Workers
+
+WORTH_S: Final = 12.0  # drawing left that repays starting other processes, each of which loads torch
+_TRIED: Final = 3  # frames drawn here before it is decided
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far an animation is.
+
+    Args:
+        stage: ``"drawing"`` or ``"encoding"``.
+        done: of this stage, in frames for drawing and as a share for encoding.
+        total: what it counts up to.
+    """
+
+    stage: str
+    done: float
+    total: float
+
+
+@dataclass(slots=True)
+class Made:
+    """An animation that was written.
+
+    Args:
+        files: what was written, in order.
+        frames: number of frames.
+        drawn: pictures that were drawn now; equal frames are drawn once.
+        resumed: pictures found from a run before, which was interrupted.
+        compile_s: time to evaluate and compile all frames.
+        draw_s: time to draw, encode pictures and wait for other processes.
+        encode_s: time to encode the film.
+        jobs: processes that drew.
+    """
+
+    files: list[Path]
+    frames: int
+    drawn: int = 0
+    resumed: int = 0
+    compile_s: float = 0.0
+    draw_s: float = 0.0
+    encode_s: float = 0.0
+    jobs: int = 1
+
+
+def make(
+    painter: Painter,
+    target: Target,
+    numbers: range,
+    *,
+    jobs: int | None = None,
+    palette: Palette = "auto",
+    dither: bool = False,
+    progress: Callable[[Progress], None] = lambda _: None,
+) -> Made:
+    """Draw frames and write them whole: nothing is put in place before all of it is there.
+
+    Frames are kept in `Target.work` on the way. If the run ends before its time, they stay there, and the
+    same call goes on with those that are missing.
+
+    Args:
+        painter: draws the clip's frames.
+        target: where they go.
+        numbers: which frames.
+        jobs: processes that draw; by default this one, and others as soon as they would pay.
+        palette: of a GIF, see `write_gif`.
+        dither: of a GIF.
+        progress: called from this thread.
+
+    Raises:
+        SceneError: a frame has errors.
+        RenderError: a frame cannot be drawn, or the format cannot be written.
+        OSError: a file cannot be written.
+    """
+    ready(target)
+    suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
+    made = Made([], len(numbers))
+    with Store(target.work, suffix) as store:
+        keys, alpha = _drawn(painter, store, numbers, jobs, progress, made)
+        started = time.perf_counter()
+        if target.kind == "sequence":
+            made.files = _numbered(store, target, numbers, keys)
+        else:
+            animation = painter.clip.animation
+            width, height = painter.clip.first.scene.canvas
+            film = Film(
+                [store.file(key) for key in keys], animation.fps, animation.loop, (width, height), alpha
+            )
+            part = store.folder / f"film{target.path.suffix}"
+            _encode(film, target, part, palette, dither, progress)
+            deliver(part, target.path)
+            made.files = [target.path]
+        made.encode_s = time.perf_counter() - started
+        store.remove()
+    return made
+
+
+def _drawn(
+    painter: Painter,
+    store: Store,
+    numbers: range,
+    jobs: int | None,
+    progress: Callable[[Progress], None],
+    made: Made,
+) -> tuple[list[str], bool]:
+    """Have every frame in the store; the key of each, and whether any has alpha."""
+    keys: list[str] = []
+    asked: set[str] = set()
+    alpha = False
+    workers: Workers | None = None
+    spent_s = 0.0
+    try:
+        for index, number in enumerate(numbers):
+            started = time.perf_counter()
+            frame = painter.prepare(painter.clip.shot(number))
+            made.compile_s += time.perf_counter() - started
+            keys.append(frame.key)
+            alpha |= frame.shot.scene.background is None
+            started = time.perf_counter()
+            if frame.key not in asked:
+                asked.add(frame.key)
+                if store.has(frame.key):
+                    made.resumed += 1
+                else:
+                    if workers is None and _pays(painter, jobs, made.drawn, spent_s, len(numbers) - index):
+                        workers = _workers(painter, jobs)
+                        made.jobs = workers.count
+                    if workers is not None and frame.program is not None:
+                        workers.submit(frame.program, store.file(frame.key))
+                    else:
+                        say = partial(_part, progress, index, len(numbers))
+                        store.put(frame.key, painter.draw(frame, say))
+                        spent_s += time.perf_counter() - started
+                    made.drawn += 1
+            made.draw_s += time.perf_counter() - started
+            progress(Progress("drawing", index + 1 - (workers.waiting if workers else 0), len(numbers)))
+        if workers is not None:
+            started = time.perf_counter()
+            while workers.waiting:
+                workers.take()
+                progress(Progress("drawing", len(numbers) - workers.waiting, len(numbers)))
+            made.draw_s += time.perf_counter() - started
+    finally:
+        if workers is not None:
+            workers.close()
+    return keys, alpha
+
+
+def _part(progress: Callable[[Progress], None], index: int, total: int, share: float) -> None:
+    progress(Progress("drawing", index + share, total))
+
+
+def _pays(painter: Painter, jobs: int | None, drawn: int, spent_s: float, left: int) -> bool:
+    """Whether to draw in other processes from here on."""
+    if painter.backend != "neural" or painter.place != "cpu" or jobs == 1:
+        return False
+    if jobs is not None:
+        return True
+    from scenelang.backend.neural import usable_cores
+
+    if painter.threads is not None or usable_cores() < 2 or drawn < _TRIED:
+        return False
+    return spent_s / drawn * left > WORTH_S
+
+
+def _workers(painter: Painter, jobs: int | None) -> Workers:
+    from scenelang.animation.workers import Workers
+    from scenelang.backend.neural import usable_cores
+
+    return Workers(jobs or usable_cores(), painter.split)
+
+
+def _numbered(store: Store, target: Target, numbers: range, keys: Sequence[str]) -> list[Path]:
+    """Move frames to where they belong; of equal ones all but the last are copies."""
+    target.path.mkdir(parents=True, exist_ok=True)
+    last = {key: index for index, key in enumerate(keys)}
+    files = []
+    for index, (number, key) in enumerate(zip(numbers, keys, strict=True)):
+        part = store.file(key)
+        if last[key] != index:
+            part = store.folder / f"copy{store.suffix}"
+            shutil.copyfile(store.file(key), part)
+        file = target.file(number)
+        os.replace(part, file)
+        files.append(file)
+    return files
+
+
+def _encode(
+    film: Film,
+    target: Target,
+    part: Path,
+    palette: Palette,
+    dither: bool,
+    progress: Callable[[Progress], None],
+) -> None:
+    def say(share: float) -> None:
+        progress(Progress("encoding", share, 1.0))
+
+    if target.kind == "gif":
+        from scenelang.animation.gif import write_gif
+
+        write_gif(film, part, say, palette=palette, dither=dither)
+    elif target.kind == "apng":
+        from scenelang.animation.apng import write_apng
+
+        write_apng(film, part, say)
+    elif target.kind == "webp":
+        from scenelang.animation.webp import write_webp
+
+        write_webp(film, part, say)
+    else:
+        from scenelang.animation.video import write_video
+
+        write_video(film, part, say, suffix=target.path.suffix.lower())
+
+
+def ready(target: Target) -> None:
+    """Find out before any work whether a format can be written.
+
+    Raises:
+        RenderError: it cannot.
+    """
+    if target.kind == "video":
+        from scenelang.animation.video import check_video
+
+        check_video(target.path.suffix.lower())
+    elif target.kind == "webp":
+        from PIL import features
+
+        from scenelang.backend.errors import RenderError
+
+        if not features.check("webp"):
+            raise RenderError("this Pillow is built without WebP")

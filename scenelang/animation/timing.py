@@ -1,0 +1,110 @@
+"""Which frames, and how long each is shown."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final, TypeVar
+
+K = TypeVar("K")
+
+_RANGE: Final = re.compile(r"\s*(\d{1,9})\s*(?:\.\.\s*(<?)\s*(\d{1,9})?\s*)?")
+
+
+class FramesError(ValueError):
+    """A range of frames that is none, or that an animation does not have."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRange:
+    """Frames as they are asked for.
+
+    Args:
+        first: from 0.
+        last: the last one; None for that of the animation.
+    """
+
+    first: int = 0
+    last: int | None = None
+
+    @classmethod
+    def parse(cls, text: str) -> FrameRange:
+        """``a..b`` inclusive, ``a..<b`` without b, ``a..`` to the end, or ``a`` alone.
+
+        Raises:
+            FramesError: it is none of these, or empty.
+        """
+        found = _RANGE.fullmatch(text)
+        if found is None or (found[2] and found[3] is None):
+            raise FramesError(f"'{text}' is no range of frames such as 0..23, 0..<24, 12.. or 7")
+        first = int(found[1])
+        if ".." not in text:
+            return cls(first, first)
+        if found[3] is None:
+            return cls(first)
+        last = int(found[3]) - bool(found[2])
+        if last < first:
+            raise FramesError(f"the range of frames '{text}' is empty")
+        return cls(first, last)
+
+    def among(self, frames: int) -> range:
+        """The numbers in an animation of ``frames`` frames.
+
+        Raises:
+            FramesError: some are outside it.
+        """
+        last = frames - 1 if self.last is None else self.last
+        outside = self.first if self.first >= frames else last if last >= frames else None
+        if outside is not None:
+            raise FramesError(f"frame {outside} is outside 0..{frames - 1}")
+        return range(self.first, last + 1)
+
+
+def starts(count: int, fps: float, per_second: int) -> list[int]:
+    """When each of ``count`` frames starts, and when the last ends, on a grid of ``per_second`` ticks.
+
+    Each is rounded by itself, so that errors do not add up and the whole is as long as it should be.
+    """
+    step = Fraction(per_second) / Fraction(fps)
+    return [math.floor(i * step + Fraction(1, 2)) for i in range(count + 1)]
+
+
+def delays(count: int, fps: float, per_second: int, shortest: int = 1) -> list[int]:
+    """Ticks that each frame is shown for; 0 where it is left out, as it would be shorter than ``shortest``.
+
+    Args:
+        count: number of frames, at least 1.
+        fps: frames a second.
+        per_second: ticks a second.
+        shortest: ticks a frame is shown for at least; the animation as a whole may not be shorter.
+    """
+    at = starts(count, fps, per_second)
+    shown = [0]
+    for index in range(1, count):
+        if at[index] - at[shown[-1]] >= shortest:
+            shown.append(index)
+    found = [0] * count
+    for index, following in zip(shown, [*shown[1:], count], strict=True):
+        found[index] = at[following] - at[index]
+    while len(shown) > 1 and found[shown[-1]] < shortest:
+        late = shown.pop()
+        found[shown[-1]] += found[late]
+        found[late] = 0
+    found[shown[0]] = max(found[shown[0]], shortest)
+    return found
+
+
+def runs(keys: Sequence[K], lengths: Iterable[int]) -> list[tuple[K, int]]:
+    """Neighbours with the same key as one, as long as all of them; those of length 0 are left out."""
+    found: list[tuple[K, int]] = []
+    for key, length in zip(keys, lengths, strict=True):
+        if length == 0:
+            continue
+        if found and found[-1][0] == key:
+            found[-1] = key, found[-1][1] + length
+        else:
+            found.append((key, length))
+    return found

@@ -1,0 +1,112 @@
+"""Drawing frames in other processes.
+
+Each is a plain ``python -m scenelang.animation.worker`` that gets compiled Programs through a pipe, so that
+an embedder's main module is not run again, and ends when its pipe does, so that none outlives this process.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import subprocess
+import sys
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from queue import SimpleQueue
+from typing import TYPE_CHECKING
+
+from scenelang.backend.errors import RenderError
+
+if TYPE_CHECKING:
+    from scenelang.program.program import Program
+
+AHEAD = 2  # frames that wait for each process, so that none is idle and few are held
+
+
+class Workers:
+    """Processes that draw Programs into files.
+
+    Args:
+        count: of processes.
+        split: how many threads a picture is split for; each draws with one, and the same pixels.
+    """
+
+    def __init__(self, count: int, split: int) -> None:
+        self.count, self.split = count, split
+        self._free: SimpleQueue[subprocess.Popen[bytes]] = SimpleQueue()
+        self._all = [_start() for _ in range(count)]
+        for process in self._all:
+            self._free.put(process)
+        self._pool = ThreadPoolExecutor(count)
+        self._waiting: deque[Future[None]] = deque()
+
+    @property
+    def waiting(self) -> int:
+        """Frames that are asked for and not known to be done."""
+        while self._waiting and self._waiting[0].done():
+            self.take()
+        return len(self._waiting)
+
+    def submit(self, program: Program, file: Path) -> None:
+        """Have a Program drawn to a picture file; waits while many are under way.
+
+        Raises:
+            RenderError, OSError: an earlier one failed.
+        """
+        from scenelang.program.store import program_bytes
+
+        while len(self._waiting) >= AHEAD * self.count:
+            self.take()
+        self._waiting.append(self._pool.submit(self._draw, program_bytes(program), file))
+
+    def take(self) -> None:
+        """Wait for the first of those asked for.
+
+        Raises:
+            RenderError, OSError: it failed.
+        """
+        self._waiting.popleft().result()
+
+    def _draw(self, program: bytes, file: Path) -> None:
+        process = self._free.get()
+        try:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            head = json.dumps({"file": str(file.absolute()), "split": self.split}).encode()
+            try:
+                process.stdin.write(struct.pack("<II", len(head), len(program)) + head + program)
+                process.stdin.flush()
+                said = process.stdout.readline()
+            except OSError:
+                said = b""
+            if not said:
+                code = process.wait()
+                raise RenderError(f"a drawing process ended by itself (code {code}); --jobs 1 needs none")
+            answer = json.loads(said)
+            if "errno" in answer:
+                raise OSError(answer["errno"], answer["error"], answer["file"])
+            if "error" in answer:
+                raise RenderError(answer["error"])
+        finally:
+            self._free.put(process)
+
+    def close(self) -> None:
+        """End the processes, whatever they are doing."""
+        for future in self._waiting:
+            future.cancel()
+        for process in self._all:
+            process.kill()
+        self._pool.shutdown()
+        for process in self._all:
+            process.communicate()
+
+
+def _start() -> subprocess.Popen[bytes]:
+    """Start a process, in a session of its own: Ctrl-C reaches this one alone, which ends the others."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "scenelang.animation.worker"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    )
