@@ -41,7 +41,7 @@ class Program:
         bounds: float32 (N, 4), world xmin, ymin, xmax, ymax: outside it the row makes no difference to
             the picture. An intersection, which reaches everything, has the whole canvas.
         canvas: width and height in pixels.
-        background: (r, g, b) as written, or None for transparency.
+        background: (r, g, b) as written, in [0, 1], or None for transparency.
         model: name of the model that draws it.
         weights: SHA-256 of that model's weights, hex.
         objects: geometry name of each row.
@@ -132,7 +132,7 @@ def _check_settings(program: Program) -> None:
         raise ProgramError(f"a canvas of {program.canvas!r}, where sides from 1 to {MOST_PIXELS} are allowed")
     colour = program.background
     if colour is not None and not (
-        len(colour) == 3 and all(type(v) in (int, float) and np.isfinite(v) for v in colour)
+        len(colour) == 3 and all(type(v) in (int, float) and 0 <= v <= 1 for v in colour)
     ):
         raise ProgramError(f"a background of {colour!r}, which is no colour")
     if not program.model:

@@ -13,10 +13,14 @@ import torch
 from torch import Tensor
 
 from scenelang.lifting import exact
+from scenelang.program.program import ProgramError
 
 Warp = tuple[float, float, float]  # twirl, bend x, bend y
 Frame = tuple[float, float, float, float, float, float]  # a b c, d e f
 
+FAR = 1e15  # leaf units: where points lie that float32 cannot follow; out of reach of everything
+TAME = 1e8  # frames of smaller numbers cannot lead a point out of float32
+MOST = 1e31  # the compiler keeps maps and deformations below this
 BLEND_REACH = 0.3  # world units: farther objects cannot change a blend (2 k for the trained k = 0.15)
 
 
@@ -30,6 +34,7 @@ class ObjectFrame:
         stretch: how much faster than one world unit per world unit a distance can change at most.
         centre: world point about which the object lies.
         half: half extents (x, y) of the world box that holds a leaf disc of radius r: half[0] r + half[1].
+        wild: whether points may leave float32 on the way, which costs a detour through float64.
     """
 
     steps: tuple[Frame | Warp, ...]
@@ -37,6 +42,7 @@ class ObjectFrame:
     stretch: float
     centre: tuple[float, float]
     half: tuple[tuple[float, float], tuple[float, float]]
+    wild: bool
 
     @property
     def growth(self) -> float:
@@ -51,8 +57,13 @@ class ObjectFrame:
 
 
 def read_frame(g: np.ndarray) -> ObjectFrame:
-    """The frame of one geometry vector (32,)."""
+    """The frame of one geometry vector (32,).
+
+    Raises:
+        ProgramError: it leads from the world to no leaf, which no compiled scene has.
+    """
     g = g.astype(np.float64)
+    largest = float(np.abs(g[exact.FRAME.start :]).max())
     last, middle = g[exact.FRAME], g[exact.MIDDLE]
     outer, inner = g[exact.OUTER].reshape(-1, 3), g[exact.INNER].reshape(-1, 3)
     # from the leaf through the middle map, and on into the world; warps keep the distance to the origin
@@ -75,17 +86,26 @@ def read_frame(g: np.ndarray) -> ObjectFrame:
     else:
         centre, half = last_linear @ middle_shift + last_shift, tuple((r, 0.0) for r in rows)
     scale = float(np.linalg.svd(total, compute_uv=False)[1])
-    return ObjectFrame(tuple(steps), scale, stretch, (float(centre[0]), float(centre[1])), (half[0], half[1]))
+    if not (largest < MOST and 1 / MOST < scale < MOST):
+        raise ProgramError("a frame beyond float32")
+    at = float(centre[0]), float(centre[1])
+    wild = largest > TAME or not 1 / TAME < scale < TAME
+    return ObjectFrame(tuple(steps), scale, min(stretch, MOST), at, (half[0], half[1]), wild)
 
 
 def _invert(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Linear part (2, 2) and shift (2,) of the map that a frame (6,) is the inverse of."""
-    linear = np.linalg.inv(frame.reshape(2, 3)[:, :2])
+    try:
+        linear = np.linalg.inv(frame.reshape(2, 3)[:, :2])
+    except np.linalg.LinAlgError:
+        raise ProgramError("a frame without an inverse") from None
     return linear, -linear @ frame[[2, 5]]
 
 
 def local_points(frame: ObjectFrame, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
     """Leaf coordinates of world points, any shape."""
+    if frame.wild:
+        x, y = x.double(), y.double()
     for step in frame.steps:
         if len(step) == 6:
             a, b, c, d, e, f = step
@@ -99,4 +119,6 @@ def local_points(frame: ObjectFrame, x: Tensor, y: Tensor) -> tuple[Tensor, Tens
                 angle.add_(torch.hypot(x, y), alpha=twirl)
             cos, sin = angle.cos(), angle.sin()
             x, y = (x * cos).addcmul_(y, sin), (y * cos).addcmul_(x, sin, value=-1.0)
+    if frame.wild:
+        return x.clamp(-FAR, FAR).float(), y.clamp(-FAR, FAR).float()
     return x, y

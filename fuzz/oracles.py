@@ -1,0 +1,86 @@
+"""What must hold of trees and diagnostics, whatever the text."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from fuzz.target import Failure, hold
+from scenelang.diagnostics import render
+from scenelang.diagnostics.codes import CODES
+from scenelang.diagnostics.diagnostic import Diagnostic
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.syntax import nodes
+
+
+def check_tree(tree: nodes.File, source: SourceFile) -> bool:
+    """Spans nest and run forward inside the text; returns whether recovery left a node of its own."""
+    hold(type(tree) is nodes.File, "parsing gives a tree", type(tree))
+    hold((tree.span.start, tree.span.end) == (0, len(source.text)), "the tree spans the text", tree.span)
+    bad = False
+    todo: list[tuple[Any, Span]] = [(tree, tree.span)]
+    while todo:
+        node, around = todo.pop()
+        if isinstance(node, tuple):
+            todo += [(item, around) for item in node]
+        elif isinstance(node, Span):
+            hold(node.source is source, "spans are of the text", node)
+            hold(around.start <= node.start <= node.end <= around.end, "spans nest", (node, around))
+        elif is_dataclass(node):
+            bad = bad or isinstance(node, nodes.BadStmt | nodes.BadExpr)
+            own: Span = getattr(node, "span", around)
+            todo.append((own, around))
+            todo += [(getattr(node, field.name), own) for field in fields(node) if field.name != "span"]
+    return bad
+
+
+def check_diagnostics(found: Sequence[Diagnostic], texts: Iterable[SourceFile] | None) -> None:
+    """Codes are known, places lie inside their text, edits do not overlap, and every format renders.
+
+    Args:
+        found: the diagnostics.
+        texts: the files that they may be in; None for any.
+    """
+    known = None if texts is None else list(texts)
+    for d in found:
+        hold(d.code in CODES, "codes are listed", d.code)
+        hold(d.message and "\n" not in d.message, "messages are one line", d.message)
+        edits = d.fix.edits if d.fix is not None else ()
+        spans = [d.span] if d.span is not None else []
+        for span in [*spans, *(label.span for label in d.labels), *(edit.span for edit in edits)]:
+            inside = 0 <= span.start <= span.end <= len(span.source.text)
+            hold(inside, "diagnostics lie inside the text", (d.code, span))
+            if known is not None:
+                hold(any(span.source is text for text in known), "diagnostics are in the text", d.code)
+        ordered = sorted(edits, key=lambda edit: (edit.span.start, edit.span.end))
+        for one, other in zip(ordered, ordered[1:], strict=False):
+            hold(one.span.end <= other.span.start, "edits of a fix do not overlap", d)
+    check_rendering(found)
+
+
+def check_rendering(found: Sequence[Diagnostic]) -> None:
+    """Every format takes the diagnostics, says each once, and lets no text break out of its place."""
+    plain = render.render_text(found)
+    hold(all(c.isprintable() or c == "\n" for c in plain), "text output has no control characters", plain)
+    coloured = render.render_text(found, color=True)
+    hold("\x1b" not in plain and len(coloured) >= len(plain), "colours only where asked for")
+    for name, text in (("json", render.render_json(found)), ("sarif", render.render_sarif(found))):
+        try:
+            data = json.loads(text)
+        except ValueError as error:
+            raise Failure(f"{name} output is JSON", error) from None
+        listed = data["diagnostics"] if name == "json" else data["runs"][0]["results"]
+        hold(len(listed) == len(found), f"{name} output has every diagnostic", len(listed))
+    concise = render.render_concise(found)
+    hold(concise.count("\n") == len(concise.splitlines()) == len(found), "a line each", concise)
+    github = render.render_github(found)
+    hold(github.count("\n") == len(found) and github.count("\r") == 0, "a command each", github)
+    starts = all(line.startswith(("::error ", "::warning ")) for line in github.split("\n")[:-1])
+    hold(starts, "only commands of our own", github)
+
+
+def same(one: Sequence[Diagnostic], other: Sequence[Diagnostic]) -> bool:
+    """Whether two runs said the same."""
+    return list(one) == list(other)

@@ -1,0 +1,79 @@
+"""What a fuzz target is, and what it says when an oracle does not hold."""
+
+from __future__ import annotations
+
+import importlib
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from random import Random
+from typing import Final
+
+TARGETS: Final = ("parse", "evaluate", "scene_json", "program", "weights")
+"""Names of the modules in `fuzz.targets`."""
+
+
+class Failure(AssertionError):
+    """An oracle does not hold.
+
+    Args:
+        oracle: which one, in a few words that are the same whatever the input.
+        detail: what was found this time.
+    """
+
+    def __init__(self, oracle: str, detail: object = "") -> None:
+        super().__init__(f"{oracle}: {detail}" if detail != "" else oracle)
+        self.oracle = oracle
+
+
+def hold(truth: object, oracle: str, detail: object = "") -> None:
+    """Raise `Failure` unless ``truth``."""
+    if not truth:
+        raise Failure(oracle, detail)
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One thing that is fuzzed.
+
+    Args:
+        name: as on the command line.
+        summary: what is fuzzed and what must hold, one sentence for the table.
+        check: one run over any bytes; whatever it raises is a finding.
+        seeds: sound and unsound inputs to start from.
+        mutate: a mutation that knows the structure of the input.
+        dictionary: byte strings that belong together, for atheris's own mutations.
+        most_bytes: longest input.
+    """
+
+    name: str
+    summary: str
+    check: Callable[[bytes], None] = field(repr=False)
+    seeds: Callable[[], list[bytes]] = field(repr=False)
+    mutate: Callable[[bytes, Random], bytes] = field(repr=False)
+    dictionary: Callable[[], list[bytes]] = field(repr=False, default=list)
+    most_bytes: int = 4096
+
+
+def load_target(name: str) -> Target:
+    """The target of a name; raises KeyError for another one."""
+    if name not in TARGETS:
+        raise KeyError(name)
+    target: Target = importlib.import_module(f"fuzz.targets.{name}").TARGET
+    return target
+
+
+def mutations(target: Target, count: int, seed: int) -> Iterator[bytes]:
+    """Seeded mutations without atheris: one to four of the target's own after each other, from its seeds."""
+    generator = Random(seed)
+    seeds = target.seeds()
+    for _ in range(count):
+        data = generator.choice(seeds)
+        for _ in range(generator.randint(1, 4)):
+            data = target.mutate(data, generator)[: target.most_bytes]
+        yield data
+
+
+def sampled(data: bytes, one_in: int) -> bool:
+    """Whether an input is one of those that a costly oracle looks at: the same ones each time."""
+    return zlib.crc32(data) % one_in == 0
