@@ -39,6 +39,7 @@ def evaluate(
     path: Path | None = None,
     frame: int = 0,
     texts: Mapping[Path, str] | None = None,
+    watch: Watch | None = None,
 ) -> tuple[Scene | None, SpanMap]:
     """Evaluate a syntax tree.
 
@@ -53,6 +54,7 @@ def evaluate(
         path: file that the tree was read from.
         frame: frame of the animation, from 0.
         texts: what imported files hold, by their resolved paths, instead of what is on the disk.
+        watch: is shown every name's value and every node; see `Session`.
 
     Returns:
         The Scene, or None if anything is wrong, and where its nodes were written.
@@ -67,6 +69,7 @@ def evaluate(
         path=path,
         frame=frame,
         texts=texts,
+        watch=watch,
     )
     return evaluation.run(frame)
 
@@ -77,11 +80,10 @@ class Evaluation:
     Args:
         file: the tree.
         diagnostics: where mistakes go; each is reported for the first frame that has it.
-        defines, models, model, root, path, texts: as for `evaluate`.
+        defines, models, model, root, path, texts, watch: as for `evaluate`.
         frame: the first frame that is run.
         fps: frames a second, instead of those that ``animate`` names.
         replays: run what no frame changes once.
-        parsed, watch: as for `evaluate`.
     """
 
     def __init__(
@@ -98,6 +100,7 @@ class Evaluation:
         fps: float | None = None,
         replays: bool = False,
         texts: Mapping[Path, str] | None = None,
+        watch: Watch | None = None,
     ) -> None:
         self.file, self.diagnostics = file, diagnostics
         self.animates = _animates(file)

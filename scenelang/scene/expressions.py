@@ -32,6 +32,20 @@ class Code(NamedTuple):
     value: Any = VARIES
 
 
+def watched(run: Run, span: Span, unit: Unit) -> Run:
+    """``run``, showing its values to whoever watches the session."""
+    watch = unit.session.watch
+    if watch is None:
+        return run
+
+    def shown(env: Env) -> Any:
+        value = run(env)
+        watch(span, value)
+        return value
+
+    return shown
+
+
 def constant(value: Any) -> Code:
     """An expression that always has ``value``."""
     return Code(lambda env: value, value)

@@ -107,6 +107,8 @@ def _action(
         if node is not None:
             session.count_parts(1, span)
             out.transforms.append(node)
+            if session.watch is not None:
+                session.watch(stmt.span, node)
 
     getters = [None if code is None else code.run for code in inputs]
     if all(code is None or code.value is not VARIES for code in inputs):

@@ -60,6 +60,8 @@ def join_child(node: Any, where: spans.Place, out: Builder, session: Session) ->
             help="put children first; a transform for some of them goes with them into group { … }",
         )
     out.add(node)
+    if session.watch is not None:
+        session.watch(where.statement, node)
 
 
 # ---------------------------------------------------------------- objects

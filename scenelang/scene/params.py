@@ -74,6 +74,8 @@ def _param(stmt: nodes.Param, place: Place) -> Action | None:
         if given is not VARIES:
             value = _from_outside(full, given, value, allowed, stmt, unit)
         env[slot] = value
+        if session.watch is not None:
+            session.watch(name.span, value)
 
     return action
 

@@ -321,6 +321,8 @@ def entering(
         slot = 1
         for get in given:
             frame[slot] = get(env) if get is not None else definition.defaults[slot - 1](frame)
+            if session.watch is not None:
+                session.watch(params[slot - 1].name.span, frame[slot])
             slot += 1
         return frame
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -31,6 +31,10 @@ _STACK_FRAMES: Final = 200_000  # calls x nesting x frames per level, with room
 _lock = threading.Lock()
 _users = 0
 _before = (0, False)  # the interpreter's recursion limit, and whether it collected cycles
+
+
+Watch = Callable[[Span, Any], None]
+"""What an editor looks on with; it may raise `Halt` to end the evaluation."""
 
 
 class Halt(Exception):
@@ -101,6 +105,7 @@ class Session:
         replays: run what no frame changes once; the evaluation is for several frames.
         roots: the live slots of every file.
         needs: collects what the statement being prepared depends on.
+        watch: called with the place of each name and its value, and of each statement and its node.
     """
 
     diagnostics: Diagnostics
@@ -119,6 +124,7 @@ class Session:
     replays: bool = False
     roots: list[list[Any]] = field(default_factory=list)
     needs: Needs = field(default_factory=Needs)
+    watch: Watch | None = None
 
     def restart(self, frame: int) -> None:
         """Forget what the last run left, to run what is prepared for another frame."""

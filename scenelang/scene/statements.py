@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeVar
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.scene.build import Builder
-from scenelang.scene.expressions import VARIES, guarded, prepare
+from scenelang.scene.expressions import VARIES, guarded, prepare, watched
 from scenelang.scene.operations import condition
 from scenelang.scene.scope import Binding, Definition, Env, Frame, Scope
 from scenelang.scene.session import MAX_NESTING, UNBOUND
@@ -179,7 +179,7 @@ def _let(stmt: nodes.Let, place: Place) -> Action | None:
     value = code.value if known else None
     binding = Binding("let", stmt.name.span, frame, slot, value, known, place.unit.session.needs)
     define(stmt.name, binding, place)
-    get = code.run
+    get = watched(code.run, stmt.name.span, place.unit)
 
     def action(env: Env, out: Builder) -> None:
         env[slot] = get(env)
@@ -279,6 +279,8 @@ def _for(stmt: nodes.For, place: Place) -> Action | None:
             return
         for value in values:
             env[slot] = value
+            if session.watch is not None:
+                session.watch(stmt.variable.span, value)
             session.tick(weight, span)
             for act in actions:
                 act(env, out)
