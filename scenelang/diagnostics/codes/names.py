@@ -17,4 +17,5 @@ CODES: dict[str, str] = {
     "E0214": "file cannot be read",
     "E0215": "import leaves the import root",
     "E0216": "import cycle",
+    "W0201": "unused name",
 }
