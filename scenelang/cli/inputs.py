@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
 from scenelang.scene.session import MAX_BYTES
 from scenelang.scene.spans import SpanMap
-from scenelang.syntax import parse
+from scenelang.syntax import nodes, parse
 
 STDIN = "-"
 
@@ -30,6 +31,7 @@ class Request:
         root: folder that imports cannot leave.
         frame: frame of the animation.
         size: canvas instead of the scene's.
+        texts: what to read instead of some imported files, by their resolved paths.
     """
 
     defines: Defines
@@ -37,6 +39,7 @@ class Request:
     root: str | None = None
     frame: int = 0
     size: tuple[int, int] | None = None
+    texts: Mapping[Path, str] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -45,12 +48,14 @@ class Input:
 
     Args:
         name: as the user wrote it.
+        tree: None if it is no text.
         scene: None if it has errors.
         spans: where its nodes were written.
         diagnostics: what was found so far.
     """
 
     name: str
+    tree: nodes.File | None = None
     scene: Scene | None = None
     spans: SpanMap = field(default_factory=SpanMap)
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
@@ -91,7 +96,7 @@ def read_input(name: str, request: Request, clock: Clock, source: SourceFile | N
     if source is None:
         return found
     with clock("parse"):
-        tree = parse(source, found.diagnostics)
+        found.tree = tree = parse(source, found.diagnostics)
     folder = request.root if request.root is not None else "." if path is None else None
     with clock("evaluate"):
         scene, spans = evaluate(
@@ -102,6 +107,7 @@ def read_input(name: str, request: Request, clock: Clock, source: SourceFile | N
             root=None if folder is None else Path(folder),
             path=path,
             frame=request.frame,
+            texts=request.texts,
         )
     if scene is not None and not found.diagnostics.errors:
         if request.size is not None:
