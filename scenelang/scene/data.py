@@ -26,7 +26,7 @@ _BRACKETS_PER_NODE: Final = 3  # a link of a chain: list, link, node
 _PLAIN_DEPTH: Final = 150  # brackets that pydantic reads by itself
 _MAX_SHOWN: Final = 20
 _MAX_PATH: Final = 80
-_WIDTH: Final = 110
+_WIDTH: Final = 90
 
 
 def to_json(scene: Scene) -> str:

@@ -343,6 +343,12 @@ class Scene(_Node):
 
         return to_nsg(self)
 
+    def to_python(self) -> str:
+        """Python code that makes an equal Scene and calls it ``scene``."""
+        from scenelang.scene.to_python import to_python
+
+        return to_python(self)
+
     def to_json(self) -> str:
         """JSON that `from_json` reads back; like `model_dump_json`, and for scenes of any depth."""
         from scenelang.scene.data import to_json

@@ -82,16 +82,27 @@ def angle(rad: float) -> str:
     """An angle in degrees where few digits say it exactly, else in radians."""
     if rad == 0.0:
         return "0"
-    degrees = round(math.degrees(rad), 9)
-    return f"{number(degrees)}deg" if math.radians(degrees) == rad else f"{number(rad)}rad"
+    exact = degrees(rad)
+    return f"{number(rad)}rad" if exact is None else f"{number(exact)}deg"
+
+
+def degrees(rad: float) -> float | None:
+    """The angle in degrees, of few digits, that is exactly so many radians; None where there is none."""
+    rounded = round(math.degrees(rad), 9)
+    return rounded if math.radians(rounded) == rad else None
 
 
 def rgb(color: Rgb) -> str:
     """A colour as ``#rrggbb`` where that is exact, else as a vector."""
+    return hex_colour(color) or _vector(color)
+
+
+def hex_colour(color: Rgb) -> str | None:
+    """``#rrggbb`` where it is exactly the colour."""
     levels = [round(c * 255) if 0.0 <= c <= 1.0 else -1 for c in color]
     if all(level >= 0 and level / 255 == c for level, c in zip(levels, color, strict=True)):
         return "#" + "".join(f"{level:02x}" for level in levels)
-    return _vector(color)
+    return None
 
 
 def _vector(values: tuple[float, ...]) -> str:
