@@ -19,6 +19,7 @@ from scenelang.scene.spans import SpanMap
 from scenelang.syntax import nodes, parse
 
 STDIN = "-"
+JSON = ".json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
 
 
 def read_input(name: str, request: Request, clock: Clock, source: SourceFile | None = None) -> Input:
-    """Parse and evaluate one scene.
+    """Read one scene: text is parsed and evaluated, JSON (by its suffix, or `{` first in standard input) read.
 
     Args:
         name: as the user wrote it.
@@ -95,6 +96,10 @@ def read_input(name: str, request: Request, clock: Clock, source: SourceFile | N
         source = read_text(name, found.diagnostics)
     if source is None:
         return found
+    if name.endswith(JSON) or (path is None and source.text.lstrip()[:1] == "{"):
+        with clock("read"):
+            scene, spans = _from_json(source, request, found.diagnostics)
+        return _with_scene(found, scene, spans, request)
     with clock("parse"):
         found.tree = tree = parse(source, found.diagnostics)
     folder = request.root if request.root is not None else "." if path is None else None
@@ -109,13 +114,31 @@ def read_input(name: str, request: Request, clock: Clock, source: SourceFile | N
             frame=request.frame,
             texts=request.texts,
         )
-    if scene is not None and not found.diagnostics.errors:
-        if request.size is not None:
-            sized = scene.model_copy(update={"canvas": request.size})
-            if spans.span(scene) is not None:
-                spans.copy(scene, sized)
-            scene = sized
-        found.scene, found.spans = scene, spans
+    return _with_scene(found, scene, spans, request)
+
+
+def _from_json(
+    source: SourceFile, request: Request, diagnostics: Diagnostics
+) -> tuple[Scene | None, SpanMap]:
+    """The scene of JSON text, which has one frame and no params."""
+    from scenelang.scene.data import load_json
+
+    if request.frame:
+        fact = f"frame {request.frame} of a scene from JSON, which is one frame"
+        diagnostics.add("E0337", fact, None, help="convert that frame of the animation to JSON")
+    return load_json(source, diagnostics)
+
+
+def _with_scene(found: Input, scene: Scene | None, spans: SpanMap, request: Request) -> Input:
+    """The input with its scene, in the size that was asked for."""
+    if scene is None or found.diagnostics.errors:
+        return found
+    if request.size is not None:
+        sized = scene.model_copy(update={"canvas": request.size})
+        if spans.span(scene) is not None:
+            spans.copy(scene, sized)
+        scene = sized
+    found.scene, found.spans = scene, spans
     return found
 
 
