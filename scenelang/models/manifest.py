@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+from scenelang.files import read_json
 
 ROOT = Path(__file__).parent
+MOST: Final = 1e300
+"""Bound of the numbers in ranges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,17 +51,77 @@ class Manifest:
 
     @staticmethod
     def from_json(text: str) -> Manifest:
-        """Read a manifest; raises ValueError on unknown or missing fields."""
-        data = json.loads(text)
+        """Read a manifest.
+
+        Raises:
+            ValueError: it is no JSON, a field is missing or unknown, or holds what it cannot.
+        """
+        data = read_json(text.encode("utf-8"))
         if not isinstance(data, dict) or data.pop("format", None) != 1:
             raise ValueError("not a model manifest of format 1")
-        for key in ("geometries", "materials", "transforms", "material_ops"):
-            data[key] = tuple(data.get(key, ()))
-        data["trained"] = {k: (float(a), float(b)) for k, (a, b) in data.get("trained", {}).items()}
-        try:
-            return Manifest(**data)
-        except TypeError as error:
-            raise ValueError(f"bad manifest: {error}") from None
+        if data.keys() != _KINDS.keys():
+            raise ValueError(f"fields missing or unknown: {', '.join(sorted(data.keys() ^ _KINDS.keys()))}")
+        for key, fits in _KINDS.items():
+            if not fits(data[key]):
+                raise ValueError(f"field `{key}` does not hold what it should")
+        if data["default_material"] not in data["materials"]:
+            raise ValueError("the default material is none of the materials")
+        lists = {key: tuple(data[key]) for key in ("geometries", "materials", "transforms", "material_ops")}
+        trained = {key: (float(low), float(high)) for key, (low, high) in data["trained"].items()}
+        return Manifest(**{**data, **lists, "trained": trained})
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str) and value != "" and value.isprintable()
+
+
+def _is_word(value: Any) -> bool:
+    return isinstance(value, str) and value.isascii() and value.isidentifier()
+
+
+def _are_words(value: Any) -> bool:
+    return isinstance(value, list) and all(map(_is_word, value)) and len(set(value)) == len(value)
+
+
+def _are_limits(value: Any) -> bool:
+    return isinstance(value, dict) and all(type(v) is int and 0 <= v < 1 << 31 for v in value.values())
+
+
+def _is_range(value: Any) -> bool:
+    """Two numbers that float64 holds, the lower first."""
+    if not isinstance(value, list) or len(value) != 2 or not all(type(v) in (int, float) for v in value):
+        return False
+    return bool(-MOST <= value[0] <= value[1] <= MOST)
+
+
+def _are_ranges(value: Any) -> bool:
+    return isinstance(value, dict) and all(map(_is_range, value.values()))
+
+
+def _are_figures(value: Any) -> bool:
+    """Whatever was measured; of the stability suite a line of text for each quantity."""
+    if not isinstance(value, dict):
+        return False
+    lines = value.get("stability", {})
+    return isinstance(lines, dict) and all(map(_is_text, lines.values()))
+
+
+_KINDS: Final[dict[str, Callable[[Any], bool]]] = {
+    "name": lambda value: _is_text(value) and '"' not in value and "\\" not in value,
+    "summary": _is_text,
+    "dimension": lambda value: type(value) is int and value in (2, 3),
+    "renderer": _is_word,
+    "lifting": _is_word,
+    "geometries": _are_words,
+    "materials": lambda value: _are_words(value) and len(value) > 0,
+    "default_material": _is_word,
+    "transforms": _are_words,
+    "material_ops": _are_words,
+    "limits": _are_limits,
+    "trained": _are_ranges,
+    "measured": _are_figures,
+}
+"""What each field may hold."""
 
 
 def available() -> list[str]:

@@ -106,12 +106,16 @@ def read_facts(name: str) -> Facts:
     """
     data = read_weights(weights_path(name))
     training = read_header(data)
-    tensors = {k: v for k, v in _outer(data).items() if k != "__metadata__"}
-    try:
-        parameters = sum(math.prod(entry["shape"]) for entry in tensors.values())
-    except (KeyError, TypeError) as error:
-        raise ModelError(f"damaged weights: {error}") from None
+    parameters = sum(_count(name, entry) for name, entry in _outer(data).items() if name != "__metadata__")
     return Facts(hashlib.sha256(data).hexdigest(), len(data), parameters, training)
+
+
+def _count(name: str, entry: Any) -> int:
+    """Numbers in a tensor that the header lists."""
+    shape = entry.get("shape") if isinstance(entry, dict) else None
+    if not isinstance(shape, list) or not all(type(side) is int and 0 <= side < 1 << 31 for side in shape):
+        raise ModelError(f"damaged weights: tensor `{name[:40]}` has no shape")
+    return math.prod(shape[:8])
 
 
 @lru_cache(maxsize=8)

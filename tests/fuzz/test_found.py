@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+import json
+import struct
 import time
+from dataclasses import replace
 
-from scenelang.diagnostics import render
+import numpy as np
+import pytest
+
+from scenelang.backend.errors import RenderError
+from scenelang.backend.render import render
 from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.render import render_text
 from scenelang.diagnostics.span import SourceFile
+from scenelang.models.manifest import ROOT, Manifest
+from scenelang.models.weights import ModelError, read_facts
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import ProgramError
+from scenelang.scene.load import loads
 from scenelang.syntax import parse
 
 
@@ -16,7 +29,7 @@ def test_snippets_of_a_very_long_line_lay_out_only_what_is_near_their_marks() ->
     found = Diagnostics()
     parse(source, found)
     before = time.process_time()
-    text = render.render_text(list(found))
+    text = render_text(list(found))
     assert time.process_time() - before < 5
     assert max(map(len, text.splitlines())) < 200
     lines = text.splitlines()
@@ -24,3 +37,93 @@ def test_snippets_of_a_very_long_line_lay_out_only_what_is_near_their_marks() ->
     for index in carets[1:150]:  # the first caret may stand under a cut line
         marked = lines[index - 1][len(lines[index]) - 1]
         assert marked == "\N{REPLACEMENT CHARACTER}", lines[index - 1 : index + 1]
+
+
+MANIFEST = json.loads((ROOT / "shapes2d" / "manifest.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"trained": -1},
+        {"trained": {"twirl": 1e308}},
+        {"trained": {"twirl": [1, 10**400]}},
+        {"trained": {"twirl": [2, 1]}},
+        {"transforms": 1},
+        {"transforms": ["twist", 2**31]},
+        {"geometries": ["square", False]},
+        {"geometries": "square"},
+        {"geometries": ["square", "square"]},
+        {"material_ops": [[]]},
+        {"materials": []},
+        {"default_material": "gold"},
+        {"limits": -1e308},
+        {"limits": {"canvas": {}}},
+        {"limits": {"inner_warps": [1, 2]}},
+        {"limits": {"inner_warps": True}},
+        {"measured": "union"},
+        {"measured": {"stability": {"twirl": 5}}},
+        {"name": [-1, 1]},
+        {"name": 'a"b'},
+        {"summary": "two\nlines"},
+        {"dimension": 2.0},
+        {"dimension": True},
+        {"renderer": None},
+        {"format": 2},
+        {"more": 1},
+    ],
+    ids=str,
+)
+def test_manifests_hold_what_the_compiler_asks_of_them(change: dict[str, object]) -> None:
+    """Each of these was a traceback while a scene was evaluated or compiled."""
+    Manifest.from_json(json.dumps(MANIFEST))
+    with pytest.raises(ValueError, match=r"."):
+        Manifest.from_json(json.dumps({**MANIFEST, **change}))
+
+
+def test_manifests_miss_nothing() -> None:
+    for key in MANIFEST:
+        with pytest.raises(ValueError, match=r"."):
+            Manifest.from_json(json.dumps({k: v for k, v in MANIFEST.items() if k != key}))
+
+
+@pytest.mark.parametrize("shape", [[1e308, 10**400], "ab", None, [-1], [1 << 40], [True], {}], ids=str)
+def test_shapes_in_weights_are_shapes(shape: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The size of a tensor of 10^400 numbers has no float64."""
+    outer = {"__metadata__": {"scenelang": '{"format": 1}'}, "codes": {"shape": shape}}
+    text = json.dumps(outer).encode()
+    data = struct.pack("<Q", len(text)) + text
+    monkeypatch.setattr("scenelang.models.weights.read_weights", lambda path: data)
+    with pytest.raises(ModelError, match="has no shape"):
+        read_facts("shapes2d")
+
+
+@pytest.mark.parametrize("background", [[0, 0, 10**400], [-1e308, 0, 0], [0.5, 1.0000001, 0]], ids=str)
+def test_a_program_has_a_colour_behind_it(background: list[float]) -> None:
+    """numpy has no isfinite for 10^400, and -1e308 overflows float32."""
+    program = compile_scene(loads("star { }"))
+    with pytest.raises(ProgramError, match="which is no colour"):
+        replace(program, background=tuple(background))
+
+
+@pytest.mark.parametrize(
+    "frame", [[0] * 6, [1, 1, 0, 1, 1, 0], [1e35, 0, 0, 0, 1, 0], [1e-40, 0, 0, 0, 1e-40, 0]], ids=str
+)
+@pytest.mark.parametrize("start", [5, 20])
+def test_vectors_that_lead_nowhere_are_refused_when_drawn(frame: list[float], start: int) -> None:
+    """A singular frame was a LinAlgError, a nearly singular one a ZeroDivisionError."""
+    program = compile_scene(loads("canvas(8, 8); star { bend(1); scale(2); }"))
+    vectors = program.vectors.copy()
+    vectors[0, start : start + 6] = frame
+    with pytest.raises(RenderError, match="damaged program"):
+        render(replace(program, vectors=vectors), device="cpu", threads=1)
+
+
+@pytest.mark.parametrize("moves", ["twirl(-1e19); scale(1e-29);", "bend(1e25); scale(1e20); translate(1e29, 0);"])
+@pytest.mark.parametrize("after", ["smooth square { scale(0.5); }", "intersect square { }", ""])
+def test_pictures_are_numbers_however_large_the_moves(moves: str, after: str) -> None:
+    """Angles beyond float32 have no cosine: pixels were NaN, and bytes whatever the processor made of it."""
+    scene = loads(f"canvas(9, 7); background(#123); chain {{ square {{ }} smooth star {{ {moves} }} {after} }}")
+    picture = render(scene, device="cpu", threads=1)
+    assert np.isfinite(picture).all()
+    assert picture.to_uint8().shape == (7, 9, 3)

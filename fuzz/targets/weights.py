@@ -1,0 +1,173 @@
+"""Any bytes as the weights of a model, or as its manifest where they begin with a brace."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from random import Random
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import torch
+from safetensors.torch import save
+
+from fuzz import tensors, trees
+from fuzz.oracles import check_diagnostics
+from fuzz.target import Target, hold
+from scenelang.backend.errors import RenderError
+from scenelang.backend.neural import draw_program
+from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.span import SourceFile
+from scenelang.models import weights
+from scenelang.models.load import Model, load_network
+from scenelang.models.manifest import ROOT, Manifest, load_manifest
+from scenelang.models.weights import ModelError, codes_of, read_facts, read_header
+from scenelang.passes import check_scene
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import ProgramError
+from scenelang.scene.evaluate import load_source
+from scenelang.scene.load import loads
+
+MODEL = "shapes2d"
+SCENE = "canvas(8, 6); chain { square { bend(0.3); rotate(20deg); } smooth star { translate(0.2, 0.1); twirl(1); } }"
+WORDS = "nsg 1; chain { square { twirl(3); scale(9); } subtract star { material flat { color(#d33); hue(9deg); } } }"
+
+
+def check(data: bytes) -> None:
+    """Read as what the first byte says."""
+    if data[:1] == b"{":
+        _check_manifest(data)
+    else:
+        _check_weights(data)
+
+
+def _check_manifest(data: bytes) -> None:
+    """A manifest or a ValueError; scenes meet every name and limit in it."""
+    try:
+        manifest = Manifest.from_json(data.decode("utf-8", "surrogateescape"))
+    except ValueError:
+        return
+    told = {**asdict(manifest), "format": 1}
+    hold(Manifest.from_json(json.dumps(told)) == manifest, "manifest to JSON and back")
+    for text in (SCENE, WORDS, f'model "{MODEL}"; star {{ }}'):
+        found = Diagnostics()
+        scene, spans = load_source(SourceFile("fuzz.nsg", text), diagnostics=found, models=[manifest])
+        if scene is not None:
+            try:
+                check_scene(scene, spans, found, manifest, None)
+            except SceneError as error:
+                check_diagnostics(error.diagnostics, None)
+        check_diagnostics(list(found), None)
+
+
+def _check_weights(data: bytes) -> None:
+    """Codes, facts and network, or ModelError; what loads is saved, loaded again and drawn with."""
+    manifest = load_manifest(MODEL)
+    _facts(data)
+    codes = None
+    try:
+        codes = codes_of(manifest, data)
+    except ModelError:
+        pass
+    try:
+        network = load_network(data, manifest)
+    except ModelError:
+        return
+    hold(codes is not None, "weights of a network have codes")
+    header = read_header(data)
+    plain = {name: value.contiguous() for name, value in network.state_dict().items()}
+    written = save(plain, {"scenelang": json.dumps(header, sort_keys=True)})
+    again = load_network(written, manifest)
+    for name, value in again.state_dict().items():
+        hold(torch.equal(value, plain[name]), "weights to bytes and back", name)
+    assert codes is not None
+    model = Model(manifest, network, codes.digest, header)
+    hold(model.codes() == codes, "codes of the network are those of the file")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            program = compile_scene(loads(SCENE), codes=codes)
+            picture = draw_program(program, model, threads=1).image
+        except (SceneError, ProgramError, RenderError):
+            return
+        pixels = picture.to_uint8()
+    hold(pixels.shape == (6, 8, 3) and np.isfinite(picture).all(), "a picture of numbers")
+
+
+def _facts(data: bytes) -> None:
+    """What `scenelang models` tells about a file."""
+    with patch.object(weights, "read_weights", lambda path: data):
+        try:
+            facts = read_facts(MODEL)
+        except ModelError:
+            return
+    json.dumps(asdict(facts))
+    hold(facts.bytes == len(data), "facts tell the size")
+
+
+@cache
+def _shipped() -> bytes:
+    return (ROOT / MODEL / "weights.safetensors").read_bytes()
+
+
+@cache
+def _manifest() -> bytes:
+    return (Path(ROOT) / MODEL / "manifest.json").read_bytes()
+
+
+@cache
+def _small() -> bytes:
+    """A network of the smallest sizes, so that most of a file is header."""
+    from scenelang.renderers.framed import Framed, FramedConfig
+
+    config = FramedConfig(decoder_width=2, cell_width=1)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(1)
+        network = Framed(config, 4, 1)
+    plain = {name: value.detach().contiguous() for name, value in network.state_dict().items()}
+    header = {"format": 1, "config": {"network": config.to_json()}, "seed": 1}
+    return bytes(save(plain, {"scenelang": json.dumps(header, sort_keys=True)}))
+
+
+def seeds() -> list[bytes]:
+    """The shipped weights, a small network, and the shipped manifest."""
+    manifest = trees.load(_manifest())
+    short = {**manifest, "measured": {}, "trained": {"objects": [1, 2], "twirl": [-1, 1], "scale": [0.5, 1]}}
+    solids = {**short, "dimension": 3, "transforms": ["twist", "displace", "scale", "twirl"]}
+    written = [trees.dump(value) for value in (short, solids, {**short, "limits": {}}, {"format": 1})]
+    return [_small(), _shipped(), _manifest(), *written, b"", b"{", b"\0" * 8]
+
+
+def mutate(data: bytes, generator: Random) -> bytes:
+    """A change of the manifest's tree, or of the weights' file at any level."""
+    if data[:1] != b"{":
+        return tensors.mutate(data, generator)
+    if generator.random() < 0.1:
+        return trees.flip(data, generator)
+    try:
+        return trees.dump(trees.mutate(trees.load(data), generator))
+    except (ValueError, RecursionError):
+        return trees.flip(data, generator)
+
+
+def dictionary() -> list[bytes]:
+    """Words of the headers and of manifests."""
+    words: list[Any] = [*asdict(load_manifest(MODEL)), "format", "config", "network", "code", "decoder_width"]
+    words += ["dtype", "shape", "data_offsets", "F32", "F16", "__metadata__", "scenelang", "codes", "material_codes"]
+    return [f'"{word}"'.encode() for word in words]
+
+
+TARGET = Target(
+    name="weights",
+    summary="any bytes are the weights of a network or a ModelError, or a manifest or a ValueError; what loads is "
+    "saved and loaded unchanged, draws finite numbers, and no scene makes a manifest raise anything else",
+    check=check,
+    seeds=seeds,
+    mutate=mutate,
+    dictionary=dictionary,
+    most_bytes=32_768,
+)
