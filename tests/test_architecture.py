@@ -26,6 +26,7 @@ ORDER = (
     "scenelang.lifting",
     "scenelang.models.weights",
     "scenelang.program",
+    "scenelang.interchange",
     "scenelang.image",
     "scenelang.reference",
     "scenelang.renderers",

@@ -79,7 +79,7 @@ def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
 
 
 def read_input(name: str, request: Request, clock: Clock, source: SourceFile | None = None) -> Input:
-    """Read one scene: text is parsed and evaluated, JSON (by its suffix, or `{` first in standard input) read.
+    """Read one scene: text is evaluated, JSON (by its suffix, or `{` first in standard input) just read.
 
     Args:
         name: as the user wrote it.

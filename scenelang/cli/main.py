@@ -23,6 +23,8 @@ COMMANDS: Final = {
     "eval": "Measure a model on unseen scenes.",
     "train": "Train a model's weights.",
     "explain": "Say what a diagnostic's code means.",
+    "convert": "Write a scene as text, JSON or Python.",
+    "schema": "Print the JSON Schema of scenes.",
 }
 INTERRUPTED: Final = 130  # as shells report it
 

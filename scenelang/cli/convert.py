@@ -1,0 +1,73 @@
+"""``scenelang convert``: scenes between text, JSON and Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Literal
+
+import click
+
+from scenelang.cli import options
+
+if TYPE_CHECKING:
+    from scenelang.scene.params import Defines
+    from scenelang.scene.schema import Scene
+
+Kind = Literal["nsg", "json", "python"]
+SUFFIXES: Final[dict[str, Kind]] = {".nsg": "nsg", ".json": "json", ".py": "python"}
+
+
+@click.command("convert")
+@click.argument("file", metavar="FILE")
+@click.option("-o", "--out", metavar="OUT", help="A file instead of standard output.")
+@click.option(
+    "--to",
+    "kind",
+    type=click.Choice(["nsg", "json", "python"]),
+    help="What to write; by default what OUT's suffix names (.nsg, .json, .py).",
+)
+@options.define
+@options.size
+@options.frame
+@options.model
+@options.root
+@click.pass_context
+def command(
+    ctx: click.Context,
+    file: str,
+    out: str | None,
+    kind: Kind | None,
+    defines: Defines,
+    size: tuple[int, int] | None,
+    frame: int,
+    model: str | None,
+    root: str | None,
+) -> None:
+    """Write a scene as text, JSON or Python code.
+
+    FILE is a scene, as text or JSON (.json), or - for standard input. What is written has no params,
+    loops or imports left, only objects and numbers, which are kept exactly: it reads back as the same scene.
+    """
+    from scenelang.cli.clock import Clock
+    from scenelang.cli.inputs import Request, read_input, unused_defines
+    from scenelang.cli.say import say_diagnostics
+    from scenelang.cli.texts import put_text
+
+    wanted = kind or SUFFIXES.get(Path(out or "").suffix.lower())
+    if wanted is None:
+        raise click.UsageError("Say what to write: --to nsg, json or python, or -o with such a suffix.")
+    request = Request(defines, model, root, frame, size)
+    found = read_input(file, request, Clock())
+    found.diagnostics.items += unused_defines(request)
+    say_diagnostics(found.diagnostics)
+    if found.scene is None or found.diagnostics.errors:
+        ctx.exit(1)
+    put_text(_written(found.scene, wanted), out)
+
+
+def _written(scene: Scene, kind: Kind) -> str:
+    if kind == "json":
+        from scenelang.scene.data import to_readable_json
+
+        return to_readable_json(scene)
+    return scene.to_nsg() if kind == "nsg" else scene.to_python()

@@ -1,0 +1,28 @@
+"""``scenelang schema``: JSON Schemas of scenes and of what commands print."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+
+@click.command("schema")
+@click.option(
+    "--kind",
+    type=click.Choice(["scene", "diagnostics", "manifest"]),
+    default="scene",
+    show_default=True,
+    help="Scenes as JSON, what `check --format json` prints, or a model's manifest.",
+)
+@click.option("-o", "--out", metavar="OUT", help="A file instead of standard output.")
+def command(kind: str, out: str | None) -> None:
+    """Print the JSON Schema (draft 2020-12) of scenes as JSON.
+
+    Editors complete and check by it; validators refuse by it what scenelang refuses, as far as a schema
+    can say.
+    """
+    from scenelang.cli.texts import put_text
+    from scenelang.interchange.schemas import SCHEMAS
+
+    put_text(json.dumps(SCHEMAS[kind](), indent=2, ensure_ascii=False) + "\n", out)

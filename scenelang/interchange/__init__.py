@@ -1,0 +1,1 @@
+"""Scenes, graphs and Programs as data for other software, and other software's data as Scenes."""
