@@ -12,6 +12,9 @@ import importlib
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from scenelang.animation.api import animate as animate
+    from scenelang.animation.api import render_frames as render_frames
+    from scenelang.animation.timing import FramesError as FramesError
     from scenelang.backend.errors import RenderError as RenderError
     from scenelang.backend.render import render as render
     from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
@@ -50,6 +53,8 @@ if TYPE_CHECKING:
 
 # Module -> public names it defines. A new public name is added here, above, and to __all__.
 _HOME: Final = {
+    "scenelang.animation.api": ("animate", "render_frames"),
+    "scenelang.animation.timing": ("FramesError",),
     "scenelang.backend.errors": ("RenderError",),
     "scenelang.backend.render": ("render",),
     "scenelang.diagnostics.diagnostic": ("Diagnostic", "Diagnostics", "SceneError"),
@@ -95,6 +100,7 @@ __all__ = [
     "Diagnostics",
     "Displace",
     "Flip",
+    "FramesError",
     "Grayscale",
     "Group",
     "Hue",
@@ -115,12 +121,14 @@ __all__ = [
     "Translate",
     "Twirl",
     "Twist",
+    "animate",
     "compile",
     "format_text",
     "load",
     "load_program",
     "loads",
     "render",
+    "render_frames",
 ]
 
 

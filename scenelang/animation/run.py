@@ -15,6 +15,7 @@ from scenelang.animation.painting import Painter
 from scenelang.animation.pictures import Film
 from scenelang.animation.store import Store, deliver
 from scenelang.animation.targets import Target
+from scenelang.diagnostics.diagnostic import SceneError
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
@@ -63,6 +64,16 @@ class Made:
     encode_s: float = 0.0
     jobs: int = 1
 
+    def lines(self) -> list[str]:
+        """What there is to say about it."""
+        each = 1000 / max(1, self.frames)
+        return [
+            f"{self.drawn} pictures drawn by {self.jobs} process{'es' * (self.jobs > 1)}, "
+            f"{self.resumed} kept from a run before",
+            f"a frame (ms): compile {self.compile_s * each:.1f}, draw {self.draw_s * each:.1f}, "
+            f"encode {self.encode_s * each:.1f}",
+        ]
+
 
 def make(
     painter: Painter,
@@ -72,6 +83,7 @@ def make(
     jobs: int | None = None,
     palette: Palette = "auto",
     dither: bool = False,
+    strict: bool = False,
     progress: Callable[[Progress], None] = lambda _: None,
 ) -> Made:
     """Draw frames and write them whole: nothing is put in place before all of it is there.
@@ -86,7 +98,8 @@ def make(
         jobs: processes that draw; by default this one, and others as soon as they would pay.
         palette: of a GIF, see `write_gif`.
         dither: of a GIF.
-        progress: called from this thread.
+        strict: count warnings as errors.
+        progress: called from any thread.
 
     Raises:
         SceneError: a frame has errors.
@@ -97,7 +110,7 @@ def make(
     suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
     made = Made([], len(numbers))
     with Store(target.work, suffix) as store:
-        keys, alpha = _drawn(painter, store, numbers, jobs, progress, made)
+        keys, alpha = _drawn(painter, store, numbers, jobs, strict, progress, made)
         started = time.perf_counter()
         if target.kind == "sequence":
             made.files = _numbered(store, target, numbers, keys)
@@ -121,6 +134,7 @@ def _drawn(
     store: Store,
     numbers: range,
     jobs: int | None,
+    strict: bool,
     progress: Callable[[Progress], None],
     made: Made,
 ) -> tuple[list[str], bool]:
@@ -134,6 +148,8 @@ def _drawn(
         for index, number in enumerate(numbers):
             started = time.perf_counter()
             frame = painter.prepare(painter.clip.shot(number))
+            if strict and painter.clip.diagnostics.items:
+                raise SceneError(painter.clip.diagnostics)
             made.compile_s += time.perf_counter() - started
             keys.append(frame.key)
             alpha |= frame.shot.scene.background is None

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from scenelang.cli.clock import Clock
 from scenelang.cli.inputs import Input, Request, read_input
 from scenelang.diagnostics.diagnostic import Diagnostic, SceneError
+from scenelang.diagnostics.span import SourceFile
 from scenelang.graph.nodes import Graph, Leaf
 from scenelang.graph.walk import nodes
 from scenelang.program.compile import compile_scene
@@ -56,6 +57,7 @@ def prepare(
     compiled: bool = True,
     verbose: bool = False,
     after: After | None = None,
+    source: SourceFile | None = None,
 ) -> Job:
     """Read an input and compile it if it is a scene.
 
@@ -66,13 +68,14 @@ def prepare(
         compiled: whether a scene has to be compiled to be drawn.
         verbose: make notes of what the passes did.
         after: called with the name of each pass and the graph it left.
+        source: the scene's text, where it was read before.
 
     Raises:
         OSError: the input cannot be read, or a model has no weights.
     """
     if name.endswith(PROGRAM):
         return _stored(name, request, clock)
-    found = read_input(name, request, clock)
+    found = read_input(name, request, clock, source)
     job = Job(name, source=found)
     if found.scene is not None and compiled:
         passes = PassNotes(further=after)

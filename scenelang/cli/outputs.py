@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from scenelang.animation.targets import is_animation
 from scenelang.cli.inputs import STDIN
 
 
@@ -35,8 +36,10 @@ def targets(names: Sequence[str], out: str) -> list[Path]:
         return [path]
     if path.exists() and not path.is_dir():
         raise click.UsageError(f"'{out}' is a file; {len(names)} scenes need a folder.")
-    if not path.exists() and not out.endswith(("/", "\\")) and _is_picture(path):
-        raise click.UsageError(f"'{out}' names a picture; {len(names)} scenes need a folder.")
+    if not path.exists() and not out.endswith(("/", "\\")):
+        what = "a picture" if _is_picture(path) else "an animation" if is_animation(out) else None
+        if what is not None:
+            raise click.UsageError(f"'{out}' names {what}; {len(names)} scenes need a folder.")
     files = [path / f"{_stem(name)}.png" for name in names]
     owner: dict[str, str] = {}
     for name, file in zip(names, files, strict=True):

@@ -20,10 +20,11 @@ class Bar:
     Args:
         what: a word or two in front of the bar.
         total: what `to` counts up to.
+        count: show how many of them are done, too.
     """
 
-    def __init__(self, what: str, total: float) -> None:
-        self.what, self.total = what, total
+    def __init__(self, what: str, total: float, *, count: bool = False) -> None:
+        self.what, self.total, self.count = what, total, count
         self._wanted = sys.stderr.isatty()
         self._started = time.perf_counter()
         self._lock = threading.Lock()
@@ -55,9 +56,10 @@ class Bar:
 
     def _show(self) -> Progress:
         from rich.console import Console
-        from rich.progress import Progress
+        from rich.progress import MofNCompleteColumn, Progress
 
-        shown = Progress(console=Console(stderr=True), transient=True)
+        columns = (*Progress.get_default_columns(), *([MofNCompleteColumn()] if self.count else []))
+        shown = Progress(*columns, console=Console(stderr=True), transient=True)
         shown.add_task(self.what, total=self.total)
         shown.start()
         return shown

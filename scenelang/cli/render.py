@@ -1,10 +1,10 @@
-"""``scenelang render``: scenes and compiled programs to picture files, in one process."""
+"""``scenelang render``: scenes and compiled programs to pictures and animations."""
 
 from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import click
 
@@ -13,9 +13,12 @@ from scenelang.cli import options
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from scenelang.animation.targets import Target
+    from scenelang.cli.animation import Wanted
     from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import Job
+    from scenelang.diagnostics.span import SourceFile
     from scenelang.image import Image
     from scenelang.scene.params import Defines
 
@@ -24,10 +27,41 @@ if TYPE_CHECKING:
 
 @click.command("render")
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
-@click.option("-o", "--out", required=True, metavar="OUT", help="A picture, or for several scenes a folder.")
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    metavar="OUT",
+    help="A picture, an animation, numbered pictures or a folder.",
+)
 @options.size
 @options.define
-@options.frame
+@click.option(
+    "--frame", type=click.IntRange(0), metavar="N", help="One frame of an animation, from 0, as a picture."
+)
+@click.option(
+    "--frames", metavar="A..B", help="Frames of an animation: 0..23, 0..<24, 12.. to the end, or 7."
+)
+@click.option(
+    "--fps",
+    type=click.FloatRange(0, 1000, min_open=True),
+    metavar="N",
+    help="Frames a second instead of the scene's; its seconds stay.",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(1, 256),
+    metavar="N",
+    help="Processes that draw frames; by default one, and more where that is faster.",
+)
+@click.option(
+    "--palette",
+    type=click.Choice(["auto", "global", "frame"]),
+    default="auto",
+    show_default=True,
+    help="Colours of a GIF: 255 for all frames or for each.",
+)
+@click.option("--dither", is_flag=True, help="Dither what a GIF's palette lacks.")
 @options.model
 @click.option(
     "--backend",
@@ -48,10 +82,15 @@ def command(
     out: str,
     size: tuple[int, int] | None,
     defines: Defines,
-    frame: int,
+    frame: int | None,
+    frames: str | None,
+    fps: float | None,
+    jobs: int | None,
+    palette: Literal["auto", "global", "frame"],
+    dither: bool,
     model: str | None,
     backend: Literal["neural", "reference"],
-    device: str,
+    device: Literal["auto", "cpu", "cuda"],
     threads: int | None,
     strict: bool,
     root: str | None,
@@ -63,17 +102,42 @@ def command(
     a picture whose suffix names the format; several scenes are drawn into a folder, each as STEM.png.
     Scenes with errors are reported and left out. Exits with 1 if there are any, 2 if a file cannot be read
     or written.
+
+    \b
+    A scene with animate(…) is drawn as an animation where OUT is
+      FILE.gif .webp .apng          animated pictures
+      FILE.mp4 .mov .mkv .webm      video, by ffmpeg
+      frame-%04d.png                numbered pictures
+      FOLDER/                       FOLDER/STEM-0000.png and so on
+    A run that was interrupted goes on where it stopped.
     """
+    from scenelang.cli.animation import Wanted, wanted_target
     from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import Request
+    from scenelang.cli.jobs import PROGRAM
     from scenelang.cli.outputs import targets
     from scenelang.cli.progress import Bar
 
-    paths = targets(files, out)
     clock = Clock()
-    request = Request(defines, model, root, frame, size)
-    jobs, code = _prepared(files, request, clock, strict, backend, verbose)
-    ready = [(job, path) for job, path in zip(jobs, paths, strict=True) if job and not job.failed(strict)]
+    wanted = Wanted(frames, fps, jobs, palette, dither)
+    if frame is not None and wanted.certain:
+        raise click.UsageError("--frame asks for a picture, --frames and --fps for an animation.")
+    if len(files) > 1 and wanted.certain:
+        raise click.UsageError("--frames and --fps take one scene.")
+    request = Request(defines, model, root, frame or 0, size)
+    source = None
+    if len(files) == 1 and frame is None and not files[0].endswith(PROGRAM):
+        target = wanted_target(files[0], out, wanted)
+        if target is not None:
+            painting = _Painting(backend, device, threads, strict, verbose)
+            code, source = _animate(files[0], out, target, request, wanted, painting)
+            if source is None:
+                ctx.exit(code)
+    elif wanted.certain:
+        raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
+    paths = targets(files, out)
+    found, code = _prepared(files, request, clock, strict, backend, verbose, source)
+    ready = [(job, path) for job, path in zip(found, paths, strict=True) if job and not job.failed(strict)]
     if not ready:
         ctx.exit(code)
     draw = _exact(request, clock) if backend == "reference" else _neural(clock, device, threads)
@@ -90,8 +154,84 @@ def command(
     ctx.exit(code)
 
 
+class _Painting(NamedTuple):
+    """How pictures are drawn, and what is said about them."""
+
+    backend: Literal["neural", "reference"]
+    device: Literal["auto", "cpu", "cuda"]
+    threads: int | None
+    strict: bool
+    verbose: bool
+
+
+def _animate(
+    name: str, out: str, target: Target, request: Request, wanted: Wanted, painting: _Painting
+) -> tuple[int, SourceFile | None]:
+    """Draw an animation; the exit code, and the scene's text if it is to be drawn as one picture."""
+    import time
+
+    from scenelang.animation.painting import Painter
+    from scenelang.animation.run import make, ready
+    from scenelang.cli.animation import Meter, frames_of, open_input, still_picture, strays, summary
+    from scenelang.cli.inputs import unused_defines
+    from scenelang.cli.main import describe
+    from scenelang.cli.say import say_diagnostics
+    from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+
+    started = time.perf_counter()
+    found = Diagnostics()
+    source, clip = open_input(name, request, wanted, found)
+    if clip is not None and still_picture(clip, target, wanted, out):
+        return 0, source
+    if source is not None:
+        found.items.extend(unused_defines(request))
+    numbers = frames_of(clip, wanted) if clip is not None and not found.errors else None
+    if clip is None or numbers is None or found.errors or (found.items and painting.strict):
+        say_diagnostics(found)
+        return 1, None
+    ready(target)
+    painter = Painter(clip, painting.backend, painting.device, painting.threads)
+    meter = Meter()
+    try:
+        made = make(
+            painter,
+            target,
+            numbers,
+            jobs=wanted.jobs,
+            palette=wanted.palette,
+            dither=wanted.dither,
+            strict=painting.strict,
+            progress=meter,
+        )
+    except SceneError:
+        meter.close()
+        say_diagnostics(found)
+        return 1, None
+    except OSError as error:
+        meter.close()
+        from scenelang.cli.main import Trouble
+
+        raise Trouble(f"cannot write '{out}': {describe(error)}") from None
+    finally:
+        meter.close()
+    say_diagnostics(found)
+    click.echo(summary(made, target, clip, started), err=True)
+    if (others := strays(target, made)) is not None:
+        click.echo(f"note: {others}", err=True)
+    if painting.verbose:
+        for line in made.lines():
+            click.echo(f"  {line}", err=True)
+    return 0, None
+
+
 def _prepared(
-    files: tuple[str, ...], request: Request, clock: Clock, strict: bool, backend: str, verbose: bool
+    files: tuple[str, ...],
+    request: Request,
+    clock: Clock,
+    strict: bool,
+    backend: str,
+    verbose: bool,
+    source: SourceFile | None,
 ) -> tuple[list[Job | None], int]:
     """Every input read and compiled, None where it cannot be read; reports mistakes; the exit code so far."""
     from scenelang.cli.inputs import merged, unused_defines
@@ -103,7 +243,7 @@ def _prepared(
     code = 0
     for name in files:
         try:
-            job = prepare(name, request, clock, compiled=backend == "neural", verbose=verbose)
+            job = prepare(name, request, clock, compiled=backend == "neural", verbose=verbose, source=source)
         except OSError as error:
             say_trouble(describe(error))
             jobs.append(None)

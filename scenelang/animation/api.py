@@ -1,0 +1,144 @@
+"""Animations for callers in Python: `scenelang.render_frames` and `scenelang.animate`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scenelang.animation.clip import Clip, open_clip
+from scenelang.animation.painting import Painter
+from scenelang.animation.run import Made, Progress, make
+from scenelang.animation.targets import find_target
+from scenelang.animation.timing import FrameRange
+
+if TYPE_CHECKING:
+    from scenelang.animation.gif import Palette
+    from scenelang.backend.render import Backend, Device
+    from scenelang.image import Image
+
+Frames = range | str | None
+
+
+def render_frames(
+    path: str | os.PathLike[str],
+    *,
+    frames: Frames = None,
+    fps: float | None = None,
+    size: tuple[int, int] | None = None,
+    params: Mapping[str, Any] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    backend: Backend = "neural",
+    device: Device = "auto",
+    threads: int | None = None,
+) -> Iterator[Image]:
+    """Draw a scene file's frames one after another; none is held.
+
+    The file is read once, when the first picture is asked for; a frame compiles what it does not share with
+    the one before. Each picture is the one that `scenelang.render` gives for its frame, bit for bit. A scene
+    without ``animate(…)`` has one frame.
+
+    Args:
+        path: the scene file.
+        frames: which, as a range or as text (``"0..23"``, ``"12.."``); all by default.
+        fps: frames a second instead of those that ``animate`` names; its seconds stay.
+        size: canvas in pixels instead of the scene's.
+        params: values for params, as for `scenelang.load`.
+        model: draw with this model instead of the one that the file names.
+        root: folder that imports cannot leave; by default the file's.
+        backend, device, threads: as for `scenelang.render`.
+
+    Yields:
+        Pictures, float32 (H, W, 3) or, where the background is none, (H, W, 4).
+
+    Raises:
+        SceneError: the scene has errors, in any frame.
+        FramesError: the animation has no such frames.
+        RenderError: as for `scenelang.render`.
+        OSError: the file cannot be opened.
+    """
+    clip = _opened(path, fps, size, params, model, root)
+    painter = Painter(clip, backend, device, threads)
+    last: tuple[str, Image] | None = None
+    for number in _numbers(clip, frames):
+        frame = painter.prepare(clip.shot(number))
+        if last is None or last[0] != frame.key:
+            last = frame.key, painter.draw(frame)
+        yield last[1].copy()
+
+
+def animate(
+    path: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    *,
+    frames: Frames = None,
+    fps: float | None = None,
+    size: tuple[int, int] | None = None,
+    params: Mapping[str, Any] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    backend: Backend = "neural",
+    device: Device = "auto",
+    threads: int | None = None,
+    jobs: int | None = None,
+    palette: Palette = "auto",
+    dither: bool = False,
+    progress: Callable[[Progress], None] = lambda _: None,
+) -> Made:
+    """Draw a scene file to an animation; a call that was interrupted goes on where it stopped.
+
+    Args:
+        path: the scene file.
+        out: a file whose suffix names the format (.gif, .webp, .apng, .mp4, .mov, .mkv, .webm), numbered
+            pictures (``frame-%04d.png``), or a folder that ends in a slash or is there.
+        frames, fps, size, params, model, root, backend, device, threads: as for `render_frames`.
+        jobs: processes that draw; by default this one, and others where they pay.
+        palette: of a GIF: ``"global"``, ``"frame"``, or the one that is exact if one is (``"auto"``).
+        dither: dither what a GIF's palette lacks.
+        progress: called with how far it is, from any thread.
+
+    Returns:
+        What was written.
+
+    Raises:
+        ValueError: ``out`` names no format.
+        SceneError, FramesError, RenderError, OSError: as for `render_frames`; nothing is written then.
+    """
+    name = os.fspath(out)
+    target = find_target(name, Path(path).stem)
+    clip = _opened(path, fps, size, params, model, root)
+    painter = Painter(clip, backend, device, threads)
+    return make(
+        painter,
+        target,
+        _numbers(clip, frames),
+        jobs=jobs,
+        palette=palette,
+        dither=dither,
+        progress=progress,
+    )
+
+
+def _opened(
+    path: str | os.PathLike[str],
+    fps: float | None,
+    size: tuple[int, int] | None,
+    params: Mapping[str, Any] | None,
+    model: str | None,
+    root: str | os.PathLike[str] | None,
+) -> Clip:
+    if fps is not None and not 0 < fps < float("inf"):
+        raise ValueError(f"{fps} frames a second, where a number above 0 is needed")
+    folder = None if root is None else Path(root)
+    return open_clip(path, defines=params, model=model, root=folder, size=size, fps=fps)
+
+
+def _numbers(clip: Clip, frames: Frames) -> range:
+    count = clip.animation.frames
+    if isinstance(frames, range):
+        for end in (frames[0], frames[-1]) if len(frames) else ():
+            FrameRange(end, end).among(count)
+        return frames
+    return (FrameRange() if frames is None else FrameRange.parse(frames)).among(count)
