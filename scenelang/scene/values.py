@@ -160,7 +160,8 @@ class RangeValue:
         if self.step is None:
             return True
         steps = (value - self.start) / self.step
-        return abs(steps - round(steps)) <= 1e-9
+        # Beyond 2^53 neighbours are whole numbers of steps apart, and so is what has no float64.
+        return not math.isfinite(steps) or abs(steps - round(steps)) <= 1e-9
 
 
 class MaterialValue:

@@ -127,3 +127,8 @@ def test_pictures_are_numbers_however_large_the_moves(moves: str, after: str) ->
     picture = render(scene, device="cpu", threads=1)
     assert np.isfinite(picture).all()
     assert picture.to_uint8().shape == (7, 9, 3)
+
+
+def test_a_param_in_a_range_of_steps_too_small_to_count() -> None:
+    """The number of steps from 0 to 1 was infinite, and infinity has no nearest whole number."""
+    assert loads("param k = 1 in 0..1 step 1e-320; square { scale(k); }").nodes
