@@ -33,8 +33,6 @@ from scenelang.syntax.tokens import Report, Tokens
 
 _REACH: Final = 3 * FOLLOWED
 _MOST_MISTAKES: Final = 50  # with more of them the whole text is read: some limit may be near
-_OLDEST: Final = 32  # a kept tree may hold on to the text of so many edits ago, whose part there is the same
-_MOVED: Final = -_OLDEST - 1  # the version of a tree that something before it has been edited since
 _GLOBAL: Final = ("E0115", "E0120", "E0121")  # open comment, nesting, too many: no matter of one statement
 
 
@@ -84,13 +82,10 @@ class Parsed:
     version: int = 0
 
     def statement(self, index: int) -> nodes.Stmt:
-        """Top-level statement number ``index``, at its place in this text.
-
-        One that has not moved may keep the source of an older version, the same up to its end.
-        """
+        """Top-level statement number ``index``, at its place in this text."""
         piece = self.pieces[index]
         delta = self.starts[index] - piece.node.span.start
-        if self.version - piece.version > _OLDEST:
+        if piece.version != self.version:
             # A new piece: the old one may belong to an older text that somebody still reads.
             piece = _Piece(move_node(piece.node, delta, self.source), self.version)
             self.pieces[index] = piece
@@ -187,7 +182,7 @@ class _Splice:
         if not self._is_sound(found, reach, pristine, end, to_end):
             return None
         fresh = file.statements
-        kept = [] if to_end else [_Piece(piece.node, _MOVED) for piece in old.pieces[last + 1 :]]
+        kept = [] if to_end else old.pieces[last + 1 :]
         if not to_end:
             # The statement that was read again to be sure has come out as it was.
             before = old.pieces[last].node
