@@ -179,6 +179,10 @@ def before_of(part: Part) -> Sequence[Comment]:
     return () if isinstance(part, str) else part.before
 
 
+def blank_of(part: Part) -> bool:
+    return not isinstance(part, str) and part.blank
+
+
 def after_of(part: Part) -> Sequence[Comment]:
     return () if isinstance(part, str) else part.after
 
@@ -194,10 +198,13 @@ def plain(part: Part, before: bool = False, after: bool = False) -> Part:
 
 
 def own_after_first(comments: Sequence[Comment]) -> Sequence[Comment]:
-    """Comments of which each after one that ends its line stands on a line of its own."""
+    """Comments of which each stands on a line of its own that comes after one that ends its line."""
     placed: list[Comment] = []
+    own = False
     for comment in comments:
-        placed.append(comment._replace(own_line=True) if placed and placed[-1].ends_line else comment)
+        own = own or comment.own_line
+        placed.append(comment._replace(own_line=own))
+        own = own or comment.ends_line
     return placed
 
 

@@ -20,19 +20,22 @@ from scenelang.formatting.documents import (
     Word,
     after_of,
     before_of,
+    blank_of,
     ends_of,
     flat_of,
     joined,
     own_after_first,
+    plain,
     sequence,
 )
 from scenelang.formatting.lists import Bracketed, Item, broken, inline
-from scenelang.formatting.trivia import Notes
+from scenelang.formatting.trivia import Notes, texts_of
 from scenelang.syntax.tokens import Tokens
 
 _PATH = re.compile(r"\w+(\.\w+)*")
 _SURE_DIGITS = 300
 """A number of so many signs without an exponent is finite."""
+_LONGEST_OPERATOR = 2
 _UNIT_LETTERS = "adegmnrstu"
 _LEVELS = {"*": 5, "/": 5, "%": 5, "+": 4, "-": 4, "<": 3, "<=": 3, ">": 3, ">=": 3, "==": 2, "!=": 2}
 _LEVELS |= {"&&": 1, "||": 0}
@@ -60,16 +63,18 @@ class Operation(Group):
         parts: list[Part] = [first]
         after = [*after_of(first)]
         for operator, operand in zip(self.operators, self.operands[1:], strict=True):
-            # A comment after an operator belongs to what stands before: the operator begins the next line.
-            if before_of(operator):
-                after += [*before_of(operator), *after_of(operator)]
-            else:
-                after += after_of(operator)
+            bare = len(flat_of(operator) or "") <= _LONGEST_OPERATOR
+            after += before_of(operator)
+            if bare:
+                # The operator will begin the next line: what stands behind it belongs to the line before.
+                after += [*after_of(operator), *before_of(operand)]
             if after:
                 parts.append(Comments(own_after_first(after)))
-            if before_of(operand):
-                parts += [LINE, Comments(before_of(operand))]
-            parts += [LINE, operator, " ", operand]
+            parts.append(LINE)
+            if bare:
+                parts += [operator, " ", operand]
+            else:  # comments before the operator must not be overtaken
+                parts.append(sequence([plain(operator, after=True), " ", operand]))
             after = [*after_of(operand)]
         return Concat(None, parts)
 
@@ -122,10 +127,8 @@ class ExpressionLayout:
         if token not in self.notes:
             return text
         note = self.notes[token]
-        if note.leading:
-            text = f"{note.leading} {text}"
-        if note.trailing:
-            text = f"{text} {note.trailing}"
+        if note.leading or note.trailing:
+            text = " ".join([*texts_of(note.leading), text, *texts_of(note.trailing)])
         if not (note.before or note.after or note.blank):
             return text
         word = Word(text)
@@ -145,8 +148,12 @@ class ExpressionLayout:
     def _comma(self, items: list[Item], comma: int) -> None:
         if comma in self.notes:
             note = self.notes[comma]
-            behind = f" {note.trailing}" if note.trailing else ""
-            items[-1] = Item(items[-1].part, behind, [*note.before, *note.after])
+            item = items[-1].part
+            after = [*note.before, *note.after]
+            if after_of(item) or after:
+                items[-1] = Item(item, "", [*after, *note.trailing])
+            else:
+                items[-1] = Item(item, "".join(f" {text}" for text in texts_of(note.trailing)))
 
     def empty(self, opening: int, closing: int) -> Part:
         return self._bracketed(Choose, opening, [], (closing,))
@@ -179,10 +186,18 @@ class ExpressionLayout:
         return self._glued(left, self.word(dot), right)
 
     def _glued(self, *parts: Part) -> Part:
-        """Parts without space between them; a string if all of them are."""
-        if all(isinstance(part, str) for part in parts):
-            return "".join(map(str, parts))
-        return sequence(parts)
+        """Parts without space between them; one word if they are words without comments around them."""
+        text = ""
+        for part in parts:
+            if isinstance(part, str):
+                text += part
+            elif isinstance(part, Word) and not (part.before or part.after):
+                text += part.flat
+            else:
+                return sequence(parts)
+        word = Word(text)
+        word.blank = blank_of(parts[0])
+        return word if word.blank else text
 
     # ------------------------------------------------------------ expressions
 

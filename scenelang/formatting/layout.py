@@ -96,12 +96,17 @@ class Block:
 
     def open(self, behind: Sequence[Comment] = ()) -> list[Part]:
         """The block on lines of its own; ``behind`` are comments that stood before its opening brace."""
-        opened = [*behind, *before_of(self.opening), *after_of(self.opening)]
+        opened = [*behind, *before_of(self.opening)]
+        head: list[Part] = [plain(self.opening)]
+        first: list[Part] = []
+        if opened and flat_of(self.opening) != "{":  # comments before the brace must not be overtaken
+            head = [Comments(opened, inside=True), plain(self.opening, after=True)]
+        elif opened := [*opened, *after_of(self.opening)]:
+            first = [Comments(own_after_first(opened))]
         inside = entries(self.statements, before_of(self.closing))
         if not inside and not opened:
             return [self.flat or "{}"]
-        first = [Comments(own_after_first(opened))] if opened else []
-        return [plain(self.opening), Indent(Concat(None, [*first, *inside])), LINE, plain(self.closing)]
+        return [*head, Indent(Concat(None, [*first, *inside])), LINE, plain(self.closing)]
 
 
 def entries(statements: Sequence[Item], dangling: Sequence[Comment]) -> list[Part]:
@@ -145,20 +150,27 @@ class Layout(ExpressionLayout):
     def _ended(self, parts: Sequence[Part], last: int, simple: bool = False) -> Statement:
         """A statement that ends with ``;``; comments before that go behind it."""
         semicolon = self.word(last)
+        after = [*after_of(parts[-1]), *before_of(semicolon), *after_of(semicolon)]
+        if after and last in self.notes:
+            after += self.notes[last].trailing
+            semicolon = ";"
         whole = [*parts[:-1], plain(parts[-1], before=len(parts) > 1), plain(semicolon)]
         stmt = Statement(joined(whole), lambda: sequence(whole), 0, simple)
         ends_of(stmt, parts[0], "")
-        stmt.after = [*after_of(parts[-1]), *before_of(semicolon), *after_of(semicolon)]
+        stmt.after = after
         return stmt
 
-    def _assigned(self, value: Part) -> Part:
-        """What stands after ``=``: operations go to a line of their own before they are broken."""
-        if isinstance(value, (Operation, Choice)) and not value.before:
-            flat = None if value.flat is None else " " + value.flat
-            doc = Choose(flat, lambda: Indent(Concat(None, [LINE, value])))
-            doc.after = value.after
-            return doc
-        return sequence([" ", value])
+    def _assigned(self, equal: int, value: Part) -> list[Part]:
+        """``=`` and what follows: operations go to a line of their own before they are broken."""
+        sign = self.word(equal)
+        commented = after_of(sign) or before_of(value)
+        if not commented and not isinstance(value, (Operation, Choice)):
+            return [" ", sign, " ", value]
+        flat = flat_of(value)
+        lines = Indent(Concat(None, [LINE, *comments_before(value), value]))
+        doc = Choose(None if commented or flat is None else " " + flat, lambda: lines)
+        doc.after = after_of(value)
+        return [" ", sign, doc]
 
     def version(self, word: int, number: int, last: int) -> Part:
         return self._ended([self.word(word), " ", self.number(number)], last)
@@ -172,16 +184,14 @@ class Layout(ExpressionLayout):
     def param_in(
         self, word: int, name: Part, equal: int, default: Part, within: int, range: Part, last: int
     ) -> Part:
-        head = [self.word(word), " ", name, " ", self.word(equal), self._assigned(default)]
+        head = [self.word(word), " ", name, *self._assigned(equal, default)]
         return self._ended([*head, " ", self.word(within), " ", range], last)
 
     def let(self, word: int, name: Part, equal: int, value: Part, last: int) -> Part:
-        head = [self.word(word), " ", name, " ", self.word(equal)]
-        return self._ended([*head, self._assigned(value)], last)
+        return self._ended([self.word(word), " ", name, *self._assigned(equal, value)], last)
 
     def fn(self, word: int, name: Part, params: Part, equal: int, body: Part, last: int) -> Part:
-        head = [self.word(word), " ", name, params, " ", self.word(equal)]
-        return self._ended([*head, self._assigned(body)], last)
+        return self._ended([self.word(word), " ", name, params, *self._assigned(equal, body)], last)
 
     def import_(self, word: int, path: int, as_: int, alias: Part, last: int) -> Part:
         return self._ended([self.word(word), " ", self.string(path), " ", self.word(as_), " ", alias], last)

@@ -17,6 +17,7 @@ from scenelang.formatting.documents import (
     Fill,
     Indent,
     Part,
+    Word,
     after_of,
     before_of,
     own_after_first,
@@ -61,14 +62,16 @@ def broken(left: Part, items: Sequence[Item], right: Part, comma: str = ",") -> 
     """A list on several lines: an item a line, numbers as many as fit, a lone vector on the same line."""
     dangling = before_of(right)
     opened = after_of(left)
-    if len(items) == 1 and not (opened or dangling):
-        part, behind, after = items[0]
-        if isinstance(part, Bracketed) and not (behind or after or part.before or part.after):
-            return Concat(None, [left, part, right])
     inside: list[Part] = [Comments(opened)] if opened else []
-    texts = [item.part for item in items if isinstance(item.part, str)]
-    if len(texts) == len(items) > 1 and not dangling and _numbers(items, texts):
-        return Concat(None, [left, Indent(Concat(None, [*inside, SOFT, Fill(texts)])), SOFT, right])
+    if not (opened or dangling):
+        if not items:
+            return Concat(None, [left, right])
+        part, behind, after = items[0]
+        alone = len(items) == 1 and isinstance(part, Bracketed)
+        if alone and not (behind or after or before_of(part) or after_of(part)):
+            return Concat(None, [left, part, right])
+        if numbers := _numbers(items):
+            return Concat(None, [left, Indent(Concat(None, [SOFT, Fill(numbers)])), SOFT, right])
     for index, (part, behind, after) in enumerate(items):
         inside.append(BLANK if index and blank_before(part) else SOFT)
         inside += comments_before(part)
@@ -79,8 +82,16 @@ def broken(left: Part, items: Sequence[Item], right: Part, comma: str = ",") -> 
     return Concat(None, [left, Indent(Concat(None, inside)), SOFT, right])
 
 
-def _numbers(items: Sequence[Item], texts: Sequence[str]) -> bool:
-    return all(_NUMBER.match(text) for text in texts) and not any(item.behind or item.after for item in items)
+def _numbers(items: Sequence[Item]) -> list[str]:
+    """The items, if they are several plain numbers without comments or blank lines between; else nothing."""
+    texts: list[str] = []
+    for index, (part, behind, after) in enumerate(items):
+        if index == 0 and isinstance(part, Word) and not (part.before or part.after):
+            part = part.flat  # a blank line before the first item means nothing
+        if not isinstance(part, str) or behind or after or not _NUMBER.match(part):
+            return []
+        texts.append(part)
+    return texts if len(texts) > 1 else []
 
 
 def blank_before(part: Part) -> bool:

@@ -95,12 +95,16 @@ class _Printer:
         return room >= 0 and _reach(stack, room) <= room
 
     def comments(self, doc: Comments, margin: int) -> None:
+        follows = False  # another comment that does not end its line
         for comment in doc.comments:
-            if comment.own_line or self.ended:
+            if self.line and not comment.own_line and follows:
+                self.line += " "
+            elif comment.own_line or self.ended:
                 if self.line:
                     self.newline(margin + INDENT if doc.inside else margin)
             elif self.line:
                 self.line = self.line.rstrip(" ") + ("  " if comment.text.startswith("//") else " ")
+            follows = not comment.ends_line
             if not self.line:
                 self.line = " " * self.margin
             head, *rest = comment.text.split("\n")

@@ -7,7 +7,7 @@ attached to, it is printed where the same rule attaches it again. That is what m
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -35,21 +35,25 @@ class Comment(NamedTuple):
     blank: bool = False
 
 
+def texts_of(comments: Iterable[Comment]) -> list[str]:
+    return [comment.text for comment in comments]
+
+
 @dataclass(slots=True)
 class Notes:
     """What stands around one token.
 
     Args:
         before: comments on lines of their own before it.
-        leading: block comments before it on its line, each with a space after it.
-        trailing: block comments after it on its line, each with a space before it.
+        leading: block comments before it on its line.
+        trailing: block comments after it on its line, which need not end there.
         after: comments behind it after which its line must end.
         blank: a blank line stands right before it, or before its leading comments.
     """
 
     before: list[Comment] = field(default_factory=list)
-    leading: str = ""
-    trailing: str = ""
+    leading: Sequence[Comment] = ()
+    trailing: Sequence[Comment] = ()
     after: list[Comment] = field(default_factory=list)
     blank: bool = False
 
@@ -69,13 +73,13 @@ def attach(tokens: Tokens) -> dict[int, Notes]:
 
 
 def comments_of(tokens: Tokens) -> list[str]:
-    """The texts of all comments, in order."""
+    """The texts of all comments, in order, without the white space at the ends of their lines."""
     text = tokens.source.text
     found: list[str] = []
     end = 0
     for start, stop in zip(tokens.starts, tokens.ends, strict=True):
         if start - end > 1:
-            found += map(_stripped, _COMMENT.findall(text, end, start))
+            found += ["\n".join(map(str.strip, c.split("\n"))) for c in _COMMENT.findall(text, end, start)]
         end = stop
     return found
 
@@ -97,11 +101,22 @@ class _Gap:
 
     def attach(self, start: int, end: int) -> None:
         comments, newlines = self._read(start, end)
-        if not comments:
-            self._note(self.index).blank = newlines[0] > 1
-            return
-        count = self._behind(comments, newlines) if self.index else 0
-        self._ahead(comments[count:], newlines[count:])
+        here = self._note(self.index)
+        behind = self._behind(comments, newlines) if self.index else 0
+        ahead = self._ahead(comments, newlines, behind)
+        here.blank = newlines[ahead] > 1
+        for comment, lines in zip(comments[behind:ahead], newlines[behind:], strict=False):
+            here.before.append(comment._replace(own_line=True, blank=lines > 1))
+        leading = comments[ahead:]
+        if last := comments[:behind]:
+            if last[-1].ends_line or ahead > behind:
+                self._note(self.index - 1).after += last
+            elif self._closes(self.index) or (newlines[behind] and self._separates(self.index - 1)):
+                self._note(self.index - 1).trailing = last
+            else:
+                leading = [*last, *leading]
+                here.blank = False
+        here.leading = leading
 
     def _read(self, start: int, end: int) -> tuple[list[Comment], list[int]]:
         """The comments, and how many newlines stand before each of them and after the last."""
@@ -121,41 +136,21 @@ class _Gap:
         return comments, newlines
 
     def _behind(self, comments: Sequence[Comment], newlines: Sequence[int]) -> int:
-        """Attach the comments that follow the token before on its line; how many have been placed."""
+        """How many comments stand on the line of the token before."""
         count = 0
-        for comment, lines in zip(comments, newlines, strict=False):
-            if lines:
-                break
+        while count < len(comments) and not newlines[count]:
             count += 1
-            if comment.ends_line:
+            if comments[count - 1].ends_line:
                 break
-        if not count:
-            return 0
-        here = comments[:count]
-        words = " ".join(comment.text for comment in here)
-        before = self._note(self.index - 1)
-        if here[-1].ends_line or count < len(comments):
-            before.after += here
-        elif self._closes(self.index) or (newlines[count] and self._separates(self.index - 1)):
-            before.trailing = words
-        else:
-            self._note(self.index).leading = words
-            self._note(self.index).blank = False
         return count
 
-    def _ahead(self, comments: Sequence[Comment], newlines: Sequence[int]) -> None:
-        """Attach the other comments to the token."""
-        here = self._note(self.index)
+    def _ahead(self, comments: Sequence[Comment], newlines: Sequence[int], behind: int) -> int:
+        """The first comment of those, ``behind`` at the earliest, that stand on the line of the token."""
         first = len(comments)
         if not self._closes(self.index):
-            while first and not newlines[first] and not comments[first - 1].ends_line:
+            while first > behind and not newlines[first] and not comments[first - 1].ends_line:
                 first -= 1
-        if comments[first:]:
-            here.leading = " ".join(comment.text for comment in comments[first:])
-        if not here.leading or comments[first:]:
-            here.blank = newlines[first] > 1
-        for comment, lines in zip(comments[:first], newlines, strict=False):
-            here.before.append(comment._replace(own_line=True, blank=lines > 1))
+        return first
 
     def _closes(self, index: int) -> bool:
         kind = self.tokens.kinds[index]
