@@ -17,6 +17,7 @@ from scenelang.files import NotWritten
 COMMANDS: Final = {
     "render": "Draw scenes or compiled programs.",
     "check": "Report what is wrong with scenes.",
+    "fmt": "Lay scenes out in the one canonical way.",
     "compile": "Compile a scene to a program.",
     "compare": "Draw a scene beside its exact picture.",
     "models": "List models, or tell about one.",

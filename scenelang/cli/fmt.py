@@ -1,0 +1,191 @@
+"""``scenelang fmt``: scene text in its canonical layout; imports nothing of the pipeline but the parser's tables."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from collections.abc import Iterator
+from typing import Final
+
+import click
+
+from scenelang.cli.main import describe
+from scenelang.cli.say import say_diagnostics, say_trouble, wants_color
+from scenelang.files import read_regular, write_whole
+
+STDIN: Final = "-"
+SUFFIX: Final = ".nsg"
+MAX_BYTES: Final = 10_000_000  # as every scene; the module that says so would cost half of the start-up
+_NEWLINE_LESS: Final = "\n\\ No newline at end of file\n"
+
+
+@click.command("fmt")
+@click.argument("paths", nargs=-1, required=True, metavar="PATH…")
+@click.option("--check", is_flag=True, help="Write nothing; name the files that are laid out otherwise.")
+@click.option("--diff", is_flag=True, help="Write nothing; print what would change.")
+@click.pass_context
+def command(ctx: click.Context, paths: tuple[str, ...], check: bool, diff: bool) -> None:
+    """Lay scenes out in the one canonical way, comments and blank lines kept.
+
+    PATH is a scene, a folder of scenes (*.nsg, also in folders inside; hidden ones and links are passed
+    over), or - to read standard input and write to standard output. A file with syntax errors is reported
+    and stays as it is.
+
+    Exits with 0, or 1 where a scene has syntax errors or, with --check or --diff, where something would
+    change, and 2 where a file cannot be read or written.
+    """
+    # Layouts are many small objects that refer to each other in no circles: looking for such would take as
+    # long as all the rest.
+    gc.disable()
+    run = _Run(check, diff)
+    for path in paths:
+        try:
+            for name in [path] if path == STDIN else scenes(path):
+                run.take(name)
+        except OSError as error:
+            say_trouble(describe(error))
+            run.unreadable += 1
+    run.summarise()
+    wrong = run.mistaken or (run.changed and (check or diff))
+    ctx.exit(2 if run.unreadable else int(bool(wrong)))
+
+
+def scenes(path: str) -> Iterator[str]:
+    """A file itself, or the scenes of a folder in order of their names; hidden ones and links are left out.
+
+    Raises:
+        OSError: a folder cannot be listed.
+    """
+    if not os.path.isdir(path):
+        yield path
+        return
+    with os.scandir(path) as entries:
+        found = sorted(entries, key=lambda entry: entry.name)
+    for entry in found:
+        if entry.name.startswith(".") or entry.is_symlink():
+            continue
+        if entry.is_dir():
+            yield from scenes(entry.path)
+        elif entry.name.endswith(SUFFIX) and entry.is_file():
+            yield entry.path
+
+
+class _Run:
+    """One run over any number of files.
+
+    Args:
+        check: only name what would change.
+        diff: only show what would change.
+    """
+
+    def __init__(self, check: bool, diff: bool) -> None:
+        self.check = check
+        self.diff = diff
+        self.writes = not (check or diff)
+        self.changed = self.same = self.mistaken = self.unreadable = 0
+        self.stdin = False
+
+    def take(self, name: str) -> None:
+        """Format one file."""
+        from scenelang.diagnostics.diagnostic import SceneError
+        from scenelang.formatting import format_text
+
+        try:
+            text = self._read(name)
+            if text is None:
+                return
+            result = format_text(text, name=_shown(name))
+        except SceneError as error:
+            say_diagnostics(error.diagnostics)
+            self.mistaken += 1
+            return
+        except OSError as error:
+            say_trouble(describe(error))
+            self.unreadable += 1
+            return
+        if result == text:
+            self.same += 1
+        else:
+            self.changed += 1
+            if self.diff:
+                self._show(_shown(name), text, result)
+            elif self.check:
+                click.echo(f"would format {_shown(name)}")
+        if self.writes:
+            self._write(name, text, result)
+
+    def _read(self, name: str) -> str | None:
+        """The text; None after a report."""
+        if name == STDIN:
+            self.stdin = True
+            data = sys.stdin.buffer.read(MAX_BYTES + 1)
+        else:
+            data = read_regular(name, MAX_BYTES)
+        if len(data) > MAX_BYTES:
+            say_trouble(f"{_shown(name)}: a file of more than {MAX_BYTES // 1_000_000} MB")
+        else:
+            try:
+                return data.decode("utf-8")
+            except UnicodeDecodeError as error:
+                say_trouble(f"{_shown(name)}: it is not UTF-8 text: byte {error.start}")
+        self.unreadable += 1
+        return None
+
+    def _write(self, name: str, text: str, result: str) -> None:
+        if name == STDIN:
+            sys.stdout.flush()
+            sys.stdout.buffer.write(result.encode("utf-8"))
+            sys.stdout.buffer.flush()
+        elif result != text:
+            try:
+                write_whole(name, result.encode("utf-8"))
+            except OSError as error:
+                say_trouble(describe(error))
+                self.unreadable += 1
+                self.changed -= 1
+
+    def _show(self, name: str, text: str, result: str) -> None:
+        """Print a unified diff."""
+        from difflib import unified_diff
+
+        colored = wants_color(sys.stdout)
+        for line in unified_diff(_lines(text), _lines(result), name, name):
+            shown = line if line.endswith("\n") else line + _NEWLINE_LESS
+            if colored:
+                shown = _colored(shown)
+            click.echo(shown, nl=False, color=True)
+
+    def summarise(self) -> None:
+        """Say how many files there were, where people read it."""
+        if self.stdin or not (self.changed or self.same or self.mistaken or self.unreadable):
+            if not self.stdin:
+                say_trouble(f"no scenes (*{SUFFIX}) there")
+                self.unreadable += 1
+            return
+        would = "" if self.writes else "would be "
+        counts = [
+            (self.changed, f"{would}formatted"),
+            (self.same, "left as they are" if self.same != 1 else "left as it is"),
+            (self.mistaken, "with syntax errors"),
+        ]
+        parts = [f"{n} scene{'s' * (n != 1)} {what}" for n, what in counts if n]
+        if parts:
+            click.echo(", ".join(parts), err=True)
+
+
+def _shown(name: str) -> str:
+    return "<stdin>" if name == STDIN else name
+
+
+def _lines(text: str) -> list[str]:
+    """Lines with their ends: a line ends at a newline and nowhere else."""
+    lines = [line + "\n" for line in text.split("\n")]
+    last = lines.pop()
+    return [*lines, last[:-1]] if last != "\n" else lines
+
+
+def _colored(line: str) -> str:
+    colors = {"-": "red", "+": "green", "@": "cyan"}
+    color = colors.get(line[0])
+    return click.style(line, fg=color, bold=line.startswith(("---", "+++"))) if color else line
