@@ -34,6 +34,7 @@ ORDER = (
     "scenelang.training",
     "scenelang.backend",
     "scenelang.animation",
+    "scenelang.watching",
     "scenelang.evaluation",
     "scenelang.cli",
 )
@@ -48,6 +49,7 @@ MAY_BE_HEAVY = (
     "scenelang.training",
     "scenelang.backend",
     "scenelang.animation",
+    "scenelang.watching",
     "scenelang.evaluation",
     "scenelang.cli",
 )

@@ -57,9 +57,6 @@ class Clip:
         fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
             seconds × fps frames, and t and u follow.
         reuse: keep what frames share; without it each frame is worked out by itself.
-
-    Raises:
-        SceneError: the scene has errors.
     """
 
     def __init__(
@@ -90,7 +87,18 @@ class Clip:
         self._last: tuple[Shot, Program] | None = None
         self.wanted = self._evaluation.wanted
         """All files that it imports, also those that are not there."""
-        self.first = self.shot(0)
+        self._first: Shot | None = None
+
+    @property
+    def first(self) -> Shot:
+        """The first frame, which every scene has.
+
+        Raises:
+            SceneError: it has errors.
+        """
+        if self._first is None:
+            self._first = self.shot(0)
+        return self._first
 
     @property
     def animates(self) -> bool:
@@ -148,7 +156,7 @@ def open_clip(path: str | os.PathLike[str], **options: Any) -> Clip:
     """A clip of a scene file; ``options`` as for `Clip`.
 
     Raises:
-        SceneError: the scene has errors.
+        SceneError: the file is no text.
         OSError: the file cannot be opened.
     """
     where = Path(path)

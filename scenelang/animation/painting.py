@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -45,13 +46,14 @@ class Painter:
         backend: ``"neural"`` or ``"reference"``.
         device: where the network runs.
         threads: tiles drawn at the same time; by default one for each usable core.
+        kept: the picture before, of which what is the same is taken over.
     """
 
     clip: Clip
     backend: Backend = "neural"
     device: Device = "auto"
     threads: int | None = None
-    _kept: Kept | None = field(default=None, repr=False)
+    kept: Kept | None = field(default=None, repr=False)
 
     def prepare(self, shot: Shot) -> Drawable:
         """Compile a frame and say what its picture depends on.
@@ -62,11 +64,11 @@ class Painter:
         """
         if self.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})
-            key = frame_key("reference", version("scenelang"), self.clip.model, scene.to_json())
+            key = frame_key("reference", _version("scenelang"), self.clip.model, scene.to_json())
             return Drawable(shot.number, key, shot, None)
         program = self.clip.program(shot)
         key = frame_key(
-            "neural", version("scenelang"), version("torch"), self.place, self.split, program.digest()
+            "neural", _version("scenelang"), _version("torch"), self.place, self.split, program.digest()
         )
         return Drawable(shot.number, key, shot, program)
 
@@ -100,16 +102,21 @@ class Painter:
             return draw_exact(frame.shot.scene, spans=frame.shot.spans, model=self.clip.model)
         from scenelang.renderers.kept import Kept
 
-        if self._kept is None and self.clip.reuse:
-            self._kept = Kept()
+        if self.kept is None and self.clip.reuse:
+            self.kept = Kept()
         return paint(
             frame.program,
             self.place,
             threads=self.split,
             split=self.split,
-            kept=self._kept,
+            kept=self.kept,
             progress=progress,
         )
+
+
+@lru_cache
+def _version(package: str) -> str:
+    return version(package)
 
 
 def paint(

@@ -26,8 +26,11 @@ def main() -> None:
         head_size, program_size = struct.unpack("<II", sizes)
         head = json.loads(_exactly(source, head_size))
         answer = _answer(head, _exactly(source, program_size), kept)
-        answers.write(json.dumps(answer).encode() + b"\n")
-        answers.flush()
+        try:
+            answers.write(json.dumps(answer).encode() + b"\n")
+            answers.flush()
+        except BrokenPipeError:  # whoever asked is gone
+            os._exit(0)
 
 
 def _exactly(source: BinaryIO, size: int) -> bytes:

@@ -78,17 +78,18 @@ def open_input(
         return None, None
     path = None if name == STDIN else Path(name)
     root = request.root if request.root is not None else "." if path is None else None
+    clip = Clip(
+        source,
+        path=path,
+        diagnostics=found,
+        defines=request.defines,
+        model=request.model,
+        root=None if root is None else Path(root),
+        size=request.size,
+        fps=wanted.fps,
+    )
     try:
-        clip = Clip(
-            source,
-            path=path,
-            diagnostics=found,
-            defines=request.defines,
-            model=request.model,
-            root=None if root is None else Path(root),
-            size=request.size,
-            fps=wanted.fps,
-        )
+        _ = clip.first
     except SceneError:
         return source, None
     return source, clip

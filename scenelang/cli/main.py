@@ -23,6 +23,7 @@ COMMANDS: Final = {
     "models": "List models, or tell about one.",
     "eval": "Measure a model on unseen scenes.",
     "train": "Train a model's weights.",
+    "watch": "Draw a scene again whenever it is saved.",
     "explain": "Say what a diagnostic's code means.",
     "convert": "Write a scene as text, JSON or Python.",
     "schema": "Print the JSON Schema of scenes.",

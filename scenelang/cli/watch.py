@@ -1,0 +1,181 @@
+"""``scenelang watch``: a scene drawn again whenever it is saved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from scenelang.cli import options
+
+if TYPE_CHECKING:
+    import PIL.Image
+
+    from scenelang.scene.params import Defines
+    from scenelang.watching.picture import Easel, Outcome
+    from scenelang.watching.screen import Screen
+
+
+@click.command("watch")
+@click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
+@click.option("-o", "--out", metavar="OUT", help="The picture, or an animation; by default STEM.png.")
+@options.size
+@options.define
+@click.option("--frame", type=click.IntRange(0), metavar="N", help="Frame of an animation, from 0.")
+@click.option("--frames", metavar="A..B", help="Frames of an animation, where OUT is one.")
+@click.option(
+    "--fps",
+    type=click.FloatRange(0, 1000, min_open=True),
+    metavar="N",
+    help="Frames a second instead of the scene's; its seconds stay.",
+)
+@options.model
+@click.option(
+    "--show",
+    type=click.Choice(["auto", "never", "always"]),
+    default="auto",
+    show_default=True,
+    help="Show the picture in the terminal; always does with coloured characters if need be.",
+)
+@click.option("--poll", is_flag=True, help="Look for changes every now and then: for network folders.")
+@click.option(
+    "--backend",
+    type=click.Choice(["neural", "reference"]),
+    default="neural",
+    show_default=True,
+    help="Draw with the trained network, or by the exact definition.",
+)
+@options.device
+@options.threads
+@options.root
+def command(
+    file: Path,
+    out: str | None,
+    size: tuple[int, int] | None,
+    defines: Defines,
+    frame: int | None,
+    frames: str | None,
+    fps: float | None,
+    model: str | None,
+    show: Literal["auto", "never", "always"],
+    poll: bool,
+    backend: Literal["neural", "reference"],
+    device: Literal["auto", "cpu", "cuda"],
+    threads: int | None,
+    root: str | None,
+) -> None:
+    """Draw a scene again whenever it, or a file that it imports, is saved.
+
+    OUT is always written, whole. Mistakes stay on the screen until they are mended, and OUT stays the last
+    good picture. Where OUT is an animation, all of it is drawn again. Ctrl-C ends it, with exit code 130.
+    """
+    import sys
+
+    from scenelang.animation.targets import is_animation
+    from scenelang.cli.animation import Wanted, wanted_target
+    from scenelang.cli.outputs import targets
+    from scenelang.cli.say import wants_color
+    from scenelang.watching.changes import Changes, stamps
+    from scenelang.watching.picture import Easel, Outdated, Wish
+    from scenelang.watching.screen import Screen
+
+    out = f"{file.stem}.png" if out is None else out
+    wanted = Wanted(frames, fps, None, "auto", False)
+    target = None
+    if frame is None and (is_animation(out) or wanted.certain or out.endswith(("/", "\\"))):
+        target = wanted_target(str(file), out, wanted)
+    path = Path(out) if target is not None else targets([str(file)], out)[0]
+    if not file.is_file():
+        raise click.UsageError(f"there is no file '{file}'.")
+    wish = Wish(
+        file,
+        path,
+        target,
+        wanted.frames,
+        frame or 0,
+        dict(defines.values),
+        model,
+        None if root is None else Path(root),
+        size,
+        fps,
+        backend,
+        device,
+        threads,
+    )
+    screen = Screen(show, wants_color(sys.stdout))
+    changes = Changes(polls=poll, say=screen.say)
+    easel = Easel(wish)
+    easel.warm()
+    while True:
+        before = stamps(easel.paths)
+        try:
+            _draw(easel, screen, before)
+        except Outdated:
+            continue
+        # what changed since it was read, even before it was known to be read, is drawn at once
+        changes.wait({path: before[path] if path in before else easel.seen[path] for path in easel.paths})
+
+
+def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] | None]) -> None:
+    import time
+
+    from scenelang.backend.errors import RenderError
+    from scenelang.cli.main import describe
+    from scenelang.diagnostics.render_text import plural
+
+    clock = time.strftime("%H:%M:%S")
+    wish = easel.wish
+    try:
+        outcome = easel.draw(before)
+    except FileNotFoundError as error:
+        screen.clear()
+        gone = error.filename is not None and Path(error.filename) == wish.file
+        screen.say(f"{clock} {wish.file} is gone; waiting for it" if gone else f"Error: {describe(error)}")
+        return
+    except OSError as error:
+        screen.clear()
+        screen.say(f"{clock} Error: {describe(error)}")
+        return
+    except RenderError as error:
+        screen.clear()
+        screen.say(f"{clock} Error: {error}")
+        return
+    screen.clear()
+    if outcome.diagnostics:
+        screen.say_diagnostics(outcome.diagnostics)
+    if outcome.good:
+        screen.say(f"{clock} {_told(outcome, wish.out)}")
+        if screen.shows and (picture := _shown(outcome)) is not None:
+            screen.show(picture)
+    else:
+        errors = sum(d.severity == "error" for d in outcome.diagnostics)
+        stays = f"; {wish.out} stays as it was" if wish.out.exists() else ""
+        screen.say(f"{clock} {wish.file}: {plural(errors, 'error')}{stays}")
+
+
+def _shown(outcome: Outcome) -> PIL.Image.Image | None:
+    """The picture, or the first one of an animation."""
+    if outcome.image is not None:
+        return outcome.image.to_pil()
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(outcome.files[0]) as film:
+            return film.convert("RGBA")
+    except UnidentifiedImageError:
+        return None  # video
+
+
+def _told(outcome: Outcome, out: Path) -> str:
+    """A line about a drawing that is good."""
+    if outcome.same:
+        return f"{out}: the same picture ({1000 * outcome.compile_s:.0f} ms)"
+    name = str(outcome.files[0])
+    if len(outcome.files) > 1:
+        name = f"{name} … {outcome.files[-1].name}"
+    total = outcome.compile_s + outcome.draw_s + outcome.save_s
+    return (
+        f"{name}: {1000 * total:.0f} ms (compile {1000 * outcome.compile_s:.0f}, "
+        f"draw {1000 * outcome.draw_s:.0f}, save {1000 * outcome.save_s:.0f})"
+    )

@@ -1,0 +1,202 @@
+"""One drawing of a watched scene."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import threading
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scenelang.animation.clip import Clip
+from scenelang.animation.painting import Painter
+from scenelang.animation.run import make
+from scenelang.animation.timing import FrameRange, FramesError
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.scene.imports import Unreadable, read_source
+from scenelang.scene.params import Defines
+from scenelang.watching.changes import Stamps, stamps
+
+if TYPE_CHECKING:
+    from scenelang.animation.run import Progress
+    from scenelang.animation.targets import Target
+    from scenelang.backend.render import Backend, Device
+    from scenelang.image import Image
+    from scenelang.renderers.kept import Kept
+
+
+class Outdated(Exception):
+    """A file was saved while the scene was drawn."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What is watched and how it is drawn.
+
+    Args:
+        file: the scene.
+        out: the picture, or the animation.
+        target: of an animation; None for a picture.
+        frames: of an animation.
+        frame: of a picture.
+        defines: values for params.
+        model, root, size, fps, backend, device, threads, jobs: as for ``scenelang render``.
+    """
+
+    file: Path
+    out: Path
+    target: Target | None = None
+    frames: FrameRange | None = None
+    frame: int = 0
+    defines: dict[str, str] = field(default_factory=dict)
+    model: str | None = None
+    root: Path | None = None
+    size: tuple[int, int] | None = None
+    fps: float | None = None
+    backend: Backend = "neural"
+    device: Device = "auto"
+    threads: int | None = None
+    jobs: int | None = None
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What came of a drawing.
+
+    Args:
+        image: a picture that was drawn.
+        good: whether the file that was asked for is as the scene says.
+        same: nothing had to be drawn: the scene means the same picture as before.
+        diagnostics: of the scene.
+        compile_s, draw_s, save_s: where the time went.
+        files: what was written.
+    """
+
+    image: Image | None = None
+    good: bool = False
+    same: bool = False
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    compile_s: float = 0.0
+    draw_s: float = 0.0
+    save_s: float = 0.0
+    files: list[Path] = field(default_factory=list)
+
+
+class Easel:
+    """Draws a scene as often as it changes; the model, the last picture and its key are kept.
+
+    Args:
+        wish: what is watched.
+    """
+
+    def __init__(self, wish: Wish) -> None:
+        self.wish = wish
+        self.paths: tuple[Path, ...] = (Path(os.path.abspath(wish.file)),)
+        """The files that the picture depends on, the scene first."""
+        self.seen: Stamps = {}
+        """How they were when their names were found out."""
+        self._key: str | None = None
+        self._image: Image | None = None
+        self._kept: Kept | None = None
+
+    def warm(self) -> None:
+        """Load torch in the background, so that a scene that is mended need not wait for it."""
+        if self.wish.backend == "neural":
+            name = "scenelang.backend.neural"
+            threading.Thread(target=importlib.import_module, args=(name,), daemon=True).start()
+
+    def draw(self, before: Stamps) -> Outcome:
+        """Read, compile, draw and save.
+
+        Args:
+            before: the files as they were; where they change meanwhile, the drawing of an animation ends.
+
+        Raises:
+            Outdated: they did.
+            RenderError: there is no such device, or no weights.
+            OSError: the picture cannot be written, or the scene not be read.
+        """
+        outcome = Outcome()
+        found = Diagnostics()
+        with contextlib.suppress(SceneError):  # its diagnostics are `found`
+            self._draw(found, outcome, before)
+        outcome.diagnostics = found.items
+        return outcome
+
+    def _draw(self, found: Diagnostics, outcome: Outcome, before: Stamps) -> None:
+        wish = self.wish
+        started = time.perf_counter()
+        clip = self._open(found)
+        try:
+            numbers = (wish.frames or FrameRange()).among(clip.animation.frames)
+        except FramesError as error:
+            found.add("E0337", str(error), None)
+            raise SceneError(found) from None
+        painter = Painter(clip, wish.backend, wish.device, wish.threads, self._kept)
+        if wish.target is not None and wish.target.kind == "video" and not clip.animates:
+            found.add("E0337", f"'{wish.out}' is for animations, and the scene has no animate(…)", None)
+            raise SceneError(found)
+        if wish.target is not None and (clip.animates or wish.target.kind == "sequence"):
+            self._film(painter, wish.target, numbers, outcome, before)
+            return
+        frame = painter.prepare(clip.shot(wish.frame))
+        outcome.compile_s = time.perf_counter() - started
+        if frame.key == self._key and wish.out.exists():
+            outcome.image, outcome.good, outcome.same = self._image, True, True
+            return
+        started = time.perf_counter()
+        outcome.image = painter.draw(frame)
+        outcome.draw_s = time.perf_counter() - started
+        self._kept, self._image = painter.kept, outcome.image
+        started = time.perf_counter()
+        outcome.image.save(wish.out)
+        outcome.save_s = time.perf_counter() - started
+        outcome.good, outcome.files, self._key = True, [wish.out], frame.key
+
+    def _open(self, found: Diagnostics) -> Clip:
+        wish = self.wish
+        try:
+            source = read_source(wish.file, os.fspath(wish.file))
+        except Unreadable as error:
+            empty = Span(SourceFile(os.fspath(wish.file), ""), 0, 0)
+            found.add(error.code, f"cannot read '{wish.file.name}': {error}", empty)
+            raise SceneError(found) from None
+        defines = Defines(dict(wish.defines))
+        clip = Clip(
+            source,
+            path=wish.file,
+            diagnostics=found,
+            defines=defines,
+            model=wish.model,
+            root=wish.root,
+            size=wish.size,
+            fps=wish.fps,
+        )
+        broken = bool(found.errors)
+        # what a broken scene imports is half known: go on watching what it did
+        known = self.paths[1:] if broken else ()
+        self.paths = tuple(dict.fromkeys((self.paths[0], *clip.wanted, *known)))
+        self.seen = stamps(self.paths)
+        defines.report_unused(found)
+        _ = clip.first
+        return clip
+
+    def _film(
+        self, painter: Painter, target: Target, numbers: range, outcome: Outcome, before: Stamps
+    ) -> None:
+        looked = time.monotonic()
+
+        def check(_: Progress) -> None:
+            nonlocal looked
+            if time.monotonic() - looked > 0.1:
+                looked = time.monotonic()
+                if stamps(before) != before:
+                    raise Outdated
+
+        made = make(painter, target, numbers, jobs=self.wish.jobs, progress=check)
+        outcome.good, outcome.files = True, made.files
+        outcome.compile_s, outcome.draw_s, outcome.save_s = made.compile_s, made.draw_s, made.encode_s
