@@ -53,7 +53,7 @@ def mutate(value: Any, generator: Random, others: tuple[Any, ...] = ()) -> Any:
             holder[key] = generator.choice(([holder[key]], {"children": [holder[key]], "kind": "group"}))
     elif change == 5 and isinstance(holder[key], int | float) and not isinstance(holder[key], bool):
         number = holder[key]
-        holder[key] = generator.choice((-number, number + 1, number * 1e9 if number < 1e9 else 0, number / 3, 0))
+        holder[key] = generator.choice((-number, number + 1, number * 1000, number // 3, 0))
     elif change == 6 and isinstance(holder[key], str):
         holder[key] = generator.choice((holder[key] * 2, holder[key][:-1], holder[key] + "\n", f'"{holder[key]}'))
     else:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import ast
 from functools import cache
 from random import Random
 from typing import Any
 
 from fuzz import text, trees
 from fuzz.oracles import check_diagnostics
-from fuzz.target import Failure, Target, hold
+from fuzz.target import Failure, Target, hold, sampled
 from scenelang.diagnostics.diagnostic import SceneError
 from scenelang.models.manifest import available, load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.store import parse_program, program_bytes
+from scenelang.scene.data import to_readable_json
 from scenelang.scene.load import loads
 from scenelang.scene.schema import Scene
 from scenelang.scene.session import deep_stack
+from scenelang.scene.to_python import to_python
 
 
 def check(data: bytes) -> None:
@@ -32,6 +35,9 @@ def check(data: bytes) -> None:
         again = Scene.from_json(written)
         hold(again == scene, "Scene to JSON and back")
         hold(again.to_json() == written, "the same JSON each time")
+        hold(Scene.from_json(to_readable_json(scene)) == scene, "Scene to readable JSON and back")
+        if sampled(data, 4):
+            _check_python(scene)
     _check_text(scene)
     try:
         program = compile_scene(scene)
@@ -55,6 +61,20 @@ def _check_text(scene: Scene) -> None:
         raise Failure("Scene to text that reads", (sorted(names), written[:500])) from None
     with deep_stack():
         hold(read == scene, "Scene to text and back", written[:500])
+
+
+def _check_python(scene: Scene) -> None:
+    """Python code of a Scene makes that Scene; only calls of our own names with literals are run."""
+    code = to_python(scene)
+    tree = ast.parse(code)
+    allowed = (ast.Module, ast.Import, ast.alias, ast.Assign, ast.Expr, ast.Call, ast.keyword, ast.Name, ast.Load,
+               ast.Store, ast.Attribute, ast.Constant, ast.Tuple, ast.List, ast.UnaryOp, ast.USub)  # fmt: skip
+    odd = [type(node).__name__ for node in ast.walk(tree) if not isinstance(node, allowed)]
+    hold(not odd, "Python code of calls and literals", (odd, code[:500]))
+    names: dict[str, Any] = {}
+    exec(compile(tree, "<scene>", "exec"), names)
+    made = [value for value in names.values() if isinstance(value, Scene)]
+    hold(made == [scene], "Scene to Python and back", code[:500])
 
 
 def _known(scene: Scene) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 _NOT_0: dict[str, Any] = {"not": {"const": 0}}
 _NOT_000: dict[str, Any] = {"not": {"const": [0, 0, 0]}}
@@ -27,7 +27,28 @@ Rgb = Annotated[
     Field(description="red, green, blue as written (sRGB-encoded); 0 is none, 1 is full"),
 ]
 Row = tuple[Finite, Finite, Finite, Finite]
-Word = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+Share = Annotated[Finite, Field(ge=0, le=1)]
+Opaque = Annotated[
+    tuple[Share, Share, Share], Field(description="red, green, blue as written (sRGB-encoded), in 0 to 1")
+]
+RESERVED = (
+    "nsg model param let fn module import for in if else group chain union smooth subtract intersect material "
+    "true false"
+).split()
+"""The keywords of the language, which name nothing else."""
+
+
+def _is_free(word: str) -> str:
+    if word in RESERVED:
+        raise ValueError(f"`{word}` is a word of the language")
+    return word
+
+
+Word = Annotated[
+    str,
+    Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", json_schema_extra={"not": {"enum": list(RESERVED)}}),
+    AfterValidator(_is_free),
+]
 """A name that text can spell."""
 Combine = Literal["union", "smooth", "subtract", "intersect"]
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from scenelang.scene.fields import (
     Affine,
@@ -19,6 +19,7 @@ from scenelang.scene.fields import (
     Factor,
     Finite,
     Length,
+    Opaque,
     Pixels,
     Radians,
     Rate,
@@ -30,6 +31,8 @@ from scenelang.scene.fields import (
 from scenelang.scene.fields import (
     Combine as Combine,
 )
+
+MAX_FRAMES = 1_000_000
 
 
 def _kind_is_required(schema: dict[str, Any]) -> None:
@@ -312,6 +315,12 @@ class Animation(_Node):
     fps: Annotated[Finite, Field(gt=0, description="frames per second")]
     loop: Annotated[bool, Field(strict=True, description="the last frame is followed by the first")] = True
 
+    @model_validator(mode="after")
+    def _is_bounded(self) -> Animation:
+        if self.seconds * self.fps > MAX_FRAMES:
+            raise ValueError(f"an animation of more than {MAX_FRAMES:,} frames")
+        return self
+
     @property
     def frames(self) -> int:
         """Number of frames, at least 1."""
@@ -330,7 +339,7 @@ class Scene(_Node):
     ] = None
     canvas: Annotated[tuple[Pixels, Pixels], Field(description="width and height in pixels")] = (256, 256)
     background: Annotated[
-        Rgb | None, Field(description="as colours are written; null gives an image with alpha")
+        Opaque | None, Field(description="as colours are written; null gives an image with alpha")
     ] = (1.0, 1.0, 1.0)
     animation: Annotated[
         Animation | None, Field(description="the animation that this Scene is one frame of")

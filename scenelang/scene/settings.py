@@ -12,7 +12,7 @@ from scenelang.scene.arguments import bind
 from scenelang.scene.build import Builder, make
 from scenelang.scene.expressions import prepare
 from scenelang.scene.functions import number
-from scenelang.scene.schema import Animation
+from scenelang.scene.schema import MAX_FRAMES, Animation
 from scenelang.scene.scope import Env
 from scenelang.scene.session import Session
 from scenelang.scene.statements import Action, Place, misplaced, states
@@ -21,7 +21,6 @@ from scenelang.scene.values import POISON, Problem, Time, Vec, describe, show
 from scenelang.syntax import nodes
 
 MAX_SIDE_PX: Final = 8192
-MAX_FRAMES: Final = 1_000_000
 LEFT_OUT: Final = object()  # an argument that was not given; None is the value ``none``
 
 _PARAMS: Final[dict[str, tuple[tuple[str, ...], int]]] = {

@@ -12,15 +12,18 @@ import pytest
 
 from scenelang.backend.errors import RenderError
 from scenelang.backend.render import render
-from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.render import render_text
 from scenelang.diagnostics.span import SourceFile
 from scenelang.models.manifest import ROOT, Manifest
 from scenelang.models.weights import ModelError, read_facts
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import ProgramError
+from scenelang.scene.fields import RESERVED
 from scenelang.scene.load import loads
+from scenelang.scene.schema import Scene
 from scenelang.syntax import parse
+from scenelang.syntax.tables import tables
 
 
 def test_snippets_of_a_very_long_line_lay_out_only_what_is_near_their_marks() -> None:
@@ -132,3 +135,27 @@ def test_pictures_are_numbers_however_large_the_moves(moves: str, after: str) ->
 def test_a_param_in_a_range_of_steps_too_small_to_count() -> None:
     """The number of steps from 0 to 1 was infinite, and infinity has no nearest whole number."""
     assert loads("param k = 1 in 0..1 step 1e-320; square { scale(k); }").nodes
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"background": [1, 1, 1e9]},
+        {"background": [-0.1, 0, 0]},
+        {"animation": {"seconds": 1e200, "fps": 1e200}},
+        {"animation": {"seconds": 1e6, "fps": 2}},
+        {"nodes": [{"kind": "object", "geometry": "union"}]},
+        {"nodes": [{"kind": "object", "geometry": "star", "material": {"name": "for"}}]},
+    ],
+    ids=str,
+)
+def test_scenes_from_data_are_no_more_than_text_can_say(data: dict[str, object]) -> None:
+    """Their text was refused, or read back as something else."""
+    with pytest.raises(SceneError, match="E0313"):
+        Scene.from_json(json.dumps(data))
+
+
+def test_reserved_words_are_those_of_the_grammar() -> None:
+    words = {text for text in tables().literals if text[0].isalpha()}
+    assert words - set(RESERVED) == {"step", "as"}  # keywords only where they can follow something
+    assert set(RESERVED) <= words
