@@ -15,7 +15,17 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from tests.syntax.mutations import KINDS, Outcome, Tally, exhaust, parsed_only, sample, scenes, study, together
+from tests.syntax.mutations import (
+    KINDS,
+    Outcome,
+    Tally,
+    exhaust,
+    parsed_only,
+    sample,
+    scenes,
+    study,
+    together,
+)
 
 COLUMNS = ("mistakes", "sound", "one, near", "one", "near", "0", "2", "3", "more", "no tree")
 
@@ -54,7 +64,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=1000, help="slips of each kind (1000)")
     parser.add_argument("--all", action="store_true", help="every token of every scene instead")
-    parser.add_argument("--tries", type=int, default=2, help="with --all: random slips of a kind at a token (2)")
+    parser.add_argument(
+        "--tries", type=int, default=2, help="with --all: random slips of a kind at a token (2)"
+    )
     parser.add_argument("--seed", type=int, default=2021)
     parser.add_argument("--kind", choices=KINDS, action="append", help="only this kind")
     parser.add_argument("--fault", choices=("syntax", "meaning"), help="list only mistakes of this sort")
@@ -63,10 +75,14 @@ def main() -> None:
     kinds = tuple(options.kind or KINDS)
     start = time.process_time()
     slips = (
-        exhaust(options.seed, options.tries, kinds) if options.all else sample(options.count, options.seed, kinds)
+        exhaust(options.seed, options.tries, kinds)
+        if options.all
+        else sample(options.count, options.seed, kinds)
     )
     table = study(slips)
-    print(f"{len(scenes())} scenes, seed {options.seed}, {time.process_time() - start:.0f} s of processor time")
+    print(
+        f"{len(scenes())} scenes, seed {options.seed}, {time.process_time() - start:.0f} s of processor time"
+    )
     print(f"{'':<18}" + "".join(f"{title:>10}" for title in COLUMNS))
     for (kind, fault), tally in sorted(table.items()):
         print(row(f"{kind} / {fault}", tally))

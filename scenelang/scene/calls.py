@@ -57,7 +57,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
     """Report a statement whose name stands for nothing."""
     unit, scope, name = place.unit, place.scope, stmt.name
     session, words = unit.session, unit.session.vocabulary
-    if name.text in unit.lost:
+    if unit.damage and unit.damage.loses(name.text):
         return
     if "." in name.text:
         alias = scope.find(name.text.partition(".")[0])

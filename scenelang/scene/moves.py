@@ -135,7 +135,7 @@ def _action(
 
 def _warn(node: Any, unit: Unit, span: Span) -> None:
     outside = outside_unit(node)
-    if outside is not None:
+    if outside is not None and not unit.session.follows("W0301", span):
         unit.session.diagnostics.add(
             "W0301",
             f"{outside:.6g} is outside 0 to 1",

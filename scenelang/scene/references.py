@@ -87,7 +87,7 @@ def lookup(name: nodes.Name, unit: Unit, scope: Scope) -> Binding | None:
 def unknown_member(name: nodes.Name, unit: Unit, exported: Unit) -> None:
     """Report that an imported file has no such name."""
     alias, _, rest = name.text.partition(".")
-    if rest in exported.lost:
+    if exported.damage and exported.damage.loses(rest):
         return
     known = [n for n, b in exported.scope.names.items() if b.kind != "import"]
     found = nearest(rest, known)
@@ -100,7 +100,7 @@ def unknown_member(name: nodes.Name, unit: Unit, exported: Unit) -> None:
 def unknown(name: nodes.Name, unit: Unit, scope: Scope, *, called: bool = False) -> None:
     """Report a name that stands for nothing in an expression."""
     text, session = name.text, unit.session
-    if text in unit.lost:
+    if unit.damage and unit.damage.loses(text):
         return
     later = scope.defined_later(text)
     if later is not None:
@@ -160,6 +160,8 @@ def _own_name(name: nodes.Name, unit: Unit, scope: Scope) -> Code:
             session.error("E0213", message, name.span, help=f"call it: {text}(…)")
         else:
             unknown(name, unit, scope)
+        return POISONED
+    if unit.damage and unit.damage.loses("animate"):
         return POISONED
     index = ANIMATED.index(text)
     session.needs.frame |= text != "frames"

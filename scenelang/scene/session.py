@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix, Label
 from scenelang.diagnostics.span import Span
+from scenelang.scene.damage import Damage
 from scenelang.scene.schema import Animation
 from scenelang.scene.spans import Calls, SpanMap
 from scenelang.scene.still import Needs
@@ -121,6 +122,7 @@ class Session:
     calls: Calls | None = None
     animated: list[Any] = field(default_factory=lambda: [UNBOUND] * 4)
     settings: Settings = field(default_factory=Settings)
+    damaged: dict[int, Damage] = field(default_factory=dict)
     replays: bool = False
     roots: list[list[Any]] = field(default_factory=list)
     needs: Needs = field(default_factory=Needs)
@@ -145,6 +147,11 @@ class Session:
             calls = calls.outer
         return labels
 
+    def follows(self, code: str, span: Span) -> bool:
+        """Whether a diagnostic may follow from a syntax mistake that has been reported."""
+        damage = self.damaged.get(id(span.source)) if self.damaged else None
+        return damage is not None and damage.explains(code, span)
+
     def error(
         self,
         code: str,
@@ -155,7 +162,9 @@ class Session:
         fix: Fix | None = None,
         labels: tuple[Label, ...] = (),
     ) -> None:
-        """Report a mistake with the calls that led to it."""
+        """Report a mistake with the calls that led to it, unless it may follow from one of syntax."""
+        if self.follows(code, span):
+            return
         self.diagnostics.add(code, message, span, labels=[*labels, *self.call_labels()], help=help, fix=fix)
 
     def problem(self, problem: Problem, span: Span, operands: tuple[nodes.Expr | None, ...] = ()) -> None:

@@ -156,6 +156,8 @@ def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
     unit, scope = place.unit, place.scope
     earlier = scope.names.get(name.text)
     scope.later.pop(name.text, None)
+    if unit.damage and unit.damage.holds(name.span):
+        binding.kind = "poison"  # what it stands for is known when its statement reads again
     if earlier is not None:
         labels = (Label(earlier.span, "first defined here"),) if earlier.span else ()
         unit.session.error(

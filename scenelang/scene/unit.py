@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.scene.damage import NONE, Damage
 from scenelang.scene.scope import Env, Frame, Scope, file_frame
 from scenelang.scene.session import Session
 from scenelang.syntax import nodes
@@ -42,8 +41,7 @@ class Unit:
     nesting: int = 0
     weight: int = 0
     first: nodes.Stmt | None = None
-    lost: frozenset[str] = frozenset()
-    """Words inside what recovery skipped: a definition may have been among it."""
+    damage: Damage = NONE
 
     def __post_init__(self) -> None:
         self.scope = Scope(self.frame)
@@ -55,34 +53,7 @@ class Unit:
         assert self.frame.root is not None
         return self.frame.root
 
-    def find_lost(self, file: nodes.File) -> None:
-        """Note the words that recovery skipped, so that their absence is no second mistake."""
-        words: set[str] = set()
-        for span in _bad_spans(file.statements):
-            words.update(re.findall(r"[A-Za-z_]\w*", span.text))
-        self.lost = frozenset(words)
-
-
-def _bad_spans(statements: tuple[nodes.Stmt, ...]) -> Iterator[Span]:
-    """Spans of unreadable statements, in all blocks."""
-    stack: list[nodes.Stmt] = list(statements)
-    while stack:
-        stmt = stack.pop()
-        match stmt:
-            case nodes.BadStmt():
-                yield stmt.span
-            case nodes.For() | nodes.Module() | nodes.Node():
-                stack.extend(stmt.body.statements)
-            case nodes.Call() | nodes.MaterialUse():
-                if stmt.body:
-                    stack.extend(stmt.body.statements)
-            case nodes.Combined():
-                stack.append(stmt.child)
-            case nodes.If():
-                stack.extend(stmt.then.statements)
-                if isinstance(stmt.otherwise, nodes.If):
-                    stack.append(stmt.otherwise)
-                elif stmt.otherwise:
-                    stack.extend(stmt.otherwise.statements)
-            case _:
-                pass
+    @property
+    def lost(self) -> frozenset[str]:
+        """Words inside what syntax mistakes have damaged: a definition may have been among it."""
+        return self.damage.words

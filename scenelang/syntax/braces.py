@@ -7,10 +7,16 @@ however it is laid out.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.syntax.automaton import advance, reach
+from scenelang.syntax.automaton import advance, fits, reach
+from scenelang.syntax.completion import completion
 from scenelang.syntax.layout import Slip, find_hidden_slips, find_slips
+from scenelang.syntax.mistakes import report_broken_off, report_instead
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
 
@@ -21,6 +27,10 @@ _LONGEST = 80  # so many places before the first misfit are tried
 def balance(tokens: Tokens, report: Report) -> None:
     """Report braces that do not match and mend the token list."""
     mender = _Mender(tokens, report)
+    if tokens.cut:
+        mender.match_the_rest()  # an open comment has swallowed the rest of the layout
+        return
+    mender.mend_plain()
     for slip in reversed(find_slips(tokens)):  # from the last on, so that indices hold
         mender.mend(slip)
     mender.match_the_rest()
@@ -41,6 +51,22 @@ def balance_hidden(tokens: Tokens, report: Report) -> bool:
     return True
 
 
+@dataclass(frozen=True, slots=True)
+class _Mend:
+    """Put ``insert`` in the place of ``delete`` tokens at index ``at``."""
+
+    at: int
+    delete: int
+    insert: tuple[int, ...]
+
+
+@cache
+def _instead() -> tuple[int, ...]:
+    """What a brace may be written for, likely ones first."""
+    names = ("(", ")", "[", "]", ";", ",", "=", "BAD_EXPRESSION", "NAME", "*", ".", "..", ":", "in", "as")
+    return tuple(map(tables().kind, names))
+
+
 class _Mender:
     """Reports and mends the braces of one file."""
 
@@ -53,6 +79,8 @@ class _Mender:
         name = tables().kind("NAME")
         self.in_block = self._deep([name, self.opening])
         self.in_if = self._deep([literals["if"], literals["("], name, literals[")"], self.opening])
+        self.behind_if = self.in_if.copy()
+        advance(self.behind_if, self.closing)
 
     def _deep(self, head: list[int]) -> list[int]:
         """The states deep inside blocks with a head: all that a line can close fits there."""
@@ -61,29 +89,56 @@ class _Mender:
             advance(stack, kind)
         return stack
 
+    def mend_plain(self) -> None:
+        """Mend a brace that cannot stand where it does, if that is all that is wrong around it."""
+        kinds = self.tokens.kinds
+        balance = kinds.count(self.opening) - kinds.count(self.closing)
+        stack = [tables().start]
+        depth = 0
+        for at, kind in enumerate(kinds):
+            before = stack.copy() if kind in (self.opening, self.closing) else []
+            if advance(stack, kind):
+                depth += (kind == self.opening) - (kind == self.closing)
+                continue
+            if (kind == self.opening and balance > 0) or (kind == self.closing and balance < 0 < depth):
+                end = min(at + 2 * _BEHIND, len(kinds))
+                for mend in (_Mend(at, 1, ()), *(_Mend(at, 1, (other,)) for other in _instead())):
+                    trial = before.copy()
+                    if (
+                        all(advance(trial, kind) for kind in mend.insert)
+                        and reach(trial, kinds, at + 1, end) == end
+                    ):
+                        self._apply(mend)
+                        break
+            return
+
     def mend(self, slip: Slip) -> None:
-        """Mend one line, brace by brace."""
+        """Mend one line: by one change where that does, else brace by brace."""
+        count = abs(slip.shift)
+        if count > 1:
+            mend, fits = self._best(slip.first, slip.stop, slip.shift > 0, count)
+            if fits:
+                self._apply(mend)
+                return
         stop = slip.stop
-        for _ in range(abs(slip.shift)):
-            at, insert, _ = self._best(slip.first, stop, slip.shift > 0)
-            if at < stop:
-                stop += 1 if insert else -1
-            if insert:
-                self._insert(at, self.opening if slip.shift > 0 else self.closing)
-            else:
-                self._delete(at)
+        for _ in range(count):
+            mend, _ = self._best(slip.first, stop, slip.shift > 0, 1)
+            if mend.at < stop:
+                stop += len(mend.insert) - mend.delete
+            self._apply(mend)
 
     def is_plausible(self, slip: Slip) -> bool:
         """Whether a slip makes sense of its line, and does not just undo a block that stands flush left."""
         if slip.shift < 0:
             return self.tokens.kinds[slip.stop - 1] != self.opening
-        return self._best(slip.first, slip.stop, True)[2]
+        return self._best(slip.first, slip.stop, True, 1)[1]
 
-    def _best(self, first: int, stop: int, opens: bool) -> tuple[int, bool, bool]:
-        """Where to mend the tokens ``[first, stop)``, whether by inserting, and whether all fits then.
+    def _best(self, first: int, stop: int, opens: bool, count: int) -> tuple[_Mend, bool]:
+        """How to mend the tokens ``[first, stop)``, and whether all fits then.
 
         Args:
-            opens: the line lacks a `{` or has a `}` too many; otherwise the other way about.
+            opens: the line lacks `{` or has `}` too many; otherwise the other way about.
+            count: how many braces it is about.
         """
         kinds = self.tokens.kinds
         # The layout cannot tell a brace at the end of a line from one at the start of the next.
@@ -91,45 +146,99 @@ class _Mender:
         while kinds[limit] in (self.opening, self.closing):
             limit += 1
         end = min(limit + _BEHIND, len(kinds) - 1)
-        surplus, missing = (self.closing, self.opening) if opens else (self.opening, self.closing)
+        surplus = self.closing if opens else self.opening
         goes_on = kinds[first] == self.closing and kinds[first + 1] == self.otherwise
         stack = (self.in_if if goes_on else self.in_block).copy()
+        if kinds[first] == self.otherwise:
+            stack = self.behind_if.copy()
         misfit = reach(stack.copy(), kinds, first, end)
         places = range(max(first, min(misfit, limit) - _LONGEST), min(misfit, limit) + 1)
         for at in range(first, places.start):
             advance(stack, kinds[at])
-        found = []  # how far all fits then, which way is likelier, where, whether by inserting
+        found = []  # how far all fits then, how likely it is, and what to do
         for at in places:
-            if kinds[at] == surplus and at < limit:
-                got = reach(stack.copy(), kinds, at + 1, end)
-                found.append((got, 0.5 if opens else 0.2, at, False))
-            trial = stack.copy()
-            if at <= stop and advance(trial, missing):
-                found.append((reach(trial, kinds, at, end), 0.3, at, True))
+            for likely, mend in self._mends(stack, at, stop, limit, opens, count):
+                trial = stack.copy()
+                if all(advance(trial, kind) for kind in mend.insert):
+                    found.append((reach(trial, kinds, at + mend.delete, end), likely, at, mend))
             if not advance(stack, kinds[at]):
                 break
-        got, _, at, insert = max(found, default=(-1, 0.0, stop, True))
+        got, _, _, mend = max(found, key=lambda one: one[:3], default=(-1, 0.0, 0, self._at_end(stop, opens)))
         if got <= misfit < end:  # another mistake is in the way: the end of the line is as good a guess
             last = [index for index in places if kinds[index] == surplus and index < limit][-1:]
-            return (last[0], False, False) if opens and last else (stop, True, False)
-        return at, insert, got == end
+            return (_Mend(last[0], 1, ()) if opens and last else self._at_end(stop, opens)), False
+        return mend, got == end
+
+    def _at_end(self, stop: int, opens: bool) -> _Mend:
+        return _Mend(stop, 0, (self.opening if opens else self.closing,))
+
+    def _mends(
+        self, stack: list[int], at: int, stop: int, limit: int, opens: bool, count: int
+    ) -> Iterator[tuple[float, _Mend]]:
+        """What may be done at one place, and how likely each is."""
+        kind = self.tokens.kinds[at]
+        surplus, missing = (self.closing, self.opening) if opens else (self.opening, self.closing)
+        wanted = (missing,) * count
+        if at <= stop:
+            yield 0.3, _Mend(at, 0, wanted)
+        if at == stop:
+            yield from self._broken_off(stack, at, wanted)
+        if at >= limit:
+            return
+        if kind == surplus:
+            if count == 1:
+                yield 0.5 if opens else 0.2, _Mend(at, 1, ())
+                for rank, other in enumerate(_instead()):
+                    yield 0.1 - 0.001 * rank, _Mend(at, 1, (other,))
+            else:
+                yield 0.4, _Mend(at, 1, (missing,) * (count - 1))
+        elif kind != missing:
+            yield 0.1, _Mend(at, 1, wanted)
+
+    def _broken_off(
+        self, stack: list[int], at: int, wanted: tuple[int, ...]
+    ) -> Iterator[tuple[float, _Mend]]:
+        """The line breaks off before a token: what its statement lacks, and the braces after that."""
+        semicolon = tables().literals[";"]
+        if wanted[0] == self.opening:
+            missing = completion(stack, self.opening)
+        else:
+            missing = completion(stack, semicolon)
+            missing = None if missing is None else (*missing, semicolon)
+        if not missing or (len(wanted) > 1 and wanted[0] == self.opening):
+            return
+        insert = (*missing, *wanted)
+        trial = stack.copy()
+        if all(advance(trial, kind) for kind in insert) and not fits(trial, self.tokens.kinds[at]):
+            insert += (*(completion(trial, semicolon) or ()), semicolon)
+        yield 0.15, _Mend(at, 0, insert)
 
     # ------------------------------------------------------------ mending
 
-    def _insert(self, at: int, kind: int) -> None:
-        tokens = self.tokens
+    def _apply(self, mend: _Mend) -> None:
+        tokens, at = self.tokens, mend.at
+        names = [tables().kinds[kind] for kind in mend.insert]
         end = tokens.end_before(at)
-        if kind == self.opening:
+        if mend.delete and names:
+            report_instead(tokens, self.report, at, names)
+        elif mend.delete:
+            self._report_unmatched(at)
+        elif mend.insert == (self.opening,):
             fix = Fix("insert `{`", (Edit(Span(tokens.source, end, end), " {"),))
             self.report.add("E0106", "missing `{`", end, end, fix=fix)
+        elif mend.insert[0] != self.closing:
+            report_broken_off(tokens, self.report, at, names)
         elif not tokens.cut:
-            labels = [Label(self._span(index), "this block is not closed") for index in self._open(at)[-1:]]
-            self.report.add("E0104", "missing `}`", end, end, labels=labels)
-        tokens.replace(at, 0, [kind])
+            self._report_unclosed(at, len(names))
+        tokens.replace(at, mend.delete, mend.insert)
 
-    def _delete(self, at: int) -> None:
-        self._report_unmatched(at)
-        self.tokens.replace(at, 1, [])
+    def _report_unclosed(self, at: int, count: int) -> None:
+        end = self.tokens.end_before(at)
+        labels = [
+            Label(self._span(index), "this block is not closed") for index in self._open(at)[-count:][-3:]
+        ]
+        times = f" {count} times" if count > 1 else ""
+        self.report.add("E0104", f"missing `}}`{times}", end, end, labels=labels)
 
     def _report_unmatched(self, at: int) -> None:
         span = self._span(at)
@@ -153,11 +262,8 @@ class _Mender:
         if not depth:
             return
         last = len(tokens.kinds) - 1
-        end = tokens.end_before(last)
         if not tokens.cut:
-            count = f" {depth} times" if depth > 1 else ""
-            labels = [Label(self._span(index), "this block is not closed") for index in self._open(last)[-3:]]
-            self.report.add("E0104", f"missing `}}`{count}", end, end, labels=labels)
+            self._report_unclosed(last, depth)
         tokens.replace(last, 0, [self.closing] * depth)
 
     def _open(self, at: int) -> list[int]:

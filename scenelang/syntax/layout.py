@@ -17,6 +17,7 @@ from scenelang.syntax.tokens import Tokens
 _SLIP = 1.4  # a slip costs as much as so many lines at the wrong depth
 _WIDEST = 12  # further off than this is not searched
 _NEVER = 1e9
+_FAR = 200  # tokens in which a statement shows whether it is one
 _ASTRAY = 4  # so many lines at the wrong depth make hidden slips likely
 
 
@@ -91,7 +92,9 @@ def _lines(tokens: Tokens) -> list[_Line]:
     previous = semicolon
     for at, kind in enumerate(tokens.kinds[:-1]):
         statement = previous in (semicolon, opening, closing) or kind == closing
-        if (statement or (kind in starters and brackets == 0)) and tokens.on_new_line(at):
+        starts = kind in starters and (brackets == 0 or _leaves_open(tokens.kinds, at))
+        if (statement or starts) and tokens.on_new_line(at):
+            brackets = 0
             lines.append(_Line(at, _indent(tokens, at), depth - (kind == closing)))
         depth += (kind == opening) - (kind == closing)
         if kind in (opening, closing, semicolon):
@@ -100,6 +103,21 @@ def _lines(tokens: Tokens) -> list[_Line]:
         previous = kind
     lines.append(_Line(len(tokens.kinds) - 1, 0, depth))
     return lines
+
+
+def _leaves_open(kinds: list[int], at: int) -> bool:
+    """Whether a line inside brackets is a statement by itself: they are not closed where it ends."""
+    literals = tables().literals
+    if kinds[at] in (literals["material"], literals["step"], literals["as"]):
+        return False
+    depth = 0
+    for kind in kinds[at : at + _FAR]:
+        if kind in (literals["{"], literals["}"], literals[";"]):
+            return True
+        depth += (kind in (literals["("], literals["["])) - (kind in (literals[")"], literals["]"]))
+        if depth < 0:
+            return False
+    return False
 
 
 def _indent(tokens: Tokens, at: int) -> int:

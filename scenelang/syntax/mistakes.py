@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.syntax.repairs import Repair
+from scenelang.syntax.repairs import REPLACEMENTS, Repair, word_for
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 
@@ -60,6 +60,40 @@ def report_braces(tokens: Tokens, report: Report, statements: Sequence[tuple[int
     report.add("E0106", "missing braces", at, at, help="braces are mandatory here", fix=fix)
 
 
+def report_broken_off(tokens: Tokens, report: Report, at: int, names: Sequence[str]) -> None:
+    """Report a statement that breaks off before a token, and what it lacks."""
+    end = tokens.end_before(at)
+    codes = {
+        ")": "E0103",
+        "]": "E0103",
+        "BAD_EXPRESSION": "E0108",
+        "NAME": "E0109",
+        "(": "E0107",
+        ";": "E0102",
+    }
+    report.add(
+        codes.get(names[0], "E0126"),
+        f"unfinished statement: missing {_listed(names)}",
+        end,
+        end,
+        help="the line breaks off here",
+    )
+
+
+def report_instead(tokens: Tokens, report: Report, at: int, names: Sequence[str]) -> None:
+    """Report a token that stands where another belongs."""
+    start, end = tokens.starts[at], tokens.ends[at]
+    found, first = _shown(tokens, at), names[0]
+    if first == "BAD_EXPRESSION":
+        report.add("E0108", f"expected an expression, found {found}", start, end)
+    elif first == "NAME":
+        report.add("E0109", f"expected a name, found {found}", start, end)
+    elif first == "STRING":
+        report.add("E0126", f"expected a string, found {found}", start, end)
+    else:
+        report.add("E0130", f"{found} where {_listed(names)} belongs", start, end)
+
+
 def report_unexpected(tokens: Tokens, report: Report, at: int) -> None:
     """Report a token that nothing could make sense of."""
     if tokens.starts[at] in tokens.reported:
@@ -76,6 +110,10 @@ def _report_insertion(
     end = tokens.end_before(at)
     found = _shown(tokens, at)
     first = names[0]
+    ends = names[-1] == ";" or (names[-2:] == ["{", "}"] and names[2:])
+    if ends and set(names) - {")", "]", ";"}:
+        report_broken_off(tokens, report, at, names)
+        return
     # An operand is missed where the next token stands, anything else where the last one ended.
     place = (
         (end, end)
@@ -135,20 +173,36 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
     if repair.delete == 2:
         first, second = tokens.text(repair.at), tokens.text(repair.at + 1)
         report.add("E0131", f"`{first}` and `{second}` are in the wrong order", start, end)
-    elif new == "NAME":
+    elif new == "NAME" and text.isalpha():
         report.add("E0110", f"`{text}` is a keyword, not a name", start, end, help=_KEYWORD_HELP)
     elif new == "==":
         report.add("E0111", "`=` does not compare", start, end, help="equality is `==`", fix=fix)
     elif new == "{}":
         report.add("E0106", f"missing block, found `{text}`", start, end)
-    elif text in (")", "]"):
+    elif text in (")", "]") and new in (")", "]"):
         report.add("E0105", f"`{text}` where `{new}` belongs", start, end, fix=fix)
-    elif text.isalpha():
+    elif word_for(text) == new:
         report.add(
             "E0127", f"`{text}` is not used here", start, end, help=f"`{new}` is the sign for it", fix=fix
         )
-    else:
+    elif repair.delete == 1 and text in REPLACEMENTS and new in REPLACEMENTS[text]:
         report.add("E0130", f"`{text}` where `{new}` belongs", start, end, fix=fix)
+    else:
+        report_instead(tokens, report, repair.at, names)
+
+
+def _listed(names: Sequence[str]) -> str:
+    """What is missing, in words: "an expression, `)` and `{`"."""
+    words = {"BAD_EXPRESSION": "an expression", "NAME": "a name", "STRING": "a string", "NUMBER": "a number"}
+    parts: list[str] = []
+    for name in names:
+        if name in words:
+            parts.append(words[name])
+        elif parts and parts[-1].endswith("`") and not name.isalpha() and not parts[-1][-2].isalpha():
+            parts[-1] = f"{parts[-1][:-1]}{' ' * (name == '{')}{name}`"
+        else:
+            parts.append(f"`{name}`")
+    return " and ".join((", ".join(parts[:-1]), parts[-1])) if parts[1:] else parts[0]
 
 
 def _is_literal(tokens: Tokens, index: int) -> bool:

@@ -167,6 +167,8 @@ class Recovery:
             return True
         if at == first + 1 and self._bare_argument(states, at):
             return True
+        if at == first + 2 and self._is(first, "fn", "module") and self._bare_parameters(states, at):
+            return True
         wants_block = fits(states, self.literals["{"]) and not fits(states, self.literals[";"])
         if not wants_block or not self._is(at - 1, ")", "else"):
             return False
@@ -204,6 +206,19 @@ class Recovery:
         self.report.add("E0126", f"expected a string, found `{span.text}`", start, end, fix=fix)
         tokens.replace(at, stop - at, [])
         self._insert(at, "STRING")
+        return True
+
+    def _bare_parameters(self, states: list[int], at: int) -> bool:
+        """`fn half x = x / 2;`: parameters without parentheses."""
+        ends = "=" if self._is(at - 2, "fn") else "{"
+        stop = at
+        while stop < at + 40 and self.tokens.kinds[stop] in (tables().kind("NAME"), self.literals[","]):
+            stop += 1
+        if stop == at or not self._is(stop, ends) or not self._wrapped_fits(states, at, stop):
+            return False
+        mistakes.report_parentheses(self.tokens, self.report, at, stop)
+        self._insert(stop, ")")
+        self._insert(at, "(")
         return True
 
     def _bare_argument(self, states: list[int], at: int) -> bool:

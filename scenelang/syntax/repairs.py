@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from scenelang.syntax.automaton import LOOKAHEAD, advance, fits, reach
+from scenelang.syntax.completion import completion
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Tokens
 
@@ -80,7 +81,7 @@ _ONLY_BEFORE = {
     "import": "STRING",
 }
 _ONLY_AFTER = {"as": "STRING", "as NAME": "STRING"}
-_REPLACEMENTS = {
+REPLACEMENTS = {
     "=": {"==": 1.0},
     "==": {"=": 1.2},
     ":": {"=": 1.2, ";": 1.2, "..": 1.4, ",": 1.4},
@@ -94,6 +95,8 @@ _REPLACEMENTS = {
 }
 _WORDS = {"and": "&&", "or": "||", "not": "!", "mod": "%"}
 _DELETION, _FURTHER_DELETION = 1.5, 0.6
+_SUBSTITUTION = 1.1  # something else stands where a forgotten token belongs
+_BREAK = 1.7  # a line breaks off
 _SWAP = 1.8
 _KEYWORD_AS_NAME = 1.1
 _NEW_LINE = 0.6  # a token that begins a line is seldom the slip
@@ -121,7 +124,7 @@ def _replacements() -> dict[int, list[tuple[Kinds, float]]]:
     kind = tables().kind
     return {
         kind(name): [(tuple(map(kind, names.split())), cost) for names, cost in costs.items()]
-        for name, costs in _REPLACEMENTS.items()
+        for name, costs in REPLACEMENTS.items()
     }
 
 
@@ -234,15 +237,26 @@ class Search:
         new_line = tokens.on_new_line(at)
         yield from self._closings(at)
         before = kinds[at - 1] if at else END
+        after = kinds[at + 1] if kind != END else END
         for insert, cost, needed_after, needed_before in _insertions():
-            if needed_after not in (-1, kind) or needed_before not in (-1, before):
+            if needed_before not in (-1, before) or not fits(stack, insert[0]):
+                continue
+            if (
+                needed_after in (-1, after)
+                and kind not in self.fixed
+                and insert != (kind,)
+                and not insert[1:]
+            ):
+                yield Repair(at, 1, insert, cost + _SUBSTITUTION + _NEW_LINE * new_line)
+            if needed_after not in (-1, kind):
                 continue
             if insert[0] == self.semicolon and (new_line or kind in self.ends):
                 cost = 1.0
             elif new_line and insert[0] not in self.ends:
                 cost += _NEW_LINE / 2
-            if fits(stack, insert[0]):
-                yield Repair(at, 0, insert, cost)
+            yield Repair(at, 0, insert, cost)
+        if new_line or kind in self.ends:
+            yield from self._broken_off(stack, at)
         if kinds[at + 1 :] and self._swappable(kind, kinds[at + 1]):
             yield Repair(at, 2, (kinds[at + 1], kind), _SWAP)
         if kind in self.fixed:
@@ -266,6 +280,14 @@ class Search:
             yield Repair(at, count, (), cost)
             cost += _FURTHER_DELETION
 
+    def _broken_off(self, stack: list[int], at: int) -> Iterator[Repair]:
+        """The line before a token breaks off in the middle of a statement."""
+        opening, closing = (tables().literals[text] for text in "{}")
+        for goal, rest in ((self.semicolon, ()), (opening, (closing,))):
+            missing = completion(stack, goal)
+            if missing:
+                yield Repair(at, 0, (*missing, goal, *rest), _BREAK + 0.05 * len(missing))
+
     def _swappable(self, left: int, right: int) -> bool:
         """Whether two tokens may be the wrong way round; at most one of them is a brace."""
         return END not in (left, right) and left != right and not (left in self.fixed and right in self.fixed)
@@ -282,6 +304,10 @@ class Search:
         if len(closings) > 1:
             yield Repair(at, 0, closings, _CLOSING + dangling + 0.1 * len(closings))
         yield Repair(at, 0, (*closings, self.semicolon), _CLOSING_AND_SEMICOLON + dangling)
+        if self.kinds[at] not in self.fixed and self.kinds[at] not in self.closings:
+            yield Repair(at, 1, closings[:1], _CLOSING + dangling + _SUBSTITUTION)
+        if self.tokens.on_new_line(at):
+            yield Repair(at, 0, (closings[0], self.comma), _CLOSING_AND_SEMICOLON + dangling)
 
     def open_brackets(self, at: int) -> list[int]:
         """Indices of the brackets of the statement that are open before a token."""

@@ -121,7 +121,10 @@ class Scene:
 def scenes() -> tuple[Scene, ...]:
     """All examples, and the sound scenes of the tests."""
     paths = [*(REPOSITORY / "examples").rglob("*.nsg"), *(Path(__file__).parent / "scenes").glob("*.nsg")]
-    return tuple(Scene(path.stem, path.read_text(encoding="utf-8"), path) for path in sorted(paths))
+    return tuple(
+        Scene(str(path.relative_to(REPOSITORY)), path.read_text(encoding="utf-8"), path)
+        for path in sorted(paths)
+    )
 
 
 @cache
@@ -179,10 +182,19 @@ def _misspelt(word: str, generator: random.Random) -> str:
     return word[:at] + row[place - 1 if place > 0 else 1] + word[at + 1 :]
 
 
+def _glue(before: str, token: str, after: str) -> str:
+    """A token between two texts, with spaces where it would grow together with its neighbours."""
+
+    def grows(left: str, right: str) -> bool:
+        return bool(left and right) and all(c.isalnum() or c in "_.#<=" for c in (left[-1], right[0]))
+
+    return f"{before}{' ' * grows(before, token)}{token}{' ' * grows(token, after)}{after}"
+
+
 def mutate(scene: Scene, kind: Kind, index: int, generator: random.Random) -> Mutation | None:
     """Make one slip at one token; None where that kind of slip cannot be made there."""
     text, words = scene.text, _words(scene)
-    name, start, end, line = words[index]
+    _, start, end, line = words[index]
     word = text[start:end]
     new, last, what = text, line, f"`{word}`"
     if kind == "delete":
@@ -192,9 +204,9 @@ def mutate(scene: Scene, kind: Kind, index: int, generator: random.Random) -> Mu
         if other == word:
             return None
         if kind == "insert":
-            new, what = f"{text[:start]}{other} {text[start:]}", f"`{other}` before {what}"
+            new, what = _glue(text[:start], other, f" {text[start:]}"), f"`{other}` before {what}"
         else:
-            new, what = f"{text[:start]}{other}{text[end:]}", f"`{other}` for {what}"
+            new, what = _glue(text[:start], other, text[end:]), f"`{other}` for {what}"
     elif kind == "swap":
         if index + 1 == len(words):
             return None
@@ -202,7 +214,7 @@ def mutate(scene: Scene, kind: Kind, index: int, generator: random.Random) -> Mu
         if text[after:stop] == word:
             return None
         gap = text[end:after]
-        new = f"{text[:start]}{text[after:stop]} {gap}{word} {text[stop:]}"
+        new = _glue(_glue(text[:start], text[after:stop], gap), word, text[stop:])
         what = f"{what} and `{text[after:stop]}`"
     elif kind == "cut":
         first = index == 0 or words[index - 1][3] < line

@@ -1,0 +1,163 @@
+"""What syntax mistakes leave unknown, so that nothing is reported that only follows from them.
+
+A statement with a syntax mistake has been mended or skipped, by guess. What it defines, and what is wrong
+inside it, is known when it reads again; until then both are passed over in silence.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from scenelang.diagnostics.diagnostic import Diagnostic
+from scenelang.diagnostics.span import Span
+from scenelang.syntax import nodes
+
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_DEFINITION = re.compile(
+    r"(?:let|param|fn|module)\b(?P<name>\s+[A-Za-z_]\w*)?|import\b(?P<alias>.*\bas\s+\w+)?"
+)
+_NAMES = frozenset(("E0201", "E0202", "E0203", "E0204", "E0206", "E0207", "E0208", "E0212", "E0213"))
+_PLACES = frozenset(("E0330", "E0331", "E0332", "E0333", "E0334", "E0335"))
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """The damage of one file.
+
+    Args:
+        parts: what cannot be trusted: simple statements, and the heads of those with a block.
+        blocks: blocks whose head is damaged; names that it defines may be used in them.
+        words: words in damaged parts: a definition may have been among them.
+        nameless: some damaged definition does not say what it defines.
+        unmatched: braces did not match, so nobody knows what stands where.
+    """
+
+    parts: tuple[Span, ...] = ()
+    blocks: tuple[Span, ...] = ()
+    words: frozenset[str] = frozenset()
+    nameless: bool = False
+    unmatched: bool = False
+
+    def __bool__(self) -> bool:
+        return bool(self.parts)
+
+    def loses(self, name: str) -> bool:
+        """Whether the definition of a name, plain or dotted, may be among what is damaged."""
+        return self.nameless or name in self.words or name.partition(".")[0] in self.words
+
+    def holds(self, span: Span) -> bool:
+        """Whether a place lies in a damaged part."""
+        return any(part.start <= span.start and span.end <= part.end for part in self.parts)
+
+    def explains(self, code: str, span: Span) -> bool:
+        """Whether a diagnostic may follow from a syntax mistake."""
+        if self.holds(span):
+            return True
+        if code in _NAMES and any(block.start <= span.start < block.end for block in self.blocks):
+            return True
+        return self.unmatched and code in _NAMES | _PLACES
+
+
+NONE = Damage()
+
+
+def find_damage(file: nodes.File, found: Iterable[Diagnostic]) -> Damage:
+    """The damage that a file's syntax mistakes have done.
+
+    Args:
+        file: its tree.
+        found: diagnostics; those of syntax in this file count.
+    """
+    source = file.span.source
+    marks = [
+        (d.code, d.span)
+        for d in found
+        if d.code.startswith("E01") and d.span is not None and d.span.source is source
+    ]
+    if not marks:
+        return NONE
+    parts = [stmt.span for stmt in _bad(file.statements)]
+    blocks: list[Span] = []
+    for _, span in marks:
+        parts.append(_lines(span))
+        for part, block in _touched(file.statements, span):
+            parts.append(part)
+            blocks += [block] if block else []
+    texts = [part.text for part in parts]
+    nameless = any(not (m["name"] or m["alias"]) for text in texts for m in _DEFINITION.finditer(text))
+    return Damage(
+        tuple(dict.fromkeys(parts)),
+        tuple(dict.fromkeys(blocks)),
+        frozenset(word for text in texts for word in _WORD.findall(text)),
+        nameless,
+        any(_is_about_braces(code, span) for code, span in marks),
+    )
+
+
+def _is_about_braces(code: str, span: Span) -> bool:
+    return code in ("E0104", "E0106", "E0129") or "{" in span.text or "}" in span.text
+
+
+def _lines(span: Span) -> Span:
+    """The whole lines of a place: what else they hold may have been read wrongly too."""
+    text = span.source.text
+    end = text.find("\n", span.end)
+    return Span(span.source, text.rfind("\n", 0, span.start) + 1, end if end >= 0 else len(text))
+
+
+def _holds_mark(block: nodes.Block, mark: Span) -> bool:
+    """Whether a mistake is inside a block; one that recovery closed ends where its last statement does."""
+    span = block.span
+    closed = span.text.endswith("}")
+    return span.start < mark.start and (mark.end < span.end or (not closed and mark.end <= span.end))
+
+
+def _inside(stmt: nodes.Stmt) -> Iterator[nodes.Block]:
+    """The blocks of statements that a statement has."""
+    match stmt:
+        case nodes.For() | nodes.Module() | nodes.Node():
+            yield stmt.body
+        case nodes.Call() | nodes.MaterialUse():
+            if stmt.body:
+                yield stmt.body
+        case nodes.Combined():
+            yield from _inside(stmt.child)
+        case nodes.If():
+            at: nodes.If | nodes.Block | None = stmt
+            while isinstance(at, nodes.If):
+                yield at.then
+                at = at.otherwise
+            if at is not None:
+                yield at
+        case _:
+            pass
+
+
+def _bad(statements: tuple[nodes.Stmt, ...]) -> Iterator[nodes.BadStmt]:
+    """Unreadable statements, in all blocks."""
+    stack: list[nodes.Stmt] = list(statements)
+    while stack:
+        stmt = stack.pop()
+        if isinstance(stmt, nodes.BadStmt):
+            yield stmt
+        for block in _inside(stmt):
+            stack.extend(block.statements)
+
+
+def _touched(statements: tuple[nodes.Stmt, ...], mark: Span) -> Iterator[tuple[Span, Span | None]]:
+    """The innermost statements at a mistake: what is damaged of each, and the block that follows."""
+    stack: list[nodes.Stmt] = list(statements)
+    while stack:
+        stmt = stack.pop()
+        if stmt.span.start > mark.end or stmt.span.end < mark.start:
+            continue
+        blocks = list(_inside(stmt))
+        within = next((block for block in blocks if _holds_mark(block, mark)), None)
+        if within is not None:
+            stack.extend(within.statements)
+        elif blocks:
+            yield Span(stmt.span.source, stmt.span.start, blocks[0].span.start), blocks[0].span
+        else:
+            yield stmt.span, None
