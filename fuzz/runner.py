@@ -170,11 +170,14 @@ def _children_s() -> float:
 
 
 def _revision() -> str:
-    """The commit that was fuzzed, if this is a checkout."""
+    """The commit that was fuzzed, with a plus where files differ from it; unknown outside a checkout."""
     try:
-        asked = subprocess.run(
-            ["git", "rev-parse", "--short=12", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
-        )
+        commit = _git("rev-parse", "--short=12", "HEAD")
+        return commit + ("+" if _git("status", "--porcelain", "scenelang", "fuzz") else "")
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
-    return asked.stdout.strip()
+
+
+def _git(*arguments: str) -> str:
+    done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=True)
+    return done.stdout.strip()

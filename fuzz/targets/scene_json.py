@@ -82,27 +82,30 @@ def _known(scene: Scene) -> bool:
     words = _words(scene)
     for name in available():
         manifest = load_manifest(name)
-        offered = {*manifest.geometries, *manifest.materials, *manifest.transforms, *manifest.material_ops}
+        offered = {("geometry", word) for word in manifest.geometries}
+        offered |= {("material", word) for word in manifest.materials}
+        offered |= {("transform", word) for word in manifest.transforms}
+        offered |= {("operation", word) for word in manifest.material_ops}
         if words <= offered and scene.model in (None, name):
             return True
     return False
 
 
-def _words(scene: Scene) -> set[str]:
+def _words(scene: Scene) -> set[tuple[str, str]]:
     """Geometries, materials, transforms and operations that a Scene names."""
-    found: set[str] = set()
+    found: set[tuple[str, str]] = set()
     todo: list[Any] = list(scene.nodes)
     while todo:
         node = todo.pop()
         if node.kind == "object":
-            found.add(node.geometry)
+            found.add(("geometry", node.geometry))
         elif node.kind == "chain":
             todo += [link.node for link in node.children]
         else:
             todo += node.children
-        found |= {transform.kind for transform in node.transforms}
+        found |= {("transform", transform.kind) for transform in node.transforms}
         if node.material is not None:
-            found |= {node.material.name, *(op.kind for op in node.material.ops)}
+            found |= {("material", node.material.name), *(("operation", op.kind) for op in node.material.ops)}
     return found
 
 
