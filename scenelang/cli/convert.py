@@ -70,4 +70,8 @@ def _written(scene: Scene, kind: Kind) -> str:
         from scenelang.scene.data import to_readable_json
 
         return to_readable_json(scene)
-    return scene.to_nsg() if kind == "nsg" else scene.to_python()
+    if kind == "python":
+        return scene.to_python()
+    from scenelang.formatting.format import format_text
+
+    return format_text(scene.to_nsg())

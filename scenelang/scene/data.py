@@ -11,6 +11,7 @@ from difflib import get_close_matches
 from typing import Any, Final
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticSerializationError
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
@@ -50,12 +51,14 @@ def _plain(value: Any, *, brief: bool = False) -> Any:
         return {
             name: _plain(item, brief=brief)
             for name, item in value.__dict__.items()
-            if not brief
-            or name in ("kind", "version")
-            or fields[name].is_required()
-            or item != fields[name].default
+            if not brief or name in ("kind", "version") or not _is_default(item, fields[name])
         }
     return [_plain(item, brief=brief) for item in value] if isinstance(value, tuple) else value
+
+
+def _is_default(item: Any, field: FieldInfo) -> bool:
+    """Whether a value is the default, bit for bit: -0.0 is not 0.0."""
+    return not field.is_required() and item == field.default and repr(item) == repr(field.default)
 
 
 def _laid_out(value: Any, margin: str) -> str:

@@ -31,10 +31,11 @@ Share = Annotated[Finite, Field(ge=0, le=1)]
 Opaque = Annotated[
     tuple[Share, Share, Share], Field(description="red, green, blue as written (sRGB-encoded), in 0 to 1")
 ]
-RESERVED = (
-    "nsg model param let fn module import for in if else group chain union smooth subtract intersect material "
-    "true false"
-).split()
+_WORDS = (
+    "nsg model param let fn module import for in if else group chain "
+    "union smooth subtract intersect material true false"
+)
+RESERVED = tuple(_WORDS.split())
 """The keywords of the language, which name nothing else."""
 
 
@@ -54,10 +55,13 @@ Combine = Literal["union", "smooth", "subtract", "intersect"]
 
 
 def _whole(value: Any) -> Any:
-    """256.0 is an integer, as in JSON Schema."""
+    """256.0 is an integer and true is none, as in JSON Schema."""
+    if isinstance(value, bool):
+        raise ValueError("true and false are no numbers")
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
+Version = Annotated[Literal[1], Field(description="of the language"), BeforeValidator(_whole)]
 Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), BeforeValidator(_whole)]
 
 

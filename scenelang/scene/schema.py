@@ -25,6 +25,7 @@ from scenelang.scene.fields import (
     Rate,
     Rgb,
     Row,
+    Version,
     Word,
     first_joins_by_union,
 )
@@ -330,7 +331,7 @@ class Animation(_Node):
 class Scene(_Node):
     """A whole scene: settings and top-level nodes, which form a union in file order."""
 
-    version: Annotated[Literal[1], Field(description="of the language")] = 1
+    version: Version = 1
     model: Annotated[
         str | None,
         Field(

@@ -18,7 +18,7 @@ from scenelang.scene.schema import (
 )
 
 _INDENT: Final = "  "
-_AXES: Final = {(1.0, 0.0, 0.0): "X", (0.0, 1.0, 0.0): "Y", (0.0, 0.0, 1.0): "Z"}
+_AXES: Final = {"[1, 0, 0]": "X", "[0, 1, 0]": "Y"}
 
 
 def to_nsg(scene: Scene) -> str:
@@ -80,7 +80,7 @@ def number(value: float) -> str:
 
 def angle(rad: float) -> str:
     """An angle in degrees where few digits say it exactly, else in radians."""
-    if rad == 0.0:
+    if number(rad) == "0":
         return "0"
     exact = degrees(rad)
     return f"{number(rad)}rad" if exact is None else f"{number(exact)}deg"
@@ -99,7 +99,7 @@ def rgb(color: Rgb) -> str:
 
 def hex_colour(color: Rgb) -> str | None:
     """``#rrggbb`` where it is exactly the colour."""
-    levels = [round(c * 255) if 0.0 <= c <= 1.0 else -1 for c in color]
+    levels = [round(c * 255) if 0.0 <= c <= 1.0 and number(c) != "-0.0" else -1 for c in color]
     if all(level >= 0 and level / 255 == c for level, c in zip(levels, color, strict=True)):
         return "#" + "".join(f"{level:02x}" for level in levels)
     return None
@@ -107,6 +107,11 @@ def hex_colour(color: Rgb) -> str | None:
 
 def _vector(values: tuple[float, ...]) -> str:
     return f"[{', '.join(map(number, values))}]"
+
+
+def _axis(axis: tuple[float, float, float]) -> str:
+    text = _vector(axis)
+    return _AXES.get(text, text)
 
 
 def material(value: Material) -> str:
@@ -134,9 +139,11 @@ def transform(t: Transform) -> str:
     """A transform statement."""
     match t.kind:
         case "translate":
-            return f"translate({number(t.x)}, {number(t.y)}{f', {number(t.z)}' if t.z else ''});"
+            return (
+                f"translate({number(t.x)}, {number(t.y)}{f', {number(t.z)}' if number(t.z) != '0' else ''});"
+            )
         case "rotate":
-            axis = "" if t.axis == (0.0, 0.0, 1.0) else f", axis = {_AXES.get(t.axis) or _vector(t.axis)}"
+            axis = "" if _vector(t.axis) == "[0, 0, 1]" else f", axis = {_axis(t.axis)}"
             return f"rotate({angle(t.angle)}{axis});"
         case "scale":
             if t.x == t.y == t.z:

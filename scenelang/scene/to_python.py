@@ -111,7 +111,7 @@ def _step(step: Transform | MaterialOp) -> _Code:
             return _Call("nsg.Translate", (f"x={number(step.x)}", f"y={number(step.y)}", *z))
         case "rotate":
             head, turn = _angle(step.angle)
-            axis = () if step.axis == (0.0, 0.0, 1.0) else (_numbers("axis=", step.axis),)
+            axis = () if repr(step.axis) == "(0.0, 0.0, 1.0)" else (_numbers("axis=", step.axis),)
             return _Call(f"nsg.Rotate{head}", (turn, *axis))
         case "scale":
             if step.x == step.y == step.z:

@@ -1,0 +1,106 @@
+"""Scenes as Python code: it makes an equal Scene, and looks as Ruff would have it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+import scenelang as nsg
+from scenelang.program.store import program_bytes
+from scenelang.scene.data import to_readable_json
+from scenelang.scene.session import deep_stack
+from tests.strategies import scenes
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))
+
+
+def run(code: str) -> nsg.Scene:
+    names: dict[str, Any] = {}
+    exec(code, names)
+    made = names["scene"]
+    assert isinstance(made, nsg.Scene)
+    return made
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(scenes)
+def test_code_makes_an_equal_scene(scene: nsg.Scene) -> None:
+    code = scene.to_python()
+    made = run(code)
+    assert made == scene
+    assert made.to_json() == scene.to_json()  # bit for bit: -0.0 equals 0.0
+    assert made.to_python() == code
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(scenes)
+def test_readable_json_reads_back(scene: nsg.Scene) -> None:
+    again = nsg.Scene.from_json(to_readable_json(scene))
+    assert again == scene
+    assert again.to_json() == scene.to_json()
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(scenes)
+def test_repr_is_code(scene: nsg.Scene) -> None:
+    assert eval(repr(scene), dict(vars(nsg)) | {name: getattr(nsg, name) for name in nsg.__all__}) == scene
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_every_way_gives_the_same_program(path: Path) -> None:
+    scene = nsg.load(path)
+    program = program_bytes(nsg.compile(scene))
+    ways = (
+        run(scene.to_python()),
+        nsg.Scene.from_json(scene.to_json()),
+        nsg.Scene.from_json(to_readable_json(scene)),
+        nsg.loads(scene.to_nsg()),
+    )
+    for way in ways:
+        assert way == scene
+        assert program_bytes(nsg.compile(way)) == program
+
+
+def test_code_is_laid_out_as_ruff_does(tmp_path: Path) -> None:
+    for path in EXAMPLES:
+        (tmp_path / f"{path.stem}.py").write_text(nsg.load(path).to_python(), "utf-8")
+    command = [sys.executable, "-m", "ruff", "format", "--check", "--isolated", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_deep_scenes_become_parts() -> None:
+    node: Any = nsg.Object("star")
+    for _ in range(399):
+        node = nsg.Chain.model_construct(
+            kind="chain",
+            children=(nsg.Link.model_construct(op="union", node=node),),
+            transforms=(),
+            material=None,
+        )
+    scene = nsg.Scene.model_construct(nodes=(node,))
+    code = scene.to_python()
+    assert "part_1 = nsg.Chain(" in code
+    with deep_stack():
+        assert run(code).nodes == scene.nodes
+        assert "…" in repr(scene) or repr(scene)
+
+
+def test_repr_shows_what_was_said() -> None:
+    star = nsg.Object("star", transforms=[nsg.Scale.uniform(0.5)], material=nsg.Material("flat"))
+    said = "Object(geometry='star', transforms=(Scale(x=0.5, y=0.5, z=0.5),), material=Material(name='flat'))"
+    assert repr(star) == said
+    assert repr(nsg.Scene()) == "Scene()"
+    assert repr(nsg.Flip()) == "Flip()"
+
+
+def test_colours_by_their_digits() -> None:
+    assert nsg.Color.hex("#d33") == nsg.Color.hex("#DD3333") == nsg.Color(rgb=(0xDD / 255, 0.2, 0.2))
+    for wrong in ("d33", "#d3", "#dd33333", "#xyz", ""):
+        with pytest.raises(ValueError, match="is no colour"):
+            nsg.Color.hex(wrong)
