@@ -1,4 +1,4 @@
-"""``scenelang check``: what is wrong with scenes; imports neither numpy nor torch."""
+"""``scenelang check``: what is wrong with scenes, and fixes; imports neither numpy nor torch."""
 
 from __future__ import annotations
 
@@ -10,17 +10,40 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-    from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+    from collections.abc import Sequence
+
+    from scenelang.cli.checking import Scenes
+    from scenelang.diagnostics.diagnostic import Diagnostic
+    from scenelang.diagnostics.fixes import Settled
     from scenelang.scene.params import Defines
 
 Format = Literal["human", "json", "sarif", "github", "concise"]
 
 
+def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
+    """Codes of warnings, or beginnings of them, from ``W0501`` and ``W02,W05``."""
+    from scenelang.diagnostics.codes import CODES
+
+    found = [code.strip().upper() for value in values for code in value.split(",") if code.strip()]
+    for code in found:
+        if not any(known.startswith(code) for known in CODES):
+            raise click.BadParameter(f"no code begins with '{code}'", ctx, param)
+        if not code.startswith("W"):
+            raise click.BadParameter(f"'{code}' is an error, and errors always count", ctx, param)
+    return tuple(found)
+
+
 @click.command("check")
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
+@click.option("--fix", "fixes", is_flag=True, help="Apply the safe fixes; report what is left.")
+@click.option("--diff", is_flag=True, help="Show what --fix would change, and change nothing.")
 @options.define
 @options.model
 @options.strict
+@click.option(
+    "--select", multiple=True, metavar="CODES", callback=_codes, help="Of warnings report only these."
+)
+@click.option("--ignore", multiple=True, metavar="CODES", callback=_codes, help="Leave these warnings out.")
 @click.option(
     "--format",
     "kind",
@@ -29,75 +52,185 @@ Format = Literal["human", "json", "sarif", "github", "concise"]
     show_default=True,
     help="How diagnostics are written.",
 )
+@click.option(
+    "--max-diagnostics", "most", type=click.IntRange(0), metavar="N", help="Write so many; count them all."
+)
+@click.option("-q", "--quiet", is_flag=True, help="Write diagnostics and no summary.")
+@options.color
 @options.frame
 @options.root
 @click.pass_context
 def command(
     ctx: click.Context,
     files: tuple[str, ...],
+    fixes: bool,
+    diff: bool,
     defines: Defines,
     model: str | None,
     strict: bool,
+    select: tuple[str, ...],
+    ignore: tuple[str, ...],
     kind: Format,
+    most: int | None,
+    quiet: bool,
+    color: options.Color,
     frame: int,
     root: str | None,
 ) -> None:
     """Report what is wrong with scenes, without drawing them.
 
-    FILE is a scene, or - for standard input. Exits with 0 where there are no errors, 1 where there are,
-    2 where a file cannot be read.
+    FILE is a scene, or - for standard input; with --fix its text then goes to standard output and
+    everything else to standard error. CODES are codes of warnings or beginnings of them: W0501,W02.
+
+    Exits with 0 where there are no errors, 1 where there are (or a difference, with --diff), 2 where a file
+    cannot be read or written.
     """
-    from scenelang.cli.clock import Clock
-    from scenelang.cli.inputs import Request, merged, read_input, unused_defines
+    from scenelang.cli.checking import Scenes, Selection
+    from scenelang.cli.inputs import STDIN, Request
     from scenelang.cli.main import describe
     from scenelang.cli.say import say_trouble
-    from scenelang.passes import check_scene
-    from scenelang.program.compile import find_model
 
-    request = Request(defines, model, root, frame)
-    parts: list[list[Diagnostic]] = []
+    scenes = Scenes(Request(defines, model, root, frame), Selection(select, ignore))
     unreadable = False
-    for name in files:
+    for name in dict.fromkeys(files):
         try:
-            found = read_input(name, request, Clock())
+            scenes.read(name)
         except OSError as error:
             say_trouble(describe(error))
             unreadable = True
-            continue
-        if found.scene is not None:
-            manifest = find_model(found.scene, found.diagnostics, model=model, spans=found.spans)
-            if manifest is not None:
-                check_scene(found.scene, found.spans, found.diagnostics, manifest)
-        parts.append(found.diagnostics.items)
-    read = len(parts)
-    if read:
-        parts.append(unused_defines(request))
-    everything = merged(parts)
-    _write(everything, kind, read)
-    wrong = everything.items if strict else everything.errors
-    ctx.exit(2 if unreadable else int(bool(wrong)))
+    out = _Output(kind, most, quiet, color, (fixes or diff) and STDIN in scenes.sources, scenes)
+    if not fixes and not diff:
+        left: Sequence[Diagnostic] = scenes.check().items if scenes.sources or scenes.unread.items else ()
+        out.write(left)
+    else:
+        settled = scenes.fix()
+        changed = {n: text for n, text in settled.texts.items() if text != scenes.sources[n].text}
+        left = [d for _, d in settled.left]
+        if diff:
+            _show(scenes, changed, out)
+            ctx.exit(2 if unreadable else int(bool(changed or _wrong(left, strict))))
+        unreadable |= not _store(changed, settled, scenes)
+        out.fixed(settled)
+        out.write(left)
+    ctx.exit(2 if unreadable else int(_wrong(left, strict)))
 
 
-def _write(found: Diagnostics, kind: Format, scenes: int) -> None:
-    """Print the diagnostics of some scenes to standard output."""
+def _wrong(left: Sequence[Diagnostic], strict: bool) -> bool:
+    return any(strict or d.severity == "error" for d in left)
+
+
+def _show(scenes: Scenes, changed: dict[str, str], out: _Output) -> None:
+    """Print what fixes would change."""
+    from scenelang.cli.checking import difference
     from scenelang.cli.say import wants_color
-    from scenelang.diagnostics.render_text import plural, render_text
+    from scenelang.diagnostics import cells
 
-    if kind != "human":
-        click.echo(_for_machines(found, kind), nl=False)
-    elif found.items:
-        click.echo(render_text(found, wants_color(sys.stdout)), nl=False, color=True)
-    elif scenes:
-        click.echo(f"no mistakes in {plural(scenes, 'scene')}")
+    paint = wants_color(sys.stdout, out.color)
+    styles = {"-": "removed", "+": "added", "@": "frame"}
+    for name, text in changed.items():
+        shown = difference(scenes.sources[name].name, scenes.sources[name].text, text)
+        for line in shown.removesuffix("\n").split("\n"):
+            style = "bold" if line.startswith(("--- ", "+++ ")) else styles.get(line[:1], "")
+            safe = cells.printable(line) if paint or sys.stdout.isatty() else line
+            click.echo(cells.paint(style, safe, paint), color=True)
 
 
-def _for_machines(found: Diagnostics, kind: Format) -> str:
+def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> bool:
+    """Write what changed, and standard input to standard output; False where a file cannot be written."""
+    from pathlib import Path
+
+    from scenelang.cli.checking import in_bytes
+    from scenelang.cli.inputs import STDIN
+    from scenelang.cli.main import describe
+    from scenelang.cli.say import say_trouble
+    from scenelang.files import write_whole
+
+    good = True
+    for name, text in changed.items():
+        if name == STDIN:
+            continue
+        try:
+            write_whole(Path(name), in_bytes(text, Path(name)))
+        except OSError as error:
+            say_trouble(describe(error))
+            good = False
+    if STDIN in scenes.sources:
+        sys.stdout.buffer.write(settled.texts[STDIN].encode("utf-8"))
+    return good
+
+
+class _Output:
+    """Writes diagnostics and a summary.
+
+    Args:
+        kind: how.
+        most: so many at most; None for all.
+        quiet: without a summary.
+        color: whether in colours.
+        to_stderr: to standard error, because a scene goes to standard output.
+        scenes: where the diagnostics come from.
+    """
+
+    def __init__(
+        self,
+        kind: Format,
+        most: int | None,
+        quiet: bool,
+        color: options.Color,
+        to_stderr: bool,
+        scenes: Scenes,
+    ) -> None:
+        self.kind, self.most, self.quiet, self.color = kind, most, quiet, color
+        self.to_stderr, self.scenes = to_stderr, scenes
+
+    def write(self, found: Sequence[Diagnostic]) -> None:
+        """Print diagnostics, or that there are none."""
+        from scenelang.cli.say import wants_color, width_of
+        from scenelang.diagnostics.render_text import plural, render_text
+
+        stream = sys.stderr if self.to_stderr else sys.stdout
+        if self.kind != "human":
+            text = _for_machines(found, self.kind, self.most)
+        elif found:
+            text = render_text(
+                found,
+                wants_color(stream, self.color),
+                width=width_of(stream),
+                most=self.most,
+                summary=not self.quiet,
+                fixer="--fix",
+                fixable=sum(d.fix is not None and self.scenes.owner(d) is not None for d in found),
+            )
+        else:
+            count = len(self.scenes.sources) + len(self.scenes.unread)
+            text = f"no mistakes in {plural(count, 'scene')}\n" if count and not self.quiet else ""
+        click.echo(text, nl=False, err=self.to_stderr, color=True)
+
+    def fixed(self, settled: Settled[str]) -> None:
+        """Say what was fixed, file by file."""
+        from scenelang.diagnostics.cells import printable
+        from scenelang.diagnostics.render_text import plural
+
+        if self.quiet:
+            return
+        for name, applied in settled.applied.items():
+            if applied:
+                codes = ", ".join(sorted({d.code for d in applied}))
+                shown = printable(self.scenes.sources[name].name)
+                click.echo(f"{shown}: fixed {plural(len(applied), 'mistake')} ({codes})", err=True)
+        if not settled.stable:
+            click.echo("Some fixes undo each other and were left out.", err=True)
+
+
+def _for_machines(found: Sequence[Diagnostic], kind: Format, most: int | None) -> str:
     from importlib.metadata import version
 
     from scenelang.diagnostics import render_machine
+    from scenelang.diagnostics.render_text import in_order
 
+    shown = in_order(found)[:most]
     if kind == "sarif":
-        return render_machine.render_sarif(found, version("scenelang"))
+        return render_machine.render_sarif(shown, version("scenelang"))
     if kind == "json":
-        return render_machine.render_json(found)
-    return render_machine.render_github(found) if kind == "github" else render_machine.render_concise(found)
+        return render_machine.render_json(shown)
+    return render_machine.render_github(shown) if kind == "github" else render_machine.render_concise(shown)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 import sys
-import textwrap
 from typing import TYPE_CHECKING
 
 import click
@@ -103,38 +102,11 @@ def _print_page(page: Page, kind: str, paint: bool) -> None:
         click.echo(json.dumps(data, indent=2, ensure_ascii=False))
         return
     width = min(shutil.get_terminal_size((_WIDEST, 24)).columns, _WIDEST)
-    click.echo(in_terminal(page, max(width, 40), paint), nl=False, color=True)
+    text = page.plain(max(width, 40), lambda text, style: _styled(text, style, paint))
+    click.echo(text, nl=False, color=True)
 
 
 def _styled(text: str, style: str, paint: bool) -> str:
     from scenelang.diagnostics import cells
 
     return cells.paint(style, text, paint)
-
-
-def in_terminal(page: Page, width: int, paint: bool) -> str:
-    """A page without its Markdown: headings alone, code indented, paragraphs wrapped.
-
-    Args:
-        page: what to print.
-        width: cells of a line.
-        paint: with ANSI colours.
-    """
-    head = f"{page.severity}[{page.code}]"
-    blocks = [_styled(head, page.severity, paint) + _styled(f": {page.title}", "bold", paint)]
-    text = re.sub(r"^<!--.*-->\n", "", page.text.partition("\n")[2], flags=re.MULTILINE)
-    for part in re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL):
-        if part.startswith("```"):
-            info, _, code = part.removesuffix("```").partition("\n")
-            title = re.search(r'title="([^"]+)"', info)
-            named = f"    {_styled(title[1] + ':', 'frame', paint)}\n" if title else ""
-            blocks.append(named + textwrap.indent(code.rstrip("\n"), "    "))
-            continue
-        for paragraph in part.strip().split("\n\n"):
-            if paragraph.startswith("## "):
-                blocks.append(_styled(paragraph[3:], "bold", paint))
-            elif paragraph:
-                plain = re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", paragraph)
-                filled = textwrap.fill(plain, width, break_long_words=False, break_on_hyphens=False)
-                blocks.append(re.sub(r"`[^`\n]+`", lambda code: _styled(code[0], "frame", paint), filled))
-    return "\n\n".join(blocks) + "\n"

@@ -6,6 +6,7 @@ Lines and columns count from 1, in code points; ends are exclusive.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable
 from typing import Any
 
@@ -73,7 +74,7 @@ def render_github(diagnostics: Iterable[Diagnostic]) -> str:
         fields = {"title": d.code}
         if d.span is not None:
             (line, column), (end_line, end_column) = d.span.locate()
-            fields = {"file": d.span.source.name, "line": str(line), "col": str(column)}
+            fields = {"file": _relative(d.span.source.name), "line": str(line), "col": str(column)}
             if end_line != line:
                 fields["endLine"] = str(end_line)
             elif end_column > column:
@@ -92,29 +93,46 @@ def _escaped(text: str, further: str = "") -> str:
 
 
 def render_sarif(diagnostics: Iterable[Diagnostic], version: str | None = None) -> str:
-    """A SARIF 2.1.0 log with one run.
+    """A SARIF 2.1.0 log with one run, its rules with the pages that explain them.
 
     Args:
         diagnostics: in any order.
         version: the version of scenelang, where it should be stated.
     """
-    from scenelang.diagnostics.codes import CODES
-
     found = in_order(diagnostics)
     used = sorted({d.code for d in found})
-    driver: dict[str, Any] = {
-        "name": "scenelang",
-        "rules": [{"id": code, "shortDescription": {"text": CODES.get(code, code)}} for code in used],
-    }
+    driver: dict[str, Any] = {"name": "scenelang", "rules": [_rule(code) for code in used]}
     if version is not None:
         driver["version"] = version
+    errors = sum(d.severity == "error" for d in found)
     run = {
         "tool": {"driver": driver},
         "columnKind": "unicodeCodePoints",
         "results": [_result(d, used.index(d.code)) for d in found],
+        "properties": {
+            "errors": errors,
+            "warnings": len(found) - errors,
+            "fixable": sum(d.fix is not None for d in found),
+        },
     }
     log = {"$schema": _SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
     return json.dumps(log, indent=2, ensure_ascii=False) + "\n"
+
+
+def _rule(code: str) -> dict[str, Any]:
+    """What viewers show of a code: its title, what it means, its page."""
+    from scenelang.diagnostics.pages import read_page, severity_of
+
+    rule: dict[str, Any] = {"id": code, "defaultConfiguration": {"level": severity_of(code)}}
+    try:
+        page = read_page(code)
+    except KeyError:  # a diagnostic of somebody else's making
+        return rule | {"shortDescription": {"text": code}}
+    rule["shortDescription"] = {"text": page.title}
+    rule["fullDescription"] = {"text": " ".join(page.meaning.split())}
+    rule["help"] = {"text": page.plain(), "markdown": page.text}
+    rule["properties"] = {"tags": [page.area]}
+    return rule
 
 
 def _result(diagnostic: Diagnostic, rule: int) -> dict[str, Any]:
@@ -147,11 +165,19 @@ def _region(span: Span) -> dict[str, int]:
     return {"startLine": line, "startColumn": column, "endLine": end_line, "endColumn": end_column}
 
 
+def _relative(name: str) -> str:
+    """A file name as seen from the working folder, with `/`; absolute where it lies outside."""
+    if os.path.isabs(name):
+        here = os.path.join(os.getcwd(), "")
+        name = name[len(here) :] if name.startswith(here) else name
+    return name.replace("\\", "/")
+
+
 def _uri(name: str) -> str:
     """A file name as a relative or absolute URI reference."""
     from urllib.parse import quote
 
-    path = quote(name.replace("\\", "/"), safe="/~")
+    path = quote(_relative(name), safe="/~")
     return f"file://{path}" if path.startswith("/") else path
 
 

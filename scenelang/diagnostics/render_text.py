@@ -38,6 +38,7 @@ def render_text(
     most: int | None = None,
     summary: bool = True,
     fixer: str = "scenelang check --fix",
+    fixable: int | None = None,
 ) -> str:
     """Snippets with marks, and a line that counts the diagnostics.
 
@@ -48,6 +49,7 @@ def render_text(
         most: show so many at most; the rest is only counted.
         summary: whether to count.
         fixer: the command that applies fixes, for the summary.
+        fixable: how many it would apply; by default all that there are.
 
     Returns:
         Text that ends in a newline; empty where there is nothing to say.
@@ -60,7 +62,9 @@ def render_text(
         left = len(found) - most
         blocks.append(paint("bold", f"… and {left:,} more", color))
     if summary:
-        blocks.append(_count(found, fixer, color))
+        if fixable is None:
+            fixable = sum(d.fix is not None for d in found)
+        blocks.append(_count(found, fixer, fixable, color))
     return "\n\n".join(blocks) + "\n"
 
 
@@ -69,12 +73,11 @@ def plural(count: int, noun: str) -> str:
     return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
 
 
-def _count(found: Sequence[Diagnostic], fixer: str, color: bool) -> str:
+def _count(found: Sequence[Diagnostic], fixer: str, fixable: int, color: bool) -> str:
     errors = sum(d.severity == "error" for d in found)
     warnings = len(found) - errors
     parts = [plural(n, noun) for n, noun in ((errors, "error"), (warnings, "warning")) if n]
     text = paint("error" if errors else "warning", ", ".join(parts), color)
-    fixable = sum(d.fix is not None for d in found)
     return f"{text}; {fixable:,} fixable with `{fixer}`" if fixable else text
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
+import subprocess
+import sys
 
 import pytest
 
+from scenelang.cli.say import wants_color, width_of
 from tests.cli.conftest import Folder
 
 WARNS = "square { material flat { color([2, 0, 0]); } }"
@@ -138,3 +142,99 @@ def test_text_that_is_no_scene(folder: Folder) -> None:
     result = folder.run("check", "a.nsg")
     assert result.exit_code == 1
     assert "not UTF-8" in result.stdout
+
+
+def test_summary_counts_what_can_be_fixed(folder: Folder) -> None:
+    """Only in files that were named: others would not be changed."""
+    folder.write("lib.nsg", "let a = sqrrt(2);\n")
+    name = folder.write(
+        "a.nsg", 'import "lib.nsg" as lib;\nsquare { rotate(45); scale(lib.a); }\nstar { scale(2) }\n'
+    )
+    assert folder.run("check", name).stdout.endswith("\n3 errors; 2 fixable with `--fix`\n")
+    assert folder.run("check", name, "lib.nsg").stdout.endswith("\n3 errors; 3 fixable with `--fix`\n")
+    assert "fixable" not in folder.run("check", name, "--quiet").stdout
+    assert folder.run("check", folder.write("b.nsg"), "-q").stdout == ""
+
+
+def test_unused_names_are_warnings(folder: Folder) -> None:
+    name = folder.write("a.nsg", "let a = 1;\nsquare {}\n")
+    result = folder.run("check", name)
+    assert result.exit_code == 0
+    assert "warning[W0201]" in result.stdout
+    # A misspelt use is one mistake, not two.
+    assert (
+        "W0201" not in folder.run("check", folder.write("b.nsg", "let aa = 1; square { scale(ab); }")).stdout
+    )
+
+
+def test_warnings_can_be_chosen(folder: Folder) -> None:
+    name = folder.write("a.nsg", "let a = 1;\n" + WARNS)
+    codes = ("W0201", "W0301")
+
+    def shown(*arguments: str) -> list[str]:
+        text = folder.run("check", name, "--format", "concise", *arguments).stdout
+        return [code for code in codes if code in text]
+
+    assert shown() == ["W0201", "W0301"]
+    assert shown("--ignore", "W02") == ["W0301"]
+    assert shown("--ignore", "w0201,W0301") == []
+    assert shown("--select", "W02", "--select", "W04") == ["W0201"]
+    assert shown("--select", "W", "--ignore", "W03") == ["W0201"]
+    assert folder.run("check", name, "--strict", "--ignore", "W").exit_code == 0
+    for arguments in (("--ignore", "E0302"), ("--select", "W99"), ("--ignore", "colour")):
+        assert folder.run("check", name, *arguments).exit_code == 2
+    errors = folder.write("b.nsg", "square { rotate(45); }")
+    assert folder.run("check", errors, "--ignore", "W").exit_code == 1
+
+
+def test_most(folder: Folder) -> None:
+    name = folder.write("a.nsg", "square { scale(a1, b1); translate(c1, d1); }")
+    result = folder.run("check", name, "--max-diagnostics", "1")
+    assert result.exit_code == 1
+    assert result.stdout.count("error[") == 1
+    assert result.stdout.endswith("… and 3 more\n\n4 errors\n")
+    data = json.loads(folder.run("check", name, "--max-diagnostics", "3", "--format", "json").stdout)
+    assert len(data["diagnostics"]) == 3
+
+
+def test_colour(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = folder.write("a.nsg", "square { rotate(45); }")
+    assert "\x1b" not in folder.run("check", name).stdout
+    assert "\x1b[1;31m" in folder.run("check", name, "--color", "always").stdout
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert "\x1b[1;31m" in folder.run("check", name, "--color", "always").stdout
+    assert "\x1b" not in folder.run("check", name, "--color", "auto").stdout
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_colours_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm-256color")
+    assert wants_color(Terminal())
+    assert not wants_color(io.StringIO())
+    assert wants_color(io.StringIO(), "always")
+    assert not wants_color(Terminal(), "never")
+    monkeypatch.setenv("TERM", "dumb")
+    assert not wants_color(Terminal())
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "yes")
+    assert not wants_color(Terminal())
+    monkeypatch.setenv("COLUMNS", "77")
+    assert width_of(Terminal()) == 77
+    assert width_of(io.StringIO()) == 140
+
+
+def test_start_without_heavy_imports(folder: Folder) -> None:
+    """A file with mistakes, fixes and warnings needs neither numpy nor torch."""
+    name = folder.write("a.nsg", "let a = 1;\nsquare { rotate(45); }\n")
+    code = (
+        "import sys\nfrom scenelang.cli.main import main\n"
+        f"try:\n    main(['check', '--diff', {name!r}])\nexcept SystemExit:\n    pass\n"
+        "print('heavy:', *sorted({'torch', 'numpy', 'lark', 'rich'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("heavy:\n")

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from scenelang.cli.explain import in_terminal
+from scenelang.diagnostics.cells import paint
 from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.pages import read_page
 from tests.cli.conftest import Folder
@@ -31,13 +31,13 @@ def test_a_code_as_it_was_printed(folder: Folder, given: str) -> None:
 @pytest.mark.parametrize("code", CODES)
 def test_every_page_reads_well_in_a_terminal(code: str) -> None:
     page = read_page(code)
-    text = in_terminal(page, 60, False)
+    text = page.plain(60)
     assert not re.search(r"```|^#|<!--|\]\(|[ \t]$", text, re.MULTILINE)
     prose = [line for line in text.splitlines()[1:] if not line.startswith("    ")]
     assert all(len(line) <= 60 for line in prose if " " in line)
     for example in page.examples:
         assert example.text.splitlines()[0] in text
-    colored = in_terminal(page, 60, True)
+    colored = page.plain(60, lambda text, style: paint(style, text, True))
     assert re.sub(r"\x1b\[[\d;]*m", "", colored) == text
 
 

@@ -18,6 +18,8 @@ from scenelang.scene.data import from_json
 from scenelang.scene.evaluate import load_source
 from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
+from scenelang.scene.unused import find_unused
+from scenelang.syntax import parse
 
 PAGES = Path(scenelang.__file__).parent / "diagnostics/pages"
 ROOT = Path(__file__).parents[2]
@@ -83,6 +85,8 @@ def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
             source, diagnostics=found, defines=defines, path=path, models=MODELS, frame=frame
         )
         defines.report_unused(found)
+        if not found.errors:
+            find_unused(parse(source, Diagnostics()), found)
     if scene is not None and (manifest := manifest_for(scene, found)):
         check_scene(scene, spans, found, manifest)
     return list(found)

@@ -19,6 +19,8 @@ from __future__ import annotations
 
 import re
 import shlex
+import textwrap
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -85,6 +87,36 @@ class Page:
     @property
     def area(self) -> str:
         return AREAS[self.code[1:3]]
+
+    @property
+    def meaning(self) -> str:
+        """What the code means: all between the title and the first section."""
+        return self.text.partition("\n")[2].partition("\n## ")[0].strip()
+
+    def plain(self, width: int = 96, paint: Callable[[str, str], str] = lambda text, style: text) -> str:
+        """The page without its Markdown: headings alone, code indented, paragraphs wrapped.
+
+        Args:
+            width: cells of a line.
+            paint: colours a text in one of the styles of `diagnostics.cells`.
+        """
+        blocks = [paint(f"{self.severity}[{self.code}]", self.severity) + paint(f": {self.title}", "bold")]
+        text = re.sub(r"^<!--.*-->\n", "", self.text.partition("\n")[2], flags=re.MULTILINE)
+        for part in re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL):
+            if part.startswith("```"):
+                info, _, code = part.removesuffix("```").partition("\n")
+                title = re.search(r'title="([^"]+)"', info)
+                named = "    " + paint(f"{title[1]}:", "frame") + "\n" if title else ""
+                blocks.append(named + textwrap.indent(code.rstrip("\n"), "    "))
+                continue
+            for paragraph in part.strip().split("\n\n"):
+                if paragraph.startswith("## "):
+                    blocks.append(paint(paragraph[3:], "bold"))
+                elif paragraph:
+                    prose = re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", paragraph)
+                    filled = textwrap.fill(prose, width, break_long_words=False, break_on_hyphens=False)
+                    blocks.append(re.sub(r"`[^`\n]+`", lambda code: paint(code[0], "frame"), filled))
+        return "\n\n".join(blocks) + "\n"
 
 
 def severity_of(code: str) -> str:

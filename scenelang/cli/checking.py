@@ -1,0 +1,148 @@
+"""What `scenelang check` finds in scenes, and their texts after all fixes."""
+
+from __future__ import annotations
+
+import codecs
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from scenelang.cli.clock import Clock
+from scenelang.cli.inputs import STDIN, Request, merged, read_input, read_text, unused_defines
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.fixes import Settled, settle
+from scenelang.diagnostics.span import SourceFile
+from scenelang.passes import check_scene
+from scenelang.program.compile import find_model
+from scenelang.scene.params import Defines
+from scenelang.scene.unused import find_unused
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Which warnings count; errors always do.
+
+    Args:
+        select: codes, or beginnings of codes, of the warnings that are wanted; empty for all.
+        ignore: of the warnings that are not.
+    """
+
+    select: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
+
+    def keeps(self, diagnostic: Diagnostic) -> bool:
+        code = diagnostic.code
+        if diagnostic.severity == "error":
+            return True
+        return code.startswith(self.select or ("W",)) and not (self.ignore and code.startswith(self.ignore))
+
+
+@dataclass(slots=True)
+class Scenes:
+    """The scenes of a command line.
+
+    Args:
+        request: what holds for all of them.
+        selection: which warnings count.
+        sources: their texts, by the names that the user wrote.
+        unread: what there is to say of those that are no text.
+    """
+
+    request: Request
+    selection: Selection = field(default_factory=Selection)
+    sources: dict[str, SourceFile] = field(default_factory=dict)
+    unread: Diagnostics = field(default_factory=Diagnostics)
+
+    def read(self, name: str) -> None:
+        """Take a scene in.
+
+        Raises:
+            OSError: it cannot be opened.
+        """
+        source = read_text(name, self.unread)
+        if source is not None:
+            self.sources[name] = source
+
+    def check(self) -> Diagnostics:
+        """All that there is to say."""
+        return self._check(self.sources, {})
+
+    def _check(self, sources: Mapping[str, SourceFile], texts: Mapping[Path, str]) -> Diagnostics:
+        # Values from outside remember which params they met, so each round needs its own.
+        request = replace(self.request, defines=Defines(self.request.defines.values), texts=texts)
+        parts = [self.unread.items]
+        for name, source in sources.items():
+            parts.append(_find(name, source, request))
+        parts.append(unused_defines(request))
+        found = merged(parts)
+        found.items[:] = [d for d in found.items if self.selection.keeps(d)]
+        return found
+
+    def owner(self, diagnostic: Diagnostic) -> str | None:
+        """The name of the scene that a diagnostic is in; None for an import that was not named."""
+        if diagnostic.span is None:
+            return None
+        name = diagnostic.span.source.name
+        place = STDIN if name == "<stdin>" else _place(name)
+        return next((own for own in self.sources if _place(own) == place), None)
+
+    def fix(self) -> Settled[str]:
+        """The texts after all fixes, by the names that the user wrote, and what is left.
+
+        Of imported files only those change that were named too.
+        """
+        names: dict[str, str] = {}  # by the place on the disk; one file may have two names
+        for name in self.sources:
+            names.setdefault(_place(name), name)
+
+        def check(texts: Mapping[str, str]) -> Iterable[tuple[str | None, Diagnostic]]:
+            sources = {name: SourceFile(self.sources[name].name, text) for name, text in texts.items()}
+            inside = {Path(_place(name)): text for name, text in texts.items() if name != STDIN}
+            return [(self.owner(d), d) for d in self._check(sources, inside)]
+
+        return settle({name: self.sources[name].text for name in names.values()}, check)
+
+
+def _place(name: str) -> str:
+    return name if name == STDIN else os.path.realpath(name)
+
+
+def _find(name: str, source: SourceFile, request: Request) -> list[Diagnostic]:
+    """What there is to say of one scene."""
+    found = read_input(name, request, Clock(), source)
+    if found.scene is not None:
+        manifest = find_model(found.scene, found.diagnostics, model=request.model, spans=found.spans)
+        if manifest is not None:
+            check_scene(found.scene, found.spans, found.diagnostics, manifest)
+    if found.tree is not None and not found.diagnostics.errors:
+        find_unused(
+            found.tree, found.diagnostics
+        )  # a name that is misspelt where it is used is no second mistake
+    return found.diagnostics.items
+
+
+def in_bytes(text: str, path: Path) -> bytes:
+    """What a file holds with a new text; a byte order mark stays.
+
+    Raises:
+        OSError: the file cannot be opened.
+    """
+    with path.open("rb") as file:
+        marked = file.read(3) == codecs.BOM_UTF8
+    return (codecs.BOM_UTF8 if marked else b"") + text.encode("utf-8")
+
+
+def difference(name: str, before: str, after: str) -> str:
+    """A unified diff, as `patch -p0` takes it; lines end at line feeds and nowhere else."""
+    from difflib import unified_diff
+
+    old, new = ([f"{line}\n" for line in text.split("\n")] for text in (before, after))
+    for lines in (old, new):
+        # What follows the last line feed is a line only if it holds something.
+        last = lines.pop().removesuffix("\n")
+        lines += [last] if last else []
+    return "".join(
+        line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
+        for line in unified_diff(old, new, name, name)
+    )
