@@ -1,50 +1,102 @@
-"""Did you mean: the known name nearest to a misspelt one."""
+"""Did you mean: the known names nearest to a misspelt one, and words of other languages."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 
+_CLEAR = 0.5  # by so much a name has to be nearer than the next for a fix to be safe
+_SWAPPED, _CASE, _JOINT, _FIRST = 0.9, 0.05, 0.3, 0.15
 
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name with the fewest slips from ``name``: at most one in three letters, ties by name.
 
-    A slip is a letter more, less or other, or two neighbours swapped; case does not count.
+def ranked(name: str, known: Iterable[str], slips: int | None = None) -> list[tuple[float, str]]:
+    """The names that may have been meant, nearest first, each with its distance.
+
+    The distance counts slips: a letter more, less or other is one, two neighbours swapped a little less,
+    an underscore or a final ``s`` too many or too few less again, other case next to nothing. A wrong first
+    letter counts a little more, since it seldom is.
+
+    Args:
+        name: what was written.
+        known: the names there are.
+        slips: how many slips are forgiven; by default one in three letters.
     """
-    best, found = len(name) // 3, None
-    for candidate in sorted(known):
-        slips = _slips(name.lower(), candidate.lower(), best)
-        if slips < best or (slips == best and found is None):
-            best, found = slips, candidate
-    return found if len(name) > 1 else None
+    if len(name) < 2 and not slips:
+        return []
+    limit = len(name) // 3 if slips is None else slips
+    plain = _plain(name)
+    found = []
+    for candidate in set(known):
+        other = _plain(candidate)
+        if other == plain:
+            distance = _CASE if candidate.lower() == name.lower() else _JOINT
+        else:
+            distance = _slips(name.lower(), candidate.lower(), limit)
+            distance += _FIRST * (name[:1].lower() != candidate[:1].lower())
+            if distance > limit + _FIRST or distance >= max(len(name), len(candidate)):
+                continue
+        found.append((distance, candidate))
+    return sorted(found)
 
 
-def _slips(a: str, b: str, limit: int) -> int:
+def nearest(name: str, known: Iterable[str], slips: int | None = None) -> str | None:
+    """The known name with the fewest slips from ``name``; None where none is near."""
+    found = ranked(name, known, slips)
+    return found[0][1] if found else None
+
+
+def _plain(name: str) -> str:
+    """A name without what is easily forgotten: case, underscores, the plural."""
+    plain = name.lower().replace("_", "")
+    return plain[:-1] if len(plain) > 3 and plain.endswith("s") else plain
+
+
+def _slips(a: str, b: str, limit: int) -> float:
     """Optimal string alignment distance; anything above ``limit`` once it is sure to exceed it."""
     if abs(len(a) - len(b)) > limit:
         return limit + 1
-    older: list[int] = []
-    row = list(range(len(b) + 1))
+    older: list[float] = []
+    row: list[float] = list(range(len(b) + 1))
     for i, letter in enumerate(a, 1):
-        older, last, row = row, older, [i]
+        older, last, row = row, older, [float(i)]
         for j, other in enumerate(b, 1):
             cost = min(older[j] + 1, row[j - 1] + 1, older[j - 1] + (letter != other))
             if i > 1 and j > 1 and letter == b[j - 2] and a[i - 2] == other:
-                cost = min(cost, last[j - 2] + 1)
+                cost = min(cost, last[j - 2] + _SWAPPED)
             row.append(cost)
         if min(row) > limit and (not last or min(older) > limit):
             return limit + 1
     return row[-1]
 
 
-def did_you_mean(name: str, known: Iterable[str], span: Span) -> tuple[str | None, Fix | None]:
-    """Help text and fix for a misspelt ``name`` at ``span``; both None where nothing is close."""
-    found = nearest(name, known)
-    if found is None:
+def did_you_mean(
+    name: str, known: Iterable[str], span: Span, *, slips: int | None = None
+) -> tuple[str | None, Fix | None]:
+    """Help text and fix for a misspelt ``name`` at ``span``; both None where nothing is close.
+
+    Where several names are equally near there is no fix, and the help names the first three.
+    """
+    found = ranked(name, known, slips)
+    if not found:
         return None, None
-    return f"did you mean '{found}'?", Fix(f"rename to '{found}'", (Edit(span, found),))
+    best = found[0][0]
+    near = [candidate for distance, candidate in found if distance < best + _CLEAR]
+    if len(near) > 1:
+        shown = [f"'{candidate}'" for candidate in near[:3]]
+        return f"did you mean {', '.join(shown[:-1])} or {shown[-1]}?", None
+    return f"did you mean '{near[0]}'?", Fix(f"rename to '{near[0]}'", (Edit(span, near[0]),))
+
+
+def instead(
+    name: str, words: Mapping[str, str], known: Iterable[str], span: Span
+) -> tuple[str | None, Fix | None]:
+    """Help and fix for a word of another language whose name here is known; both None for any other."""
+    here = words.get(name.lower())
+    if here is None or here not in known:
+        return None, None
+    return f"it is called '{here}' here", Fix(f"write '{here}'", (Edit(span, here),))
 
 
 def listing(known: Iterable[str], limit: int = 12) -> str:

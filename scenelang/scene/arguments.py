@@ -8,6 +8,7 @@ from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.scene.session import Session
+from scenelang.scene.unknown import told_at_definition
 from scenelang.syntax import nodes
 
 Bound = list[nodes.Argument | None]
@@ -33,6 +34,7 @@ def bind(
     spread: bool = False,
     help: str | None = None,
     definition: Span | None = None,
+    places: Sequence[Span] = (),
 ) -> Bound | None:
     """The argument of each parameter, None where it is left out.
 
@@ -46,6 +48,7 @@ def bind(
         spread: one positional argument may be a vector of all.
         help: advice for a wrong number of arguments; by default the signature.
         definition: where what is called was defined.
+        places: where its parameters were.
 
     Returns:
         One entry a parameter, or None if a mistake was reported.
@@ -65,6 +68,14 @@ def bind(
             position += 1
         elif arg.name.text in params:
             index = list(params).index(arg.name.text)
+        elif told_at_definition(
+            session,
+            arg.name.text,
+            arg.name.span.source,
+            [(param, place, "argument") for param, place in zip(params, places, strict=False)],
+        ):
+            good = False
+            continue
         else:
             hint, fix = did_you_mean(arg.name.text, params, arg.name.span)
             hint = hint or (f"its arguments are {listing(params)}" if params else "it takes no arguments")

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from scenelang.diagnostics.diagnostic import Label
-from scenelang.diagnostics.suggest import did_you_mean, listing
+from scenelang.diagnostics.suggest import did_you_mean, instead, listing
+from scenelang.scene import elsewhere
 from scenelang.scene.expressions import prepare
-from scenelang.scene.functions import FUNCTIONS
+from scenelang.scene.functions import ANIMATED, CONSTANTS, FUNCTIONS
 from scenelang.scene.materials import prepare_value_use
 from scenelang.scene.moves import prepare_move
 from scenelang.scene.objects import HOLDERS, prepare_module_call, prepare_object
-from scenelang.scene.references import VALUES, lookup, unknown_member, wrong_kind
-from scenelang.scene.scope import Scope
+from scenelang.scene.references import VALUES, lookup, unknown, unknown_member, wrong_kind
+from scenelang.scene.scope import Binding, Scope
 from scenelang.scene.settings import prepare_setting
 from scenelang.scene.statements import Action, Place, inner, prepare_block, states
 from scenelang.scene.transforms import GEOMETRY, TEXTURE
+from scenelang.scene.unknown import report_unknown
 from scenelang.scene.vocabulary import SETTINGS
 from scenelang.syntax import nodes
 
@@ -32,8 +34,9 @@ def _call(stmt: nodes.Call, place: Place) -> Action | None:
         words = place.unit.session.vocabulary
         if name in words.geometries:
             return prepare_object(stmt, place)
-        _skim(stmt, place)
-        _unknown(stmt, place)
+        if not _lacks_module(stmt, place):
+            _skim(stmt, place)
+            _unknown(stmt, place)
         return None
     if binding.kind == "module":
         return prepare_module_call(stmt, binding.value, place)
@@ -53,6 +56,35 @@ def _skim(stmt: nodes.Call, place: Place) -> None:
         prepare_block(stmt.body.statements, inner(place, "unknown"), stmt.body.span)
 
 
+def _lacks_module(stmt: nodes.Call, place: Place) -> bool:
+    """Report ``dot(x, y) { … }`` whose arguments are unknown names: the word `module` is missing."""
+    unit, scope, name = place.unit, place.scope, stmt.name
+    if stmt.body is None or not stmt.args or "." in name.text:
+        return False
+    params = [
+        arg.name or (arg.value.name if isinstance(arg.value, nodes.NameRef) else None) for arg in stmt.args
+    ]
+    bare = [p for p, arg in zip(params, stmt.args, strict=True) if p is not None and arg.name is None]
+    if None in params or not bare or not all(_stands_for_nothing(p.text, scope) for p in bare):
+        return False
+    if unit.damage and unit.damage.loses(name.text):
+        return False
+    body = inner(place, "unknown")
+    for param in params:
+        if param is not None:
+            body.scope.names[param.text] = Binding("poison", param.span)
+    prepare_block(stmt.body.statements, body, stmt.body.span)
+    written = ", ".join(arg.span.text for arg in stmt.args)
+    help = f"to define it write module {name.text}({written}) {{ … }}"
+    message = f"unknown geometry or module '{name.text}'"
+    report_unknown(name, unit, scope, "E0204", message, help=help, kinds=("module",))
+    return True
+
+
+def _stands_for_nothing(name: str, scope: Scope) -> bool:
+    return scope.find(name) is None and name not in CONSTANTS and name not in ANIMATED
+
+
 def _unknown(stmt: nodes.Call, place: Place) -> None:
     """Report a statement whose name stands for nothing."""
     unit, scope, name = place.unit, place.scope, stmt.name
@@ -63,7 +95,11 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         alias = scope.find(name.text.partition(".")[0])
         if alias is not None and alias.kind == "import":
             unknown_member(name, unit, alias.value)
-            return
+        elif alias is None:
+            unknown(name, unit, scope)
+        else:
+            wrong_kind(name, alias, unit, "an imported file")
+        return
     if words.blind and place.kind in HOLDERS:
         return  # it may be a geometry of the model that is not at hand
     later = scope.defined_later(name.text)
@@ -83,15 +119,23 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         session.error("E0213", message, name.span)
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
-    hint, fix = did_you_mean(name.text, _candidates(stmt, place, scope), name.span)
+    candidates = _candidates(stmt, place, scope)
+    hint, fix = did_you_mean(name.text, candidates, name.span)
+    if hint is None:
+        hint, fix = instead(name.text, elsewhere.WORDS, candidates, name.span)
+    if hint is None and elsewhere.STATEMENTS.get(name.text):
+        hint = elsewhere.STATEMENTS[name.text]
     if hint is None and place.kind in ("file", "group", "chain") and words.geometries:
         hint = f"the model draws {listing(words.geometries)}"
-    session.error("E0204", f"unknown {what} '{name.text}'", name.span, help=hint, fix=fix)
+    message = f"unknown {what} '{name.text}'"
+    report_unknown(name, unit, scope, "E0204", message, help=hint, fix=fix, kinds=("module", *VALUES))
 
 
 def _candidates(stmt: nodes.Call, place: Place, scope: Scope) -> set[str]:
     """Names that could have been meant, given where the statement stands and how it looks."""
     words = place.unit.session.vocabulary
+    before = stmt.span.source.text[: stmt.span.start].rstrip()
+    otherwise = {"else", "else if"} if before.endswith("}") and stmt.body is not None else set()
     modules = {n for n, b in scope.visible() if b.kind == "module"}
     values = {n for n, b in scope.visible() if b.kind in VALUES}
     if place.kind == "material":
@@ -100,7 +144,9 @@ def _candidates(stmt: nodes.Call, place: Place, scope: Scope) -> set[str]:
         return words.transforms if stmt.args is not None else {*values, "material"}
     found = words.geometries | modules
     if stmt.args is None and stmt.body is not None:
-        found.update(NODE_WORDS)
+        found.update((*NODE_WORDS, *(otherwise - {"else if"})))
     if stmt.args is not None and stmt.body is None:
         found.update(words.transforms if place.kind != "file" else SETTINGS)
+    if stmt.args is not None and stmt.body is not None:
+        found.update(otherwise - {"else"})
     return found

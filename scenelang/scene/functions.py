@@ -254,21 +254,3 @@ CONSTANTS: Final[dict[str, Any]] = {
     "none": None,
 }
 ANIMATED: Final = ("t", "u", "frame", "frames")
-
-ELSEWHERE: Final = {
-    "pow": "write a ^ b",
-    "mod": "write a % b",
-    "fract": "write x % 1",
-    "length": "len counts items; for a norm write sqrt(v.x ^ 2 + v.y ^ 2)",
-    "norm": "write sqrt(v.x ^ 2 + v.y ^ 2)",
-    "atan": "write atan2(y, x)",
-    "ln": "log is the natural logarithm",
-    "lerp": "write mix(a, b, t)",
-    "random": "write rand(seed)",
-    "rands": "write rand(seed)",
-    "vec2": "write [x, y]",
-    "vec3": "write [x, y, z]",
-    "radians": "glue the unit to the number: 30deg",
-    "degrees": "divide by 1deg for a number of degrees",
-}
-"""Functions of languages nearby, and what to write here."""

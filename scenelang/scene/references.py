@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from scenelang.diagnostics.diagnostic import Label
+from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.diagnostics.suggest import did_you_mean, listing, nearest
+from scenelang.diagnostics.suggest import did_you_mean, listing
+from scenelang.scene import elsewhere
 from scenelang.scene.arguments import Bound, bind
 from scenelang.scene.expressions import (
     POISONED,
@@ -18,12 +19,13 @@ from scenelang.scene.expressions import (
     prepare,
     prepares,
 )
-from scenelang.scene.functions import ANIMATED, CONSTANTS, ELSEWHERE, FUNCTIONS
+from scenelang.scene.functions import ANIMATED, CONSTANTS, FUNCTIONS
 from scenelang.scene.literals import member
 from scenelang.scene.scope import Binding, Definition, Env, Scope
 from scenelang.scene.session import MAX_DEPTH, UNBOUND
 from scenelang.scene.spans import Calls
 from scenelang.scene.unit import Unit
+from scenelang.scene.unknown import report_unknown
 from scenelang.scene.values import POISON
 from scenelang.syntax import nodes
 
@@ -90,17 +92,22 @@ def unknown_member(name: nodes.Name, unit: Unit, exported: Unit) -> None:
     if exported.damage and exported.damage.loses(rest):
         return
     known = [n for n, b in exported.scope.names.items() if b.kind != "import"]
-    found = nearest(rest, known)
     last = Span(name.span.source, name.span.end - len(rest), name.span.end)
-    help, fix = did_you_mean(rest, [found], last) if found else (None, None)
+    help, fix = did_you_mean(rest, known, last)
     help = help or (f"it has {listing(known)}" if known else "it defines nothing")
-    unit.session.error("E0212", f"'{alias}' has no '{rest}'", last, help=help, fix=fix)
+    end = nodes.Name(rest, last)
+    report_unknown(end, unit, Scope(unit.frame), "E0212", f"'{alias}' has no '{rest}'", help=help, fix=fix)
 
 
 def unknown(name: nodes.Name, unit: Unit, scope: Scope, *, called: bool = False) -> None:
     """Report a name that stands for nothing in an expression."""
     text, session = name.text, unit.session
     if unit.damage and unit.damage.loses(text):
+        return
+    alias, dot, _ = text.partition(".")
+    if dot:
+        head = Span(name.span.source, name.span.start, name.span.start + len(alias))
+        unknown(nodes.Name(alias, head), unit, scope)
         return
     later = scope.defined_later(text)
     if later is not None:
@@ -111,15 +118,24 @@ def unknown(name: nodes.Name, unit: Unit, scope: Scope, *, called: bool = False)
         labels = (Label(later, "defined here"),)
         session.error("E0203", message, name.span, labels=labels, help=advice)
         return
-    visible = {n for n, b in scope.visible() if (b.kind == "fn") == called and b.kind != "poison"}
-    known = visible | (set(FUNCTIONS) if called else {*CONSTANTS, *ANIMATED})
-    help, fix = did_you_mean(text, known, name.span)
-    if text in ELSEWHERE:
-        help, fix = ELSEWHERE[text], None
+    kinds = ("fn",) if called else (*VALUES, "import")
+    visible = {n for n, b in scope.visible() if b.kind in kinds}
     if called:
-        session.error("E0207", f"unknown function '{text}'", name.span, help=help, fix=fix)
-    else:
-        session.error("E0201", f"unknown name '{text}'", name.span, help=help, fix=fix)
+        help, fix = did_you_mean(text, visible | set(FUNCTIONS), name.span)
+        help, fix = (elsewhere.FUNCTIONS[text], None) if text in elsewhere.FUNCTIONS else (help, fix)
+        report_unknown(
+            name, unit, scope, "E0207", f"unknown function '{text}'", help=help, fix=fix, kinds=kinds
+        )
+        return
+    help, fix = did_you_mean(text, visible | {*CONSTANTS, *ANIMATED, "true", "false"}, name.span)
+    here = elsewhere.NAMES.get(text.lower())
+    colour = elsewhere.COLOURS.get(text.lower())
+    if here is not None and here.lower() != text.lower():
+        help, fix = f"it is called '{here}' here", Fix(f"write '{here}'", (Edit(name.span, here),))
+    elif help is None and colour is not None:
+        help = f"colours have no names; {text.lower()} is {colour}"
+        fix = Fix(f"write '{colour}'", (Edit(name.span, colour),))
+    report_unknown(name, unit, scope, "E0201", f"unknown name '{text}'", help=help, fix=fix, kinds=kinds)
 
 
 def wrong_kind(name: nodes.Name, binding: Binding, unit: Unit, wanted: str, help: str | None = None) -> None:
@@ -307,6 +323,7 @@ def entering(
         args,
         span,
         definition=definition.node.name.span,
+        places=[p.name.span for p in params],
     )
     if bound is None:
         return None

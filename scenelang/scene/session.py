@@ -123,6 +123,8 @@ class Session:
     animated: list[Any] = field(default_factory=lambda: [UNBOUND] * 4)
     settings: Settings = field(default_factory=Settings)
     damaged: dict[int, Damage] = field(default_factory=dict)
+    unknown: dict[tuple[str, str, int], int] = field(default_factory=dict)
+    names_in: dict[int, dict[str, list[Span]]] = field(default_factory=dict)
     replays: bool = False
     roots: list[list[Any]] = field(default_factory=list)
     needs: Needs = field(default_factory=Needs)

@@ -93,7 +93,7 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
     optional = [index >= required for index in range(len(params))]
     bound = bind(session, name, params, optional, stmt.args or (), span, spread=name == "canvas")
     if bound is None:
-        return None
+        return _unknown_time(session) if name == "animate" else None
     getters = [codes[id(arg)].run if arg is not None else None for arg in bound]
     operands = tuple([arg.value if arg is not None else None for arg in bound])
     apply = _APPLY[name]
@@ -110,6 +110,15 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
             session.problem(problem, span, operands)
             if name == "animate":
                 session.animated[:] = [POISON] * 4
+
+    return action
+
+
+def _unknown_time(session: Session) -> Action:
+    """What `animate` with a mistake does: its variables are unknown, which is no further mistake."""
+
+    def action(env: Env, out: Builder) -> None:
+        session.animated[:] = [POISON] * 4
 
     return action
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.diagnostics.span import SourceFile
 from scenelang.scene.damage import NONE, Damage
 from scenelang.scene.scope import Env, Frame, Scope, file_frame
 from scenelang.scene.session import Session

@@ -1,0 +1,127 @@
+"""Reporting names that stand for nothing: once a name, and at its definition where that has the slip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
+
+from scenelang.diagnostics.diagnostic import Edit, Fix, Label
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.diagnostics.suggest import did_you_mean, ranked
+from scenelang.scene.scope import Binding, Scope
+from scenelang.scene.session import Session
+from scenelang.scene.unit import Unit
+from scenelang.syntax import nodes
+from scenelang.syntax.lexer import scan
+from scenelang.syntax.tables import tables
+from scenelang.syntax.tokens import Report
+
+_SHOWN: Final = 3
+_CODES: Final = {"module": "E0204", "fn": "E0207"}
+
+
+def uses(session: Session, source: SourceFile) -> dict[str, list[Span]]:
+    """Where each name stands in a text, its definition included; made once, at the first unknown name."""
+    known = session.names_in.get(id(source))
+    if known is None:
+        known = session.names_in[id(source)] = {}
+        tokens = scan(source, Report(source))
+        kinds = {tables().kind(name) for name in ("NAME", "step", "as")}
+        for index, kind in enumerate(tokens.kinds):
+            if kind in kinds:
+                span = Span(source, tokens.starts[index], tokens.ends[index])
+                known.setdefault(span.text, []).append(span)
+    return known
+
+
+def is_unused(session: Session, name: str, span: Span | None) -> bool:
+    """Whether nothing in a text bears a name but its definition at ``span``."""
+    return span is not None and len(uses(session, span.source).get(name, ())) == 1
+
+
+def told_at_definition(
+    session: Session, text: str, source: SourceFile, defined: Iterable[tuple[str, Span | None, str]]
+) -> bool:
+    """Report a name that is used several times at the definition that was misspelt, if there is one.
+
+    Args:
+        session: where it is reported.
+        text: the unknown name.
+        source: the file that it is used in.
+        defined: names that are defined around it, each with its place and the kind of its binding.
+    """
+    places = uses(session, source).get(text, [])
+    if len(places) < 2 or "." in text:
+        return False
+    spans = {name: (span, kind) for name, span, kind in defined if is_unused(session, name, span)}
+    near = ranked(text, spans, max(1, len(text) // 3))
+    if not near or (near[1:] and near[1][0] - near[0][0] < 0.5):
+        return False
+    name = near[0][1]
+    span, kind = spans[name]
+    if span is None or span.source is not source:
+        return False
+    session.error(
+        _CODES.get(kind, "E0201"),
+        f"'{name}' is defined here, '{text}' is used",
+        span,
+        help=f"did you mean to define '{text}'?",
+        fix=Fix(f"rename to '{text}'", (Edit(span, text),)),
+        labels=tuple(Label(place, "used here") for place in places[:_SHOWN]),
+    )
+    return True
+
+
+def report_unknown(
+    name: nodes.Name,
+    unit: Unit,
+    scope: Scope,
+    code: str,
+    message: str,
+    *,
+    help: str | None,
+    fix: Fix | None = None,
+    kinds: tuple[str, ...] = (),
+) -> None:
+    """Report a name that stands for nothing; again only as a further place of the first report.
+
+    Args:
+        name: the name.
+        unit: its file.
+        scope: where it is used.
+        code: code of the diagnostic.
+        message: the fact.
+        help: advice; by default an unused name nearby is suggested.
+        fix: a safe change.
+        kinds: kinds of bindings that it could have stood for.
+    """
+    session = unit.session
+    key = (code, name.text, id(unit.source))
+    first = session.unknown.get(key)
+    items = session.diagnostics.items
+    if first is not None and first < len(items) and items[first].code == code:
+        shown = items[first]
+        if len(shown.labels) < _SHOWN and shown.span != name.span:
+            items[first] = replace(shown, labels=(*shown.labels, Label(name.span, "also here")))
+        return
+    around = [(n, b) for n, b in scope.visible() if b.kind in kinds]
+    defined = [(n, b.span, b.kind) for n, b in around]
+    if told_at_definition(session, name.text, unit.source, defined):
+        return
+    labels: tuple[Label, ...] = ()
+    if help is None:
+        unused = [n for n, b in around if is_unused(session, n, b.span)]
+        help, _ = did_you_mean(name.text, unused, name.span, slips=1)
+    suggested = _suggested(help, around)
+    if suggested is not None and suggested.span is not None:
+        labels = (Label(suggested.span, "defined here"),)
+    before = len(items)
+    session.error(code, message, name.span, help=help, fix=fix, labels=labels)
+    if len(items) > before:
+        session.unknown[key] = before
+
+
+def _suggested(help: str | None, around: list[tuple[str, Binding]]) -> Binding | None:
+    """The binding whose name a help text suggests."""
+    return next((b for n, b in around if help == f"did you mean '{n}'?"), None)
