@@ -26,6 +26,7 @@ ORDER = (
     "scenelang.lifting",
     "scenelang.models.weights",
     "scenelang.program",
+    "scenelang.lsp",
     "scenelang.interchange",
     "scenelang.image",
     "scenelang.reference",

@@ -24,6 +24,7 @@ COMMANDS: Final = {
     "eval": "Measure a model on unseen scenes.",
     "train": "Train a model's weights.",
     "watch": "Draw a scene again whenever it is saved.",
+    "lsp": "Serve editors over the Language Server Protocol.",
     "explain": "Say what a diagnostic's code means.",
     "convert": "Write a scene as text, JSON or Python.",
     "schema": "Print the JSON Schema of scenes.",

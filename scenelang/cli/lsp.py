@@ -1,0 +1,43 @@
+"""``scenelang lsp``: the language server."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command("lsp")
+@click.option("--stdio", is_flag=True, help="Speak over standard input and output; the default.")
+@click.option(
+    "--tcp", type=click.IntRange(1, 65535), metavar="PORT", help="Listen on a port of this machine."
+)
+@click.option("--log", type=click.Path(dir_okay=False), metavar="FILE", help="Write a log to a file.")
+def command(stdio: bool, tcp: int | None, log: str | None) -> None:
+    """Serve an editor over the Language Server Protocol.
+
+    Editors start it themselves; docs/editors.md says how.
+    """
+    import logging
+
+    from scenelang.cli.main import Trouble
+
+    if stdio and tcp is not None:
+        raise click.UsageError("--stdio and --tcp exclude each other.")
+    try:
+        from scenelang.lsp.server import make_server
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
+            raise
+        raise Trouble("the language server needs pygls: pip install 'scenelang[lsp]'") from None
+    handler = logging.FileHandler(log, encoding="utf-8") if log else logging.StreamHandler()
+    logging.basicConfig(
+        level=logging.INFO if log else logging.ERROR,
+        handlers=[handler],
+        format="%(asctime)s %(name)s %(levelname)s %(message)s",
+    )
+    if not log:  # requests that are refused are answered as such; the library would print a trace
+        logging.getLogger("pygls").setLevel(logging.CRITICAL)
+    server = make_server()
+    if tcp is not None:
+        server.start_tcp("127.0.0.1", tcp)
+    else:
+        server.start_io()

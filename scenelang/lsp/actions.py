@@ -1,0 +1,137 @@
+"""Changes of the text: fixes of diagnostics, and formatting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import SequenceMatcher
+from typing import Final
+
+from lsprotocol import types
+
+from scenelang.diagnostics.diagnostic import Diagnostic
+from scenelang.diagnostics.fixes import apply_fixes
+from scenelang.lsp.convert import to_diagnostic
+from scenelang.lsp.workspace import Document
+
+FIX_ALL: Final = "source.fixAll.scenelang"
+_MOST_LINES: Final = 4000  # of a difference that is looked at line by line
+
+
+def code_actions(
+    document: Document, place: types.Range, only: Sequence[str] | None
+) -> list[types.CodeAction]:
+    """What may be done about the mistakes in a range.
+
+    Args:
+        document: the text.
+        place: where the cursor or the selection is.
+        only: the kinds that the client asks for; None for all.
+    """
+    lines = document.lines
+    start, end = lines.offset(place.start), lines.offset(place.end)
+    found = [*document.parsed.diagnostics, *document.semantic]
+    here = [
+        d
+        for d in found
+        if d.span is not None
+        and d.span.source.name == document.source.name
+        and _line(document, d.span.start) <= _line(document, end)
+        and _line(document, d.span.end) >= _line(document, start)
+    ]
+    actions = []
+    if _wants(only, types.CodeActionKind.QuickFix):
+        near = [d for d in here if d.span is not None and d.span.start <= end and d.span.end >= start]
+        actions += [_quick(document, d, d in near) for d in here if _is_ours(document, d)]
+    whole = _fix_all(document, found) if _wants(only, FIX_ALL) else None
+    if whole is not None:
+        actions.append(whole)
+    return actions
+
+
+def _line(document: Document, offset: int) -> int:
+    return document.lines.position(offset).line
+
+
+def _wants(only: Sequence[str] | None, kind: str) -> bool:
+    """Whether a kind is asked for; `source` asks for `source.fixAll` too."""
+    if not only:
+        return True
+    return any(kind == asked or kind.startswith(f"{getattr(asked, 'value', asked)}.") for asked in only)
+
+
+def _is_ours(document: Document, d: Diagnostic) -> bool:
+    return d.fix is not None and all(e.span.source.name == document.source.name for e in d.fix.edits)
+
+
+def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeAction:
+    assert d.fix is not None
+    edits = [types.TextEdit(document.lines.span(e.span), e.replacement) for e in d.fix.edits]
+    shown = to_diagnostic(d, document)
+    return types.CodeAction(
+        title=d.fix.message[:1].upper() + d.fix.message[1:],
+        kind=types.CodeActionKind.QuickFix,
+        diagnostics=[shown] if shown is not None else None,
+        is_preferred=preferred,
+        edit=_edit(document, edits),
+    )
+
+
+def _edit(document: Document, edits: list[types.TextEdit]) -> types.WorkspaceEdit:
+    return types.WorkspaceEdit(changes={document.uri: edits})
+
+
+def _fix_all(document: Document, found: Sequence[Diagnostic]) -> types.CodeAction | None:
+    text, done = apply_fixes(document.text, [d for d in found if _is_ours(document, d)])
+    if not done or text == document.text:
+        return None
+    return types.CodeAction(
+        title=f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake",
+        kind=FIX_ALL,
+        edit=_edit(document, text_edits(document, text)),
+    )
+
+
+# ---------------------------------------------------------------- formatting
+
+
+def formatted(document: Document, place: types.Range | None = None) -> list[types.TextEdit]:
+    """The edits that lay a text out in the canonical way, or those of them in a range.
+
+    Raises:
+        SceneError: the text has syntax errors.
+    """
+    from scenelang.formatting import format_text
+
+    text = format_text(document.text, name=document.source.name)
+    edits = text_edits(document, text)
+    if place is None:
+        return edits
+    first, last = place.start.line, place.end.line - (place.end.character == 0 and place.end != place.start)
+    return [e for e in edits if e.range.start.line <= last and e.range.end.line >= first]
+
+
+def text_edits(document: Document, text: str) -> list[types.TextEdit]:
+    """Few small edits that make the text ``text``, so that cursors and folds stay where they are."""
+    old, new = document.text.splitlines(keepends=True), text.splitlines(keepends=True)
+    starts = [0]
+    for line in old:
+        starts.append(starts[-1] + len(line))
+    head = 0
+    while head < min(len(old), len(new)) and old[head] == new[head]:
+        head += 1
+    tail = 0
+    while tail < min(len(old), len(new)) - head and old[-1 - tail] == new[-1 - tail]:
+        tail += 1
+    inner_old, inner_new = old[head : len(old) - tail], new[head : len(new) - tail]
+    if not inner_old and not inner_new:
+        return []
+    if len(inner_old) + len(inner_new) > _MOST_LINES:
+        blocks = [(0, len(inner_old), 0, len(inner_new))]
+    else:
+        matcher = SequenceMatcher(None, inner_old, inner_new, autojunk=False)
+        blocks = [(a, b, c, d) for tag, a, b, c, d in matcher.get_opcodes() if tag != "equal"]
+    lines = document.lines
+    return [
+        types.TextEdit(lines.range(starts[head + a], starts[head + b]), "".join(inner_new[c:d]))
+        for a, b, c, d in blocks
+    ]

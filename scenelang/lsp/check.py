@@ -1,0 +1,141 @@
+"""Everything that can be said of a scene, in the background: evaluation, the compiler's checks, values.
+
+Nothing here touches a `Document`: a check gets what it needs when it begins and gives back one value, so that
+it may run beside the editing.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.graph.lower import Spans
+from scenelang.graph.nodes import Graph
+from scenelang.models.manifest import Manifest
+from scenelang.passes import check_scene
+from scenelang.program.compile import find_model
+from scenelang.scene.evaluate import Evaluation, in_file_order
+from scenelang.scene.schema import Scene
+from scenelang.scene.session import Halt
+from scenelang.scene.unused import find_unused
+from scenelang.syntax import nodes
+
+MAX_SEEN: Final = 4  # values and nodes kept of one place
+
+
+class Superseded(Exception):
+    """The text has changed: nobody wants this check any more."""
+
+
+@dataclass(slots=True)
+class Seen:
+    """What one place had while a scene was evaluated.
+
+    Args:
+        values: the first few, in order, equal ones once.
+        count: how many there were.
+    """
+
+    values: list[Any] = field(default_factory=list)
+    count: int = 0
+
+
+@dataclass(slots=True)
+class Checked:
+    """What a check found.
+
+    Args:
+        source: the text that was checked.
+        diagnostics: mistakes and warnings of evaluation and compiler, without those of syntax.
+        wanted: the files that it imports, also those that are not there.
+        seen: by file name, start and end: values of names, nodes of statements.
+        scene: the scene, None if it has errors.
+        manifest: the model that draws it, where that is known.
+    """
+
+    source: SourceFile
+    diagnostics: list[Diagnostic]
+    wanted: frozenset[Path]
+    seen: dict[tuple[str, int, int], Seen]
+    scene: Scene | None = None
+    manifest: Manifest | None = None
+
+    def at(self, name: str, start: int, end: int) -> Seen | None:
+        """What a place of a file had."""
+        return self.seen.get((name, start, end))
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What to check.
+
+    Args:
+        file: the tree.
+        path: its file, if it has one.
+        root: the folder that imports cannot leave; by default the file's.
+        texts: what open files hold.
+        model: draw with this model instead of the scene's.
+        syntax: how many syntax mistakes the text has.
+    """
+
+    file: nodes.File
+    path: Path | None
+    root: Path | None
+    texts: Mapping[Path, str]
+    model: str | None = None
+    syntax: int = 0
+
+
+def check(task: Task, stop: threading.Event) -> Checked:
+    """Evaluate a scene and run the compiler's checks.
+
+    Raises:
+        Superseded: ``stop`` was set meanwhile.
+    """
+    found = Diagnostics()
+    seen: dict[tuple[str, int, int], Seen] = {}
+
+    def watch(span: Span, value: Any) -> None:
+        if stop.is_set():
+            raise Halt
+        place = seen.setdefault((span.source.name, span.start, span.end), Seen())
+        place.count += 1
+        if len(place.values) < MAX_SEEN and not any(value is old for old in place.values):
+            place.values.append(value)
+
+    evaluation = Evaluation(
+        task.file,
+        diagnostics=found,
+        model=task.model,
+        root=task.root,
+        path=task.path,
+        texts=task.texts,
+        watch=watch,
+    )
+    scene, spans = evaluation.run(0)
+    if stop.is_set():
+        raise Superseded
+    if not task.syntax:
+        find_unused(task.file, found)
+    manifest = None
+    if scene is not None and not task.syntax:
+        manifest = find_model(scene, found, model=task.model, spans=spans)
+        if manifest is not None:
+            _compile(scene, spans, found, manifest, stop)
+    wanted = frozenset(evaluation.wanted)
+    return Checked(task.file.span.source, in_file_order(found.items), wanted, seen, scene, manifest)
+
+
+def _compile(
+    scene: Scene, spans: Spans, found: Diagnostics, manifest: Manifest, stop: threading.Event
+) -> None:
+    def after(name: str, graph: Graph) -> None:
+        if stop.is_set():
+            raise Superseded
+
+    check_scene(scene, spans, found, manifest, after)

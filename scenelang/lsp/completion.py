@@ -1,0 +1,367 @@
+"""Completion: what may stand at the cursor."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from lsprotocol import types
+
+from scenelang.lsp import words
+from scenelang.lsp.callees import Callee, find_callee
+from scenelang.lsp.context import COMBINE, Cursor, cursor_at
+from scenelang.lsp.names import Symbol
+from scenelang.lsp.signatures import describe_symbol
+from scenelang.lsp.vocabulary import vocabulary_of
+from scenelang.lsp.workspace import Document, Workspace
+from scenelang.scene.vocabulary import Vocabulary
+from scenelang.syntax import nodes
+from scenelang.syntax.lexer import UNITS
+
+Kind = types.CompletionItemKind
+_HEADS: Final = (
+    "let",
+    "fn",
+    "module",
+    "for",
+    "if",
+    "group",
+    "union",
+    "smooth",
+    "subtract",
+    "intersect",
+    "chain",
+)
+_SYMBOLS: Final = {
+    "let": Kind.Variable,
+    "param": Kind.Property,
+    "argument": Kind.Variable,
+    "loop": Kind.Variable,
+    "fn": Kind.Function,
+    "module": Kind.Module,
+    "import": Kind.File,
+}
+_MAX_PATHS: Final = 200
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    """A proposal.
+
+    Args:
+        label: what the list shows.
+        kind: its icon.
+        text: what is inserted; the label without it.
+        rank: one letter; what is likelier comes first.
+        detail: a line beside the label.
+        about: Markdown.
+        snippet: whether ``text`` has placeholders.
+    """
+
+    label: str
+    kind: Kind
+    text: str = ""
+    rank: str = "m"
+    detail: str = ""
+    about: str = ""
+    snippet: bool = False
+
+
+def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
+    """What may stand at an offset.
+
+    Args:
+        docs: all documents.
+        document: the text.
+        offset: where the cursor is.
+        snippets: whether the client fills in placeholders.
+    """
+    names = document.names
+    values = frozenset(
+        s.name for s in names.visible(offset) if s.kind in ("let", "argument", "loop", "param")
+    )
+    cursor = cursor_at(document.parsed, offset, values)
+    start, end = cursor.start, cursor.end
+    if cursor.inside == "string":
+        start, end = (
+            start + 1,
+            max(end - (document.text[end - 1 : end] == '"' and end - 1 > start), start + 1),
+        )
+    maker = _Maker(docs, document, cursor)
+    lines = document.lines
+    place = lines.range(start, max(end, start))
+    items = []
+    seen = set()
+    for item in maker.items():
+        if item.label in seen:
+            continue
+        seen.add(item.label)
+        text = item.text or item.label
+        if item.snippet and not snippets:
+            text = item.label
+        items.append(
+            types.CompletionItem(
+                label=item.label,
+                kind=item.kind,
+                detail=item.detail or None,
+                documentation=types.MarkupContent(types.MarkupKind.Markdown, item.about)
+                if item.about
+                else None,
+                sort_text=f"{item.rank}{item.label}",
+                filter_text=item.label,
+                insert_text_format=types.InsertTextFormat.Snippet if item.snippet and snippets else None,
+                text_edit=types.TextEdit(place, text),
+            )
+        )
+    return types.CompletionList(is_incomplete=False, items=items)
+
+
+class _Maker:
+    """Collects what fits at one cursor."""
+
+    def __init__(self, docs: Workspace, document: Document, cursor: Cursor) -> None:
+        self.docs, self.document, self.cursor = docs, document, cursor
+        self.words: Vocabulary = vocabulary_of(document, docs)
+
+    def items(self) -> Iterator[_Item]:
+        cursor, before = self.cursor, self.cursor.before
+        last = before[-1] if before else ""
+        if cursor.inside == "comment":
+            return
+        if cursor.inside == "string":
+            yield from self._strings(before)
+        elif cursor.inside == "number":
+            yield from self._units()
+        elif cursor.inside == "colour":
+            return
+        elif last == ".":
+            yield from self._members(before)
+        elif not before:
+            yield from self._statements()
+        elif last in ("let", "param", "fn", "module", "nsg", "as", "#") or before == ("for", "("):
+            return
+        elif before[:2] == ("for", "(") and len(before) == 3:
+            yield _Item("in", Kind.Keyword, "in ")
+        elif before[0] == "import":
+            if len(before) == 2:
+                yield _Item("as", Kind.Keyword, "as ")
+        elif last == "material":
+            yield from self._materials()
+        elif len(before) == 1 and last in COMBINE:
+            yield from self._children("a")
+            yield from (self._keyword(word) for word in ("group", *COMBINE, "chain"))
+        elif before[0] == "param" and len(before) > 3 and "in" not in before and _ends_operand(last):
+            yield _Item("in", Kind.Keyword, "in ", "a", about=words.KEYWORDS["in"].text)
+        elif (last == ")" and before[0] == "if") or _in_parameters(before):
+            return
+        elif not _ends_operand(last):
+            yield from self._expressions()
+        elif ".." in before or "..<" in before:
+            yield _Item("step", Kind.Keyword, "step ")
+
+    # ------------------------------------------------------------ statements
+
+    def _keyword(self, word: str, rank: str = "p") -> _Item:
+        known = words.KEYWORDS[word]
+        text = known.snippet or f"{word} {{\n\t$0\n}}"
+        return _Item(word, Kind.Keyword, text, rank, known.head, known.text, True)
+
+    def _statements(self) -> Iterator[_Item]:
+        block = self.cursor.block
+        kind = block.kind
+        if kind == "material":
+            yield from self._calls(words.OPERATIONS, self.words.material_ops, "a")
+            yield from (self._keyword(word) for word in ("let", "for", "if"))
+            return
+        if kind == "file" and not block.nested:
+            tops = [s for s in self.document.parsed.heads() if isinstance(s, nodes.Version | nodes.Model)]
+            given = {type(stmt) for stmt in tops}
+            if nodes.Version not in given:
+                yield self._keyword("nsg", "c")
+            if nodes.Model not in given:
+                yield self._keyword("model", "q")
+            yield from (self._keyword(word, "q") for word in ("param", "import"))
+            yield from self._calls(words.SETTINGS, set(words.SETTINGS), "q")
+        if kind == "object":
+            yield from self._calls(words.TRANSFORMS, self.words.transforms, "a")
+            yield self._keyword("material", "b")
+            yield from self._material_values("b")
+            yield from (self._keyword(word) for word in ("let", "for", "if"))
+            return
+        yield from self._children("a")
+        if kind == "chain":
+            yield from (
+                _Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text)
+                for word in COMBINE
+            )
+        yield from (self._keyword(word) for word in _HEADS if kind != "chain" or word not in COMBINE)
+        if kind in ("group", "chain"):
+            yield from self._calls(words.TRANSFORMS, self.words.transforms, "n")
+            yield self._keyword("material", "n")
+            yield from self._material_values("n")
+
+    def _calls(self, known: dict[str, words.Word], offered: Iterable[str], rank: str) -> Iterator[_Item]:
+        for name in sorted(offered):
+            word = known.get(name)
+            if word is not None:
+                yield _Item(name, Kind.Method, word.snippet, rank, word.head, word.text, True)
+
+    def _children(self, rank: str) -> Iterator[_Item]:
+        for name in sorted(self.words.geometries):
+            text = f"{name} {{ ${{1:scale(0.5);}} }}"
+            yield _Item(name, Kind.Class, text, rank, "geometry", words.GEOMETRIES.get(name, ""), True)
+        for symbol in self.document.names.visible(self.cursor.offset):
+            if symbol.kind == "module":
+                yield self._symbol(symbol, self.document, statement=True)
+            elif symbol.kind == "import":
+                yield self._symbol(symbol, self.document)
+
+    def _material_values(self, rank: str) -> Iterator[_Item]:
+        for symbol in self.document.names.visible(self.cursor.offset):
+            if symbol.kind in ("let", "argument", "loop"):
+                value = getattr(symbol.node, "value", None)
+                if symbol.kind != "let" or isinstance(
+                    value, nodes.MaterialExpr | nodes.NameRef | nodes.Member
+                ):
+                    yield _Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
+
+    def _materials(self) -> Iterator[_Item]:
+        for name in sorted(self.words.materials):
+            text = f"{name} {{ ${{1:color(#d33);}} }}"
+            yield _Item(name, Kind.EnumMember, text, "a", "material", words.MATERIALS.get(name, ""), True)
+
+    # ------------------------------------------------------------ expressions
+
+    def _symbol(self, symbol: Symbol, where: Document, *, statement: bool = False) -> _Item:
+        text, snippet = "", False
+        if symbol.kind in ("fn", "module"):
+            required = [p.name for p in symbol.params if not getattr(p.node, "default", None)]
+            holes = ", ".join(f"${{{at}:{name}}}" for at, name in enumerate(required, 1))
+            text, snippet = f"{symbol.name}({holes}){';' if statement else ''}", True
+        elif symbol.kind == "import":
+            text = symbol.name
+        rank = "b" if symbol.scope.parent is not None else "d"
+        head, about = describe_symbol(symbol, where)
+        return _Item(symbol.name, _SYMBOLS[symbol.kind], text, rank, head, about, snippet)
+
+    def _expressions(self) -> Iterator[_Item]:
+        callee = find_callee(self.docs, self.document, self.cursor)
+        if callee is not None and self.cursor.call is not None:
+            yield from self._arguments(callee)
+        for symbol in self.document.names.visible(self.cursor.offset):
+            if symbol.kind != "module":
+                yield self._symbol(symbol, self.document)
+        for name, word in words.FUNCTION_WORDS.items():
+            yield _Item(name, Kind.Function, word.snippet, "k", word.head, word.text, True)
+        for known in (words.CONSTANTS, words.ANIMATED):
+            for name, word in known.items():
+                yield _Item(name, Kind.Constant, "", "l", about=word.text)
+        for name in ("true", "false"):
+            yield _Item(name, Kind.Keyword, "", "n")
+        yield _Item("material", Kind.Keyword, "material ", "n", about=words.KEYWORDS["material"].text)
+
+    def _arguments(self, callee: Callee) -> Iterator[_Item]:
+        """Names of arguments that are left, and values that the one at hand takes."""
+        call = self.cursor.call
+        assert call is not None
+        name = call.named
+        if name is None:
+            start = self.cursor.before[-1] in ("(", ",")
+            left = callee.params[call.index :] if callee.positional else callee.params
+            for param in left if start else ():
+                if param not in call.given:
+                    about = callee.about.get(param, "")
+                    yield _Item(f"{param} =", Kind.Field, f"{param} = ", "a", "argument", about)
+            if call.index < len(callee.params) and callee.positional:
+                name = callee.params[call.index]
+        yield from self._values(callee.name, name)
+
+    def _values(self, callee: str, param: str | None) -> Iterator[_Item]:
+        if param == "axis":
+            for axis in ("X", "Y", "Z"):
+                yield _Item(axis, Kind.EnumMember, "", "0", about=words.CONSTANTS[axis].text)
+        elif param == "loop":
+            for value in ("true", "false"):
+                yield _Item(value, Kind.EnumMember, "", "0")
+        elif param == "angle":
+            for unit in ("deg", "turn", "rad"):
+                label = {"deg": "30deg", "turn": "0.25turn", "rad": "0.5rad"}[unit]
+                text = f"${{1:{label.removesuffix(unit)}}}{unit}"
+                yield _Item(label, Kind.Unit, text, "0", "an angle", "", True)
+        elif callee in ("color", "background") and param == "c":
+            yield _Item("#d33", Kind.Color, "#${1:d33}", "0", "a colour", "", True)
+            for name in ("rgb", "hsv"):
+                yield _Item(
+                    name, Kind.Function, words.FUNCTION_WORDS[name].snippet, "0", "a colour", "", True
+                )
+            if callee == "background":
+                yield _Item("none", Kind.EnumMember, "", "0", about=words.CONSTANTS["none"].text)
+
+    def _members(self, before: tuple[str, ...]) -> Iterator[_Item]:
+        alias = before[-2] if len(before) > 1 else ""
+        symbol = self.document.names.scope_at(self.cursor.offset).find(alias)
+        if symbol is None or symbol.kind != "import" or not isinstance(symbol.node, nodes.Import):
+            if before[-3:-2] != (".",) and re.fullmatch(r"[\w\])]+", alias):
+                for name in "xyzrgb":
+                    yield _Item(name, Kind.Field)
+            return
+        library = self.docs.imported(self.document, symbol.node.path.value)
+        if library is None:
+            return
+        statement = len(before) == 2 or (len(before) == 3 and before[0] in COMBINE)
+        for found in library.names.exported():
+            if not statement or found.kind in ("module", "let"):
+                yield self._symbol(found, library, statement=statement)
+
+    # ------------------------------------------------------------ inside tokens
+
+    def _units(self) -> Iterator[_Item]:
+        typed = self.document.text[self.cursor.start : self.cursor.offset]
+        number = re.match(r"[0-9]*\.?[0-9]*", typed)
+        if number is None or not number[0] or number[0] == ".":
+            return
+        rest = typed[number.end() :]
+        for unit in UNITS:
+            if rest and unit.startswith(rest):
+                yield _Item(f"{number[0]}{unit}", Kind.Unit)
+
+    def _strings(self, before: tuple[str, ...]) -> Iterator[_Item]:
+        if before == ("model",):
+            for manifest in self.words.models:
+                yield _Item(manifest.name, Kind.Module, about=manifest.summary)
+        elif before == ("import",):
+            yield from self._paths()
+
+    def _paths(self) -> Iterator[_Item]:
+        """Scenes that can be imported, below the import root."""
+        document = self.document
+        folder = document.path.parent if document.path is not None else next(iter(self.docs.folders), None)
+        if folder is None:
+            return
+        count = 0
+        for where, inner, files in os.walk(folder):
+            inner[:] = sorted(name for name in inner if not name.startswith("."))[:20]
+            for name in sorted(files):
+                path = os.path.join(where, name)
+                if name.endswith(".nsg") and path != str(document.path):
+                    count += 1
+                    if count > _MAX_PATHS:
+                        return
+                    yield _Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
+
+
+def _ends_operand(text: str) -> bool:
+    """Whether an expression can end with a token, so that an operator and not an operand comes next."""
+    return text in (")", "]", "}", "true", "false") or (
+        (text[:1].isalnum() or text[:1] in '_#"') and text not in words.KEYWORDS
+    )
+
+
+def _in_parameters(before: tuple[str, ...]) -> bool:
+    """Whether the cursor is where a fn or module names its parameters."""
+    if before[0] not in ("fn", "module") or ")" in before:
+        return False
+    return before[-1] in ("(", ",")

@@ -1,0 +1,216 @@
+"""Where the cursor is: in which word, statement, call and block.
+
+This looks at tokens alone, which are there however broken the text is.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from scenelang.syntax.incremental import Parsed
+from scenelang.syntax.tables import tables
+
+BlockKind = Literal["file", "group", "chain", "object", "material"]
+COMBINE: Final = ("union", "smooth", "subtract", "intersect")
+_NODES: Final = {"group": "group", "chain": "chain", **dict.fromkeys(COMBINE, "group"), "module": "group"}
+_COMMENTS: Final = re.compile(r"//[^\n]*\n|/\*[\s\S]*?\*/")
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A call whose parentheses the cursor is in.
+
+    Args:
+        name: what is called, perhaps dotted.
+        start: where the name begins.
+        index: which positional argument the cursor is in, from 0.
+        named: the name of the argument it is in, if that has one.
+        given: names of arguments given so far, the cursor's own left out.
+    """
+
+    name: str
+    start: int
+    index: int
+    named: str | None
+    given: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A block around the cursor.
+
+    Args:
+        kind: what it may hold.
+        head: the word that heads its statement.
+        nested: whether a `for` or `if` stands in between.
+    """
+
+    kind: BlockKind
+    head: str
+    nested: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Cursor:
+    """What is around an offset.
+
+    Args:
+        offset: the place.
+        start, end: the word that the cursor is in or behind; equal to ``offset`` where there is none.
+        inside: ``comment``, ``string``, ``number``, ``colour`` or ``code``.
+        before: the tokens of the statement before that word, as text.
+        call: the innermost call.
+        block: the innermost block.
+    """
+
+    offset: int
+    start: int
+    end: int
+    inside: Literal["comment", "string", "number", "colour", "code"]
+    before: tuple[str, ...]
+    call: Call | None
+    block: Block
+
+
+class _Reader:
+    """Tokens read backwards."""
+
+    def __init__(self, parsed: Parsed) -> None:
+        tokens = parsed.tokens
+        self.kinds, self.starts, self.ends = tokens.kinds, tokens.starts, tokens.ends
+        self.source_text = parsed.source.text
+        self.names = tables().kinds
+
+    def text(self, index: int) -> str:
+        return self.source_text[self.starts[index] : self.ends[index]]
+
+    def kind(self, index: int) -> str:
+        return self.names[self.kinds[index]]
+
+    def head(self, index: int) -> int:
+        """Index of the first token of the statement that holds the token before ``index``."""
+        at = index
+        while at and self.kind(at - 1) not in (";", "{", "}"):
+            at -= 1
+        return at
+
+    def opening(self, index: int) -> int | None:
+        """Index of the `{` that is open before a token."""
+        depth = 0
+        for at in range(index - 1, -1, -1):
+            kind = self.kind(at)
+            if kind == "}":
+                depth += 1
+            elif kind == "{":
+                if depth == 0:
+                    return at
+                depth -= 1
+        return None
+
+
+def cursor_at(parsed: Parsed, offset: int, values: frozenset[str] = frozenset()) -> Cursor:
+    """What is around an offset.
+
+    Args:
+        parsed: the text.
+        offset: the place.
+        values: names in sight that may be materials.
+    """
+    read = _Reader(parsed)
+    count = len(read.kinds) - 1
+    index = min(bisect_left(read.starts, offset), count)  # tokens before this one begin before the cursor
+    start = end = offset
+    inside: Literal["comment", "string", "number", "colour", "code"] = "code"
+    if index and read.ends[index - 1] >= offset:
+        token = index - 1
+        kind, text = read.kind(token), read.text(token)
+        if kind == "STRING":
+            closed = len(text) > 1 and text.endswith('"') and read.ends[token] == offset
+            inside = "code" if closed else "string"
+        elif kind == "NUMBER":
+            inside = "number"
+        elif kind == "COLOR":
+            inside = "colour"
+        if inside != "code" or text[:1].isalpha() or text[:1] == "_":
+            start, end, index = read.starts[token], read.ends[token], token
+    elif _in_comment(read, index, offset):
+        inside = "comment"
+    head = read.head(index)
+    before = tuple(read.text(at) for at in range(head, index))
+    return Cursor(offset, start, end, inside, before, _call(read, head, index), _block(read, index, values))
+
+
+def _in_comment(read: _Reader, index: int, offset: int) -> bool:
+    gap = read.source_text[read.ends[index - 1] if index else 0 : offset]
+    rest = _COMMENTS.sub(" ", gap)
+    return "//" in rest or "/*" in rest
+
+
+def _call(read: _Reader, head: int, index: int) -> Call | None:
+    """The innermost call whose parentheses are open before a token."""
+    depth = commas = 0
+    given: set[str] = set()
+    named: str | None = None
+    fresh = True  # still in the argument that the cursor is in
+    for at in range(index - 1, head - 1, -1):
+        kind = read.kind(at)
+        if kind in (")", "]"):
+            depth += 1
+        elif kind in ("(", "["):
+            if depth:
+                depth -= 1
+                continue
+            if kind == "[":
+                commas, fresh, named = 0, True, None
+                given.clear()
+                continue
+            name, start = _callee(read, head, at)
+            return Call(name, start, commas, named, frozenset(given)) if name else None
+        elif depth == 0 and kind == ",":
+            commas += 1
+            fresh = False
+        elif depth == 0 and kind == "=" and at > head and read.kind(at - 1) in ("NAME", "step", "as"):
+            if fresh:
+                named = read.text(at - 1)
+            else:
+                given.add(read.text(at - 1))
+    return None
+
+
+def _callee(read: _Reader, head: int, opening: int) -> tuple[str, int]:
+    """The name before a `(`, and where it begins; empty for a parenthesis of another kind."""
+    at = opening - 1
+    if at < head or read.kind(at) not in ("NAME", "step", "as"):
+        return "", 0
+    if at > head and read.kind(at - 1) in ("fn", "module"):
+        return "", 0
+    name, start = read.text(at), read.starts[at]
+    while at - 2 >= head and read.kind(at - 1) == "." and read.kind(at - 2) == "NAME":
+        at -= 2
+        name, start = f"{read.text(at)}.{name}", read.starts[at]
+    return name, start
+
+
+def _block(read: _Reader, index: int, values: frozenset[str]) -> Block:
+    nested = False
+    while True:
+        brace = read.opening(index)
+        if brace is None:
+            return Block("file", "", nested)
+        head = read.head(brace)
+        words = [read.text(at) for at in range(head, brace)]
+        while words[1:] and words[0] in COMBINE:
+            words.pop(0)
+        first = words[0] if words else ""
+        if first in ("for", "if", "else"):
+            nested, index = True, head
+            continue
+        if first in _NODES:
+            kind: BlockKind = "chain" if first == "chain" else "group"
+            return Block(kind, first, nested)
+        if "material" in words[-2:] or "material" in words[-4:-1] or (first in values and len(words) == 1):
+            return Block("material", first, nested)
+        return Block("object", first, nested)

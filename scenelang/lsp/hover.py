@@ -1,0 +1,247 @@
+"""Hover: what the word under the cursor means, and what it came to when the scene was evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from lsprotocol import types
+
+from scenelang.lsp import values, words
+from scenelang.lsp.check import Seen
+from scenelang.lsp.names import Symbol, Use
+from scenelang.lsp.signatures import describe_symbol
+from scenelang.lsp.tree import path_to
+from scenelang.lsp.vocabulary import dimension_of, vocabulary_of
+from scenelang.lsp.workspace import Document, Workspace
+from scenelang.models.manifest import Manifest
+from scenelang.scene import to_nsg
+from scenelang.syntax import nodes
+
+
+def hover(docs: Workspace, document: Document, offset: int) -> types.Hover | None:
+    """What there is to say about an offset."""
+    use = document.names.at(offset)
+    if use is not None:
+        text = _use(docs, document, use)
+        return _answer(document, use.start, use.end, text) if text else None
+    path = path_to(document.parsed, offset)
+    for node in reversed(path):
+        keyword = _keyword(node, offset)
+        if keyword is not None:
+            start, end, word = keyword
+            return _answer(document, start, end, _word(words.KEYWORDS[word]) + _node_facts(document, node))
+    return None
+
+
+def _answer(document: Document, start: int, end: int, text: str) -> types.Hover:
+    content = types.MarkupContent(types.MarkupKind.Markdown, text)
+    return types.Hover(content, document.lines.range(start, end))
+
+
+def _code(text: str) -> str:
+    return f"```nsg\n{text}\n```"
+
+
+def _word(word: words.Word) -> str:
+    about = [f"- `{name}`: {line}" for name, line in zip(word.params, word.about, strict=False) if word.about]
+    return "\n\n".join([_code(word.head), word.text, *(["\n".join(about)] if about else [])])
+
+
+def _keyword(node: Any, offset: int) -> tuple[int, int, str] | None:
+    """The keyword that heads a node, if the cursor is on it."""
+    kinds = {
+        nodes.Version: "nsg",
+        nodes.Model: "model",
+        nodes.Param: "param",
+        nodes.Let: "let",
+        nodes.Fn: "fn",
+        nodes.Module: "module",
+        nodes.Import: "import",
+        nodes.For: "for",
+        nodes.If: "if",
+        nodes.MaterialUse: "material",
+        nodes.MaterialExpr: "material",
+    }
+    word = node.kind if isinstance(node, nodes.Node) else kinds.get(type(node))
+    if isinstance(node, nodes.Combined):
+        word = node.op
+    if word is None:
+        return None
+    start = node.span.start
+    return (start, start + len(word), word) if start <= offset <= start + len(word) else None
+
+
+# ---------------------------------------------------------------- names
+
+
+def _use(docs: Workspace, document: Document, use: Use) -> str | None:
+    found = docs.definition(document, use)
+    if found is not None:
+        return _definition(document, *found)
+    text = use.text
+    word: words.Word | None = None
+    match use.role:
+        case "function":
+            word = words.FUNCTION_WORDS.get(text)
+        case "constant":
+            word = words.CONSTANTS.get(text)
+        case "animated":
+            word = words.ANIMATED.get(text)
+        case "setting":
+            word = words.SETTINGS.get(text)
+        case "transform" | "operation":
+            table = words.OPERATIONS if use.role == "operation" else words.TRANSFORMS
+            return (_word(table[text]) + _transform_facts(document, use)) if text in table else None
+        case "geometry":
+            return _geometry(docs, document, use)
+        case "material":
+            return _material(document, text)
+        case "model":
+            return next((_model(m) for m in vocabulary_of(document).models if m.name == text), None)
+        case "argument":
+            return _argument(use)
+        case "path":
+            library = docs.imported(document, text)
+            return f"`{library.path}`" if library is not None else "no such file"
+        case _:
+            return None
+    return _word(word) if word is not None else None
+
+
+def _argument(use: Use) -> str | None:
+    word = words.word_for_call(use.callee.text, use.callee.role == "operation") if use.callee else None
+    if word is None or use.text not in word.params:
+        return None
+    about = dict(zip(word.params, word.about, strict=False)).get(use.text, "")
+    return f"{_code(word.head)}\n\n`{use.text}`: {about}" if about else _code(word.head)
+
+
+def _definition(document: Document, where: Document, symbol: Symbol) -> str:
+    head, about = describe_symbol(symbol, where)
+    parts = [_code(head)]
+    if about:
+        parts.append(about)
+    seen = seen_at(document, where, symbol.span.start, symbol.span.end)
+    line = describe_values(seen)
+    if line and not (isinstance(symbol.node, nodes.Let | nodes.Param) and _says_it(symbol.node, line)):
+        parts.append(line)
+    if where is not document and where.path is not None:
+        parts.append(f"in `{where.path.name}`")
+    return "\n\n".join(parts)
+
+
+def _says_it(node: nodes.Let | nodes.Param, line: str) -> bool:
+    """Whether a definition shows its value already."""
+    value = node.value if isinstance(node, nodes.Let) else node.default
+    return line == f"= `{value.span.text}`"
+
+
+def seen_at(document: Document, where: Document, start: int, end: int) -> Seen | None:
+    """What a place had in a document's last check; None where it has been edited since."""
+    checked = document.checked
+    if checked is None:
+        return None
+    if where is document:
+        old_start, old_end = document.before(start), document.before(end)
+        if old_start is None or old_end is None:
+            return None
+        start, end = old_start, old_end
+    return checked.at(where.source.name, start, end)
+
+
+def describe_values(seen: Seen | None) -> str:
+    """The values of a name in a line; empty where none is known."""
+    if seen is None:
+        return ""
+    shown = list(dict.fromkeys(text for v in seen.values if (text := values.show_value(v)) is not None))
+    if not shown:
+        return ""
+    more = ", …" if seen.count > len(seen.values) and len(shown) > 1 else ""
+    return "= " + ", ".join(f"`{text}`" for text in shown) + more
+
+
+# ---------------------------------------------------------------- what the model offers
+
+
+def _geometry(docs: Workspace, document: Document, use: Use) -> str | None:
+    text = use.text
+    owners = [m.name for m in vocabulary_of(document).models if text in m.geometries]
+    if not owners:
+        return None
+    parts = [_code(f"{text} {{ … }}"), words.GEOMETRIES.get(text, ""), "of " + _listed(owners)]
+    path = path_to(document.parsed, use.start)
+    node = next((n for n in reversed(path) if isinstance(n, nodes.Call) and n.name.text == text), None)
+    return "\n\n".join(part for part in parts if part) + (_node_facts(document, node) if node else "")
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(f"model `{name}`" for name in names)
+
+
+def _material(document: Document, text: str) -> str | None:
+    owners = [m.name for m in vocabulary_of(document).models if text in m.materials]
+    if not owners:
+        return None
+    return "\n\n".join(
+        [_code(f"material {text} {{ … }}"), words.MATERIALS.get(text, ""), "of " + _listed(owners)]
+    )
+
+
+def _model(manifest: Manifest) -> str:
+    """A model's facts."""
+    ranges = [f"{name} {low:g} to {high:g}" for name, (low, high) in manifest.trained.items()]
+    rows = [
+        ("geometries", ", ".join(manifest.geometries)),
+        ("materials", ", ".join(manifest.materials)),
+        ("transforms", ", ".join(manifest.transforms)),
+        ("texture operations", ", ".join(manifest.material_ops)),
+        ("measured for", "; ".join(ranges)),
+    ]
+    table = "\n".join(f"| {name} | {text} |" for name, text in rows if text)
+    head = f"{_code(f'model {chr(34)}{manifest.name}{chr(34)};')}\n\n{manifest.summary}"
+    return f"{head}\n\n| {manifest.dimension}D | |\n|---|---|\n{table}"
+
+
+# ---------------------------------------------------------------- transforms and objects
+
+
+def _nodes_of(document: Document, node: Any) -> list[Any]:
+    """Scene nodes that a statement made."""
+    seen = seen_at(document, document, node.span.start, node.span.end)
+    return list(seen.values) if seen is not None else []
+
+
+def _transform_facts(document: Document, use: Use) -> str:
+    """The matrix or the formula that a transform came to."""
+    path = path_to(document.parsed, use.start)
+    node = next((n for n in reversed(path) if isinstance(n, nodes.Call)), None)
+    if node is None:
+        return ""
+    made = _nodes_of(document, node)
+    parts = []
+    for item in made[:2]:
+        shown = values.show_transform(item, dimension_of(document))
+        if shown is not None:
+            called = to_nsg.transform(item)
+            parts.append(f"`{called}`\n\n```text\n{shown}\n```")
+    more = "\n\n…" if len(made) > 2 else ""
+    return "\n\n---\n\n" + "\n\n".join(parts) + more if parts else ""
+
+
+def _node_facts(document: Document, node: Any) -> str:
+    """The composed chain of an object or a group, and how often it was made."""
+    if not isinstance(node, nodes.Call | nodes.Node):
+        return ""
+    seen = seen_at(document, document, node.span.start, node.span.end)
+    made = [item for item in (seen.values if seen else ()) if getattr(item, "transforms", None)]
+    if seen is None or not made:
+        return ""
+    dimension = dimension_of(document)
+    item = made[0]
+    steps = values.show_chain(item.transforms, dimension)
+    chain = "\n".join(to_nsg.transform(t) for t in item.transforms)
+    times = f" (the first of {seen.count})" if seen.count > 1 else ""
+    composed = "\n\nthen\n\n".join(f"```text\n{step}\n```" for step in steps)
+    stretch = values.show_stretch(item.transforms, dimension)
+    return f"\n\n---\n\ntransforms{times}:\n{_code(chain)}\ncomposed:\n\n{composed}\n\nscales by {stretch}"

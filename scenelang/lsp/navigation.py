@@ -1,0 +1,194 @@
+"""Going about: definition, references, highlights, rename."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from lsprotocol import types
+
+from scenelang.lsp.names import Symbol, Use
+from scenelang.lsp.workspace import Document, Workspace, uri_of
+from scenelang.scene.vocabulary import LANGUAGE
+from scenelang.syntax import nodes
+from scenelang.syntax.tables import tables
+
+_NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+class Refused(Exception):
+    """Why a name cannot be changed."""
+
+
+def definition(docs: Workspace, document: Document, offset: int) -> types.Location | None:
+    """Where the name at an offset is defined; for an import's path the file."""
+    use = document.names.at(offset)
+    if use is None:
+        return None
+    if use.role == "path":
+        library = docs.imported(document, use.text)
+        return types.Location(library.uri, library.lines.range(0, 0)) if library is not None else None
+    found = docs.definition(document, use)
+    if found is None:
+        return None
+    where, symbol = found
+    return types.Location(where.uri, where.lines.span(symbol.span))
+
+
+def _uses(docs: Workspace, document: Document, offset: int) -> list[tuple[Document, Use]]:
+    use = document.names.at(offset)
+    found = docs.definition(document, use) if use is not None else None
+    return list(docs.uses(*found)) if found is not None else []
+
+
+def references(docs: Workspace, document: Document, offset: int, declaration: bool) -> list[types.Location]:
+    """Every place that means the same as the name at an offset."""
+    return [
+        types.Location(where.uri, where.lines.range(use.start, use.end))
+        for where, use in _uses(docs, document, offset)
+        if declaration or not use.defines
+    ]
+
+
+def highlights(docs: Workspace, document: Document, offset: int) -> list[types.DocumentHighlight]:
+    """The places of this file that mean the same as the name at an offset."""
+    use = document.names.at(offset)
+    if use is None:
+        return []
+    found = docs.definition(document, use)
+    if found is None:  # a word of the language: the same word elsewhere
+        alike = [u for u in document.names.uses if u.text == use.text and u.role == use.role]
+    else:
+        alike = [
+            u
+            for u in document.names.uses
+            if u.text == use.text and (d := docs.definition(document, u)) is not None and d[1] is found[1]
+        ]
+    kinds = types.DocumentHighlightKind
+    return [
+        types.DocumentHighlight(
+            document.lines.range(u.start, u.end), kinds.Write if u.defines else kinds.Read
+        )
+        for u in alike
+    ]
+
+
+# ---------------------------------------------------------------- rename
+
+
+def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.PrepareRenamePlaceholder | None:
+    """The name at an offset, where it may be changed.
+
+    Raises:
+        Refused: it belongs to the language or to a model.
+    """
+    use = document.names.at(offset)
+    if use is None:
+        return None
+    if docs.definition(document, use) is None:
+        raise Refused(f"'{use.text}' is not defined in a scene file")
+    return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
+
+
+def rename(docs: Workspace, document: Document, offset: int, new: str) -> types.WorkspaceEdit | None:
+    """Change a name wherever it is meant, in all files.
+
+    Raises:
+        Refused: the new name is none, or would mean something else somewhere.
+    """
+    use = document.names.at(offset)
+    found = docs.definition(document, use) if use is not None else None
+    if found is None or use is None:
+        return None
+    where, symbol = found
+    if new == symbol.name:
+        return None
+    _check_name(new, symbol)
+    places = list(docs.uses(where, symbol))
+    for other, place in places:
+        _check_place(other, place, symbol, new)
+    _check_captures(docs, where, symbol, new)
+    edits: dict[str, tuple[Document, list[types.TextEdit]]] = {}
+    for other, place in places:
+        text_edit = types.TextEdit(other.lines.range(place.start, place.end), new)
+        edits.setdefault(other.uri, (other, []))[1].append(text_edit)
+    return types.WorkspaceEdit(
+        document_changes=[
+            types.TextDocumentEdit(types.OptionalVersionedTextDocumentIdentifier(uri, other.version), changes)
+            for uri, (other, changes) in edits.items()
+        ],
+    )
+
+
+def plain_edit(edit: types.WorkspaceEdit) -> types.WorkspaceEdit:
+    """The same for clients that know no versioned edits."""
+    changes = {
+        item.text_document.uri: [e for e in item.edits if isinstance(e, types.TextEdit)]
+        for item in edit.document_changes or ()
+        if isinstance(item, types.TextDocumentEdit)
+    }
+    return types.WorkspaceEdit(changes=changes)
+
+
+def _check_name(new: str, symbol: Symbol) -> None:
+    keywords = {text for text in tables().literals if text[0].isalpha()} - {"step", "as"}
+    if not _NAME.fullmatch(new):
+        raise Refused(f"'{new}' is not a name: letters, digits and _, not beginning with a digit")
+    if new in keywords:
+        raise Refused(f"'{new}' is a keyword")
+    if symbol.kind == "module" and new in LANGUAGE:
+        raise Refused(f"'{new}' is a word of the language and names no module")
+
+
+def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
+    """Whether at a place that is renamed the new name stands for something else already."""
+    if place.role in ("member", "argument"):
+        return
+    scope = symbol.scope if place.defines else other.names.scope_at(place.start)
+    inner = scope
+    while inner is not None:
+        taken = inner.symbols.get(new)
+        if taken is not None:
+            line = taken.span.locate()[0][0]
+            raise Refused(f"'{new}' is already defined in line {line} of {_called(other)}")
+        if inner is symbol.scope:
+            return
+        if inner.parent is None:
+            return
+        inner = inner.parent
+
+
+def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) -> None:
+    """Whether the renamed definition would be meant where the new name means something else now."""
+    scope = symbol.scope
+    if symbol.owner is not None and any(p.name == new for p in symbol.owner.params):
+        raise Refused(f"'{symbol.owner.name}' has a parameter '{new}' already")
+    for use in where.names.uses:
+        if use.text != new or use.role in ("member", "argument", "property", "material", "model", "path"):
+            continue
+        if not scope.start <= use.start < scope.end:
+            continue
+        inner = where.names.scope_at(use.start)
+        meant = inner.find(new)
+        if meant is None or not (scope.start <= meant.scope.start and meant.scope.end <= scope.end):
+            line = where.lines.position(use.start).line + 1
+            raise Refused(f"'{new}' in line {line} of {_called(where)} would mean this")
+
+
+def _called(document: Document) -> str:
+    return document.path.name if document.path is not None else document.uri
+
+
+# ---------------------------------------------------------------- links
+
+
+def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:
+    """Imports that can be followed."""
+    found = []
+    for stmt in document.file.statements:
+        if isinstance(stmt, nodes.Import):
+            library = docs.imported(document, stmt.path.value)
+            if library is not None and library.path is not None:
+                place = document.lines.range(stmt.path.span.start + 1, max(stmt.path.span.end - 1, 0))
+                found.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
+    return found

@@ -1,0 +1,193 @@
+"""The server: requests of the client to the functions of this package, and diagnostics back.
+
+Syntax answers at once, in the loop that reads messages. Evaluation waits until the typing pauses and runs on
+a thread of its own; what it finds is dropped where the text has changed meanwhile.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import wraps
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from lsprotocol import types
+from pygls.lsp.server import LanguageServer
+from pygls.protocol import LanguageServerProtocol
+from pygls.protocol.language_server import lsp_method
+
+from scenelang.lsp.check import Checked, Superseded, Task, check
+from scenelang.lsp.convert import to_diagnostic
+from scenelang.lsp.settings import Settings
+from scenelang.lsp.workspace import Document, Workspace, path_of
+
+log = logging.getLogger("scenelang.lsp")
+_DEEP: Final = 10_000  # trees are up to 200 levels deep, walks take a few calls a level
+
+
+class Protocol(LanguageServerProtocol):
+    """pygls's protocol without its own copies of documents, which split lines by other rules."""
+
+    @lsp_method(types.TEXT_DOCUMENT_DID_OPEN)
+    def lsp_text_document__did_open(self, params: types.DidOpenTextDocumentParams) -> Any:
+        yield self.fm.features[types.TEXT_DOCUMENT_DID_OPEN], (params,), None
+
+    @lsp_method(types.TEXT_DOCUMENT_DID_CHANGE)
+    def lsp_text_document__did_change(self, params: types.DidChangeTextDocumentParams) -> Any:
+        yield self.fm.features[types.TEXT_DOCUMENT_DID_CHANGE], (params,), None
+
+    @lsp_method(types.TEXT_DOCUMENT_DID_CLOSE)
+    def lsp_text_document__did_close(self, params: types.DidCloseTextDocumentParams) -> Any:
+        yield self.fm.features[types.TEXT_DOCUMENT_DID_CLOSE], (params,), None
+
+
+class Server(LanguageServer):
+    """One client, its documents, and the checks that run for it."""
+
+    def __init__(self) -> None:
+        super().__init__("scenelang", version("scenelang"), protocol_cls=Protocol)
+        self.docs = Workspace()
+        self.settings = Settings()
+        self._timers: dict[str, asyncio.TimerHandle] = {}
+        self._running: dict[str, threading.Event] = {}
+        self._pool = ThreadPoolExecutor(1, "check")
+
+    def begin(self, params: types.InitializeParams) -> None:
+        """Take over what the client says about itself."""
+        sys.setrecursionlimit(max(sys.getrecursionlimit(), _DEEP))
+        encoding = str(getattr(self.workspace.position_encoding, "value", self.workspace.position_encoding))
+        folders = [path_of(folder.uri) for folder in params.workspace_folders or ()]
+        if not folders and params.root_uri:
+            folders = [path_of(params.root_uri)]
+        known = [folder.resolve() for folder in folders if folder is not None]
+        self.docs = Workspace(encoding, known)  # type: ignore[arg-type]
+        self.settings = Settings.read(params.initialization_options)
+
+    # ------------------------------------------------------------ diagnostics
+
+    def publish(self, document: Document) -> None:
+        """Send what is known now: the syntax of this text, and what the last check found, moved along."""
+        found = [*document.parsed.diagnostics, *document.semantic]
+        shown = [d for d in (to_diagnostic(item, document) for item in found) if d is not None]
+        self.text_document_publish_diagnostics(
+            types.PublishDiagnosticsParams(document.uri, shown, document.version)
+        )
+
+    def schedule(self, document: Document, delay_s: float | None = None) -> None:
+        """Check a document once nothing has changed for a while."""
+        self.forget(document.uri)
+        delay = self.settings.debounce_ms / 1000 if delay_s is None else delay_s
+        loop = asyncio.get_running_loop()
+        self._timers[document.uri] = loop.call_later(delay, self._start, document.uri)
+
+    def forget(self, uri: str) -> None:
+        """Drop the check that waits or runs for a document."""
+        timer = self._timers.pop(uri, None)
+        if timer is not None:
+            timer.cancel()
+        stop = self._running.pop(uri, None)
+        if stop is not None:
+            stop.set()
+
+    def _start(self, uri: str) -> None:
+        self._timers.pop(uri, None)
+        document = self.docs.open.get(uri)
+        if document is None:
+            return
+        stop = self._running[uri] = threading.Event()
+        loop = asyncio.get_running_loop()
+        parsed = document.parsed
+        folder = next(iter(self.docs.folders), None)
+        root = self.settings.root or (folder if document.path is None else None)
+        texts, model = self.docs.texts(), self.settings.model
+
+        def work() -> None:
+            if stop.is_set():
+                return
+            try:
+                task = Task(parsed.file, document.path, root, texts, model, len(parsed.diagnostics))
+                checked = check(task, stop)
+            except Superseded:
+                return
+            except Exception:
+                log.exception("internal error while checking %s", uri)
+                return
+            loop.call_soon_threadsafe(self._finish, document, checked, stop)
+
+        self._pool.submit(work)
+
+    def _finish(self, document: Document, checked: Checked, stop: threading.Event) -> None:
+        if stop.is_set() or checked.source is not document.source:
+            return
+        self._running.pop(document.uri, None)
+        document.checked, document.edits = checked, []
+        document.semantic = checked.diagnostics
+        self.publish(document)
+        if self.settings.value_hints and self._refreshes():
+            self.workspace_inlay_hint_refresh(None)
+
+    def _refreshes(self) -> bool:
+        workspace = self.client_capabilities.workspace
+        hint = workspace.inlay_hint if workspace is not None else None
+        return bool(hint is not None and hint.refresh_support)
+
+    def changed(self, path: Path | None, but: str = "") -> None:
+        """Check again what imports a file."""
+        if path is not None:
+            for other in self.docs.importers(path):
+                if other.uri != but:
+                    self.schedule(other)
+
+    def shutdown(self) -> None:
+        for uri in list(self.docs.open):
+            self.forget(uri)
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        super().shutdown()
+
+    def report_server_error(self, error: Exception, source: Any) -> None:
+        """Keep trouble in the log: a window that pops up helps nobody."""
+        log.error("%s", error)
+
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def quiet(empty: Any = None) -> Callable[[F], F]:
+    """Answer with ``empty`` where a handler fails: an editor goes on, and the log says what happened."""
+
+    def decorate(handler: F) -> F:
+        @wraps(handler)
+        def safe(server: Server, params: Any) -> Any:
+            from pygls.exceptions import JsonRpcException
+
+            try:
+                return handler(server, params)
+            except JsonRpcException:
+                raise
+            except Exception as error:
+                log.exception("internal error in %s", handler.__name__)
+                server.window_log_message(
+                    types.LogMessageParams(
+                        types.MessageType.Error, f"internal error in {handler.__name__}: {error!r}"
+                    )
+                )
+                return empty
+
+        return safe  # type: ignore[return-value]
+
+    return decorate
+
+
+def make_server() -> Server:
+    """A server with all its features."""
+    from scenelang.lsp import handlers
+
+    server = Server()
+    handlers.register(server)
+    return server

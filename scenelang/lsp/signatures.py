@@ -1,0 +1,101 @@
+"""Signatures: of what a definition says of itself, and of the call at the cursor."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from lsprotocol import types
+
+from scenelang.lsp.callees import find_callee
+from scenelang.lsp.context import cursor_at
+from scenelang.lsp.names import Symbol
+from scenelang.lsp.workspace import Document, Workspace
+from scenelang.syntax import nodes
+
+_LINE: Final = re.compile(r"^[ \t]*//(.*)$")
+_MAX_SHOWN: Final = 200
+
+
+def describe_symbol(symbol: Symbol, document: Document) -> tuple[str, str]:
+    """A definition's first line, and the comment above it."""
+    node = symbol.node
+    if isinstance(node, nodes.Module):
+        head = f"module {_call(symbol)}"
+    elif isinstance(node, nodes.Fn):
+        head = f"fn {_call(symbol)} = {_short(node.body.span.text)}"
+    elif isinstance(node, nodes.For):
+        head = f"for ({symbol.name} in {_short(node.iterable.span.text)})"
+    elif isinstance(node, nodes.Parameter):
+        head = f"(parameter) {_short(node.span.text)}"
+    else:
+        head = _short(node.span.text)
+    return head, comment_above(document, symbol)
+
+
+def _call(symbol: Symbol) -> str:
+    params = ", ".join(_short(p.node.span.text) for p in symbol.params)
+    return f"{symbol.name}({params})"
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 1] + "…"
+
+
+def comment_above(document: Document, symbol: Symbol) -> str:
+    """The lines of comment right above a definition, or behind it on its line."""
+    if isinstance(symbol.node, nodes.Parameter | nodes.For):
+        return ""
+    lines = document.lines
+    number = lines.position(symbol.node.span.start).line
+    found: list[str] = []
+    at = number - 1
+    while at >= 0 and (match := _LINE.match(_line(document, at))):
+        found.insert(0, match[1].strip())
+        at -= 1
+    last = lines.position(symbol.node.span.end).line
+    behind = re.match(r"[ \t]*//(.*)", _line(document, last)[_column(document, symbol) :])
+    if behind and not isinstance(symbol.node, nodes.Module):
+        found.append(behind[1].strip())
+    return "\n".join(found)
+
+
+def _line(document: Document, number: int) -> str:
+    starts = document.lines.starts
+    end = starts[number + 1] if number + 1 < len(starts) else len(document.text)
+    return document.text[starts[number] : end].rstrip("\r\n")
+
+
+def _column(document: Document, symbol: Symbol) -> int:
+    end = symbol.node.span.end
+    starts = document.lines.starts
+    return end - starts[document.lines.position(end).line]
+
+
+def signature_help(docs: Workspace, document: Document, offset: int) -> types.SignatureHelp | None:
+    """How what is being called is called, and which argument the cursor is in."""
+    cursor = cursor_at(document.parsed, offset)
+    callee = find_callee(docs, document, cursor)
+    if callee is None or cursor.call is None or cursor.inside == "comment":
+        return None
+    active: int | None = cursor.call.index
+    if cursor.call.named is not None:
+        named = cursor.call.named
+        active = callee.params.index(named) if named in callee.params else None
+    elif callee.variadic:
+        active = min(cursor.call.index, len(callee.params) - 1)
+    parameters = []
+    at = callee.head.find("(") + 1
+    for param in callee.params:
+        match = re.compile(rf"\b{re.escape(param)}\b").search(callee.head, at)
+        about = types.MarkupContent(types.MarkupKind.Markdown, callee.about.get(param, ""))
+        label: str | tuple[int, int] = param
+        if match is not None:
+            label, at = (match.start(), match.end()), match.end()
+        parameters.append(types.ParameterInformation(label, about if about.value else None))
+    text = types.MarkupContent(types.MarkupKind.Markdown, callee.text) if callee.text else None
+    if active is not None and active >= len(parameters):
+        active = None
+    signature = types.SignatureInformation(callee.head, text, parameters, active)
+    return types.SignatureHelp([signature], 0, active)

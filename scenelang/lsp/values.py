@@ -1,0 +1,119 @@
+"""Values, matrices and chains in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from scenelang.graph import affine
+from scenelang.graph.chain import merged
+from scenelang.graph.nodes import Move
+from scenelang.graph.steps import Affine, Rows, Warp
+from scenelang.graph.transforms import step_of
+from scenelang.scene import schema, to_nsg
+from scenelang.scene.values import POISON, Angle, MaterialValue, RangeValue, Time, Vec, pack, show
+
+_MOST_ITEMS = 8
+
+
+def show_value(value: Any) -> str | None:
+    """A value as one would write it; None for one that a mistake has made unknown."""
+    cls = value.__class__
+    if value is POISON:
+        return None
+    if cls is float:
+        return show(value)
+    if cls is bool:
+        return "true" if value else "false"
+    if cls is str:
+        short = value if len(value) <= 60 else value[:57] + "…"
+        return '"' + short.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if cls is Angle:
+        return _angle(value.rad)
+    if cls is Time:
+        return f"{show(value.s)}s"
+    if cls is Vec:
+        items = [show_value(item) or "?" for item in value.items[:_MOST_ITEMS]]
+        more = [f"… {len(value.items)} items"] if len(value.items) > _MOST_ITEMS else []
+        return f"[{', '.join([*items, *more])}]"
+    if cls is RangeValue:
+        ends = [show_value(pack(x, value.unit)) or "?" for x in (value.start, value.stop)]
+        step = "" if value.step is None else f" step {show_value(pack(value.step, value.unit))}"
+        return f"{ends[0]}{'..<' if value.exclusive else '..'}{ends[1]}{step}"
+    if cls is MaterialValue:
+        return to_nsg.material(value.material).rstrip(";")
+    return "none" if value is None else None
+
+
+def _angle(rad: float) -> str:
+    degrees = rad * 180 / 3.141592653589793
+    return f"{show(round(degrees, 6))}deg"
+
+
+def show_matrix(rows: Rows, dimension: int) -> str:
+    """The 3 × 3 matrix of a map of the plane, or the 4 × 4 one of space."""
+    if dimension == 2:
+        table = [[rows[0], rows[1], rows[3]], [rows[4], rows[5], rows[7]], [0.0, 0.0, 1.0]]
+    else:
+        table = [list(rows[0:4]), list(rows[4:8]), list(rows[8:12]), [0.0, 0.0, 0.0, 1.0]]
+    cells = [[f"{value + 0.0:.4g}" for value in row] for row in table]
+    width = max(len(cell) for row in cells for cell in row)
+    return "\n".join("[ " + "  ".join(cell.rjust(width) for cell in row) + " ]" for row in cells)
+
+
+def show_warp(warp: Warp) -> str:
+    """How a point goes back through a warp, in a formula."""
+    terms = []
+    if warp.twirl:
+        terms.append(f"{show(warp.twirl)} |p|")
+    for factor, name in zip(warp.bend, ("p.x", "p.y"), strict=True):
+        if factor:
+            terms.append(f"{show(factor)} {name}")
+    angle = " + ".join(terms) or "0"
+    return f"p → R({angle}) p"
+
+
+def show_transform(node: Any, dimension: int) -> str | None:
+    """The matrix or the formula of a geometry transform; None for what is neither."""
+    if not isinstance(node, Transform):
+        return None
+    step = step_of(node, dimension)
+    if isinstance(step, Affine):
+        return show_matrix(step.rows, dimension)
+    return show_warp(step) if isinstance(step, Warp) else None
+
+
+Transform = (
+    schema.Translate
+    | schema.Rotate
+    | schema.Scale
+    | schema.Shear
+    | schema.Matrix
+    | schema.Twirl
+    | schema.Bend
+    | schema.Twist
+    | schema.Displace
+)
+
+
+def show_chain(transforms: tuple[Any, ...], dimension: int) -> list[str]:
+    """A chain of transforms after composing its neighbouring affine maps: matrices and formulas in order."""
+    moves = []
+    for transform in transforms:
+        step = step_of(transform, dimension)
+        if isinstance(step, Affine | Warp):
+            moves.append(Move(step))
+    return [
+        show_matrix(move.step.rows, dimension) if isinstance(move.step, Affine) else show_warp(move.step)
+        for move in merged(moves)
+    ]
+
+
+def show_stretch(transforms: tuple[Any, ...], dimension: int) -> str:
+    """How much the affine maps of a chain scale, at least and at most."""
+    rows = affine.translation(0.0, 0.0)
+    for transform in transforms:
+        step = step_of(transform, dimension)
+        if isinstance(step, Affine):
+            rows = affine.compose(step.rows, rows)
+    low, high = affine.stretches(rows, dimension)
+    return show(low) if abs(low - high) < 1e-9 * max(high, 1.0) else f"{show(low)} to {show(high)}"

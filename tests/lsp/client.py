@@ -1,0 +1,279 @@
+"""A client of the language server over real standard input and output, written against the protocol alone.
+
+It keeps its own copy of each text and knows nothing of the server's code, so that both can be held against
+each other.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+Json = dict[str, Any]
+CAPABILITIES: Json = {
+    "general": {"positionEncodings": ["utf-16"]},
+    "workspace": {
+        "workspaceEdit": {"documentChanges": True},
+        "didChangeWatchedFiles": {"dynamicRegistration": True},
+        "inlayHint": {"refreshSupport": True},
+    },
+    "textDocument": {
+        "completion": {"completionItem": {"snippetSupport": True}},
+        "rename": {"prepareSupport": True},
+        "publishDiagnostics": {"relatedInformation": True, "versionSupport": True},
+        "semanticTokens": {
+            "requests": {"full": True, "range": True},
+            "tokenTypes": [],
+            "tokenModifiers": [],
+            "formats": ["relative"],
+        },
+    },
+}
+
+
+class Client:
+    """One server process and the editor in front of it.
+
+    Args:
+        root: the folder that the editor has open.
+        encoding: the only position encoding that the client knows.
+        options: initialization options.
+        command: how to start the server.
+    """
+
+    def __init__(
+        self,
+        root: Path | None = None,
+        encoding: str = "utf-16",
+        options: Json | None = None,
+        command: list[str] | None = None,
+    ) -> None:
+        self.process = subprocess.Popen(
+            command or [sys.executable, "-m", "scenelang", "lsp"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+        self.encoding = encoding
+        self.texts: dict[str, str] = {}
+        self.versions: dict[str, int] = {}
+        self.published: dict[str, list[Json]] = {}
+        self.logged: list[Json] = []
+        self.asked: list[Json] = []
+        self._answers: dict[int, Json] = {}
+        self._inbox: queue.Queue[Json | None] = queue.Queue()
+        self._id = 0
+        self.stderr: list[bytes] = []
+        for target in (self._read, self._drain):
+            threading.Thread(target=target, daemon=True).start()
+        capabilities = json.loads(json.dumps(CAPABILITIES))
+        capabilities["general"]["positionEncodings"] = [encoding]
+        folder = {"uri": root.as_uri(), "name": root.name} if root else None
+        params = {
+            "processId": None,
+            "rootUri": folder["uri"] if folder else None,
+            "workspaceFolders": [folder] if folder else None,
+            "capabilities": capabilities,
+            "initializationOptions": {"debounceMs": 20} if options is None else options,
+        }
+        self.capabilities = self.request("initialize", params)["capabilities"]
+        self.notify("initialized", {})
+
+    # ------------------------------------------------------------ messages
+
+    def _read(self) -> None:
+        stream = self.process.stdout
+        assert stream is not None
+        while True:
+            length = 0
+            while (line := stream.readline().strip()) or not length:
+                if not line and stream.closed:
+                    break
+                if not line:
+                    if self.process.poll() is not None or not length:
+                        self._inbox.put(None)
+                        return
+                    break
+                name, _, value = line.partition(b":")
+                if name.lower() == b"content-length":
+                    length = int(value)
+            self._inbox.put(json.loads(stream.read(length)))
+
+    def _drain(self) -> None:
+        assert self.process.stderr is not None
+        for line in self.process.stderr:
+            self.stderr.append(line)
+
+    def send(self, message: Json) -> None:
+        data = json.dumps({"jsonrpc": "2.0", **message}).encode()
+        assert self.process.stdin is not None
+        self.process.stdin.write(b"Content-Length: %d\r\n\r\n" % len(data) + data)
+        self.process.stdin.flush()
+
+    def notify(self, method: str, params: Any) -> None:
+        self.send({"method": method, "params": params})
+
+    def start(self, method: str, params: Any) -> int:
+        """Send a request; its answer is asked for later."""
+        self._id += 1
+        self.send({"id": self._id, "method": method, "params": params})
+        return self._id
+
+    def _take(self, seconds: float) -> bool:
+        """Take one message in; False where none came."""
+        try:
+            message = self._inbox.get(timeout=max(seconds, 0.0))
+        except queue.Empty:
+            return False
+        if message is None:
+            raise EOFError(b"".join(self.stderr).decode())
+        method = message.get("method")
+        if method == "textDocument/publishDiagnostics":
+            self.published.setdefault(message["params"]["uri"], []).append(message["params"])
+        elif method == "window/logMessage":
+            self.logged.append(message["params"])
+        elif method and "id" in message:
+            self.asked.append(message)
+            self.send({"id": message["id"], "result": None})
+        elif method is None:
+            self._answers[message["id"]] = message
+        return True
+
+    def answer(self, request: int, seconds: float = 30.0) -> Json:
+        """The whole answer to a request."""
+        end = time.monotonic() + seconds
+        while request not in self._answers:
+            assert self._take(end - time.monotonic()), f"no answer to {request}"
+        return self._answers.pop(request)
+
+    def request(self, method: str, params: Any) -> Any:
+        """The result of a request; an error of the server fails the test."""
+        message = self.answer(self.start(method, params))
+        assert "error" not in message, message["error"]
+        return message["result"]
+
+    def refused(self, method: str, params: Any) -> str:
+        """The message of a request that the server refuses."""
+        message = self.answer(self.start(method, params))
+        assert "error" in message, message
+        return str(message["error"]["message"])
+
+    # ------------------------------------------------------------ documents
+
+    def open(self, uri: str, text: str) -> str:
+        self.texts[uri], self.versions[uri] = text, 1
+        item = {"uri": uri, "languageId": "nsg", "version": 1, "text": text}
+        self.notify("textDocument/didOpen", {"textDocument": item})
+        return uri
+
+    def change(self, uri: str, start: int, end: int, new: str) -> None:
+        """Replace offsets ``[start, end)`` of a text."""
+        text = self.texts[uri]
+        place = {"start": self.position(text, start), "end": self.position(text, end)}
+        self.texts[uri] = text[:start] + new + text[end:]
+        self._changed(uri, {"range": place, "text": new})
+
+    def replace(self, uri: str, text: str) -> None:
+        """Send a whole text."""
+        self.texts[uri] = text
+        self._changed(uri, {"text": text})
+
+    def _changed(self, uri: str, change: Json) -> None:
+        self.versions[uri] += 1
+        document = {"uri": uri, "version": self.versions[uri]}
+        self.notify("textDocument/didChange", {"textDocument": document, "contentChanges": [change]})
+
+    def close(self, uri: str) -> None:
+        self.notify("textDocument/didClose", {"textDocument": {"uri": uri}})
+
+    def position(self, text: str, offset: int) -> Json:
+        before = text[:offset]
+        line = before.count("\n")
+        column = before[before.rfind("\n") + 1 :]
+        return {"line": line, "character": self.units(column)}
+
+    def units(self, text: str) -> int:
+        return (
+            len(text.encode({"utf-16": "utf-16-le", "utf-8": "utf-8", "utf-32": "utf-32-le"}[self.encoding]))
+            // {
+                "utf-16": 2,
+                "utf-8": 1,
+                "utf-32": 4,
+            }[self.encoding]
+        )
+
+    def offset(self, text: str, place: Json) -> int:
+        start = 0
+        for _ in range(place["line"]):
+            start = text.index("\n", start) + 1
+        at = start
+        while self.units(text[start:at]) < place["character"]:
+            at += 1
+        return at
+
+    def at(self, uri: str, word: str, shift: int = 0, occurrence: int = 0) -> Json:
+        """Text and position of the ``occurrence``-th ``word`` of a document, ``shift`` further on."""
+        at = -1
+        for _ in range(occurrence + 1):
+            at = self.texts[uri].index(word, at + 1)
+        return {
+            "textDocument": {"uri": uri},
+            "position": self.position(self.texts[uri], at + shift),
+        }
+
+    def shown(self, uri: str, place: Json) -> str:
+        """The text of a range."""
+        text = self.texts[uri]
+        return text[self.offset(text, place["start"]) : self.offset(text, place["end"])]
+
+    def applied(self, text: str, edits: list[Json]) -> str:
+        """A text after edits, which must not overlap."""
+        spans = sorted(
+            (self.offset(text, e["range"]["start"]), self.offset(text, e["range"]["end"]), e["newText"])
+            for e in edits
+        )
+        out, at = [], 0
+        for start, end, new in spans:
+            assert start >= at, "edits overlap"
+            out += [text[at:start], new]
+            at = end
+        return "".join([*out, text[at:]])
+
+    def diagnostics(self, uri: str, seconds: float = 20.0) -> list[Json]:
+        """What is published for the latest text of a document, once its check has ended too."""
+        end = time.monotonic() + seconds
+        count = len(self.published.get(uri, []))
+        wanted = 2  # the syntax at once, the rest later
+        while True:
+            found = [p for p in self.published.get(uri, []) if p.get("version") == self.versions[uri]]
+            if len(found) >= wanted:
+                return list(found[-1]["diagnostics"])
+            assert self._take(end - time.monotonic()), f"only {count} publications for {uri}"
+
+    def next_diagnostics(self, uri: str, seconds: float = 20.0) -> list[Json]:
+        """The publication after those that have come so far."""
+        end = time.monotonic() + seconds
+        count = len(self.published.get(uri, []))
+        while len(self.published.get(uri, [])) == count:
+            assert self._take(end - time.monotonic()), "nothing published"
+        return list(self.published[uri][-1]["diagnostics"])
+
+    def stop(self) -> int:
+        """Shut the server down; its exit code."""
+        self.request("shutdown", None)
+        self.notify("exit", None)
+        return self.process.wait(20)
+
+    def kill(self) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait(20)
+        for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
+            if stream is not None:
+                stream.close()
