@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.graph.lower import Memory
 from scenelang.scene.evaluate import Evaluation
 from scenelang.scene.imports import Unreadable, read_source
 from scenelang.scene.params import Defines
@@ -85,6 +86,7 @@ class Clip:
             replays=reuse,
         )
         self._last: tuple[Shot, Program] | None = None
+        self._memory = Memory() if reuse else None
         self.wanted = self._evaluation.wanted
         """All files that it imports, also those that are not there."""
         self._first: Shot | None = None
@@ -137,7 +139,13 @@ class Clip:
 
         if self.reuse and self._last is not None and _same(self._last[0].scene, shot.scene):
             return self._last[1]
-        program = compile_scene(shot.scene, spans=shot.spans, diagnostics=self.diagnostics, model=self.model)
+        program = compile_scene(
+            shot.scene,
+            spans=shot.spans,
+            diagnostics=self.diagnostics,
+            model=self.model,
+            memory=self._memory,
+        )
         self._last = shot, program
         return program
 

@@ -44,6 +44,15 @@ def leaf_box(leaf: Leaf, level: float, dimension: int) -> Box:
     """
     if dimension != 2:
         return EVERYWHERE
+    if leaf.notes is None:
+        return _box(leaf, level)
+    box: Box | None = leaf.notes.get(level)
+    if box is None:
+        box = leaf.notes[level] = _box(leaf, level)
+    return box
+
+
+def _box(leaf: Leaf, level: float) -> Box:
     reach = 0.0
     if level > 0.0:
         stretch = affine.stretches(composed(leaf.moves), 2)[0]

@@ -1,4 +1,4 @@
-"""A graph as text, for people and for `--dump-after`."""
+"""A graph as text, for people."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def dump(graph: Graph) -> str:
         link, depth, first = stack.pop()
         word = "" if first or link.op == "union" else f"{link.op} "
         node = link.node
-        name = f"{node.geometry} {_hex(node.rgb)}" if isinstance(node, Leaf) else f"({node.kind})"
-        moves = " ".join(_move(move, graph.dimension) for move in node.moves)
+        name = f"{node.geometry} {hex_text(node.rgb)}" if isinstance(node, Leaf) else f"({node.kind})"
+        moves = " ".join(move_text(move, graph.dimension) for move in node.moves)
         lines.append(f"{'  ' * depth}{word}{name}" + (f"  {moves}" if moves else ""))
         if isinstance(node, Fold):
             _push(stack, node, depth + 1)
@@ -35,7 +35,8 @@ def _push(stack: list[tuple[Link, int, bool]], fold: Fold, depth: int) -> None:
     stack.extend((fold.links[at], depth, at == 0) for at in range(len(fold.links) - 1, -1, -1))
 
 
-def _move(move: Move, dimension: int) -> str:
+def move_text(move: Move, dimension: int) -> str:
+    """``warp(twirl; bend)``, or the rows of a matrix."""
     step = move.step
     if not isinstance(step, Affine):
         return f"warp({step.twirl:.6g}; {step.bend[0]:.6g} {step.bend[1]:.6g})"
@@ -46,5 +47,6 @@ def _move(move: Move, dimension: int) -> str:
     return f"[{'; '.join(rows)}]"
 
 
-def _hex(rgb: tuple[float, float, float]) -> str:
+def hex_text(rgb: tuple[float, float, float]) -> str:
+    """``#rrggbb``, rounded."""
     return "#" + "".join(f"{int(255.0 * v + 0.5):02x}" for v in rgb)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import Span
@@ -27,7 +27,25 @@ class Spans(Protocol):
         """The place of ``node``, None where it is unknown."""
 
 
-def lower(scene: schema.Scene, manifest: Manifest, spans: Spans | None, diagnostics: Diagnostics) -> Graph:
+Leaves = dict[int, tuple[schema.Object, schema.Material | None, Leaf]]
+"""Objects, by identity, with the material around them and what they were lowered to."""
+
+
+class Memory:
+    """The leaves of the last frame of an animation: objects that stay keep theirs, with their notes."""
+
+    def __init__(self) -> None:
+        self.leaves: Leaves = {}
+        self.model = ""  # that they were lowered for
+
+
+def lower(
+    scene: schema.Scene,
+    manifest: Manifest,
+    spans: Spans | None,
+    diagnostics: Diagnostics,
+    memory: Memory | None = None,
+) -> Graph:
     """The graph of a scene for one model.
 
     Where a name or a transform is not one the model has, a diagnostic says so and the node is kept
@@ -38,6 +56,7 @@ def lower(scene: schema.Scene, manifest: Manifest, spans: Spans | None, diagnost
         manifest: the model's.
         spans: where nodes were written; None for a scene that did not come from text.
         diagnostics: receives E03xx and E05xx.
+        memory: of the frame before; holds this one afterwards.
     """
     width, height = scene.canvas
     most = manifest.limits.get("canvas", 8192)
@@ -48,7 +67,11 @@ def lower(scene: schema.Scene, manifest: Manifest, spans: Spans | None, diagnost
             spans.span(scene) if spans else None,
             help="render smaller with `canvas(w, h)` or `--size`",
         )
-    root = _Lowering(manifest, spans, diagnostics).run(scene)
+    old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
+    lowering = _Lowering(manifest, spans, diagnostics, old, None if memory is None else {})
+    root = lowering.run(scene)
+    if memory is not None and lowering.kept is not None:
+        memory.leaves, memory.model = lowering.kept, manifest.name
     return Graph(root, scene.canvas, scene.background, manifest.dimension)
 
 
@@ -69,6 +92,8 @@ class _Lowering:
     manifest: Manifest
     spans: Spans | None
     diagnostics: Diagnostics
+    old: Leaves
+    kept: Leaves | None
     objects: int = 0
     colours: dict[int, tuple[str, Triple]] = field(default_factory=dict)
     said: set[tuple[str, str]] = field(default_factory=set)
@@ -113,10 +138,21 @@ class _Lowering:
         return ((link.op, link.node) for link in node.children)
 
     def leaf(self, node: schema.Object, material: schema.Material | None) -> Leaf:
+        if self.kept is None:
+            return self.lowered(node, material, None)
+        seen = self.old.get(id(node))
+        if seen is None or seen[0] is not node or seen[1] is not material:
+            seen = node, material, self.lowered(node, material, {})
+        self.kept[id(node)] = seen
+        return seen[2]
+
+    def lowered(
+        self, node: schema.Object, material: schema.Material | None, notes: dict[Any, Any] | None
+    ) -> Leaf:
         if node.geometry not in self.manifest.geometries:
             self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
         name, rgb = (self.manifest.default_material, WHITE) if material is None else self.colour(material)
-        return Leaf(node.geometry, name, rgb, self.moves(node), self.place(node))
+        return Leaf(node.geometry, name, rgb, self.moves(node), self.place(node), notes)
 
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
         found = []

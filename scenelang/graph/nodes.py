@@ -7,7 +7,8 @@ new graph.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from scenelang.diagnostics.span import Span
 from scenelang.graph.steps import Step
@@ -32,6 +33,8 @@ class Leaf:
         rgb: the colour after the material's whole chain, in [0, 1], as written (sRGB in 2D).
         moves: steps into the parent's space, nearest the leaf first.
         span: where the object was written.
+        notes: what was worked out about a leaf that stays from frame to frame of an animation, by what it
+            is; None for a leaf that is used once. It is no part of the value.
     """
 
     geometry: str
@@ -39,6 +42,12 @@ class Leaf:
     rgb: tuple[float, float, float]
     moves: tuple[Move, ...] = ()
     span: Span | None = None
+    notes: dict[Any, Any] | None = field(default=None, compare=False, repr=False)
+
+    def moved(self, moves: tuple[Move, ...]) -> Leaf:
+        """The same object with other moves."""
+        notes: dict[Any, Any] | None = None if self.notes is None else {}
+        return Leaf(self.geometry, self.material, self.rgb, moves, self.span, notes)
 
 
 @dataclass(frozen=True, slots=True)

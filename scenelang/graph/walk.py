@@ -46,13 +46,25 @@ def leaves(root: Node) -> Iterator[Leaf]:
     return (node for node, _ in nodes(root) if isinstance(node, Leaf))
 
 
-def map_moves(graph: Graph, change: Callable[[tuple[Move, ...]], tuple[Move, ...]]) -> Graph:
-    """The graph with ``change`` applied to the moves of every node."""
+def map_moves(graph: Graph, change: Callable[[tuple[Move, ...]], tuple[Move, ...]], name: str) -> Graph:
+    """The graph with ``change`` applied to the moves of every node.
+
+    Args:
+        graph: any graph.
+        change: depends on nothing but the moves and the graph's dimension.
+        name: of the change, under which leaves that stay note what became of them.
+    """
 
     def leaf(node: Leaf) -> Node:
         if not node.moves:
             return node
-        return Leaf(node.geometry, node.material, node.rgb, change(node.moves), node.span)
+        if node.notes is None:
+            return node.moved(change(node.moves))
+        made: Leaf | None = node.notes.get(name)
+        if made is None:
+            moves = change(node.moves)
+            made = node.notes[name] = node if moves == node.moves else node.moved(moves)
+        return made
 
     def fold(node: Fold, children: list[Node]) -> Fold:
         links = [Link(link.op, child) for link, child in zip(node.links, children, strict=True)]

@@ -7,12 +7,12 @@ which costs less than finding the equal ones would.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.lower import Spans, lower
+from scenelang.graph.lower import Memory, Spans, lower
 from scenelang.graph.nodes import Graph
 from scenelang.graph.verify import Invariant, verify
 from scenelang.models.manifest import Manifest
@@ -56,22 +56,39 @@ PASSES: tuple[Pass, ...] = (
 )
 
 
-def run_passes(graph: Graph, context: Context, after: Callable[[str, Graph], None] | None = None) -> Graph:
+OPTIONAL = frozenset({"drop_unseen", "drop_hidden"})
+"""Passes that only save work: no later stage needs what they do."""
+
+
+def run_passes(
+    graph: Graph,
+    context: Context,
+    after: Callable[[str, Graph], None] | None = None,
+    without: Collection[str] = (),
+) -> Graph:
     """Run all passes in order, verifying the graph after each.
 
     Args:
         graph: as lowered.
         context: the model and where mistakes go.
         after: called with ``"lower"`` and each pass's name and the graph it left.
+        without: names of `OPTIONAL` passes to leave out.
 
     Returns:
         The graph after the last pass; if errors were reported on the way, what could be kept of it.
+
+    Raises:
+        ValueError: a pass that others need is to be left out.
     """
+    if not OPTIONAL.issuperset(without):
+        raise ValueError(f"passes that cannot be left out: {', '.join(sorted(set(without) - OPTIONAL))}")
     holds: frozenset[Invariant] = frozenset()
     verify(graph, "lower")
     if after is not None:
         after("lower", graph)
     for step in PASSES:
+        if step.name in without:
+            continue
         before, graph = graph, step.run(graph, context)
         if graph is not before or step.establishes:
             holds |= step.establishes
@@ -92,6 +109,8 @@ def check_scene(
     diagnostics: Diagnostics,
     manifest: Manifest,
     after: Callable[[str, Graph], None] | None = None,
+    without: Collection[str] = (),
+    memory: Memory | None = None,
 ) -> Graph:
     """Everything that can be said of a scene before it is lifted; imports no numpy.
 
@@ -100,16 +119,17 @@ def check_scene(
         spans: where its nodes were written, None if it did not come from text.
         diagnostics: receives errors and warnings.
         manifest: of the model to draw with.
-        after: as for `run_passes`.
+        after, without: as for `run_passes`.
+        memory: as for `lower`.
 
     Returns:
         The stream; it stands for the scene only if no error was reported.
     """
     before = len(diagnostics.errors)
     with _uncollected():
-        graph = lower(scene, manifest, spans, diagnostics)
+        graph = lower(scene, manifest, spans, diagnostics, memory)
         whole = len(diagnostics.errors) == before
-        return run_passes(graph, Context(manifest, diagnostics, whole), after)
+        return run_passes(graph, Context(manifest, diagnostics, whole), after, without)
 
 
 @contextmanager

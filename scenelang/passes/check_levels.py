@@ -21,7 +21,11 @@ def check_levels(graph: Graph, context: Context) -> Graph:
     Before: the normal form of `fold_warps`.
     """
     for leaf in leaves(graph.root):
-        _check(leaf, graph.dimension, context)
+        if leaf.notes is None:
+            _check(leaf, graph.dimension, context)
+        elif "check_levels" not in leaf.notes:
+            leaf.notes["check_levels"] = True
+            _check(leaf, graph.dimension, context)
     return graph
 
 

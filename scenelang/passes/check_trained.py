@@ -38,7 +38,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     manifest, worst, count = context.manifest, dict[str, _Worst](), 0
     for leaf in leaves(graph.root):
         count += 1
-        for quantity, value in _measures(leaf, graph.dimension):
+        for quantity, value in _noted(leaf, graph.dimension):
             _note(worst, quantity, value, leaf, manifest)
     for quantity in ("twirl", "bend", "scale"):
         if (found := worst.get(quantity)) is not None:
@@ -53,6 +53,15 @@ def check_trained(graph: Graph, context: Context) -> Graph:
         last = next((link.node for link in reversed(graph.root.links) if isinstance(link.node, Leaf)), None)
         _warn(context, "objects", f"{count:,} objects are outside the measured range {{}}", last)
     return graph
+
+
+def _noted(leaf: Leaf, dimension: int) -> list[tuple[str, float]]:
+    if leaf.notes is None:
+        return _measures(leaf, dimension)
+    found: list[tuple[str, float]] | None = leaf.notes.get("measures")
+    if found is None:
+        found = leaf.notes["measures"] = _measures(leaf, dimension)
+    return found
 
 
 def _measures(leaf: Leaf, dimension: int) -> list[tuple[str, float]]:

@@ -48,10 +48,19 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
             keep[index] = False
         elif op == "union":
             drawn.add(key)
-            cover = _cover(leaf)
+            cover = _noted(leaf)
             if cover is not None and (len(covers) < _MOST or cover > covers[-1]):
                 covers = sorted([*covers, cover], reverse=True)[:_MOST]
     return Graph(begun(links, keep), graph.canvas, graph.background, graph.dimension)
+
+
+def _noted(leaf: Leaf) -> Cover | None:
+    if leaf.notes is None:
+        return _cover(leaf)
+    if "cover" not in leaf.notes:
+        leaf.notes["cover"] = _cover(leaf)
+    cover: Cover | None = leaf.notes["cover"]
+    return cover
 
 
 def _cover(leaf: Leaf) -> Cover | None:

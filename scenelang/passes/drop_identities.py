@@ -13,7 +13,7 @@ def drop_identities(graph: Graph, context: Context) -> Graph:
 
     Maps that only compose to the identity are left to `fold_warps`.
     """
-    return map_moves(graph, _kept)
+    return map_moves(graph, _kept, "drop_identities")
 
 
 def _kept(moves: Moves) -> Moves:

@@ -14,4 +14,4 @@ def fold_affines(graph: Graph, context: Context) -> Graph:
     Before: any graph. After: MERGED. Doing it here, before `push_transforms`, keeps the chain that each
     group hands down short however deep it stands.
     """
-    return map_moves(graph, merged)
+    return map_moves(graph, merged, "fold_affines")

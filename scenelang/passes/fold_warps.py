@@ -18,4 +18,4 @@ def fold_warps(graph: Graph, context: Context) -> Graph:
     def change(moves: Moves) -> Moves:
         return normal(moves, graph.dimension)
 
-    return map_moves(graph, change)
+    return map_moves(graph, change, "fold_warps")

@@ -31,11 +31,12 @@ def push_transforms(graph: Graph, context: Context) -> Graph:
         if len(here.links) < len(here.fold.links):
             link = here.fold.links[len(here.links)]
             node = link.node
+            if isinstance(node, Leaf) and not here.outward:
+                here.links.append(link)
+                continue
             moves = merged(node.moves + here.outward) if here.outward else node.moves
             if isinstance(node, Leaf):
-                here.links.append(
-                    Link(link.op, Leaf(node.geometry, node.material, node.rgb, moves, node.span))
-                )
+                here.links.append(Link(link.op, node.moved(moves)))
             else:
                 stack.append(_Open(node, moves))
             continue

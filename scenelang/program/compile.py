@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
-from scenelang.graph.lower import Spans
+from scenelang.graph.lower import Memory, Spans
 from scenelang.graph.nodes import Graph
 from scenelang.models.choose import choose_model
 from scenelang.models.manifest import Manifest, available, load_manifest
@@ -26,6 +26,8 @@ def compile_scene(
     model: str | None = None,
     codes: Codes | None = None,
     after: Callable[[str, Graph], None] | None = None,
+    without: Collection[str] = (),
+    memory: Memory | None = None,
 ) -> Program:
     """Compile a scene for a model.
 
@@ -36,6 +38,9 @@ def compile_scene(
         model: draw with this model instead of the one the scene names.
         codes: lift with these instead of the model's shipped ones, for weights under trial.
         after: called with ``"lower"`` and the name of each pass and the graph it left.
+        without: names of passes to leave out, of those that only save work (`scenelang.passes.OPTIONAL`).
+        memory: what the frame before left, of an animation whose frames share nodes; the same Program comes
+            out with or without it.
 
     Returns:
         The Program; the same scene always gives the same one, byte for byte.
@@ -47,7 +52,7 @@ def compile_scene(
     found = diagnostics if diagnostics is not None else Diagnostics()
     manifest = find_model(scene, found, model=model, spans=spans)
     if manifest is not None:
-        graph = check_scene(scene, spans, found, manifest, after)
+        graph = check_scene(scene, spans, found, manifest, after, without, memory)
     if manifest is None or found.errors:
         raise SceneError(found)
     # Lifting is what needs numpy; scenes that are only checked or have errors never come this far.

@@ -46,6 +46,24 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
 
 
 def _vectors(rows: Rows, manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
+    """Vectors (N, 64). Leaves that stay from frame to frame note theirs; a row depends on nothing else."""
+    note = "vector", codes.digest
+    fresh = [row for row in rows if row[1].notes is None or note not in row[1].notes]
+    made = _lifted(fresh, manifest, codes)
+    if len(fresh) == len(rows) and all(leaf.notes is None for _, leaf in rows):
+        return made
+    for (_, leaf), vector in zip(fresh, made, strict=True):
+        if leaf.notes is not None:
+            leaf.notes[note] = vector.copy()
+    lifted = iter(made)
+    vectors = np.empty((len(rows), WIDTH), dtype=np.float32)
+    asked = {id(leaf) for _, leaf in fresh}
+    for index, (_, leaf) in enumerate(rows):
+        vectors[index] = next(lifted) if id(leaf) in asked else (leaf.notes or {})[note]
+    return vectors
+
+
+def _lifted(rows: Rows, manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
     vectors = np.zeros((len(rows), WIDTH), dtype=np.float32)  # (N, 64)
     if rows:
         levels = [split_levels([move.step for move in leaf.moves], manifest.limits) for _, leaf in rows]
