@@ -23,7 +23,7 @@ _LEAST_WIDTH = 30
 _HEAD, _TAIL = 2, 1
 """Of a mark over many lines so many are shown after its first line and before its last."""
 _BEFORE, _LONGEST = 500, 4000
-"""Of a line longer than the second number of code points, so many are laid out, from the first before a mark."""
+"""A line with more code points than the second has so many laid out, from the first before a mark on."""
 
 
 @dataclass(frozen=True, slots=True)

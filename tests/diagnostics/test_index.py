@@ -1,0 +1,30 @@
+"""The index of codes in the documentation is the one that the pages make, and its sample is a real one."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from pathlib import Path
+
+from scenelang.diagnostics.codes import CODES
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.render import render_text
+from scenelang.diagnostics.span import SourceFile
+from scenelang.scene.evaluate import load_source
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "errors.md").read_text("utf-8")
+
+
+def test_the_index_is_made_from_the_pages() -> None:
+    """`python docs/make_errors.py` writes it anew."""
+    assert runpy.run_path(str(DOCS / "make_errors.py"))["index"]() == PAGE
+    assert set(re.findall(r"^\| \[([EW]\d{4})\]", PAGE, re.MULTILINE)) == set(CODES)
+
+
+def test_the_sample_is_what_is_printed() -> None:
+    sample = re.search(r"```text\n(.*?)```", PAGE, re.DOTALL)
+    assert sample is not None
+    found = Diagnostics()
+    load_source(SourceFile("scene.nsg", "square { rotate(45); }\n"), diagnostics=found)
+    assert render_text(found, summary=False) == sample[1]
