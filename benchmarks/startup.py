@@ -16,6 +16,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from scenelang.formatting import format_text
+
 CHECK_LIMIT_S = 0.25
 RENDER_LIMIT = "1.5 x import torch + 0.3 s"
 
@@ -59,12 +61,15 @@ def main() -> None:
         forty, four = Path(folder, "forty.nsg"), Path(folder, "four.nsg")
         forty.write_text(forty_lines())
         four.write_text(FOUR)
+        neat = Path(folder, "neat.nsg")
+        neat.write_text(format_text(forty_lines()))
         run = [sys.executable, "-m", "scenelang"]
         commands = {
             "python": [sys.executable, "-c", "pass"],
             "import torch": [sys.executable, "-c", "import torch"],
             "--help": [*run, "--help"],
             "check, 40 lines": [*run, "check", str(forty)],
+            "fmt --check, 40 lines": [*run, "fmt", "--check", str(neat)],
             "compile, 4 objects": [*run, "compile", str(four), "-o", f"{folder}/four.safetensors"],
             "render, 4 objects, 256 x 256": [*run, "render", str(four), "-o", f"{folder}/four.png"],
         }
@@ -79,8 +84,10 @@ def main() -> None:
     for name, value in median.items():
         spread = f"{min(taken[name]):.3f} to {max(taken[name]):.3f}"
         print(f"{name:30} {value:.3f} s ({spread}), {value / torch_s:.2f} x import torch")
-    check_s, render_s = median["check, 40 lines"], median["render, 4 objects, 256 x 256"]
+    check_s, fmt_s = median["check, 40 lines"], median["fmt --check, 40 lines"]
+    render_s = median["render, 4 objects, 256 x 256"]
     print(f"check:  {check_s:.3f} s of {CHECK_LIMIT_S} s")
+    print(f"fmt:    {fmt_s:.3f} s of {CHECK_LIMIT_S} s")
     print(f"render: {render_s:.3f} s of {1.5 * torch_s + 0.3:.3f} s ({RENDER_LIMIT})")
 
 

@@ -1,4 +1,4 @@
-"""``scenelang fmt``: scene text in its canonical layout; imports nothing of the pipeline but the parser's tables."""
+"""``scenelang fmt``: scene text in its canonical layout; of the pipeline it imports the parser alone."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final
 
 import click
@@ -35,20 +36,30 @@ def command(ctx: click.Context, paths: tuple[str, ...], check: bool, diff: bool)
     Exits with 0, or 1 where a scene has syntax errors or, with --check or --diff, where something would
     change, and 2 where a file cannot be read or written.
     """
-    # Layouts are many small objects that refer to each other in no circles: looking for such would take as
-    # long as all the rest.
-    gc.disable()
     run = _Run(check, diff)
-    for path in paths:
-        try:
-            for name in [path] if path == STDIN else scenes(path):
-                run.take(name)
-        except OSError as error:
-            say_trouble(describe(error))
-            run.unreadable += 1
+    with _no_search_for_circles():
+        for path in paths:
+            try:
+                for name in [path] if path == STDIN else scenes(path):
+                    run.take(name)
+            except OSError as error:
+                say_trouble(describe(error))
+                run.unreadable += 1
     run.summarise()
     wrong = run.mistaken or (run.changed and (check or diff))
     ctx.exit(2 if run.unreadable else int(bool(wrong)))
+
+
+@contextmanager
+def _no_search_for_circles() -> Iterator[None]:
+    """Layouts are many small objects and hold no circles; looking for some takes as long as all the rest."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def scenes(path: str) -> Iterator[str]:

@@ -128,7 +128,9 @@ class ExpressionLayout:
             return text
         note = self.notes[token]
         if note.leading or note.trailing:
-            text = " ".join([*texts_of(note.leading), text, *texts_of(note.trailing)])
+            gap = "" if text in ("(", "[") else " "
+            text += "".join(gap + comment for comment in texts_of(note.trailing))
+            text = " ".join([*texts_of(note.leading), text])
         if not (note.before or note.after or note.blank):
             return text
         word = Word(text)
@@ -253,7 +255,10 @@ class ExpressionLayout:
         return sequence([self.word(word), " ", name])
 
     def index(self, value: Part, opening: int, index: Part, closing: int) -> Part:
-        return self._glued(value, self.word(opening), index, self.word(closing))
+        left, right = self.word(opening), self.word(closing)
+        if isinstance(index, str):
+            return self._glued(value, left, index, right)
+        return sequence([value, self._enclosed(left, index, right)])
 
     def member(self, value: Part, dot: int, name: Part) -> Part:
         flat = flat_of(value)
@@ -269,10 +274,11 @@ class ExpressionLayout:
         return sequence([name, args])
 
     def parenthesised(self, opening: int, value: Part, closing: int) -> Part:
-        left, right = self.word(opening), self.word(closing)
-        flat = joined([left, value, right])
+        return self._enclosed(self.word(opening), value, self.word(closing))
+
+    def _enclosed(self, left: Part, value: Part, right: Part) -> Part:
         inside = [Item(value)]
-        doc = Choose(flat, lambda: broken(left, inside, right, comma=""))
+        doc = Choose(joined([left, value, right]), lambda: broken(left, inside, right, comma=""))
         return ends_of(doc, left, right)
 
     def vector_empty(self, opening: int, closing: int) -> Part:

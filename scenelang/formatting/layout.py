@@ -185,7 +185,10 @@ class Layout(ExpressionLayout):
         self, word: int, name: Part, equal: int, default: Part, within: int, range: Part, last: int
     ) -> Part:
         head = [self.word(word), " ", name, *self._assigned(equal, default)]
-        return self._ended([*head, " ", self.word(within), " ", range], last)
+        limits = sequence([self.word(within), " ", range])
+        flat = flat_of(limits)
+        tail = Choose(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, limits])))
+        return self._ended([*head, ends_of(tail, limits, limits)], last)
 
     def let(self, word: int, name: Part, equal: int, value: Part, last: int) -> Part:
         return self._ended([self.word(word), " ", name, *self._assigned(equal, value)], last)
