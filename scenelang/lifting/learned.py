@@ -1,0 +1,110 @@
+"""Learned lifting without torch: the compiler's side of `scenelang.training.encoders`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.graph.steps import Affine, Step
+
+Array = npt.NDArray[np.float64]
+
+# Numbers that a transformation hands to its encoder.
+GEOMETRY_INPUTS = {"affine": 16, "twirl": 1, "bend": 1}
+MATERIAL_INPUTS = {"color": 3}
+
+
+@dataclass(frozen=True, slots=True)
+class Lifting:
+    """Vectors and encoders of a model, as its weights file holds them, in float64.
+
+    Args:
+        codes: (G, d_g), one row a geometry of the manifest, in its order.
+        material_codes: (K, d_m), one row a material.
+        encoders: kind of transformation to its three layers, each (weight (out, in), bias (out,)).
+    """
+
+    codes: Array
+    material_codes: Array
+    encoders: Mapping[str, tuple[tuple[Array, Array], ...]]
+
+    def matrices(self, kind: str, numbers: npt.ArrayLike) -> Array:
+        """Matrices (M, d, d) of M transformations of a kind: (M, inputs)."""
+        x = np.atleast_2d(np.asarray(numbers, np.float64))
+        *hidden, (weight, bias) = self.encoders[kind]
+        for w, b in hidden:
+            x = np.maximum(x @ w.T + b, 0.0)
+        size = round(len(bias) ** 0.5)
+        return (x @ weight.T + bias).reshape(-1, size, size) + np.eye(size)
+
+
+def read_lifting(tensors: Mapping[str, npt.NDArray[Any]], prefix: str = "lifting.") -> Lifting:
+    """The lifting in a weights file.
+
+    Args:
+        tensors: by name, as `safetensors.numpy.load` returns them.
+        prefix: of the lifting's names.
+
+    Raises:
+        KeyError: something is missing.
+    """
+
+    def array(name: str) -> Array:
+        return np.asarray(tensors[prefix + name], np.float64)
+
+    kinds = [("geometry", kind) for kind in GEOMETRY_INPUTS] + [
+        ("material", kind) for kind in MATERIAL_INPUTS
+    ]
+    encoders = {
+        kind: tuple(
+            (array(f"{side}.{kind}.layers.{i}.weight"), array(f"{side}.{kind}.layers.{i}.bias"))
+            for i in range(3)
+        )
+        for side, kind in kinds
+    }
+    return Lifting(array("codes"), array("material_codes"), encoders)
+
+
+def step_numbers(step: Step) -> tuple[str, list[float]]:
+    """Which encoder a step goes through, and with what numbers."""
+    if isinstance(step, Affine):
+        a, b, c, d, e, f, g, h, i, j, k, l = step.rows  # noqa: E741
+        return "affine", [a, b, c, d, e, f, g, h, i, j, k, l, 0.0, 0.0, 0.0, 1.0]
+    if step.twirl and any(step.bend):
+        raise ValueError("a merged warp has no encoder; it is split before it is lifted")
+    return ("bend", [step.bend[0]]) if step.bend[0] else ("twirl", [step.twirl])
+
+
+def lift_geometry(lifting: Lifting, chains: Sequence[Sequence[Step]], leaves: Sequence[int]) -> Array:
+    """Geometry vectors (N, d_g): T_n … T_1 g of each chain, nearest the leaf first.
+
+    Args:
+        lifting: of the model.
+        chains: steps of each object.
+        leaves: geometry of each object, a row of the codes.
+    """
+    out: Array = lifting.codes[np.asarray(leaves, int)].copy()
+    for at in range(max(map(len, chains), default=0)):
+        groups: dict[str, list[tuple[int, list[float]]]] = {}
+        for row, chain in enumerate(chains):
+            if at < len(chain):
+                kind, numbers = step_numbers(chain[at])
+                groups.setdefault(kind, []).append((row, numbers))
+        for kind, members in groups.items():
+            rows = [row for row, _ in members]
+            made = lifting.matrices(kind, [numbers for _, numbers in members])
+            out[rows] = np.einsum("mij,mj->mi", made, out[rows])
+    return out
+
+
+def lift_material(lifting: Lifting, colours: Sequence[Sequence[float]], materials: Sequence[int]) -> Array:
+    """Material vectors (N, d_m) of objects whose material is one colour (r, g, b) in [0, 1]."""
+    codes: Array = lifting.material_codes[np.asarray(materials, int)]
+    if not len(codes):
+        return codes
+    lifted: Array = np.einsum("mij,mj->mi", lifting.matrices("color", colours), codes)
+    return lifted
