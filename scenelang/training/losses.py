@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
 
-from scenelang.renderers.framed import Framed
+from scenelang.renderers.framed import Framed, Trace
 from scenelang.training.scenes import Batch, LeafBatch
 
 SHARP = 0.02  # distances are asked for relative to themselves plus this
@@ -26,12 +26,17 @@ def image_loss(network: Framed, batch: Batch) -> tuple[Tensor, dict[str, float]]
     Returns:
         The loss, and its parts as numbers by name.
     """
-    b, n = batch.leaf.shape
     material = network.material_codes[torch.zeros_like(batch.leaf).flatten()]
-    colours = batch.rgb * network.object_albedo(material).view(b, n, 3)
+    colours = batch.rgb * network.object_albedo(material).view(*batch.leaf.shape, 3)
     trace = network.trace(batch.q, batch.scale, network.codes[batch.leaf], colours, batch.tokens)
+    return trace_loss(trace, batch)
+
+
+def trace_loss(trace: Trace, batch: Batch) -> tuple[Tensor, dict[str, float]]:
+    """Loss of what a network answered along the streams of a batch; see `image_loss`."""
+    n = batch.leaf.shape[1]
     used = (torch.arange(n, device=batch.leaf.device) < batch.count[:, None]).float()[..., None]  # (B, N, 1)
-    entries = used.sum() * batch.q.shape[2]
+    entries = used.sum() * batch.distance.shape[2]
     inside, covered = (batch.distance < 0).float(), (batch.depth < 0).float()
     alone = cross_entropy(trace.alone, 1 - inside, reduction="none")
     cover = cross_entropy(trace.margin, 1 - covered, reduction="none")
@@ -50,10 +55,19 @@ def image_loss(network: Framed, batch: Batch) -> tuple[Tensor, dict[str, float]]
     return torch.stack(list(parts.values())).sum(), {k: v.item() for k, v in parts.items()}
 
 
-def leaf_loss(network: Framed, batch: LeafBatch) -> tuple[Tensor, dict[str, float]]:
-    """Loss of the leaves alone, in their own frames: coverage and distance, as in `image_loss`."""
-    one = torch.ones(len(network.codes), device=batch.q.device)
-    features = network.decode(batch.q, one, network.decoder_weights(network.codes))[..., 0]
+def leaf_loss(
+    network: Framed, batch: LeafBatch, codes: Tensor | None = None
+) -> tuple[Tensor, dict[str, float]]:
+    """Loss of the leaves alone, in their own frames: coverage and distance, as in `image_loss`.
+
+    Args:
+        network: its decoder is what is trained.
+        batch: points.
+        codes: of the leaves (G, C), if they are not the network's own.
+    """
+    codes = network.codes if codes is None else codes
+    one = torch.ones(len(codes), device=batch.q.device)
+    features = network.decode(batch.q, one, network.decoder_weights(codes))[..., 0]
     inside = (batch.distance < 0).float()
     parts = {
         "alone": cross_entropy(features * network.edge_slope.exp(), 1 - inside),

@@ -111,7 +111,7 @@ def _inverse(m: Tensor) -> Tensor:
 
 def _boundary(leaf: Tensor, g: torch.Generator) -> Tensor:
     """Points (B, P, 2) on the boundaries of leaves (B, P)."""
-    n, phase, outer, inner = _sectors(g.device)[leaf].unbind(-1)
+    n, phase, outer, inner = sectors(g.device)[leaf].unbind(-1)
     half = math.pi / n
     t = torch.rand(leaf.shape, generator=g, device=g.device)
     side = torch.where(torch.rand(leaf.shape, generator=g, device=g.device) < 0.5, 1.0, -1.0)
@@ -134,7 +134,8 @@ def _forward_warp(q: Tensor, twirl: Tensor, bend: Tensor) -> Tensor:
     return torch.stack([c * q[..., 0] - s * q[..., 1], s * q[..., 0] + c * q[..., 1]], -1)
 
 
-def _sectors(device: torch.device) -> Tensor:
+def sectors(device: torch.device) -> Tensor:
+    """Symmetry (G, 4) of all leaves: order, direction of a vertex, outer and inner radius."""
     return torch.tensor([SECTORS[name] for name in GEOMETRIES], device=device)
 
 
@@ -143,7 +144,7 @@ def _edges(config: SceneConfig) -> int:
     return int(config.points * config.edge)
 
 
-def _points(
+def points_of(
     world: Tensor,
     leaf: Tensor,
     count: Tensor,
@@ -153,7 +154,17 @@ def _points(
     config: SceneConfig,
     g: torch.Generator,
 ) -> Tensor:
-    """World points (B, pool, 2): first those on edges, then a pool around objects and over the canvas."""
+    """World points (B, pool, 2): first those on edges, then a pool around objects and over the canvas.
+
+    Args:
+        world: world-from-leaf maps (B, N, 2, 3) of the affine maps.
+        leaf: geometry index (B, N).
+        count: (B,) objects in use.
+        twirl, bend: (B, N).
+        singular: smallest singular value (B, N) of the maps.
+        config: how many, and which share on edges.
+        g: random numbers.
+    """
     b, edges = leaf.shape[0], _edges(config)
     pool = edges + 3 * (config.points - edges)
     pick = (torch.rand((b, pool), generator=g, device=g.device) * count[:, None]).long()
@@ -197,8 +208,8 @@ def leaf_batch(p: int, g: torch.Generator) -> LeafBatch:
     angle, radius = _uniform(leaf.shape, 0.0, math.tau, g), 2.0 * _uniform(leaf.shape, 0.0, 1.0, g) ** 0.7
     even = torch.stack([radius * angle.cos(), radius * angle.sin()], -1)
     q = torch.where((torch.arange(p, device=g.device) % 2 == 0)[:, None], near, even)
-    sectors = (v[:, None] for v in _sectors(g.device).unbind(-1))
-    return LeafBatch(q, sector_distance(q[..., 0], q[..., 1], *sectors))
+    shape = (v[:, None] for v in sectors(g.device).unbind(-1))
+    return LeafBatch(q, sector_distance(q[..., 0], q[..., 1], *shape))
 
 
 def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Batch:
@@ -226,12 +237,12 @@ def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Bat
     frame = _inverse(world)
     singular = torch.linalg.svdvals(world[..., :2])[..., 1]
 
-    points = _points(world, leaf, count, twirl, bend, singular, config, g)
+    points = points_of(world, leaf, count, twirl, bend, singular, config, g)
     x, y = points[:, None, :, 0], points[:, None, :, 1]  # (B, 1, pool)
     qx, qy = carry_back_affine(frame[..., None].permute(2, 3, 0, 1, 4), x, y)
     qx, qy = carry_back_warp(twirl[..., None], bend[..., None], torch.zeros((), device=device), qx, qy)
-    sectors = _sectors(device)[leaf]
-    d = sector_distance(qx, qy, *(v[..., None] for v in sectors.unbind(-1))) * singular[..., None]
+    shape = sectors(device)[leaf]
+    d = sector_distance(qx, qy, *(v[..., None] for v in shape.unbind(-1))) * singular[..., None]
     steps = list(fold(d.unbind(1), rgb[:, :, None].unbind(1), tokens.T[..., None]))
     # of the points that are not on an edge keep those near the boundary of the whole stream
     gumbel = -torch.log(
