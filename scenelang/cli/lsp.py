@@ -23,7 +23,7 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
     if stdio and tcp is not None:
         raise click.UsageError("--stdio and --tcp exclude each other.")
     try:
-        from scenelang.lsp.server import make_server
+        from scenelang.lsp.handlers import make_server
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
             raise

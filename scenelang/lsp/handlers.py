@@ -326,7 +326,9 @@ _HANDLERS: Final = (
 )
 
 
-def register(server: Server) -> None:
-    """Give a server all its handlers."""
+def make_server() -> Server:
+    """A server with all its features."""
+    server = Server()
     for method, handler, options in _HANDLERS:
         server.feature(method, options)(handler)
+    return server

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from itertools import groupby
 from typing import Any, Final
 
 from lsprotocol import types
@@ -117,14 +118,10 @@ def folding(document: Document) -> list[types.FoldingRange]:
             if isinstance(node, nodes.Block | nodes.Vector):
                 closes = document.text[node.span.end - 1 : node.span.end] in ("}", "]")
                 add(node.span.start, node.span.end, None, int(closes))
-    run: list[nodes.Import] = []
-    for stmt in (*document.file.statements, None):
-        if isinstance(stmt, nodes.Import):
-            run.append(stmt)
-        else:
-            if len(run) > 1:
-                add(run[0].span.start, run[-1].span.end, types.FoldingRangeKind.Imports)
-            run = []
+    for group, run in groupby(document.file.statements, lambda stmt: isinstance(stmt, nodes.Import)):
+        if group:
+            imports = list(run)
+            add(imports[0].span.start, imports[-1].span.end, types.FoldingRangeKind.Imports)
     for match in _COMMENT.finditer(document.text):
         if not match[0].startswith('"'):
             add(match.start(), match.end() - match[0].endswith("\n"), types.FoldingRangeKind.Comment)

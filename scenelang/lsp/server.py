@@ -148,7 +148,7 @@ class Server(LanguageServer):
         for uri in list(self.docs.open):
             self.forget(uri)
         self._pool.shutdown(wait=False, cancel_futures=True)
-        super().shutdown()
+        super().shutdown()  # type: ignore[no-untyped-call]
 
     def report_server_error(self, error: Exception, source: Any) -> None:
         """Keep trouble in the log: a window that pops up helps nobody."""
@@ -182,12 +182,3 @@ def quiet(empty: Any = None) -> Callable[[F], F]:
         return safe  # type: ignore[return-value]
 
     return decorate
-
-
-def make_server() -> Server:
-    """A server with all its features."""
-    from scenelang.lsp import handlers
-
-    server = Server()
-    handlers.register(server)
-    return server

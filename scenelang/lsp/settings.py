@@ -36,9 +36,10 @@ class Settings:
         hints = given.get("inlayHints")
         hints = hints if isinstance(hints, dict) else {}
         debounce, model, root = given.get("debounceMs"), given.get("model"), given.get("root")
-        number = isinstance(debounce, int | float) and not isinstance(debounce, bool)
+        if not isinstance(debounce, int | float) or isinstance(debounce, bool):
+            debounce = cls().debounce_ms
         return cls(
-            debounce_ms=min(max(float(debounce), 0.0), 60_000.0) if number else cls().debounce_ms,
+            debounce_ms=min(max(float(debounce), 0.0), 60_000.0),
             model=model if isinstance(model, str) and model else None,
             root=Path(root).expanduser() if isinstance(root, str) and root else None,
             value_hints=hints.get("values") is not False,

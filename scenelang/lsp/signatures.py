@@ -10,6 +10,7 @@ from lsprotocol import types
 from scenelang.lsp.callees import find_callee
 from scenelang.lsp.context import cursor_at
 from scenelang.lsp.names import Symbol
+from scenelang.lsp.text import width
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax import nodes
 
@@ -92,7 +93,12 @@ def signature_help(docs: Workspace, document: Document, offset: int) -> types.Si
         about = types.MarkupContent(types.MarkupKind.Markdown, callee.about.get(param, ""))
         label: str | tuple[int, int] = param
         if match is not None:
-            label, at = (match.start(), match.end()), match.end()
+            # Offsets into a label count UTF-16, whatever positions count.
+            label = (
+                width(callee.head[: match.start()], "utf-16"),
+                width(callee.head[: match.end()], "utf-16"),
+            )
+            at = match.end()
         parameters.append(types.ParameterInformation(label, about if about.value else None))
     text = types.MarkupContent(types.MarkupKind.Markdown, callee.text) if callee.text else None
     if active is not None and active >= len(parameters):

@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any
 
 from scenelang.diagnostics.span import Span
-from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Parsed
 
 _LEAVES = (Span, str, int, float, bool, type(None))
@@ -52,10 +51,3 @@ def path_to(parsed: Parsed, offset: int) -> list[Any]:
             return path
         # Where two touch at the offset, the one that begins there is meant.
         path.append(max(inner, key=lambda n: (n.span.start, -n.span.end)))
-
-
-def definitions(statements: tuple[nodes.Stmt, ...]) -> Iterator[nodes.Stmt]:
-    """Statements of a block that define or make something worth an outline."""
-    for stmt in statements:
-        if not isinstance(stmt, nodes.BadStmt | nodes.Version):
-            yield stmt

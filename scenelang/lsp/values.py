@@ -20,7 +20,7 @@ def show_value(value: Any) -> str | None:
     cls = value.__class__
     if value is POISON:
         return None
-    if cls is float:
+    if isinstance(value, float):
         return show(value)
     if cls is bool:
         return "true" if value else "false"

@@ -17,7 +17,8 @@ N = TypeVar("N")
 
 def move_node(node: N, delta: int, source: SourceFile) -> N:
     """A tree of `syntax.nodes` with its spans ``delta`` further on, in ``source``."""
-    moved: N = _mover(node.__class__)(node, delta, source)
+    cls: type = node.__class__
+    moved: N = _mover(cls)(node, delta, source)
     return moved
 
 
