@@ -21,6 +21,7 @@ ROOT = Path(__file__).parents[1]
 CODE_PAGES = "scenelang/diagnostics/pages"
 ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 _LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
+_CODES = re.compile(r"^(```nsg)(?: [EW]\d{4})+", re.MULTILINE)  # the codes that a test expects of a scene
 _FENCE = re.compile(r"(^```.*?^```$)", re.MULTILINE | re.DOTALL)
 
 
@@ -70,7 +71,7 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
         up = "../" * page.file.src_uri.count("/")
         return f"[{text}]({up}{inside}{hash_sign}{anchor})"
 
-    parts = _FENCE.split(markdown)
+    parts = _FENCE.split(_CODES.sub(r"\1", markdown))
     return "".join(part if part.startswith("```") else _LINK.sub(link, part) for part in parts)
 
 

@@ -1,18 +1,34 @@
-"""Draw the pictures of the documentation from examples/: ``python docs/make_pictures.py``.
+"""Draw every picture of the documentation: ``python docs/make_pictures.py``.
 
-Each example becomes ``docs/pictures/NAME.png``, drawn by the network. ``gallery.png`` shows several, and
-``chain-compared.png`` one beside the exact picture and the difference between the two.
-``worst-chains.png`` has the worst cases that ``docs/results/chains.json`` names.
+The pictures come from scenes, drawn by the shipped network, so that one command draws all of them again
+when the scenes or the weights change. `plan` lists them:
+
+- ``NAME.png`` for each scene of ``examples/``, and ``NAME.webp`` for each animation;
+- ``PAGE/NAME.png`` (or ``.webp``) for each scene of a page: a block of ``nsg``, an empty line, and a picture
+  ``![text](pictures/PAGE/NAME.png)`` is drawn from that block;
+- ``language/NAME.png``, a strip of labelled pictures, for scenes of ``examples/reference/``: a comment
+  ``// Shown: label: -D k=0 | label: -D k=1`` says what is in the strip of the scene's name, and
+  ``// Shown NAME: …`` in another one;
+- the gallery, one scene beside its exact picture, and the worst cases of an evaluation.
+
+Pictures with few colours are stored with a palette. Files that would not change are left alone.
 """
 
 from __future__ import annotations
 
 import argparse
+import fnmatch
+import io
 import json
+import re
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from PIL import Image as pillow
+from PIL import ImageDraw, ImageFont
 
 import scenelang as nsg
 from scenelang.evaluation.run import Case, worst_sheet
@@ -20,24 +36,104 @@ from scenelang.models.load import load_model
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
+REFERENCE = EXAMPLES / "reference"
 PICTURES = DOCS / "pictures"
-GALLERY = ("gear", "flower", "tangram", "night", "blobs", "logo", "deformations", "tree")
+GALLERY = ("gear", "flower", "lava", "walker", "logo", "mandala", "night", "vortex")
+GALLERY_FRAMES = {"vortex": 8, "lava": 30}
 COMPARED = "chain"
 GAP_PX = 8
 LOUDER = 20  # factor on the difference of two pictures
-SHARPER = 2  # the gallery's scenes are drawn larger by this
+SHARPER = 2  # strips and the gallery are drawn larger by this and made smaller again, for screens' sake
+STRIP_PX, LABEL_PX = 150, 20  # a cell of a strip, and the line below it
+MOVING_PX, MOVING_FPS = 192, 12  # animations: the shorter side, and the most frames a second
+MOVING_BYTES = 150_000
+PALETTE = 256
+NEAR = 2.5  # a palette that changes values by more than this on average (of 255) is not used
+_SCENE = re.compile(
+    r"^```nsg(?: title=[^\n]*)?\n(.*?)^```\n\n!\[[^\]]*\]\(pictures/([\w/-]+\.(?:png|webp))\)",
+    re.MULTILINE | re.DOTALL,
+)
+_SHOWN = re.compile(r"^// Shown( \w+)?: (.*)$", re.MULTILINE)
 
 
-def enlarged(scene: nsg.Scene, factor: int) -> nsg.Scene:
-    """The same scene on a larger canvas."""
+@dataclass(frozen=True)
+class Source:
+    """A scene's file or text, its params and the frame that stands for it."""
+
+    path: Path | None = None
+    text: str = ""
+    params: tuple[tuple[str, str], ...] = ()
+    frame: int = 0
+
+    def scene(self, frame: int | None = None) -> nsg.Scene:
+        """The scene in a frame."""
+        number = self.frame if frame is None else frame
+        if self.path is not None:
+            return nsg.load(self.path, params=dict(self.params), frame=number)
+        return nsg.loads(self.text, root=EXAMPLES, frame=number)
+
+
+def sized(scene: nsg.Scene, shorter_px: int) -> nsg.Scene:
+    """The same scene on a canvas whose shorter side is this long."""
     width, height = scene.canvas
-    return scene.model_copy(update={"canvas": (width * factor, height * factor)})
+    factor = shorter_px / min(width, height)
+    return scene.model_copy(update={"canvas": (round(width * factor), round(height * factor))})
 
 
 def over_white(picture: nsg.Image) -> pillow.Image:
     """A picture without alpha."""
     shown = picture.to_pil().convert("RGBA")
     return pillow.alpha_composite(pillow.new("RGBA", shown.size, "white"), shown).convert("RGB")
+
+
+def png(picture: pillow.Image) -> bytes:
+    """A small PNG: with a palette where that looks the same."""
+    if picture.mode == "RGB":
+        few = picture.quantize(PALETTE, pillow.Quantize.MEDIANCUT, dither=pillow.Dither.NONE)
+        off = np.abs(np.asarray(few.convert("RGB"), np.float64) - np.asarray(picture, np.float64))
+        if off.mean() < NEAR and np.percentile(off, 99.9) < 10 * NEAR:
+            picture = few
+    data = io.BytesIO()
+    picture.save(data, "PNG", optimize=True)
+    return data.getvalue()
+
+
+def still(source: Source) -> bytes:
+    """One frame as a PNG, with alpha if it has any."""
+    return png(nsg.render(source.scene()).to_pil())
+
+
+def moving(source: Source) -> bytes:
+    """An animation as a WebP, small, over white."""
+    first = source.scene(0)
+    if first.animation is None:
+        raise SystemExit(f"{source.path or source.text}: not an animation")
+    animation = first.animation
+    every = max(1, round(animation.fps / MOVING_FPS)) if animation.frames > 1 else 1
+    frames = [
+        over_white(nsg.render(sized(source.scene(number), MOVING_PX)))
+        for number in range(0, animation.frames, every)
+    ]
+    shown_ms = round(1000 * animation.seconds / len(frames)) if animation.fps >= 2 else 250
+    data = webp(frames, shown_ms, animation.loop)
+    if len(data) > MOVING_BYTES:  # many small parts that all move
+        frames, shown_ms = frames[::2], 2 * shown_ms
+        data = webp(frames, shown_ms, animation.loop)
+    while len(data) > MOVING_BYTES:
+        side = round(0.85 * frames[0].width), round(0.85 * frames[0].height)
+        frames = [frame.resize(side, pillow.Resampling.LANCZOS) for frame in frames]
+        data = webp(frames, shown_ms, animation.loop)
+    return data
+
+
+def webp(frames: list[pillow.Image], shown_ms: int, loop: bool) -> bytes:
+    """An animated WebP; without a loop its last frame stays for a while."""
+    data, first = io.BytesIO(), frames[0]
+    shown = [*[shown_ms] * (len(frames) - 1), shown_ms if loop else 1500]
+    first.save(
+        data, "WEBP", save_all=True, append_images=frames[1:], duration=shown, loop=0, quality=70, method=4
+    )
+    return data.getvalue()
 
 
 def tiled(pictures: list[pillow.Image], columns: int, side: tuple[int, int]) -> pillow.Image:
@@ -55,7 +151,46 @@ def tiled(pictures: list[pillow.Image], columns: int, side: tuple[int, int]) -> 
     return sheet
 
 
-def worst_cases(name: str, count: int) -> pillow.Image:
+def strips(path: Path) -> dict[str, list[tuple[str, Source]]]:
+    """(label, scene) of each cell, for each strip of a scene of the reference."""
+    found = {}
+    for name, cells in _SHOWN.findall(path.read_text("utf-8")):
+        parts = [cell.rpartition(": -D ") for cell in cells.split(" | ")]
+        found[name.strip() or path.stem] = [
+            (label.strip(), Source(path, params=tuple(re.findall(r"([\w.]+)=(\S+)", values))))
+            for label, _, values in parts
+        ]
+    return found
+
+
+def strip(cells: list[tuple[str, Source]]) -> bytes:
+    """A row of pictures with a label below each."""
+    sheet = pillow.new("RGB", (len(cells) * (STRIP_PX + GAP_PX) - GAP_PX, STRIP_PX + LABEL_PX), "white")
+    pen, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
+    for index, (label, source) in enumerate(cells):
+        large = over_white(nsg.render(sized(source.scene(), SHARPER * STRIP_PX)))
+        left = index * (STRIP_PX + GAP_PX)
+        sheet.paste(large.resize((STRIP_PX, STRIP_PX), pillow.Resampling.BOX), (left, 0))
+        pen.text((left + STRIP_PX / 2, STRIP_PX + LABEL_PX / 2 + 1), label, "#333", font, anchor="mm")
+    return png(sheet)
+
+
+def gallery() -> bytes:
+    """Some examples on a sheet."""
+    scenes = [Source(EXAMPLES / f"{name}.nsg", frame=GALLERY_FRAMES.get(name, 0)).scene() for name in GALLERY]
+    large = [over_white(nsg.render(sized(scene, SHARPER * 200))) for scene in scenes]
+    return png(tiled(large, 4, (200, 200)))
+
+
+def compared() -> bytes:
+    """A scene by the network, exactly, and the difference between the two."""
+    scene = nsg.load(EXAMPLES / f"{COMPARED}.nsg")
+    network, exact = nsg.render(scene), nsg.render(scene, backend="reference")
+    difference = np.clip(LOUDER * np.abs(network - exact), 0.0, 1.0).astype(np.float32).view(nsg.Image)
+    return png(tiled([over_white(picture) for picture in (network, exact, difference)], 3, (256, 256)))
+
+
+def worst_cases(name: str, count: int) -> bytes:
     """The worst cases of an evaluation: network, exact picture, FLIP map."""
     report = json.loads((DOCS / "results" / f"{name}.json").read_text("utf-8"))
     cases = [
@@ -63,28 +198,63 @@ def worst_cases(name: str, count: int) -> pillow.Image:
     ]
     sheet = worst_sheet(load_model("shapes2d"), name, report["seed"], cases, count).to_pil()
     sheet.thumbnail((1100, 1100))
-    return sheet.quantize(128)
+    return png(sheet.quantize(128))
+
+
+def plan() -> dict[str, Callable[[], bytes]]:
+    """What `docs/pictures` holds, and how each file of it is made."""
+    made: dict[str, Callable[[], bytes]] = {}
+    for path in sorted(EXAMPLES.glob("*.nsg")):
+        animation = nsg.load(path).animation
+        middle = 0 if animation is None else animation.frames - 1 if not animation.loop else 0
+        made[f"{path.stem}.png"] = lambda source=Source(path, frame=middle): still(source)
+        if animation is not None:
+            made[f"{path.stem}.webp"] = lambda source=Source(path): moving(source)
+    for path in sorted(REFERENCE.glob("*.nsg")):
+        for name, cells in strips(path).items():
+            made[f"language/{name}.png"] = lambda cells=cells: strip(cells)
+    for page in sorted(DOCS.glob("*.md")):
+        for text, name in _SCENE.findall(page.read_text("utf-8")):
+            if name in made:
+                raise SystemExit(f"{page.name}: {name} is drawn twice")
+            draw = moving if name.endswith(".webp") else still
+            made[name] = lambda draw=draw, source=Source(text=text): draw(source)
+    made["gallery.png"] = gallery
+    made[f"{COMPARED}-compared.png"] = compared
+    made["worst-chains.png"] = lambda: worst_cases("chains", 6)
+    return made
 
 
 def main() -> None:
-    """Draw everything."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--backend", choices=("neural", "reference"), default="neural")
-    backend = parser.parse_args().backend
-    PICTURES.mkdir(exist_ok=True)
-    scenes = {path.stem: nsg.load(path) for path in sorted(EXAMPLES.glob("*.nsg"))}
-    for name, scene in scenes.items():
-        nsg.render(scene, backend=backend).to_pil().save(PICTURES / f"{name}.png", optimize=True)
-    large = [over_white(nsg.render(enlarged(scenes[name], SHARPER), backend=backend)) for name in GALLERY]
-    tiled(large, 4, (200, 200)).save(PICTURES / "gallery.png", optimize=True)
-
-    worst_cases("chains", 6).save(PICTURES / "worst-chains.png", optimize=True)
-
-    scene = scenes[COMPARED]
-    network, exact = nsg.render(scene, backend=backend), nsg.render(scene, backend="reference")
-    difference = np.clip(LOUDER * np.abs(network - exact), 0.0, 1.0).astype(np.float32).view(nsg.Image)
-    shown = [over_white(picture) for picture in (network, exact, difference)]
-    tiled(shown, 3, (256, 256)).save(PICTURES / f"{COMPARED}-compared.png", optimize=True)
+    """Draw what is asked for, and say what changed."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--only", metavar="PATTERN", default="*", help="such as 'tutorial/*' or 'gear.png'")
+    only = parser.parse_args().only
+    made = plan()
+    chosen = [name for name in made if fnmatch.fnmatch(name, only)]
+    if not chosen:
+        raise SystemExit(f"no picture is called {only}; there are {', '.join(made)}")
+    changed = 0
+    for name in chosen:
+        started = time.perf_counter()
+        path, data = PICTURES / name, made[name]()
+        before = path.read_bytes() if path.exists() else None
+        if data != before:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+            changed += 1
+            state = "new" if before is None else "changed"
+            print(
+                f"{state:8}{len(data) / 1024:7.1f} KB{time.perf_counter() - started:7.1f} s  {name}",
+                flush=True,
+            )
+    stale = [
+        path for path in sorted(PICTURES.rglob("*.*")) if path.relative_to(PICTURES).as_posix() not in made
+    ]
+    for path in stale:
+        print(f"no longer made: {path.relative_to(PICTURES)}")
+    total = sum(path.stat().st_size for path in PICTURES.rglob("*.*"))
+    print(f"{changed} of {len(chosen)} changed; all pictures together {total / 2**20:.2f} MB")
 
 
 if __name__ == "__main__":
