@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -10,21 +9,12 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-    from scenelang.graph.nodes import Graph
-    from scenelang.program.program import Program
     from scenelang.scene.params import Defines
 
 
 @click.command("compile")
 @click.argument("file", metavar="FILE")
-@click.option("-o", "--out", metavar="OUT", help="The program's file, .safetensors.")
-@click.option(
-    "--dump-after",
-    "dumps",
-    multiple=True,
-    metavar="PASS",
-    help="Print the graph after a pass, or after 'lower' as written; may be given several times.",
-)
+@click.option("-o", "--out", required=True, metavar="OUT", help="The program's file, .safetensors.")
 @options.size
 @options.define
 @options.frame
@@ -36,8 +26,7 @@ if TYPE_CHECKING:
 def command(
     ctx: click.Context,
     file: str,
-    out: str | None,
-    dumps: tuple[str, ...],
+    out: str,
     size: tuple[int, int] | None,
     defines: Defines,
     frame: int,
@@ -48,56 +37,26 @@ def command(
 ) -> None:
     """Compile a scene to a program that `scenelang render` draws and other software can read.
 
-    FILE is a scene, or - for standard input. Without OUT the scene is compiled and only what
-    --dump-after asks for is printed.
+    FILE is a scene, or - for standard input. `scenelang dump` shows what the compiler made of it.
     """
     from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import Request, unused_defines
     from scenelang.cli.jobs import PROGRAM, prepare
     from scenelang.cli.say import say_diagnostics
 
-    if out is None and not dumps:
-        raise click.UsageError("Give -o OUT, --dump-after PASS, or both.")
     if file.endswith(PROGRAM):
         raise click.UsageError(f"'{file}' is a compiled program already.")
-    if out is not None and not out.endswith(PROGRAM):
+    if not out.endswith(PROGRAM):
         raise click.UsageError(f"A program's file ends in {PROGRAM}, '{out}' does not.")
-    _check_passes(dumps)
-
-    def after(name: str, graph: Graph) -> None:
-        from scenelang.graph.dump import dump
-
-        if name in dumps:
-            click.echo(f"after {name}:\n{dump(graph)}")
-
     clock = Clock()
     request = Request(defines, model, root, frame, size)
-    job = prepare(file, request, clock, verbose=verbose, after=after if dumps else None)
+    job = prepare(file, request, clock, verbose=verbose)
     job.diagnostics = [*job.diagnostics, *unused_defines(request)]
     say_diagnostics(job.diagnostics)
     if job.failed(strict) or job.program is None:
         ctx.exit(1)
-    if out is not None:
-        with clock("save"):
-            _save(job.program, out)
+    with clock("save"):
+        job.program.save(out)
     if verbose:
         lines = "".join(f"\n  {note}" for note in job.notes)
-        click.echo(f"{file}{f' -> {out}' if out else ''}{lines}\n{clock.report()}", err=True)
-
-
-def _check_passes(names: tuple[str, ...]) -> None:
-    from scenelang.passes import PASSES
-
-    known = ["lower", *(step.name for step in PASSES)]
-    for name in names:
-        if name not in known:
-            raise click.UsageError(f"No pass '{name}'; there are {', '.join(known)}.")
-
-
-def _save(program: Program, out: str) -> None:
-    from scenelang.cli.main import Trouble
-
-    try:
-        program.save(Path(out))
-    except OSError as error:  # it names the temporary file
-        raise Trouble(f"cannot write '{out}': {(error.strerror or str(error)).lower()}") from None
+        click.echo(f"{file} -> {out}{lines}\n{clock.report()}", err=True)

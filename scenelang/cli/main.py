@@ -27,6 +27,8 @@ COMMANDS: Final = {
     "lsp": "Serve editors over the Language Server Protocol.",
     "explain": "Say what a diagnostic's code means.",
     "convert": "Write a scene as text, JSON or Python.",
+    "dump": "Show what a scene is after each stage.",
+    "graph": "Draw the graph of a scene.",
     "schema": "Print the JSON Schema of scenes.",
 }
 INTERRUPTED: Final = 130  # as shells report it

@@ -196,19 +196,6 @@ def test_standard_input(folder: Folder) -> None:
     assert picture("a.png").shape == (16, 16, 3)
 
 
-def test_dump_after(folder: Folder) -> None:
-    text = "group { star { scale(0.5); } translate(0.1, 0); rotate(0deg); }"
-    result = folder.run(
-        "compile", folder.write("a.nsg", text), "--dump-after", "lower", "--dump-after", "linearise"
-    )
-    assert result.exit_code == 0
-    lower, _, linear = result.stdout.partition("after linearise:")
-    assert "(group)" in lower
-    assert "(group)" not in linear
-    assert "star #ffffff  [0.5 0 0.1; 0 0.5 0]" in linear
-    assert "drop_empty" in folder.run("compile", "a.nsg", "--dump-after", "nothing").stderr
-
-
 @pytest.mark.parametrize("arguments", [(), ("-o", "a.png"), ("-o", "none/a.safetensors")])
 def test_compile_usage(folder: Folder, arguments: tuple[str, ...]) -> None:
     assert folder.run("compile", folder.write("a.nsg"), *arguments).exit_code == 2

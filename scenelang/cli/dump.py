@@ -1,0 +1,122 @@
+"""``scenelang dump``: what a scene is after each stage of the compiler; imports no torch."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from scenelang.cli import options
+
+if TYPE_CHECKING:
+    from scenelang.cli.stages import Stages
+    from scenelang.scene.params import Defines
+
+
+@click.command("dump")
+@click.argument("file", metavar="FILE")
+@click.option(
+    "--after",
+    "stages",
+    multiple=True,
+    metavar="STAGE",
+    help="A stage or pass; may be given several times. Default: program, with --diff all.",
+)
+@click.option("--diff", is_flag=True, help="Only what each pass changed.")
+@click.option("--format", "kind", type=click.Choice(["text", "json"]), default="text", show_default=True)
+@click.option("-o", "--out", metavar="OUT", help="A file instead of standard output.")
+@options.define
+@options.size
+@options.frame
+@options.model
+@options.root
+@click.pass_context
+def command(
+    ctx: click.Context,
+    file: str,
+    stages: tuple[str, ...],
+    diff: bool,
+    kind: Literal["text", "json"],
+    out: str | None,
+    defines: Defines,
+    size: tuple[int, int] | None,
+    frame: int,
+    model: str | None,
+    root: str | None,
+) -> None:
+    """Show what a scene is after stages of the compiler.
+
+    FILE is a scene, or - for standard input. The stages are syntax (the tree), scene, lower (the graph as
+    written), the passes in their order (`--after help` lists them) and program. A scene with mistakes is
+    shown as far as it goes; then the exit code is 1.
+    """
+    from scenelang.cli.inputs import Request
+    from scenelang.cli.say import say_diagnostics
+    from scenelang.cli.stages import known_stages, run_stages, stage_names
+    from scenelang.cli.texts import put_text
+
+    if stages == ("help",):
+        click.echo("\n".join(stage_names()))
+        return
+    wanted = known_stages(stages)
+    made = run_stages(file, Request(defines, model, root, frame, size))
+    say_diagnostics(made.diagnostics)
+    shown = list(_changes(made, wanted) if diff else _whole(made, wanted or ("program",), kind))
+    if kind == "json":
+        put_text(json.dumps({"version": 1, "stages": shown}, indent=2, ensure_ascii=False) + "\n", out)
+    else:
+        titled = len(shown) > 1 or diff
+        parts = [(f"after {each['stage']}:\n" if titled else "") + each["text"] for each in shown]
+        put_text("\n".join(parts), out)
+    ctx.exit(int(bool(made.diagnostics.errors)))
+
+
+def _changes(made: Stages, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
+    """The differences that the passes made, of those that made any; all passes, or the wanted."""
+    from scenelang.graph.dump import dump
+    from scenelang.interchange.changes import changes
+
+    before, old = "", "nothing"
+    for name, graph in made.graphs.items():
+        if before and made.graphs[old] is graph:
+            text = before
+        else:
+            text = dump(graph)
+        if not wanted or name in wanted:
+            said = changes(before, text, old, name) if before else text
+            if said or wanted:
+                yield {"stage": name, "text": said}
+        before, old = text, name
+
+
+def _whole(made: Stages, wanted: tuple[str, ...], kind: str) -> Iterator[dict[str, Any]]:
+    """The stages that were reached, as text or as data."""
+    from scenelang.graph.dump import dump
+    from scenelang.interchange.graph_data import graph_data, program_data, program_table
+    from scenelang.interchange.tree import tree_data, tree_text
+
+    tree, scene, program = made.source.tree, made.source.scene, made.program
+    for name in wanted:
+        if name == "syntax" and tree is not None:
+            yield {"stage": name, "tree": tree_data(tree)} if kind == "json" else _text(name, tree_text(tree))
+        elif name == "scene" and scene is not None:
+            yield (
+                {"stage": name, "scene": json.loads(scene.to_json())}
+                if kind == "json"
+                else _text(name, scene.to_nsg())
+            )
+        elif name == "program" and program is not None:
+            yield (
+                {"stage": name, "program": program_data(program)}
+                if kind == "json"
+                else _text(name, program_table(program))
+            )
+        elif name in made.graphs:
+            graph = made.graphs[name]
+            yield {"stage": name, "graph": graph_data(graph)} if kind == "json" else _text(name, dump(graph))
+
+
+def _text(stage: str, text: str) -> dict[str, Any]:
+    return {"stage": stage, "text": text}

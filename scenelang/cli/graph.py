@@ -1,0 +1,144 @@
+"""``scenelang graph``: a picture of a scene's tree, of the compiler's graph or of a program."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from scenelang.cli import options
+
+if TYPE_CHECKING:
+    from scenelang.cli.stages import Stages
+    from scenelang.interchange.drawing import Drawing
+    from scenelang.scene.params import Defines
+
+_PATIENCE_S: Final = 60
+_SUFFIXES: Final = (".mmd", ".dot", ".svg", ".png")
+
+
+@click.command("graph")
+@click.argument("file", metavar="FILE")
+@click.option("-o", "--out", metavar="OUT", help="A file: .mmd (Mermaid), .dot, .svg or .png (Graphviz).")
+@click.option(
+    "--to",
+    "kind",
+    type=click.Choice(["mmd", "dot", "svg", "png"]),
+    help="What to write; default: as OUT's suffix, else mmd.",
+)
+@click.option(
+    "--after",
+    "stage",
+    default="scene",
+    show_default=True,
+    metavar="STAGE",
+    help="scene, lower, a pass, or program.",
+)
+@click.option(
+    "--most", type=click.IntRange(1, 10_000), default=200, show_default=True, help="Boxes to draw at most."
+)
+@options.define
+@options.size
+@options.frame
+@options.model
+@options.root
+@click.pass_context
+def command(
+    ctx: click.Context,
+    file: str,
+    out: str | None,
+    kind: str | None,
+    stage: str,
+    most: int,
+    defines: Defines,
+    size: tuple[int, int] | None,
+    frame: int,
+    model: str | None,
+    root: str | None,
+) -> None:
+    """Draw the graph of a scene: its tree with transforms, materials and booleans.
+
+    FILE is a scene, or - for standard input. Mermaid and DOT are text; .svg and .png need the program `dot`
+    of Graphviz. Large scenes are cut, and a box says how many nodes are left out.
+    """
+    from scenelang.cli.inputs import Request
+    from scenelang.cli.say import say_diagnostics
+    from scenelang.cli.stages import known_stages, run_stages
+    from scenelang.cli.texts import put_text
+    from scenelang.interchange.drawing import to_dot, to_mermaid
+
+    wanted = _kind(out, kind)
+    known_stages((stage,), without=("syntax",))
+    dot = _find_dot(wanted)
+    made = run_stages(file, Request(defines, model, root, frame, size))
+    say_diagnostics(made.diagnostics)
+    drawing = _drawing(made, stage, most)
+    if drawing is None or made.diagnostics.errors:
+        ctx.exit(1)
+    if wanted == "mmd":
+        put_text(to_mermaid(drawing), out)
+    elif dot is None:
+        put_text(to_dot(drawing), out)
+    else:
+        _put_picture(_picture(dot, wanted, to_dot(drawing)), out)
+
+
+def _kind(out: str | None, kind: str | None) -> str:
+    suffix = Path(out or "").suffix.lower()
+    if kind is not None:
+        return kind
+    if out in (None, "-"):
+        return "mmd"
+    if suffix not in _SUFFIXES:
+        raise click.UsageError(f"'{out}' has none of the suffixes {', '.join(_SUFFIXES)}; say one with --to.")
+    return suffix[1:]
+
+
+def _find_dot(kind: str) -> str | None:
+    """The program that draws, where one is needed."""
+    if kind in ("mmd", "dot"):
+        return None
+    found = shutil.which("dot")
+    if found is None:
+        raise click.UsageError(
+            f".{kind} needs Graphviz, whose program 'dot' is not here: install the package 'graphviz', "
+            "or write .dot or .mmd, which need nothing."
+        )
+    return found
+
+
+def _drawing(made: Stages, stage: str, most: int) -> Drawing | None:
+    from scenelang.interchange.drawing import draw_graph, draw_program, draw_scene
+
+    if stage == "scene":
+        return None if made.source.scene is None else draw_scene(made.source.scene, most)
+    if stage == "program":
+        return None if made.program is None else draw_program(made.program, most)
+    return draw_graph(made.graphs[stage], most) if stage in made.graphs else None
+
+
+def _picture(dot: str, kind: str, text: str) -> bytes:
+    from scenelang.cli.main import Trouble
+
+    try:
+        done = subprocess.run(
+            [dot, f"-T{kind}"], input=text.encode(), capture_output=True, timeout=_PATIENCE_S, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise Trouble(f"dot took more than {_PATIENCE_S} seconds; draw fewer boxes with --most") from None
+    if done.returncode != 0 or not done.stdout:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        raise Trouble(f"dot failed{f': {said[0]}' if said else ''}")
+    return done.stdout
+
+
+def _put_picture(data: bytes, out: str | None) -> None:
+    from scenelang.files import write_whole
+
+    if out is None or out == "-":
+        click.get_binary_stream("stdout").write(data)
+    else:
+        write_whole(out, data)
