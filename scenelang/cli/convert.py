@@ -72,6 +72,4 @@ def _written(scene: Scene, kind: Kind) -> str:
         return to_readable_json(scene)
     if kind == "python":
         return scene.to_python()
-    from scenelang.formatting.format import format_text
-
-    return format_text(scene.to_nsg())
+    return scene.to_nsg()

@@ -42,7 +42,7 @@ class Statement(Choose):
 
     Args:
         flat, maker: see `Choose`.
-        depth: how many blocks it has within each other, empty ones not counted.
+        depth: how many blocks it has within each other.
         simple: it may stand in a block that is on one line.
     """
 
@@ -69,7 +69,7 @@ class Block:
         self.opening = opening
         self.closing = closing
         self.statements = statements
-        self.depth = 0
+        self.depth = 1
         self.flat: str | None = None
         simple = not (before_of(opening) or after_of(opening) or before_of(closing))
         for index, item in enumerate(statements):

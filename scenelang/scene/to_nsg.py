@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.formatting import format_text
 from scenelang.scene.fields import Rgb
 from scenelang.scene.schema import (
     Boolean,
@@ -44,7 +46,11 @@ def to_nsg(scene: Scene) -> str:
         else:
             word, node, depth = entry
             todo.extend(reversed(_node(word, node, depth)))
-    return "\n".join(lines) + "\n"
+    text = "\n".join(lines) + "\n"
+    try:
+        return format_text(text)
+    except SceneError:  # nested deeper than text may be: to be looked at, not to be read back
+        return text
 
 
 def _node(word: str, node: SceneNode, depth: int) -> list[str | tuple[str, SceneNode, int]]:
