@@ -103,7 +103,8 @@ def same_unit(a: float, ua: str, b: float, ub: str) -> str:
     if (a, b)[bare] == 0.0:
         return "angle"
     help = "give it a unit: deg, rad or turn"
-    raise Problem("E0302", "a bare number beside an angle", help, operand=bare, fix="angle")
+    notes = {1 - bare: "an angle"}
+    raise Problem("E0302", "a bare number beside an angle", help, operand=bare, fix="angle", notes=notes)
 
 
 def _unit_of(op: str, a: float, ua: str, b: float, ub: str) -> str:
@@ -146,7 +147,9 @@ def binary(op: str, a: Any, b: Any) -> Any:
         return pack(ARITHMETIC[op](x, y), _unit_of(op, x, ua, y, ub))
     if ca is Vec and cb is Vec:
         if len(a.items) != len(b.items):
-            raise Problem("E0307", f"vectors of {len(a.items)} and {len(b.items)} items do not combine")
+            lengths = [f"{len(v.items)} items" for v in (a, b)]
+            message = f"vectors of {len(a.items)} and {len(b.items)} items do not combine"
+            raise Problem("E0307", message, notes=dict(enumerate(lengths)))
         return Vec(tuple([binary(op, x, y) for x, y in zip(a.items, b.items, strict=True)]))
     if ca is Vec and cb in UNITS:
         return Vec(tuple([binary(op, x, b) for x in a.items]))
@@ -157,6 +160,7 @@ def binary(op: str, a: Any, b: Any) -> Any:
         "E0303",
         f"cannot {_VERBS[op]} {describe(a)} {_PREPOSITIONS[op]} {describe(b)}",
         operand=operand,
+        notes={1 - operand: describe((a, b)[1 - operand])},
     )
 
 
@@ -185,7 +189,8 @@ def compare(op: str, a: Any, b: Any) -> bool:
     """``a op b`` for ``< <= > >=``."""
     if a.__class__ not in UNITS or b.__class__ not in UNITS:
         operand = 0 if a.__class__ not in UNITS else 1
-        raise Problem("E0303", f"cannot order {describe(a)} and {describe(b)}", operand=operand)
+        notes = {1 - operand: describe((a, b)[1 - operand])}
+        raise Problem("E0303", f"cannot order {describe(a)} and {describe(b)}", operand=operand, notes=notes)
     x, ua = unpack(a)
     y, ub = unpack(b)
     same_unit(x, ua, y, ub)
@@ -203,7 +208,8 @@ def equal(a: Any, b: Any) -> bool:
     if a is None or b is None:
         return a is b
     if ca is not cb:
-        raise Problem("E0303", f"cannot compare {describe(a)} with {describe(b)}", operand=1)
+        message = f"cannot compare {describe(a)} with {describe(b)}"
+        raise Problem("E0303", message, operand=1, notes={0: describe(a)})
     if ca is Vec:
         return len(a.items) == len(b.items) and all(
             equal(x, y) for x, y in zip(a.items, b.items, strict=True)

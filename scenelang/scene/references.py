@@ -40,6 +40,8 @@ def value_of(name: nodes.Name, binding: Binding, unit: Unit, scope: Scope) -> Co
     if binding.kind == "poison" or frame is None:
         return POISONED
     session, span = unit.session, name.span
+    if binding.span is not None:
+        session.defined[id(span.source), span.start] = binding.span
     if frame is scope.frame and frame is not unit.frame:
         return constant(binding.value) if binding.known else Code(lambda env: env[slot])
     if frame is scope.frame and binding.known:

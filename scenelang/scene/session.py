@@ -128,6 +128,8 @@ class Session:
     replays: bool = False
     roots: list[list[Any]] = field(default_factory=list)
     needs: Needs = field(default_factory=Needs)
+    defined: dict[tuple[int, int], Span] = field(default_factory=dict)
+    """Where variables are defined, by the file and place of each use."""
     watch: Watch | None = None
 
     def restart(self, frame: int) -> None:
@@ -175,9 +177,17 @@ class Session:
         if problem.operand is not None and problem.operand < len(operands):
             operand = operands[problem.operand]
         fix = angle_fix(operand) if problem.fix == "angle" and operand is not None else None
-        self.error(
-            problem.code, problem.message, operand.span if operand else span, help=problem.help, fix=fix
-        )
+        labels = [
+            Label(other.span, words)
+            for index, words in problem.notes.items()
+            if index < len(operands) and (other := operands[index]) is not None
+        ]
+        if isinstance(operand, nodes.NameRef):
+            defined = self.defined.get((id(operand.span.source), operand.span.start))
+            if defined is not None:
+                labels.append(Label(defined, f"'{operand.name.text}' is defined here"))
+        place = operand.span if operand else span
+        self.error(problem.code, problem.message, place, help=problem.help, fix=fix, labels=tuple(labels))
 
     def halt(self, code: str, message: str, span: Span, help: str | None = None) -> Halt:
         """Report a limit that was met; the caller raises what this returns."""
@@ -214,7 +224,8 @@ def angle_fix(expr: nodes.Expr) -> Fix:
         small = abs(inner.value) <= 6.2832 and not inner.value.is_integer()
         unit = "rad" if small else "deg"
         return Fix(f"add '{unit}'", (Edit(Span(inner.span.source, inner.span.end, inner.span.end), unit),))
-    text = expr.span.text
-    if not isinstance(expr, nodes.NameRef | nodes.CallExpr | nodes.Member | nodes.Index):
-        text = f"({text})"
-    return Fix("multiply by '1deg'", (Edit(expr.span, f"{text} * 1deg"),))
+    source, start, end = expr.span.source, expr.span.start, expr.span.end
+    if isinstance(expr, nodes.NameRef | nodes.CallExpr | nodes.Member | nodes.Index):
+        return Fix("multiply by '1deg'", (Edit(Span(source, end, end), " * 1deg"),))
+    opening, closing = Edit(Span(source, start, start), "("), Edit(Span(source, end, end), ") * 1deg")
+    return Fix("multiply by '1deg'", (opening, closing))

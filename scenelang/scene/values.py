@@ -7,7 +7,8 @@ three numbers. `POISON` stands for a value whose mistake has been reported; what
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, Final
 
 from scenelang.scene.schema import Material
@@ -24,11 +25,18 @@ class Problem(Exception):
         message: the fact.
         help: advice.
         operand: which operand or argument is to blame, from 0; None for all of it.
-        fix: what to do about that operand, see `FIXES`.
+        fix: ``angle`` where that operand lacks the unit of an angle.
+        notes: words for further operands, by their numbers.
     """
 
     def __init__(
-        self, code: str, message: str, help: str | None = None, operand: int | None = None, fix: str = ""
+        self,
+        code: str,
+        message: str,
+        help: str | None = None,
+        operand: int | None = None,
+        fix: str = "",
+        notes: Mapping[int, str] = MappingProxyType({}),
     ) -> None:
         super().__init__(message)
         self.code = code
@@ -36,6 +44,7 @@ class Problem(Exception):
         self.help = help
         self.operand = operand
         self.fix = fix
+        self.notes = notes
 
 
 class Poison:

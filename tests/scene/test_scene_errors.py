@@ -117,7 +117,24 @@ def test_labels_show_both_places() -> None:
     label = run_text("square { material flat; material flat; }").only().labels[0]
     assert label.span.text == "material flat"
     inside = run_text("module m(a) { square { scale(1 / a); } }\nm(0);").only()
-    assert [x.span.locate()[0] for x in inside.labels] == [(2, 1)]
+    assert [x.span.locate()[0] for x in inside.labels] == [(1, 10), (2, 1)]
+
+
+@pytest.mark.parametrize(
+    ("text", "labels"),
+    [
+        ("let k = 45;\nsquare { rotate(k); }", [("k", "'k' is defined here")]),
+        ('square { translate("a" + 1, 0); }', [("1", "a number")]),
+        ('square { translate(1 - "a", 0); }', [("1", "a number")]),
+        ("square { translate([1, 2] + [1, 2, 3]); }", [("[1, 2]", "2 items"), ("[1, 2, 3]", "3 items")]),
+        ("square { rotate(45deg + 1); }", [("45deg", "an angle")]),
+        ("if (1 == true) { square {} }", [("1", "a number")]),
+        ('if ("a" < 1) { square {} }', [("1", "a number")]),
+    ],
+)
+def test_labels_show_what_else_takes_part(text: str, labels: list[tuple[str, str]]) -> None:
+    found = run_text(text).only()
+    assert [(label.span.text, label.message) for label in found.labels] == labels
 
 
 def test_diagnostics_of_what_recovery_skipped_stay_single() -> None:
