@@ -18,6 +18,7 @@ ORDER = (
     "scenelang.diagnostics",
     "scenelang.syntax",
     "scenelang.formatting",
+    "scenelang.highlighting",
     "scenelang.models.manifest",
     "scenelang.scene",
     "scenelang.models.choose",

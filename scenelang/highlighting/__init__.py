@@ -1,0 +1,1 @@
+"""Colours for scene text: a Pygments lexer, and the TextMate grammar that editors use."""

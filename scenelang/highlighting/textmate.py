@@ -1,0 +1,127 @@
+"""The TextMate grammar, made from the words and terminals of the language.
+
+    python -m scenelang.highlighting.textmate
+
+writes `grammar/scenelang.tmLanguage.json`; a test keeps that in step. A language server's semantic tokens
+say more where one runs: what a name stands for is beyond regular expressions.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Final
+
+from scenelang.highlighting import words
+
+SCOPE: Final = "source.nsg"
+PATH: Final = Path(__file__).parents[2] / "grammar" / "scenelang.tmLanguage.json"
+
+_CAPTURES: Final = "punctuation.definition.{}.nsg"
+
+
+def textmate() -> dict[str, Any]:
+    """The grammar as data."""
+    return {
+        "name": "scenelang",
+        "scopeName": SCOPE,
+        "fileTypes": ["nsg"],
+        "patterns": [{"include": f"#{name}"} for name in _REPOSITORY],
+        "repository": {name: {"patterns": patterns} for name, patterns in _REPOSITORY.items()},
+    }
+
+
+def _any(texts: Iterable[str]) -> str:
+    return "|".join(re.escape(text) for text in texts)
+
+
+def _words(texts: Iterable[str], scope: str, after: str = "") -> dict[str, Any]:
+    return {"match": rf"\b(?:{_any(texts)})\b{after}", "name": f"{scope}.nsg"}
+
+
+def _named(word: str, scope: str, what: str = words.NAME) -> dict[str, Any]:
+    """A keyword and the name after it."""
+    captures = {"1": {"name": f"keyword.declaration.{word}.nsg"}, "2": {"name": f"{scope}.nsg"}}
+    return {"match": rf"\b({word})\s+({what})", "captures": captures}
+
+
+_REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
+    "comments": [
+        {
+            "begin": "//",
+            "end": "$",
+            "name": "comment.line.double-slash.nsg",
+            "beginCaptures": {"0": {"name": _CAPTURES.format("comment")}},
+        },
+        {
+            "begin": r"/\*",
+            "end": r"\*/",
+            "name": "comment.block.nsg",
+            "captures": {"0": {"name": _CAPTURES.format("comment")}},
+        },
+    ],
+    "strings": [
+        {
+            "begin": '"',
+            "end": '"|(?=$)',
+            "name": "string.quoted.double.nsg",
+            "beginCaptures": {"0": {"name": "punctuation.definition.string.begin.nsg"}},
+            "endCaptures": {"0": {"name": "punctuation.definition.string.end.nsg"}},
+            "patterns": [
+                {"match": r"\\[\"\\nt]", "name": "constant.character.escape.nsg"},
+                {"match": r"\\.", "name": "invalid.illegal.escape.nsg"},
+            ],
+        }
+    ],
+    "declarations": [
+        _named("fn", "entity.name.function"),
+        _named("module", "entity.name.type.module"),
+        _named("let", "variable.other.constant"),
+        _named("param", "variable.parameter"),
+    ],
+    "keywords": [
+        _words(words.DECLARING, "keyword.declaration"),
+        _words(words.CONTROL, "keyword.control"),
+        _words(words.NODES, "storage.type.node"),
+        _words(words.MATERIAL, "storage.type.material"),
+        _words(words.TRUTH, "constant.language.boolean"),
+    ],
+    "names": [
+        _words(words.CONSTANTS, "constant.language"),
+        _words(words.ANIMATED, "variable.language", r"(?!\s*[({])"),
+        _words(words.SETTINGS, "support.function.setting", r"(?=\s*\()"),
+        _words((*words.TRANSFORMS, *words.TEXTURE), "support.function.transform", r"(?=\s*\()"),
+        _words(words.FUNCTIONS, "support.function", r"(?=\s*\()"),
+        {"match": rf"{words.NAME}(?=\s*\{{)", "name": "entity.name.type.nsg"},
+        {"match": rf"{words.NAME}(?=\s*\()", "name": "entity.name.function.call.nsg"},
+        {"match": rf"{words.NAME}(?=\s*=(?!=))", "name": "variable.parameter.nsg"},
+        {"match": words.NAME, "name": "variable.other.nsg"},
+    ],
+    "numbers": [
+        {
+            "match": words.NUMBER.replace("(?:deg|rad|turn|ms|s)", "(deg|rad|turn|ms|s)"),
+            "name": "constant.numeric.nsg",
+            "captures": {"1": {"name": "keyword.other.unit.nsg"}},
+        },
+        {"match": words.COLOR, "name": "constant.other.color.rgb-value.hex.nsg"},
+    ],
+    "signs": [
+        {"match": _any(words.OPERATORS), "name": "keyword.operator.nsg"},
+        {"match": r"[{}]", "name": "punctuation.section.block.nsg"},
+        {"match": r"[()]", "name": "punctuation.section.parens.nsg"},
+        {"match": r"[\[\]]", "name": "punctuation.section.brackets.nsg"},
+        {"match": ",", "name": "punctuation.separator.comma.nsg"},
+        {"match": ";", "name": "punctuation.terminator.statement.nsg"},
+    ],
+}
+
+
+def encode() -> str:
+    """The text of the file."""
+    return json.dumps(textmate(), indent=2, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    PATH.write_text(encode(), encoding="utf-8")
