@@ -41,3 +41,5 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
         server.start_tcp("127.0.0.1", tcp)
     else:
         server.start_io()
+    if not server.was_shut_down:  # the protocol: an exit that was not announced is a failure
+        raise click.exceptions.Exit(1)

@@ -43,6 +43,11 @@ def begin(server: Server, params: types.InitializeParams) -> None:
 
 
 @quiet()
+def shut_down(server: Server, params: None) -> None:
+    server.was_shut_down = True
+
+
+@quiet()
 def watch_files(server: Server, params: types.InitializedParams) -> None:
     """Ask to be told of scene files that change on the disk."""
     workspace = server.client_capabilities.workspace
@@ -283,6 +288,7 @@ def on_links(server: Server, params: types.DocumentLinkParams) -> list[types.Doc
 _HANDLERS: Final = (
     (types.INITIALIZE, begin, None),
     (types.INITIALIZED, watch_files, None),
+    (types.SHUTDOWN, shut_down, None),
     (types.TEXT_DOCUMENT_DID_OPEN, opened, None),
     (types.TEXT_DOCUMENT_DID_CHANGE, changed, None),
     (types.TEXT_DOCUMENT_DID_SAVE, saved, types.SaveOptions(include_text=False)),

@@ -54,6 +54,7 @@ class Server(LanguageServer):
         super().__init__("scenelang", version("scenelang"), protocol_cls=Protocol)
         self.docs = Workspace()
         self.settings = Settings()
+        self.was_shut_down = False
         self._timers: dict[str, asyncio.TimerHandle] = {}
         self._running: dict[str, threading.Event] = {}
         self._pool = ThreadPoolExecutor(1, "check")

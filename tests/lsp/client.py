@@ -82,7 +82,11 @@ class Client:
             "capabilities": capabilities,
             "initializationOptions": {"debounceMs": 20} if options is None else options,
         }
-        self.capabilities = self.request("initialize", params)["capabilities"]
+        try:
+            self.capabilities = self.request("initialize", params)["capabilities"]
+        except BaseException:
+            self.kill()
+            raise
         self.notify("initialized", {})
 
     # ------------------------------------------------------------ messages

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -354,7 +355,7 @@ def test_folding_and_growing_selections(client: Client, uri: str) -> None:
         inner = inner.get("parent")
     assert texts[:3] == ["r", "0.2 * r", "scale(0.2 * r);"]
     assert texts[-1] == client.texts[uri]
-    assert all(outer.find(inner) >= 0 for inner, outer in zip(texts, texts[1:], strict=False))
+    assert all(outer.find(inner) >= 0 for inner, outer in pairwise(texts))
 
 
 def test_imports_are_links(client: Client, uri: str) -> None:
@@ -364,7 +365,9 @@ def test_imports_are_links(client: Client, uri: str) -> None:
 
 
 def test_colours_are_shown_and_written(client: Client, uri: str) -> None:
-    client.replace(uri, "background([0, 0.5, 1]);\nlet c = rgb(1, 0, 0);\nlet d = hsv(120deg, 1, 1);\nlet e = #abc;\n")
+    client.replace(
+        uri, "background([0, 0.5, 1]);\nlet c = rgb(1, 0, 0);\nlet d = hsv(120deg, 1, 1);\nlet e = #abc;\n"
+    )
     found = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
     assert [client.shown(uri, f["range"]) for f in found] == [
         "[0, 0.5, 1]",
@@ -418,7 +421,9 @@ def test_fixes_are_code_actions(client: Client, uri: str) -> None:
     }
     actions = {a["title"]: a for a in client.request("textDocument/codeAction", params)}
     assert all(a["kind"] == "quickfix" for a in actions.values())
-    assert client.applied(text, actions["Insert `;`"]["edit"]["changes"][uri]) == text.replace("5) }", "5); }")
+    assert client.applied(text, actions["Insert `;`"]["edit"]["changes"][uri]) == text.replace(
+        "5) }", "5); }"
+    )
     params["context"] = {"diagnostics": [], "only": ["source.fixAll"]}
     (whole,) = client.request("textDocument/codeAction", params)
     assert whole["kind"] == "source.fixAll.scenelang"

@@ -1,0 +1,259 @@
+"""The protocol itself: the life of a session, encodings, cancelling, texts in step, nothing that crashes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.lsp.client import Client, Json
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+ASTRAL = '/* 𝄞 é */ let\ta = "𝄞𝄞"; let b = #d33; squar { }\n'
+
+
+@pytest.fixture
+def client() -> Iterator[Client]:
+    client = Client()
+    yield client
+    client.kill()
+
+
+def test_shutdown_then_exit_ends_with_0(client: Client) -> None:
+    assert client.stop() == 0
+    assert b"Traceback" not in b"".join(client.stderr)
+
+
+def test_exit_without_shutdown_ends_with_1(client: Client) -> None:
+    client.notify("exit", None)
+    assert client.process.wait(20) == 1
+
+
+def test_the_end_of_input_ends_the_server(client: Client) -> None:
+    assert client.process.stdin is not None
+    client.process.stdin.close()
+    client.process.wait(20)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-32"])
+def test_positions_count_what_was_agreed_on(encoding: str) -> None:
+    client = Client(encoding=encoding)
+    try:
+        assert client.capabilities["positionEncoding"] == encoding
+        uri = client.open("untitled:a", ASTRAL)
+        (found,) = (d for d in client.diagnostics(uri) if d["code"] == "E0204")
+        assert client.shown(uri, found["range"]) == "squar"
+        (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
+        assert client.shown(uri, colour["range"]) == "#d33"
+        at = ASTRAL.index("𝄞𝄞") + 1
+        client.change(uri, at, at + 1, "é𝄞x")
+        client.change(uri, 0, 0, "𝄞")
+        (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
+        assert client.shown(uri, colour["range"]) == "#d33"
+    finally:
+        client.kill()
+
+
+def test_lines_end_as_the_protocol_says(client: Client) -> None:
+    uri = client.open("untitled:a", "let a = 1;\r\nlet b = 2;\rlet c = #d33;\n")
+    (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
+    assert colour["range"]["start"] == {"line": 2, "character": 8}
+    client.replace(uri, "let a = \u2028#d33;\x0b\nlet b = #d33;\n")
+    found = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
+    assert [c["range"]["start"] for c in found] == [{"line": 0, "character": 9}, {"line": 1, "character": 8}]
+
+
+def test_places_outside_the_text_are_its_ends(client: Client) -> None:
+    uri = client.open("untitled:a", "let a = 1;\n")
+    far = {"line": 1000, "character": 1000}
+    params: Json = {"textDocument": {"uri": uri}, "position": far}
+    for method in ("hover", "completion", "definition", "signatureHelp", "documentHighlight"):
+        client.request(f"textDocument/{method}", params)
+    version = {"uri": uri, "version": 2}
+    change = {"range": {"start": far, "end": far}, "text": "let b = #d33;\n"}
+    client.notify("textDocument/didChange", {"textDocument": version, "contentChanges": [change]})
+    (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
+    assert colour["range"]["start"] == {"line": 1, "character": 8}
+
+
+def test_documents_that_are_not_there_get_empty_answers(client: Client) -> None:
+    document = {"textDocument": {"uri": "file:///nowhere/at/all.nsg"}}
+    at = {**document, "position": {"line": 0, "character": 0}}
+    assert client.request("textDocument/hover", at) is None
+    assert client.request("textDocument/documentSymbol", document) == []
+    assert (
+        client.request(
+            "textDocument/formatting", {**document, "options": {"tabSize": 2, "insertSpaces": True}}
+        )
+        is None
+    )
+    change = {"textDocument": {**document["textDocument"], "version": 2}, "contentChanges": [{"text": "x"}]}
+    client.notify("textDocument/didChange", change)
+    client.notify("textDocument/didClose", document)
+    client.notify("some/unknownNotification", {})
+    assert "unknownRequest" in client.refused("some/unknownRequest", {})
+    assert client.stop() == 0
+
+
+def test_a_cancelled_request_is_answered_all_the_same(client: Client) -> None:
+    uri = client.open("untitled:a", "let a = 1;\n")
+    request = client.start("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+    client.notify("$/cancelRequest", {"id": request})
+    answer = client.answer(request)
+    assert "result" in answer or answer["error"]["code"] == -32800
+    assert client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+
+
+def test_typing_goes_on_while_a_long_scene_is_evaluated() -> None:
+    client = Client(options={"debounceMs": 0})
+    try:
+        slow = "fn f(n) = n > 0 ? f(n - 1) + f(n - 2) : 0;\nlet a = f(23);\n"
+        slow += "for (i in 0..<300) { for (j in 0..<300) { square { scale(0.5); } } }\n"
+        uri = client.open("untitled:a", slow)
+        time.sleep(0.3)
+        start = time.monotonic()
+        client.change(uri, 0, 0, "// a\n")
+        client.next_diagnostics(uri)
+        client.request("textDocument/completion", client.at(uri, "let a", 0))
+        assert time.monotonic() - start < 2.0
+        client.replace(uri, "square { rotate(30); }\n")
+        assert [d["code"] for d in client.diagnostics(uri)] == ["E0302"]
+        assert client.stop() == 0
+    finally:
+        client.kill()
+
+
+def test_many_documents_are_open_at_once() -> None:
+    client = Client(EXAMPLES)
+    try:
+        uris = [
+            client.open(path.as_uri(), path.read_text("utf-8")) for path in sorted(EXAMPLES.glob("*.nsg"))
+        ]
+        for uri in uris:
+            assert [d for d in client.diagnostics(uri, 60) if d["severity"] == 1] == []
+            document = {"textDocument": {"uri": uri}}
+            assert client.request("textDocument/documentSymbol", document)
+            client.request("textDocument/semanticTokens/full", document)
+    finally:
+        client.kill()
+
+
+PIECES = [
+    *"{}()[];,.\"'/=#é𝄞\t\n",
+    *(
+        "\r\n",
+        "let x = ",
+        "square { scale(0.5); }\n",
+        'import "a.nsg" as b;\n',
+        "lib.",
+        "/*",
+        "*/",
+        "30deg",
+        "rotate(",
+    ),
+]
+FEATURES = ("hover", "completion", "signatureHelp", "definition", "documentHighlight", "prepareRename")
+WHOLE = ("documentSymbol", "foldingRange", "documentColor", "documentLink", "semanticTokens/full")
+
+
+@pytest.fixture(scope="module")
+def lasting() -> Iterator[Client]:
+    client = Client()
+    yield client
+    assert client.logged == [], client.logged
+    assert client.stop() == 0
+    client.kill()
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.sampled_from(["carousel", "tangram", "gear", "chain"]),
+    st.lists(st.tuples(st.floats(0, 1), st.integers(0, 9), st.sampled_from(PIECES)), min_size=1, max_size=6),
+    st.floats(0, 1),
+)
+def test_random_edits_keep_texts_in_step_and_crash_nothing(
+    lasting: Client, name: str, edits: list[tuple[float, int, str]], where: float
+) -> None:
+    client = lasting
+    uri = client.open(f"untitled:{name}", (EXAMPLES / f"{name}.nsg").read_text("utf-8"))
+    document = {"textDocument": {"uri": uri}}
+    for share, length, new in edits:
+        text = client.texts[uri]
+        start = round(share * len(text))
+        end = min(start + length, len(text))
+        # A position cannot stand between the two characters of a CRLF.
+        if "\r" in (text[start - 1 : start], text[end - 1 : end]):
+            continue
+        client.change(uri, start, end, new)
+    if "\r" not in client.texts[uri]:
+        whole = client.request(
+            "textDocument/selectionRange", {**document, "positions": [{"line": 0, "character": 0}]}
+        )
+        outer = whole[0]
+        while outer.get("parent"):
+            outer = outer["parent"]
+        assert client.shown(uri, outer["range"]) == client.texts[uri]
+        colours = client.request("textDocument/documentColor", document)
+        assert all(client.shown(uri, c["range"])[:1] in "#[rh" for c in colours)
+    line = client.texts[uri].count("\n")
+    at = {**document, "position": {"line": round(where * line), "character": 3}}
+    for feature in FEATURES:
+        client.answer(client.start(f"textDocument/{feature}", at))
+    for feature in WHOLE:
+        client.request(f"textDocument/{feature}", document)
+    place = {"start": {"line": 0, "character": 0}, "end": {"line": line + 1, "character": 0}}
+    client.request("textDocument/inlayHint", {**document, "range": place})
+    client.request("textDocument/codeAction", {**document, "range": place, "context": {"diagnostics": []}})
+    client.close(uri)
+
+
+def test_a_missing_library_is_one_line_that_says_what_to_do() -> None:
+    code = "import sys; sys.modules['pygls'] = None\nfrom scenelang.cli.main import main\nmain(['lsp'])"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.strip() == "Error: the language server needs pygls: pip install 'scenelang[lsp]'"
+
+
+def test_stdio_and_tcp_exclude_each_other() -> None:
+    command = [sys.executable, "-m", "scenelang", "lsp", "--stdio", "--tcp", "4000"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+
+
+def test_a_log_is_written_where_asked(tmp_path: Path) -> None:
+    log = tmp_path / "server.log"
+    client = Client(command=[sys.executable, "-m", "scenelang", "lsp", "--stdio", "--log", str(log)])
+    try:
+        assert client.stop() == 0
+        assert "INFO" in log.read_text("utf-8")
+    finally:
+        client.kill()
+
+
+def test_an_internal_error_is_logged_and_the_answer_empty(tmp_path: Path) -> None:
+    code = (
+        "import scenelang.lsp.hover as hover\n"
+        "def broken(*_): raise RuntimeError('on purpose')\n"
+        "hover.hover = broken\n"
+        "from scenelang.cli.main import main\n"
+        "main(['lsp'])"
+    )
+    client = Client(command=[sys.executable, "-c", code])
+    try:
+        uri = client.open("untitled:a", "let a = 1;\n")
+        answer: Any = client.request("textDocument/hover", client.at(uri, "let", 1))
+        assert answer is None
+        client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+        assert "on purpose" in client.logged[-1]["message"]
+        assert client.stop() == 0
+    finally:
+        client.kill()
