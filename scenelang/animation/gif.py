@@ -137,7 +137,7 @@ def _compressed(index: npt.NDArray[np.uint8]) -> bytes:
 
     image = Image.fromarray(index, "L")
     data = io.BytesIO()
-    image.save(data, "GIF", optimize=False)
+    image.save(data, "GIF", optimize=False, interlace=0)
     return _image_data(data.getvalue())
 
 

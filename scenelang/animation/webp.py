@@ -48,7 +48,6 @@ def write_webp(film: Film, part: Path, progress: Callable[[float], None]) -> Non
             "WEBP",
             save_all=True,
             lossless=True,
-            exact=True,
             quality=80,  # of the search, not of the picture
             method=4,
             duration=[length for _, length in shown],

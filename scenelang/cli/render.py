@@ -207,6 +207,13 @@ def _animate(
         meter.close()
         say_diagnostics(found)
         return 1, None
+    except KeyboardInterrupt:
+        meter.close()
+        if target.work.exists():
+            click.echo(
+                f"\nframes are kept in '{target.work}'; the same command goes on with the rest", err=True
+            )
+        raise
     except OSError as error:
         meter.close()
         from scenelang.cli.main import Trouble

@@ -84,5 +84,5 @@ def _rows(
             repr((row.token, row.reach, row.touch)),
         )
         found.append(hashlib.sha256(codes + parts[0] + parts[1] + parts[2].encode()).digest())
-    table = np.frombuffer(b"".join(found), np.uint8).reshape(len(found), -1)
+    table = np.frombuffer(b"".join(found), np.uint8).reshape(len(found), 32)
     return table, np.array(low), np.array(high)

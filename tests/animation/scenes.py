@@ -7,6 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 
 HEAD = "animate(seconds = 1, fps = 6);\n"
+DARK = "background(#1d2233);\n"
 TRICKY = {
     "all of it moves": "square { scale(0.3); rotate(0.25turn * u); }",
     "nothing moves": "square { scale(0.3); } group { star; scale(0.2); }",
@@ -54,7 +55,8 @@ TRICKY = {
 
 def tricky(name: str) -> str:
     """The text of one of `TRICKY`."""
-    return HEAD + TRICKY[name]
+    text = TRICKY[name]
+    return HEAD + ("" if "background" in text else DARK) + text
 
 
 def examples() -> list[Path]:
