@@ -23,8 +23,11 @@ from pygments.token import (
 
 from scenelang.highlighting import words as nsg
 
+_RESERVED = "|".join((*nsg.DECLARING, *nsg.CONTROL, *nsg.NODES, *nsg.MATERIAL, *nsg.TRUTH))
+_FREE = rf"(?!(?:{_RESERVED})\b){nsg.NAME}"
 
-class NsgLexer(RegexLexer):
+
+class NsgLexer(RegexLexer):  # type: ignore[misc]  # Pygments has no types
     """Scenes of the scenelang language."""
 
     name = "scenelang"
@@ -40,8 +43,8 @@ class NsgLexer(RegexLexer):
             (r"//[^\n]*", Comment.Single),
             (r"/\*[\s\S]*?\*/", Comment.Multiline),
             (r"/\*[\s\S]*", Error),
-            (rf"(fn)(\s+)({nsg.NAME})", bygroups(Keyword.Declaration, Whitespace, Name.Function)),
-            (rf"(module)(\s+)({nsg.NAME})", bygroups(Keyword.Declaration, Whitespace, Name.Class)),
+            (rf"(fn)(\s+)({_FREE})", bygroups(Keyword.Declaration, Whitespace, Name.Function)),
+            (rf"(module)(\s+)({_FREE})", bygroups(Keyword.Declaration, Whitespace, Name.Class)),
             (rf"(import)(\s+)({nsg.STRING})", bygroups(Keyword.Namespace, Whitespace, String.Double)),
             (words(nsg.DECLARING, r"\b", r"\b"), Keyword.Declaration),
             (words(nsg.CONTROL, r"\b", r"\b"), Keyword),

@@ -39,14 +39,12 @@ def same_tokens(text: str) -> None:
     read = list(NsgLexer().get_tokens_unprocessed(text))
     assert "".join(value for _, _, value in read) == text
     assert not [value for _, kind, value in read if kind in Error]
-    seen = [
-        (start, value, kind) for start, kind, value in read if kind not in Whitespace and kind not in Comment
-    ]
+    seen = [found for found in read if found[1] not in Whitespace and found[1] not in Comment]
     starts, ends, kinds = tokens.starts[:-1], tokens.ends[:-1], tokens.kinds[:-1]
-    assert [(start, value) for start, value, _ in seen] == [
+    assert [(start, value) for start, _, value in seen] == [
         (s, text[s:e]) for s, e in zip(starts, ends, strict=True)
     ]
-    for (_, value, kind), number in zip(seen, kinds, strict=True):
+    for (_, kind, value), number in zip(seen, kinds, strict=True):
         terminal = tables().kinds[number]
         if terminal in CLASSES:
             assert kind in CLASSES[terminal], (value, kind)
