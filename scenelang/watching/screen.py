@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import warnings
 from typing import TYPE_CHECKING, Any, Literal
 
 from scenelang.diagnostics.diagnostic import Diagnostic
@@ -71,7 +72,9 @@ class Screen:
         wide, high = picture.width / cell_width, picture.height / cell_height
         scale = min(1.0, room / high, columns / wide)
         size = max(1, round(wide * scale)), max(1, round(high * scale))
-        console.print(self._shown(over_grey(picture), width=size[0], height=size[1]))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # between two libraries
+            console.print(self._shown(over_grey(picture), width=size[0], height=size[1]))
         sys.stdout.flush()
 
     def _write(self, text: str) -> None:
