@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from scenelang.diagnostics.diagnostic import Label
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node
 from scenelang.graph.walk import bottom_up
 from scenelang.passes.context import Context
@@ -49,6 +50,7 @@ def _linked(fold: Fold, children: list[Node | None], context: Context) -> list[L
                     "W0401",
                     "an intersection with an empty node, which leaves nothing",
                     link.node.span,
+                    labels=[Label(fold.span, "the intersection")] if fold.span is not None else [],
                     help="give the node a child, or drop it",
                 )
                 links.clear()

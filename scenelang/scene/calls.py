@@ -112,7 +112,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
     if owner is not None and words.chosen is not None:
         message = f"geometry '{name.text}' belongs to model '{owner}', not '{words.chosen.name}'"
         help = f"model '{words.chosen.name}' draws {listing(words.geometries)}"
-        session.error("E0205", message, name.span, help=help)
+        session.error("E0205", message, name.span, help=help, labels=session.model_label())
         return
     if name.text in FUNCTIONS:
         message = f"'{name.text}' is a function, not an object or a module"

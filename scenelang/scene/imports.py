@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 from typing import Final
 
-from scenelang.diagnostics.span import SourceFile
+from scenelang.diagnostics.diagnostic import Label
+from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.files import read_regular
 from scenelang.scene.build import Builder
 from scenelang.scene.damage import find_damage
@@ -69,6 +70,8 @@ class Loader:
 
     root: Path | None
     chain: list[Path] = field(default_factory=list)
+    sites: list[Span] = field(default_factory=list)
+    """Where the imports of that chain are written."""
     parsed: dict[Path, nodes.File] = field(default_factory=dict)
     wanted: dict[Path, None] = field(default_factory=dict)
     """All files that were asked for inside the root, there or not, as written and resolved."""
@@ -102,7 +105,10 @@ class Loader:
         self.wanted.update({Path(os.path.abspath(folder / text)): None, path: None})
         if path in self.chain:
             names = " → ".join(p.name for p in [*self.chain[self.chain.index(path) :], path])
-            session.error("E0216", f"import cycle: {names}", span)
+            # The first file of the chain, unless it is standard input, was not imported.
+            around = self.sites[max(0, self.chain.index(path) + 1 - len(self.chain) + len(self.sites)) :]
+            labels = tuple([Label(site, "which imports this") for site in around])
+            session.error("E0216", f"import cycle: {names}", span, labels=labels)
             return None
         self.count += 1
         if self.count > MAX_IMPORTS:
@@ -152,10 +158,12 @@ def _import(stmt: nodes.Import, place: Place) -> Action | None:
     prefix = f"{unit.prefix}{stmt.alias.text}."
     brought = Unit(file.span.source, unit.session, loader, unit.defines, path, prefix)
     loader.chain.append(path)
+    loader.sites.append(stmt.path.span)
     try:
         body = prepare_file(brought, file, imported=True)
     finally:
         loader.chain.pop()
+        loader.sites.pop()
     binding.value = brought
     env = brought.root_env
 

@@ -100,7 +100,8 @@ def _unknown(name: nodes.Name, unit: Unit, scope: Scope, known: set[str]) -> Non
         return
     if owner is not None and words.chosen is not None:
         message = f"material '{name.text}' belongs to model '{owner}', not '{words.chosen.name}'"
-        session.error("E0205", message, name.span, help=f"model '{words.chosen.name}' has {listing(known)}")
+        help = f"model '{words.chosen.name}' has {listing(known)}"
+        session.error("E0205", message, name.span, help=help, labels=session.model_label())
         return
     hint, fix = did_you_mean(name.text, known, name.span)
     help = hint or f"there is {listing(known)}"

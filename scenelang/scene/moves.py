@@ -72,7 +72,9 @@ def _offered(stmt: nodes.Call, place: Place) -> bool:
     owner = words.owner(name)
     model = f"model '{words.chosen.name}' has" if words.chosen else "the models here have"
     help = f"model '{owner}' has it" if owner else None
-    place.unit.session.error("E0205", f"{model} no transform '{name}'", stmt.name.span, help=help)
+    session = place.unit.session
+    message = f"{model} no transform '{name}'"
+    session.error("E0205", message, stmt.name.span, help=help, labels=session.model_label())
     return False
 
 
@@ -140,5 +142,7 @@ def _warn(node: Any, unit: Unit, span: Span) -> None:
             "W0301",
             f"{outside:.6g} is outside 0 to 1",
             span,
-            help="components run from 0 to 1; the result is clamped to that",
+            help="divide components of 0 to 255 by 255"
+            if outside > 1 and outside.is_integer()
+            else "components run from 0 to 1; the result is clamped to that",
         )

@@ -131,14 +131,17 @@ def _from_outside(full: str, given: Any, default: Any, allowed: Any, stmt: nodes
         value = literal(given, unit) if isinstance(given, str) else from_python(given)
         if value is None:
             advice = "write a number with its unit, a colour, a vector, true or false"
-            session.error("E0310", f"{shown} is not a literal", span, help=advice)
+            labels = (Label(stmt.default.span, "its default"),)
+            session.error("E0310", f"{shown} is not a literal", span, help=advice, labels=labels)
             return POISON
     if default is POISON:
         return value
     fitting = _fit(value, default)
     if fitting is None:
         help = "give it a unit, as in 30deg" if default.__class__ is Angle else None
-        session.error("E0310", f"{shown} is {describe(value)}, expected {describe(default)}", span, help=help)
+        message = f"{shown} is {describe(value)}, expected {describe(default)}"
+        labels = (Label(stmt.default.span, f"its default is {describe(default)}"),)
+        session.error("E0310", message, span, help=help, labels=labels)
         return POISON
     if allowed.__class__ is RangeValue or allowed.__class__ is Vec:
         try:

@@ -171,6 +171,11 @@ class Session:
             return
         self.diagnostics.add(code, message, span, labels=[*labels, *self.call_labels()], help=help, fix=fix)
 
+    def model_label(self) -> tuple[Label, ...]:
+        """Where the scene names its model, if it does."""
+        given = self.settings.given.get("model")
+        return () if given is None else (Label(given, "the model of this scene"),)
+
     def problem(self, problem: Problem, span: Span, operands: tuple[nodes.Expr | None, ...] = ()) -> None:
         """Report a `Problem` at the operand it blames, or else at ``span``."""
         operand = None

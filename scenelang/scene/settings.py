@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from scenelang.diagnostics.diagnostic import Label
+from scenelang.diagnostics.diagnostic import Edit, Fix, Label
+from scenelang.diagnostics.fixes import removal
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.scene.arguments import bind
@@ -56,8 +57,18 @@ def _version(stmt: nodes.Version, place: Place) -> Action | None:
         message = f"language version {version.span.text} is not supported"
         session.error("E0334", message, version.span, help="this is version 1: nsg 1;")
     elif place.unit.first is not stmt:
-        session.error("E0334", "the language version is not the first statement", stmt.span)
+        message = "the language version is not the first statement"
+        session.error("E0334", message, stmt.span, fix=_to_the_top(stmt, place.unit.first))
     return None
+
+
+def _to_the_top(stmt: nodes.Version, first: nodes.Stmt | None) -> Fix | None:
+    """Move a statement before the first one."""
+    if first is None or stmt.span.source is not first.span.source:
+        return None
+    source, start = stmt.span.source, first.span.start
+    away = removal(source, stmt.span.start, stmt.span.end)
+    return Fix("move it to the top", (Edit(Span(source, start, start), f"{stmt.span.text}\n"), *away.edits))
 
 
 @states(nodes.Model)
@@ -143,7 +154,9 @@ def _canvas(session: Session, span: Span, width: Any, height: Any) -> None:
 def _background(session: Session, span: Span, value: Any) -> None:
     if session.vocabulary.chosen is not None and session.vocabulary.dimension == 3:
         message = f"model '{session.vocabulary.chosen.name}' brings its own background"
-        raise Problem("E0336", message, "in 3D the background belongs to the model")
+        help = "in 3D the background belongs to the model"
+        session.error("E0336", message, span, help=help, labels=session.model_label())
+        return
     if value is None:
         session.settings.background = None
         return

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from functools import cache
+from unicodedata import category
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import SourceFile, Span
@@ -201,4 +202,7 @@ class _Slips:
     def _illegal(self, start: int, end: int, text: str) -> None:
         self.tokens.reported.add(start)
         shown = text if text.isprintable() else " ".join(f"U+{ord(c):04X}" for c in text[:8])
-        self.report.add("E0113", f"illegal character `{shown}`", start, end)
+        unseen = all(category(c) in ("Cf", "Cc") for c in text)  # comes along when text is copied
+        fix = self._fix(start, end, "") if unseen else None
+        help = "it cannot be seen" if unseen else None
+        self.report.add("E0113", f"illegal character `{shown}`", start, end, help=help, fix=fix)

@@ -172,7 +172,9 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
     fix = _change(f"write `{new}`", tokens, start, end, new)
     if repair.delete == 2:
         first, second = tokens.text(repair.at), tokens.text(repair.at + 1)
-        report.add("E0131", f"`{first}` and `{second}` are in the wrong order", start, end)
+        gap = tokens.source.text[tokens.ends[repair.at] : tokens.starts[repair.at + 1]]
+        swap = _change("swap them", tokens, start, end, f"{second}{gap}{first}")
+        report.add("E0131", f"`{first}` and `{second}` are in the wrong order", start, end, fix=swap)
     elif new == "NAME" and text.isalpha():
         report.add("E0110", f"`{text}` is a keyword, not a name", start, end, help=_KEYWORD_HELP)
     elif new == "==":
