@@ -172,3 +172,14 @@ def test_texts_instead_of_files(tmp_path: Path) -> None:
     scene, _ = evaluate(tree, diagnostics=found, path=tmp_path / "a.nsg", texts=given)
     assert scene is not None, list(found)
     assert scene.nodes[0].transforms[0].x == 0.25
+
+
+def test_a_cycle_shows_each_import_on_the_way(tmp_path: Path) -> None:
+    write(tmp_path, a='import "b.nsg" as b;', b='import "c.nsg" as c;', c='import "b.nsg" as b;')
+    found = load(tmp_path / "a.nsg").only()
+    assert (found.code, found.message) == ("E0216", "import cycle: b.nsg → c.nsg → b.nsg")
+    assert found.span is not None
+    assert Path(found.span.source.name).name == "c.nsg"
+    assert [(Path(x.span.source.name).name, x.span.text) for x in found.labels] == [("b.nsg", '"c.nsg"')]
+    write(tmp_path, a='import "a.nsg" as a;')
+    assert load(tmp_path / "a.nsg").only().labels == ()

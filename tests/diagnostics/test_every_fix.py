@@ -1,0 +1,83 @@
+"""Every fix mends: where a text has one mistake, applying its fix leaves none and brings no other."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from scenelang.diagnostics.codes import CODES
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.fixes import apply_fixes, settle
+from scenelang.diagnostics.pages import read_page
+from scenelang.diagnostics.span import SourceFile
+from scenelang.scene.evaluate import load_source
+from scenelang.scene.unused import find_unused
+from scenelang.syntax import parse
+from tests.diagnostics.test_pages import MODELS
+
+TESTS = Path(__file__).parents[1]
+SINGLE = [
+    *(
+        (f"page of {code}", example.text)
+        for code in CODES
+        for example in read_page(code).examples
+        if (example.kind, example.language) == ("bad", "nsg") and not example.options and not example.limits
+    ),
+    *(
+        case.partition("\n")[::2]
+        for case in (TESTS / "scene/errors.nsgs").read_text("utf-8").split("=== ")[1:]
+        if len(re.findall(r"//!.*", case)) == 1
+    ),
+]
+MANY = sorted([*(TESTS / "scene/malformed").glob("*.nsg"), *(TESTS / "syntax/malformed").glob("*.nsg")])
+
+
+def check(text: str) -> list[Diagnostic]:
+    found = Diagnostics()
+    source = SourceFile("a.nsg", text)
+    load_source(source, diagnostics=found, models=MODELS)
+    if not found.errors:
+        find_unused(parse(source, Diagnostics()), found)
+    return list(found)
+
+
+# Their one mistake hides others on purpose.
+HIDING = {"reported once in a loop", "an unknown model is one mistake", "poison is silent"}
+FIXABLE = [
+    (title, text)
+    for title, text in SINGLE
+    if title not in HIDING and sum(d.fix is not None for d in check(text)) == 1
+]
+
+
+@pytest.mark.parametrize(("title", "text"), FIXABLE, ids=[title for title, _ in FIXABLE])
+def test_a_fix_mends(title: str, text: str) -> None:
+    before = check(text)
+    after, applied = apply_fixes(text, before)
+    assert len(applied) == 1
+    left = [d.code for d in check(after) if d.code != "W0201"]
+    others = [d.code for d in before if d is not applied[0]]
+    assert left == others, after
+
+
+def test_most_kinds_of_mistakes_that_can_be_mended_are() -> None:
+    """A list to keep in step: codes whose page has an example that is mended by itself."""
+    mended = {title.removeprefix("page of ") for title, _ in FIXABLE if title.startswith("page of ")}
+    assert mended == {
+        *("E0102", "E0103", "E0105", "E0106", "E0107", "E0111", "E0112", "E0114", "E0116", "E0117", "E0119"),
+        *("E0123", "E0126", "E0127", "E0130", "E0131", "E0132", "W0101"),
+        *("E0201", "E0204", "E0206", "E0208", "E0210", "W0201"),
+        *("E0302", "E0334", "E0335"),
+    }
+
+
+@pytest.mark.parametrize("path", MANY, ids=lambda path: f"{path.parent.parent.name}-{path.stem}")
+def test_fixes_of_many_mistakes_come_to_rest(path: Path) -> None:
+    text = path.read_text("utf-8")
+    before = check(text)
+    done = settle({"one": text}, lambda texts: [("one", d) for d in check(texts["one"])])
+    assert done.stable
+    assert not any(d.fix for _, d in done.left)
+    assert len(done.left) <= len(before)
