@@ -6,6 +6,7 @@ import importlib
 import io
 import sys
 from collections.abc import Sequence
+from keyword import iskeyword
 from typing import Final
 
 import click
@@ -13,7 +14,8 @@ import click
 from scenelang.backend.errors import RenderError
 from scenelang.files import NotWritten
 
-# Command -> what `--help` says. Each lies in `scenelang/cli/<command>.py` as `command`, imported when called.
+# Command -> what `--help` says. Each lies in `scenelang/cli/<command>.py` as `command`, imported when called;
+# a keyword's file ends in an underscore.
 COMMANDS: Final = {
     "render": "Draw scenes or compiled programs.",
     "check": "Report what is wrong with scenes.",
@@ -27,6 +29,7 @@ COMMANDS: Final = {
     "lsp": "Serve editors over the Language Server Protocol.",
     "explain": "Say what a diagnostic's code means.",
     "convert": "Write a scene as text, JSON or Python.",
+    "import": "Make a scene of a glTF file's nodes.",
     "dump": "Show what a scene is after each stage.",
     "graph": "Draw the graph of a scene.",
     "schema": "Print the JSON Schema of scenes.",
@@ -47,7 +50,8 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = importlib.import_module(f"scenelang.cli.{cmd_name}").command
+        module = f"scenelang.cli.{cmd_name}{'_' if iskeyword(cmd_name) else ''}"
+        command: click.Command = importlib.import_module(module).command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

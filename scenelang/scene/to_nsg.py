@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Final
 
 from scenelang.diagnostics.diagnostic import SceneError
@@ -23,8 +24,13 @@ _INDENT: Final = "  "
 _AXES: Final = {"[1, 0, 0]": "X", "[0, 1, 0]": "Y"}
 
 
-def to_nsg(scene: Scene) -> str:
-    """The text of ``scene``: settings that differ from the defaults, then its nodes in order."""
+def to_nsg(scene: Scene, notes: Mapping[int, str] | None = None) -> str:
+    """The text of ``scene``: settings that differ from the defaults, then its nodes in order.
+
+    Args:
+        scene: any Scene.
+        notes: comments to put before nodes, a line each, by the nodes' `id`.
+    """
     lines = ["nsg 1;"]
     if scene.model is not None:
         lines.append(f'model "{scene.model}";')
@@ -45,6 +51,8 @@ def to_nsg(scene: Scene) -> str:
             lines.append(entry)
         else:
             word, node, depth = entry
+            if notes and id(node) in notes:
+                lines.append(f"{_INDENT * depth}// {notes[id(node)]}")
             todo.extend(reversed(_node(word, node, depth)))
     text = "\n".join(lines) + "\n"
     try:
