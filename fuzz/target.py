@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Final
 
-TARGETS: Final = ("parse", "evaluate", "scene_json", "program", "weights")
+TARGETS: Final = ("parse", "evaluate", "scene_json", "program", "weights", "formatting", "incremental")
 """Names of the modules in `fuzz.targets`."""
 
 

@@ -28,7 +28,8 @@ def format_text(text: str, *, name: str = "<text>") -> str:
         name: what errors call it.
 
     Returns:
-        The same tokens and comments in the canonical layout; equal to ``text`` if it has that already.
+        The same tokens and comments in the canonical layout, but for stray semicolons, which go; equal to
+        ``text`` if it has that already.
 
     Raises:
         SceneError: the text has syntax errors.
@@ -47,10 +48,20 @@ def format_text(text: str, *, name: str = "<text>") -> str:
         parse(SourceFile(name, text), diagnostics)
         if diagnostics.errors:
             raise SceneError(diagnostics)
+        if diagnostics.items:
+            return format_text(_without_strays(text, diagnostics), name=name)
     assert document is not None, "a text without mistakes that the tables do not read"
     result = "".join(line + "\n" for line in render(document))
     _compare(tokens, result)
     return mark + result.replace("\n", newline)
+
+
+def _without_strays(text: str, diagnostics: Diagnostics) -> str:
+    """A text without the semicolons that stand for nothing, all that a parse warns about."""
+    for d in sorted(diagnostics, key=lambda d: -d.span.start if d.span is not None else 0):
+        assert d.code == "W0101" and d.span is not None, "a warning about more than stray semicolons"
+        text = text[: d.span.start] + text[d.span.end :]
+    return text
 
 
 def _document(layout: Layout) -> Part | None:

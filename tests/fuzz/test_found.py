@@ -15,6 +15,7 @@ from scenelang.backend.render import render
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.render import render_text
 from scenelang.diagnostics.span import SourceFile
+from scenelang.formatting import format_text
 from scenelang.models.manifest import ROOT, Manifest
 from scenelang.models.weights import ModelError, read_facts
 from scenelang.program.compile import compile_scene
@@ -159,3 +160,18 @@ def test_reserved_words_are_those_of_the_grammar() -> None:
     words = {text for text in tables().literals if text[0].isalpha()}
     assert words - set(RESERVED) == {"step", "as"}  # keywords only where they can follow something
     assert set(RESERVED) <= words
+
+
+@pytest.mark.parametrize(
+    ("text", "laid"),
+    [
+        ("star {};\n", "star {}\n"),
+        ("let a = 1; ;; // one\nlet b = 2;", "let a = 1; // one\nlet b = 2;\n"),
+        ("group { star { } /* two */; }", "group { star {} /* two */ }\n"),
+        ("star { }\r\n;\r\n", "star {}\r\n"),
+        (";", ""),
+    ],
+)
+def test_formatting_takes_stray_semicolons_out(text: str, laid: str) -> None:
+    """They are only warned about, and the formatter took a text without errors for one the grammar reads."""
+    assert format_text(text) == laid
