@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import re
 import shlex
@@ -73,6 +74,14 @@ def test_scenes_give_what_the_page_says(block: Block) -> None:
         if manifest is not None:
             check_scene(scene, spans, found, manifest)
     assert tuple(d.code for d in found.errors) == block.words, [(d.message, d.span) for d in found]
+
+
+def test_json_is_json() -> None:
+    for block in of("json"):
+        try:
+            json.loads(block.text)
+        except ValueError as error:
+            pytest.fail(f"{block}: {error}")
 
 
 def test_blocks_say_their_language() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from scenelang.formatting.format import format_text
 from tests.pictures import premultiplied, psnr_db
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -108,3 +109,10 @@ def suggestions() -> list[tuple[str, dict[str, str]]]:
 def test_suggestions_of_comments_work(name: str, params: dict[str, str]) -> None:
     assert params
     assert nsg.compile(nsg.load(EXAMPLES / name, params=params)).digest()
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.rglob("*.nsg")), ids=lambda path: path.stem)
+def test_example_is_laid_out(path: Path) -> None:
+    """As `scenelang fmt examples` leaves it."""
+    text = path.read_text("utf-8")
+    assert format_text(text) == text
