@@ -162,7 +162,21 @@ def _report_deletion(tokens: Tokens, report: Report, repair: Repair) -> None:
             "E0105", f"unmatched `{text}`", start, end, fix=_change("remove it", tokens, start, end, "")
         )
     else:
-        report.add("E0101", f"unexpected {_quoted(text)}", start, end)
+        report.add("E0101", f"unexpected {_quoted(text)}", start, end, fix=_once(tokens, repair, start, end))
+
+
+def _once(tokens: Tokens, repair: Repair, start: int, end: int) -> Fix | None:
+    """Remove what is written twice in a row, with the space between."""
+    text = tokens.source.text
+    if repair.at and tokens.text(repair.at - 1) == text[start:end]:
+        before = tokens.ends[repair.at - 1]
+        start = start if text[before:start].strip() else before
+    elif tokens.text(repair.end) == text[start:end]:
+        behind = tokens.starts[repair.end]
+        end = end if text[end:behind].strip() else behind
+    else:
+        return None
+    return _change("remove it", tokens, start, end, "")
 
 
 def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
