@@ -102,7 +102,8 @@ def test_vim_colours(tmp_path: Path) -> None:
 def test_vim_formats_and_indents(tmp_path: Path) -> None:
     (tmp_path / "scene.nsg").write_text("square   {}\n\n\n\nstar{}\n", "utf-8")
     program = tmp_path / "scenelang"
-    program.write_text(f'#!/bin/sh\nexec {shutil.which("python3")} -m scenelang "$@"\n')
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m scenelang "$@"\n')
+    program.chmod(0o755)
     script = (
         f"{HEAD}let $PATH = '{tmp_path}:' . $PATH\n"
         "NsgFormat\nlet g:out = getline(1, '$')\n"
