@@ -185,13 +185,13 @@ class _Output:
 
     def write(self, found: Sequence[Diagnostic]) -> None:
         """Print diagnostics, or that there are none."""
-        from scenelang.cli.say import wants_color, width_of
-        from scenelang.diagnostics.render_text import plural, render_text
-
         stream = sys.stderr if self.to_stderr else sys.stdout
         if self.kind != "human":
             text = _for_machines(found, self.kind, self.most)
         elif found:
+            from scenelang.cli.say import wants_color, width_of
+            from scenelang.diagnostics.render_text import render_text
+
             text = render_text(
                 found,
                 wants_color(stream, self.color),
@@ -203,7 +203,8 @@ class _Output:
             )
         else:
             count = len(self.scenes.sources) + len(self.scenes.unread)
-            text = f"no mistakes in {plural(count, 'scene')}\n" if count and not self.quiet else ""
+            scenes = "1 scene" if count == 1 else f"{count:,} scenes"
+            text = f"no mistakes in {scenes}\n" if count and not self.quiet else ""
         click.echo(text, nl=False, err=self.to_stderr, color=True)
 
     def fixed(self, settled: Settled[str]) -> None:

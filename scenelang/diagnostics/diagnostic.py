@@ -107,4 +107,4 @@ class SceneError(Exception):
         self.diagnostics = tuple(diagnostics)
         from scenelang.diagnostics.render import render_text
 
-        super().__init__(render_text(self.diagnostics))
+        super().__init__(render_text(self.diagnostics, fixable=0))

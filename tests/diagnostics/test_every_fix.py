@@ -31,6 +31,13 @@ SINGLE = [
         if len(re.findall(r"//!.*", case)) == 1
     ),
 ]
+SINGLE += [
+    ("a keyword twice", "let let a = 1; square { scale(a); }"),
+    ("a comma twice", "square { scale(0.5,, 0.5); }"),
+    ("a word twice with a comment between", "for (i in /* to */ in 0..3) { square {} }"),
+    ("an invisible space", "square { sc\u200bale(0.5); }"),
+    ("a control character", "square { scale(0.5); }\x07"),
+]
 MANY = sorted([*(TESTS / "scene/malformed").glob("*.nsg"), *(TESTS / "syntax/malformed").glob("*.nsg")])
 
 
