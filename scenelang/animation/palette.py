@@ -19,8 +19,7 @@ _MOST_KNOWN = 1 << 20  # colours that are counted; more are thinned to the most 
 def packed(pixels: Pixels) -> npt.NDArray[np.uint32]:
     """Colours (H, W, 3) as one number each, of any shape before the last axis."""
     wide = pixels[..., :3].astype(np.uint32)
-    number: npt.NDArray[np.uint32] = (wide[..., 0] << 16) | (wide[..., 1] << 8) | wide[..., 2]
-    return number
+    return np.asarray((wide[..., 0] << 16) | (wide[..., 1] << 8) | wide[..., 2], np.uint32)
 
 
 def unpacked(numbers: npt.NDArray[np.uint32]) -> Colours:
@@ -136,4 +135,4 @@ class Mapper:
         table.putpalette(self.colours.tobytes())
         image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
         index = np.asarray(image.quantize(palette=table, dither=Image.Dither.FLOYDSTEINBERG))
-        return np.minimum(index, len(self.colours) - 1).astype(np.uint8)
+        return np.asarray(np.minimum(index, len(self.colours) - 1), np.uint8)
