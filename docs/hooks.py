@@ -2,6 +2,7 @@
 
 - A page for each diagnostic, ``errors/E0401.html``, from ``scenelang/diagnostics/pages/E0401.md``, and the
   changelog and the contributors' guide as pages.
+- What each command's ``--help`` says, as a page.
 - The scenes of ``examples/`` as files to download.
 - Links of pages lead to files of the repository, as code hosts show them; here they lead to the same thing
   inside the site, and where the site has no such thing they become plain text.
@@ -13,13 +14,17 @@ import re
 from pathlib import Path
 from typing import Any
 
+import click
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
+from scenelang.cli.main import COMMANDS, cli
+
 ROOT = Path(__file__).parents[1]
 CODE_PAGES = "scenelang/diagnostics/pages"
 ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
+COMMANDS_PAGE = "commands.md"
 _LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 _CODES = re.compile(r"^(```nsg)(?: [EW]\d{4})+", re.MULTILINE)  # the codes that a test expects of a scene
 _FENCE = re.compile(r"(^```.*?^```$)", re.MULTILINE | re.DOTALL)
@@ -38,7 +43,7 @@ def _existing(entries: list[Any]) -> list[Any]:
         if isinstance(goal, list):
             inner = _existing(goal)
             kept += [{title: inner}] if inner else []
-        elif (ROOT / "docs" / goal).exists() or goal in ROOT_PAGES.values():
+        elif (ROOT / "docs" / goal).exists() or goal in (COMMANDS_PAGE, *ROOT_PAGES.values()):
             kept.append(entry)
     return kept
 
@@ -52,7 +57,19 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             made[path.relative_to(ROOT).as_posix()] = path
     for target, path in made.items():
         files.append(File.generated(config, target, content=path.read_bytes()))
+    files.append(File.generated(config, COMMANDS_PAGE, content=commands_page()))
     return files
+
+
+def commands_page() -> str:
+    """Every command with the text of its ``--help``."""
+    parts = ["# Commands\n\nWhat `scenelang COMMAND --help` says.\n"]
+    for name, summary in COMMANDS.items():
+        command = cli.get_command(click.Context(cli), name)
+        assert command is not None, name
+        context = click.Context(command, info_name=f"scenelang {name}", terminal_width=100)
+        parts.append(f"## {name}\n\n{summary}\n\n```text\n{command.get_help(context)}\n```\n")
+    return "\n".join(parts)
 
 
 def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+import scenelang
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.models.manifest import load_manifest
@@ -257,3 +258,8 @@ def test_site_is_built(tmp_path: Path) -> None:
             page.read_text("utf-8"),
         )
         assert not fetched, f"{page.name}: {fetched}"
+
+
+def test_every_public_name_is_in_the_embedding_guide() -> None:
+    page = (ROOT / "docs/embedding.md").read_text("utf-8")
+    assert [name for name in scenelang.__all__ if f"`{name}`" not in page] == []
