@@ -10,12 +10,12 @@ from scenelang.scene.functions import ANIMATED, CONSTANTS, FUNCTIONS
 from scenelang.scene.materials import prepare_value_use
 from scenelang.scene.moves import prepare_move
 from scenelang.scene.objects import HOLDERS, prepare_module_call, prepare_object
-from scenelang.scene.references import VALUES, lookup, unknown, unknown_member, wrong_kind
+from scenelang.scene.references import lookup, wrong_kind
 from scenelang.scene.scope import Binding, Scope
 from scenelang.scene.settings import prepare_setting
 from scenelang.scene.statements import Action, Place, inner, prepare_block, states
 from scenelang.scene.transforms import GEOMETRY, TEXTURE
-from scenelang.scene.unknown import report_unknown
+from scenelang.scene.unknown import VALUES, report_unknown, unknown, unknown_member
 from scenelang.scene.vocabulary import SETTINGS
 from scenelang.syntax import nodes
 

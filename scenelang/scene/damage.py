@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import nodes
+from scenelang.syntax.tables import tables
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _DEFINITION = re.compile(
@@ -86,7 +87,7 @@ def find_damage(file: nodes.File, found: Iterable[Diagnostic]) -> Damage:
             parts.append(part)
             blocks += [block] if block else []
     texts = [part.text for part in parts]
-    nameless = any(not (m["name"] or m["alias"]) for text in texts for m in _DEFINITION.finditer(text))
+    nameless = any(_is_nameless(match) for text in texts for match in _DEFINITION.finditer(text))
     return Damage(
         tuple(dict.fromkeys(parts)),
         tuple(dict.fromkeys(blocks)),
@@ -94,6 +95,13 @@ def find_damage(file: nodes.File, found: Iterable[Diagnostic]) -> Damage:
         nameless,
         any(_is_about_braces(code, span) for code, span in marks),
     )
+
+
+def _is_nameless(definition: re.Match[str]) -> bool:
+    """Whether a definition does not say what it defines, or says it with a keyword."""
+    if definition["name"]:
+        return definition["name"].strip() in tables().literals
+    return not definition["alias"]
 
 
 def _is_about_braces(code: str, span: Span) -> bool:

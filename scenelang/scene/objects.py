@@ -9,7 +9,7 @@ from scenelang.diagnostics.span import Span
 from scenelang.scene import spans
 from scenelang.scene.build import Builder, ChainBuilder, make
 from scenelang.scene.expressions import prepare
-from scenelang.scene.references import VALUES, entering, lookup
+from scenelang.scene.references import entering, lookup
 from scenelang.scene.schema import Boolean, Chain, Group, Material, Object
 from scenelang.scene.scope import Definition, Env
 from scenelang.scene.session import MAX_NODE_DEPTH, Session
@@ -24,6 +24,7 @@ from scenelang.scene.statements import (
     prepare_statement,
     states,
 )
+from scenelang.scene.unknown import VALUES
 from scenelang.scene.vocabulary import LANGUAGE
 from scenelang.syntax import nodes
 
@@ -78,6 +79,8 @@ def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
     if stmt.args:
         for arg in stmt.args:
             prepare(arg.value, unit, place.scope)
+        if not fits:
+            return None
         help = f"size it in its block: {name} {{ scale(0.5); }}"
         session.error("E0308", f"'{name}' takes no arguments", stmt.args[0].span, help=help)
         return None

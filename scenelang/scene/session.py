@@ -123,6 +123,7 @@ class Session:
     animated: list[Any] = field(default_factory=lambda: [UNBOUND] * 4)
     settings: Settings = field(default_factory=Settings)
     damaged: dict[int, Damage] = field(default_factory=dict)
+    reported: dict[tuple[int, int, int], str] = field(default_factory=dict)
     unknown: dict[tuple[str, str, int], int] = field(default_factory=dict)
     names_in: dict[int, dict[str, list[Span]]] = field(default_factory=dict)
     replays: bool = False
@@ -167,8 +168,9 @@ class Session:
         labels: tuple[Label, ...] = (),
     ) -> None:
         """Report a mistake with the calls that led to it, unless it may follow from one of syntax."""
-        if self.follows(code, span):
-            return
+        place = (id(span.source), span.start, span.end)
+        if self.reported.setdefault(place, code) != code or self.follows(code, span):
+            return  # one place, one mistake: what else is wrong there most likely comes of it
         self.diagnostics.add(code, message, span, labels=[*labels, *self.call_labels()], help=help, fix=fix)
 
     def model_label(self) -> tuple[Label, ...]:

@@ -8,7 +8,9 @@ from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.diagnostics.suggest import did_you_mean, ranked
+from scenelang.diagnostics.suggest import did_you_mean, listing, ranked
+from scenelang.scene import elsewhere
+from scenelang.scene.functions import ANIMATED, CONSTANTS, FUNCTIONS
 from scenelang.scene.scope import Binding, Scope
 from scenelang.scene.session import Session
 from scenelang.scene.unit import Unit
@@ -16,6 +18,9 @@ from scenelang.syntax import nodes
 from scenelang.syntax.lexer import scan
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report
+
+VALUES: Final = ("let", "param", "argument", "loop")
+"""Kinds of bindings that are values."""
 
 _SHOWN: Final = 3
 _CODES: Final = {"module": "E0204", "fn": "E0207"}
@@ -125,3 +130,55 @@ def report_unknown(
 def _suggested(help: str | None, around: list[tuple[str, Binding]]) -> Binding | None:
     """The binding whose name a help text suggests."""
     return next((b for n, b in around if help == f"did you mean '{n}'?"), None)
+
+
+def unknown_member(name: nodes.Name, unit: Unit, exported: Unit) -> None:
+    """Report that an imported file has no such name."""
+    alias, _, rest = name.text.partition(".")
+    if exported.damage and exported.damage.loses(rest):
+        return
+    known = [n for n, b in exported.scope.names.items() if b.kind != "import"]
+    last = Span(name.span.source, name.span.end - len(rest), name.span.end)
+    help, fix = did_you_mean(rest, known, last)
+    help = help or (f"it has {listing(known)}" if known else "it defines nothing")
+    end = nodes.Name(rest, last)
+    report_unknown(end, unit, Scope(unit.frame), "E0212", f"'{alias}' has no '{rest}'", help=help, fix=fix)
+
+
+def unknown(name: nodes.Name, unit: Unit, scope: Scope, *, called: bool = False) -> None:
+    """Report a name that stands for nothing in an expression."""
+    text, session = name.text, unit.session
+    if unit.damage and unit.damage.loses(text):
+        return
+    alias, dot, _ = text.partition(".")
+    if dot:
+        head = Span(name.span.source, name.span.start, name.span.start + len(alias))
+        unknown(nodes.Name(alias, head), unit, scope)
+        return
+    later = scope.defined_later(text)
+    if later is not None:
+        message, advice = (
+            f"'{text}' is used before its line",
+            f"move the definition of '{text}' above this line",
+        )
+        labels = (Label(later, "defined here"),)
+        session.error("E0203", message, name.span, labels=labels, help=advice)
+        return
+    kinds = ("fn",) if called else (*VALUES, "import")
+    visible = {n for n, b in scope.visible() if b.kind in kinds}
+    if called:
+        help, fix = did_you_mean(text, visible | set(FUNCTIONS), name.span)
+        help, fix = (elsewhere.FUNCTIONS[text], None) if text in elsewhere.FUNCTIONS else (help, fix)
+        report_unknown(
+            name, unit, scope, "E0207", f"unknown function '{text}'", help=help, fix=fix, kinds=kinds
+        )
+        return
+    help, fix = did_you_mean(text, visible | {*CONSTANTS, *ANIMATED, "true", "false"}, name.span)
+    here = elsewhere.NAMES.get(text.lower())
+    colour = elsewhere.COLOURS.get(text.lower())
+    if here is not None and here.lower() != text.lower():
+        help, fix = f"it is called '{here}' here", Fix(f"write '{here}'", (Edit(name.span, here),))
+    elif help is None and colour is not None:
+        help = f"colours have no names; {text.lower()} is {colour}"
+        fix = Fix(f"write '{colour}'", (Edit(name.span, colour),))
+    report_unknown(name, unit, scope, "E0201", f"unknown name '{text}'", help=help, fix=fix, kinds=kinds)

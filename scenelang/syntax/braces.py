@@ -92,25 +92,21 @@ class _Mender:
     def mend_plain(self) -> None:
         """Mend a brace that cannot stand where it does, if that is all that is wrong around it."""
         kinds = self.tokens.kinds
-        balance = kinds.count(self.opening) - kinds.count(self.closing)
-        stack = [tables().start]
-        depth = 0
-        for at, kind in enumerate(kinds):
-            before = stack.copy() if kind in (self.opening, self.closing) else []
-            if advance(stack, kind):
-                depth += (kind == self.opening) - (kind == self.closing)
-                continue
-            if (kind == self.opening and balance > 0) or (kind == self.closing and balance < 0 < depth):
-                end = min(at + 2 * _BEHIND, len(kinds))
-                for mend in (_Mend(at, 1, ()), *(_Mend(at, 1, (other,)) for other in _instead())):
-                    trial = before.copy()
-                    if (
-                        all(advance(trial, kind) for kind in mend.insert)
-                        and reach(trial, kinds, at + 1, end) == end
-                    ):
-                        self._apply(mend)
-                        break
+        start = [tables().start]
+        at = reach(start.copy(), kinds, 0, len(kinds))
+        if at == len(kinds) or kinds[at] not in (self.opening, self.closing):
             return
+        more = kinds.count(self.opening) - kinds.count(self.closing)
+        depth = kinds[:at].count(self.opening) - kinds[:at].count(self.closing)
+        if more <= 0 if kinds[at] == self.opening else more >= 0 or depth == 0:
+            return
+        reach(start, kinds, 0, at)
+        end = min(at + 2 * _BEHIND, len(kinds))
+        for mend in (_Mend(at, 1, ()), *(_Mend(at, 1, (other,)) for other in _instead())):
+            trial = start.copy()
+            if all(advance(trial, kind) for kind in mend.insert) and reach(trial, kinds, at + 1, end) == end:
+                self._apply(mend)
+                return
 
     def mend(self, slip: Slip) -> None:
         """Mend one line: by one change where that does, else brace by brace."""
@@ -160,7 +156,10 @@ class _Mender:
             for likely, mend in self._mends(stack, at, stop, limit, opens, count):
                 trial = stack.copy()
                 if all(advance(trial, kind) for kind in mend.insert):
-                    found.append((reach(trial, kinds, at + mend.delete, end), likely, at, mend))
+                    got = reach(trial, kinds, at + mend.delete, end)
+                    if got == end == len(kinds) - 1 and not fits(trial, self.closing):
+                        got -= 1  # the text would end in the middle of a statement
+                    found.append((got, likely, at, mend))
             if not advance(stack, kinds[at]):
                 break
         got, _, _, mend = max(found, key=lambda one: one[:3], default=(-1, 0.0, 0, self._at_end(stop, opens)))
@@ -199,6 +198,8 @@ class _Mender:
         self, stack: list[int], at: int, wanted: tuple[int, ...]
     ) -> Iterator[tuple[float, _Mend]]:
         """The line breaks off before a token: what its statement lacks, and the braces after that."""
+        if fits(stack, self.closing):
+            return  # nothing is unfinished
         semicolon = tables().literals[";"]
         if wanted[0] == self.opening:
             missing = completion(stack, self.opening)
@@ -211,7 +212,7 @@ class _Mender:
         trial = stack.copy()
         if all(advance(trial, kind) for kind in insert) and not fits(trial, self.tokens.kinds[at]):
             insert += (*(completion(trial, semicolon) or ()), semicolon)
-        yield 0.15, _Mend(at, 0, insert)
+        yield 0.6, _Mend(at, 0, insert)
 
     # ------------------------------------------------------------ mending
 

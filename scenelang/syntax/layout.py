@@ -41,7 +41,16 @@ class _Line:
 
 def find_slips(tokens: Tokens) -> list[Slip]:
     """The slips that explain best why braces do not match; none where there are too many."""
-    return _slips(_lines(tokens))
+    lines = _lines(tokens)
+    alone = _unbalanced_line(lines) if not any(line.indent for line in lines) else []
+    return alone or _slips(lines)
+
+
+def _unbalanced_line(lines: list[_Line]) -> list[Slip]:
+    """In a text without indentation whose lines each close what they open: the one that does not."""
+    pairs = [(line, after, after.depth - line.depth) for line, after in pairwise(lines)]
+    wrong = [Slip(line.first, after.first, -more) for line, after, more in pairs if more]
+    return wrong if len(wrong) == 1 and len(lines) > 2 else []
 
 
 def find_hidden_slips(tokens: Tokens) -> list[Slip]:
@@ -92,8 +101,8 @@ def _lines(tokens: Tokens) -> list[_Line]:
     previous = semicolon
     for at, kind in enumerate(tokens.kinds[:-1]):
         statement = previous in (semicolon, opening, closing) or kind == closing
-        starts = kind in starters and (brackets == 0 or _leaves_open(tokens.kinds, at))
-        if (statement or starts) and tokens.on_new_line(at):
+        candidate = (statement or kind in starters) and tokens.on_new_line(at)
+        if candidate and (statement or brackets == 0 or _leaves_open(tokens.kinds, at)):
             brackets = 0
             lines.append(_Line(at, _indent(tokens, at), depth - (kind == closing)))
         depth += (kind == opening) - (kind == closing)

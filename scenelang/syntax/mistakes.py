@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.syntax.repairs import REPLACEMENTS, Repair, word_for
+from scenelang.syntax.repairs import REPLACEMENTS, Repair, keywords_near, word_for
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 
@@ -92,6 +92,15 @@ def report_instead(tokens: Tokens, report: Report, at: int, names: Sequence[str]
         report.add("E0126", f"expected a string, found {found}", start, end)
     else:
         report.add("E0130", f"{found} where {_listed(names)} belongs", start, end)
+
+
+def report_misspelt(tokens: Tokens, report: Report, at: int, word: str) -> None:
+    """Report a word where a keyword was meant."""
+    start, end = tokens.starts[at], tokens.ends[at]
+    fix = _change(f"write `{word}`", tokens, start, end, word)
+    report.add(
+        "E0132", f"unknown word `{tokens.text(at)}`", start, end, help=f"did you mean `{word}`?", fix=fix
+    )
 
 
 def report_unexpected(tokens: Tokens, report: Report, at: int) -> None:
@@ -201,6 +210,8 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
         report.add(
             "E0127", f"`{text}` is not used here", start, end, help=f"`{new}` is the sign for it", fix=fix
         )
+    elif new.isalpha() and new.islower() and new in keywords_near(text):
+        report_misspelt(tokens, report, repair.at, new)
     elif repair.delete == 1 and text in REPLACEMENTS and new in REPLACEMENTS[text]:
         report.add("E0130", f"`{text}` where `{new}` belongs", start, end, fix=fix)
     else:

@@ -12,10 +12,10 @@ from typing import Any
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, nearest
-from scenelang.syntax import mistakes
+from scenelang.syntax import mistakes, nodes
 from scenelang.syntax.automaton import fits, reach, statement_depth
 from scenelang.syntax.lexer import UNIT_ALIASES, UNITS
-from scenelang.syntax.repairs import FOLLOWED, MAX_REPLAY, Search
+from scenelang.syntax.repairs import FOLLOWED, MAX_REPLAY, Search, keywords_near
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
 
@@ -55,6 +55,9 @@ class Recovery:
         if self.report.full or self.repairs > 4 * MAX_MISTAKES:
             return None
         depth = statement_depth(states)
+        start = self._misspelt_if(states, values, at) if self._is(at, "else") else None
+        if start is not None:
+            return start
         first = self._index(values[depth]) if depth < len(values) else at
         known = self._head_mistake(states, first, at) if first < at else self._start_mistake(states, at)
         if self._misspelt(states[: depth + 1], first, at):
@@ -152,6 +155,36 @@ class Recovery:
         self.report.add("E0132", f"unknown statement `{text}`", start, end, help=help, fix=fix)
         tokens.kinds[first] = self.literals[word]
         return True
+
+    def _misspelt_if(self, states: list[int], values: list[Any], at: int) -> int | None:
+        """`fi (a) { … } else { … }`: where `if` was meant, for parsing to go on from there."""
+        kinds, tokens = self.tokens.kinds, self.tokens
+        block = self._opening_of(at - 1, "{", "}")
+        bracket = self._opening_of(block - 1, "(", ")") if block else 0
+        first = bracket - 1
+        if (
+            first < 0
+            or kinds[first] != tables().kind("NAME")
+            or "if" not in keywords_near(tokens.text(first))
+        ):
+            return None
+        starts = [i for i, value in enumerate(values) if isinstance(value, nodes.Name | nodes.NameRef)]
+        depth = next((i for i in reversed(starts) if values[i].span.start == tokens.starts[first]), None)
+        if depth is None:
+            return None
+        mistakes.report_misspelt(tokens, self.report, first, "if")
+        kinds[first] = self.literals["if"]
+        del states[depth + 1 :], values[depth:]
+        return first
+
+    def _opening_of(self, at: int, opening: str, closing: str) -> int:
+        """Index of the bracket that the one at an index closes; 0 where there is none."""
+        depth = 0
+        for index in range(at, max(0, at - 4 * MAX_REPLAY), -1):
+            depth += self._is(index, closing) - self._is(index, opening)
+            if depth == 0:
+                return index if self._is(index, opening) else 0
+        return 0
 
     def _head_mistake(self, states: list[int], first: int, at: int) -> bool:
         """`for` and `if` without parentheses or braces."""

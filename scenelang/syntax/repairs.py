@@ -6,10 +6,11 @@ make. Only repairs after which at least three tokens or a whole statement fit ar
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
+from scenelang.diagnostics.suggest import ranked
 from scenelang.syntax.automaton import LOOKAHEAD, advance, fits, reach
 from scenelang.syntax.completion import completion
 from scenelang.syntax.tables import END, tables
@@ -96,7 +97,8 @@ REPLACEMENTS = {
 _WORDS = {"and": "&&", "or": "||", "not": "!", "mod": "%"}
 _DELETION, _FURTHER_DELETION = 1.5, 0.6
 _SUBSTITUTION = 1.1  # something else stands where a forgotten token belongs
-_BREAK = 1.7  # a line breaks off
+_MISSPELT = 0.9
+_BREAK = 1.4  # a line breaks off
 _SWAP = 1.8
 _KEYWORD_AS_NAME = 1.1
 _NEW_LINE = 0.6  # a token that begins a line is seldom the slip
@@ -131,6 +133,13 @@ def _replacements() -> dict[int, list[tuple[Kinds, float]]]:
 def word_for(text: str) -> str | None:
     """The operator that other languages write as this word."""
     return _WORDS.get(text)
+
+
+@lru_cache(maxsize=256)
+def keywords_near(text: str) -> tuple[str, ...]:
+    """Keywords that a word may have been meant for, nearest first."""
+    words = [word for word in tables().literals if word.isalpha()]
+    return tuple(word for _, word in ranked(text, words, max(1, len(text) // 3)))
 
 
 Found = tuple[float, float, Repair, list[int]]
@@ -189,6 +198,9 @@ class Search:
                 prefixes.append((at, prefix.copy()))
             advance(prefix, self.kinds[at])
         found = self._try_all(prefix, self.at)
+        if prefixes:
+            at, prefix = prefixes[-1]
+            found += self._try(prefix, at, self._misspelt(at))
         best = self._settle(found)
         if best is not None and best[0] >= self._worth(self.at + FOLLOWED) - 2:
             return best[1]
@@ -203,11 +215,15 @@ class Search:
         return own + 0.15 * (min(stop, self.at + FOLLOWED) - self.at - own)
 
     def _try_all(self, stack: list[int], at: int) -> list[Found]:
-        """All repairs at one token that help, each with its score, its cost and the states after it."""
+        """All repairs at one token that help."""
+        return self._try(stack, at, self._candidates(stack, at))
+
+    def _try(self, stack: list[int], at: int, candidates: Iterable[Repair]) -> list[Found]:
+        """Those of some repairs that help, each with its score, its cost and the states after it."""
         found: list[Found] = []
         distance = self.at - at
         extra = 0.1 + 0.1 * distance if distance else 0.0
-        for repair in self._candidates(stack, at):
+        for repair in candidates:
             trial = stack.copy()
             if not all(advance(trial, kind) for kind in repair.insert):
                 continue
@@ -266,7 +282,9 @@ class Search:
             yield Repair(at, 1, insert, cost + 0.5 * header)
         if kind in self.keywords:
             yield Repair(at, 1, (self.name,), _KEYWORD_AS_NAME + (at < self.at))
-        elif kind == self.name and (operator := word_for(tokens.text(at))):
+        elif kind == self.name:
+            yield from self._misspelt(at)
+        if kind == self.name and (operator := word_for(tokens.text(at))):
             yield Repair(at, 1, (tables().literals[operator],), 1.0)
         cost = _DELETION
         for count in range(1, 4):
@@ -279,6 +297,12 @@ class Search:
                 cost += _NEW_LINE
             yield Repair(at, count, (), cost)
             cost += _FURTHER_DELETION
+
+    def _misspelt(self, at: int) -> Iterator[Repair]:
+        """A keyword with a slip."""
+        if self.kinds[at] == self.name:
+            for word in keywords_near(self.tokens.text(at)):
+                yield Repair(at, 1, (tables().literals[word],), _MISSPELT)
 
     def _broken_off(self, stack: list[int], at: int) -> Iterator[Repair]:
         """The line before a token breaks off in the middle of a statement."""
