@@ -1,5 +1,5 @@
 """``python -m scenelang``."""
 
-from scenelang.cli.main import main
+from scenelang.cli.start import main
 
 main()

@@ -35,7 +35,7 @@ def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
     name = os.fspath(path)
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
     handle = os.open(name, flags | getattr(os, "O_BINARY", 0))
-    with os.fdopen(handle, "rb") as file:
+    try:
         mode = os.fstat(handle).st_mode
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), name)
@@ -43,7 +43,10 @@ def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
             os.set_blocking(handle, True)
         elif not stat.S_ISREG(mode):
             raise OSError(errno.EINVAL, "not a regular file", name)
-        return file.read(most_bytes + 1)
+        with os.fdopen(handle, "rb", closefd=False) as file:
+            return file.read(most_bytes + 1)
+    finally:
+        os.close(handle)
 
 
 def read_json(data: bytes, *, most_depth: int = _JSON_DEPTH) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -139,6 +140,6 @@ def _put_picture(data: bytes, out: str | None) -> None:
     from scenelang.files import write_whole
 
     if out is None or out == "-":
-        click.get_binary_stream("stdout").write(data)
+        sys.stdout.buffer.write(data)
     else:
         write_whole(out, data)

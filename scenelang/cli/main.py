@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib
 import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from keyword import iskeyword
-from typing import Final
+from typing import Any, Final
 
 import click
 
@@ -69,23 +70,42 @@ class _Commands(click.Group):
             ctx.fail(f"No such command '{args[0]}'.{advice}")
         return super().resolve_command(ctx, args)
 
-    def invoke(self, ctx: click.Context) -> object:
-        try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:
-            raise click.exceptions.Exit(INTERRUPTED) from None
-        except BrokenPipeError:
-            raise  # whoever reads our output has enough; click ends the process quietly
-        except OSError as error:
-            raise Trouble(describe(error)) from None
-        except RenderError as error:
-            raise Trouble(str(error)) from None
-        except Exception as error:
-            from scenelang.models.weights import ModelError
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:
+        with _told():
+            return super().make_context(info_name, args, parent, **extra)
 
-            if isinstance(error, ModelError):
-                raise Trouble(str(error)) from None
-            raise
+    def invoke(self, ctx: click.Context) -> object:
+        with _told():
+            return super().invoke(ctx)
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    """What goes wrong without being a bug, told in a line."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise click.exceptions.Exit(INTERRUPTED) from None
+    except BrokenPipeError:
+        raise  # whoever reads our output has enough; click ends the process quietly
+    except OSError as error:
+        raise Trouble(describe(error)) from None
+    except RenderError as error:
+        raise Trouble(str(error)) from None
+    except (click.ClickException, click.exceptions.Exit, click.exceptions.Abort):
+        raise
+    except Exception as error:
+        from scenelang.models.weights import ModelError
+
+        if isinstance(error, ModelError):
+            raise Trouble(str(error)) from None
+        raise
 
 
 def describe(error: OSError) -> str:
