@@ -51,9 +51,8 @@ def test_it_is_the_weighted_distance_of_unit_features(monkeypatch: pytest.Monkey
     for picture in (a.numpy(), b.numpy()):
         shift = np.array(lpips.SHIFT, np.float32)[:, None, None].astype(float)
         scale = np.array(lpips.SCALE, np.float32)[:, None, None].astype(float)
-        first = convolve(
-            (2 * picture - 1 - shift) / scale, w["conv.0.weight"].numpy(), w["conv.0.bias"].numpy(), 2
-        )
+        w0, b0, w1, b1 = (w[f"conv.{i}.{k}"].numpy() for i in (0, 1) for k in ("weight", "bias"))
+        first = convolve((2 * picture - 1 - shift) / scale, w0, b0, 2)
         side = (first.shape[1] - 2) // 2 + 1
         pooled = np.zeros((3, side, side))
         for i in range(side):
