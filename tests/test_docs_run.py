@@ -21,7 +21,7 @@ import pytest
 from scenelang.cli.main import main
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("index", "tutorial", "cookbook", "embedding", "language")
+PAGES = ("index", "tutorial", "cookbook", "embedding", "language", "formatting")
 _BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```\n(?:\n```text\n(.*?)^```$)?", re.MULTILINE | re.DOTALL)
 VENV = ".venv/bin/"
 _LONG = {"watch", "train", "eval", "lsp"}  # commands that do not end, or not soon
@@ -30,13 +30,14 @@ _OTHERS = {"python3", "python", "pip", "git", "mkdocs"}  # parsed by test_docs.p
 
 def run(arguments: list[str]) -> tuple[int, str]:
     """What a command exits with and prints."""
-    printed = io.StringIO()
+    data, code = io.BytesIO(), 0
+    printed = io.TextIOWrapper(data, "utf-8", write_through=True)
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
         try:
             main(arguments)
         except SystemExit as end:
-            return int(end.code or 0), printed.getvalue()
-    return 0, printed.getvalue()
+            code = int(end.code or 0)
+    return code, data.getvalue().decode("utf-8")
 
 
 def like(expected: str) -> re.Pattern[str]:
