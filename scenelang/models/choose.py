@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from scenelang.models.manifest import Manifest
 from scenelang.scene.schema import Chain, Object, Scene, SceneNode
@@ -19,7 +19,7 @@ def choose_model(scene: Scene, models: Iterable[Manifest]) -> Manifest | None:
         The fitting manifest with the fewest geometries, then the fewest other words, then the first by
         name; None if none fits.
     """
-    geometries, materials, transforms, operations = _names(scene)
+    geometries, materials, transforms, operations = names_used(scene)
     fitting = [
         m
         for m in models
@@ -37,7 +37,7 @@ def _size(model: Manifest) -> tuple[int, int, str]:
     return len(model.geometries), others, model.name
 
 
-def _names(scene: Scene) -> tuple[set[str], set[str], set[str], set[str]]:
+def names_used(scene: Scene) -> tuple[set[str], set[str], set[str], set[str]]:
     """Names of geometries, materials, transforms and texture operations in a scene."""
     geometries: set[str] = set()
     materials: set[str] = set()
@@ -51,6 +51,43 @@ def _names(scene: Scene) -> tuple[set[str], set[str], set[str], set[str]]:
             materials.add(node.material.name)
             operations.update(op.kind for op in node.material.ops)
     return geometries, materials, transforms, operations
+
+
+def apart(scene: Scene, models: Sequence[Manifest]) -> tuple[Use, Use] | None:
+    """Two names of a scene that no model has both of, the earlier one first; None where three are needed."""
+    uses = list(_uses(scene))
+    owners = [{m.name for m in models if name in getattr(m, field)} for name, field, _ in uses]
+    for later in range(len(uses)):
+        for earlier in range(later):
+            if not owners[earlier] & owners[later]:
+                return uses[earlier], uses[later]
+    return None
+
+
+Use = tuple[str, str, object]
+"""A name, the field of manifests that lists such names, and the node that uses it first."""
+
+
+def _uses(scene: Scene) -> Iterator[Use]:
+    """Each name once, in the order of the scene."""
+    seen: set[tuple[str, str]] = set()
+    stack: list[SceneNode] = list(reversed(scene.nodes))
+    while stack:
+        node = stack.pop()
+        found: list[Use] = [(t.kind, "transforms", t) for t in node.transforms]
+        if node.material is not None:
+            found.append((node.material.name, "materials", node.material))
+            found += [(op.kind, "material_ops", op) for op in node.material.ops]
+        if isinstance(node, Object):
+            found.insert(0, (node.geometry, "geometries", node))
+        elif isinstance(node, Chain):
+            stack.extend(link.node for link in reversed(node.children))
+        else:
+            stack.extend(reversed(node.children))
+        for use in found:
+            if use[:2] not in seen:
+                seen.add(use[:2])
+                yield use
 
 
 def walk(nodes: Iterable[SceneNode]) -> Iterator[SceneNode]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING
 
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics, Label, SceneError
 from scenelang.graph.lower import Memory, Spans
 from scenelang.graph.nodes import Graph
-from scenelang.models.choose import choose_model
+from scenelang.models.choose import apart, choose_model
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.models.weights import Codes
 from scenelang.passes import check_scene
@@ -88,9 +88,27 @@ def find_model(
         # Compiling for the only model there is says what exactly it lacks.
         return manifests[0]
     if fitting is None:
-        fact = "no single model has every geometry, material and transform of the scene"
-        diagnostics.add("E0508", fact, place, help="name one with `model`, and the errors say what it lacks")
+        _no_model(scene, manifests, diagnostics, spans)
     return fitting
+
+
+def _no_model(
+    scene: Scene, manifests: Sequence[Manifest], diagnostics: Diagnostics, spans: Spans | None
+) -> None:
+    """Report that no model has all of a scene, at two names that are never together."""
+    help = "name one with `model`, and the errors say what it lacks"
+    pair = apart(scene, manifests)
+    if pair is None:
+        fact = "no single model has every geometry, material and transform of the scene"
+        diagnostics.add("E0508", fact, spans.span(scene) if spans is not None else None, help=help)
+        return
+    places = [spans.span(node) if spans is not None else None for _, _, node in pair]
+    known = [
+        " and ".join(f"`{m.name}`" for m in manifests if name in getattr(m, field)) for name, field, _ in pair
+    ]
+    labels = [Label(places[0], f"{known[0] or 'no model'} has this")] if places[0] is not None else []
+    fact = f"no model has both `{pair[0][0]}` and `{pair[1][0]}`, which {known[1] or 'none'} has"
+    diagnostics.add("E0508", fact, places[1], labels=labels, help=help)
 
 
 compile = compile_scene

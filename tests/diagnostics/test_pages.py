@@ -14,6 +14,7 @@ from scenelang.diagnostics.pages import AREAS, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.passes import check_scene
+from scenelang.program.compile import find_model
 from scenelang.scene.data import from_json
 from scenelang.scene.evaluate import load_source
 from scenelang.scene.params import Defines
@@ -43,16 +44,12 @@ SOLIDS = Manifest(
 MODELS = [SOLIDS, *(load_manifest(name) for name in available() if name != SOLIDS.name)]
 
 
-def manifest_for(scene: Scene, found: Diagnostics) -> Manifest | None:
-    """As the compiler picks it, from `MODELS`."""
-    from scenelang.models.choose import choose_model
-
-    if scene.model is not None:
-        return next(m for m in MODELS if m.name == scene.model)
-    chosen = choose_model(scene, MODELS)
-    if chosen is None:
-        found.add("E0508", "no model fits", None)
-    return chosen
+@pytest.fixture(autouse=True)
+def two_models(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The compiler, too, finds `MODELS` and no others."""
+    by_name = {m.name: m for m in MODELS}
+    monkeypatch.setattr("scenelang.program.compile.available", lambda: tuple(by_name))
+    monkeypatch.setattr("scenelang.program.compile.load_manifest", by_name.__getitem__)
 
 
 def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
@@ -87,7 +84,7 @@ def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
         defines.report_unused(found)
         if not found.errors:
             find_unused(parse(source, Diagnostics()), found)
-    if scene is not None and (manifest := manifest_for(scene, found)):
+    if scene is not None and (manifest := find_model(scene, found, spans=spans)):
         check_scene(scene, spans, found, manifest)
     return list(found)
 
@@ -126,3 +123,16 @@ def test_shape_of_a_page(page: Page) -> None:
     assert 200 < len(prose) < 1500
     assert all(len(line) <= 110 for line in page.text.splitlines())
     assert page.area in AREAS.values()
+
+
+def test_a_scene_for_two_models_is_shown_where_they_part() -> None:
+    found = Diagnostics()
+    source = SourceFile("scene.nsg", "square { scale(0.5); }\nsphere { scale(0.3); }\n")
+    scene, spans = load_source(source, diagnostics=found, models=MODELS)
+    assert scene is not None
+    assert find_model(scene, found, spans=spans) is None
+    (only,) = found
+    assert only.message == "no model has both `square` and `sphere`, which `solids3d` has"
+    assert only.span is not None
+    assert (only.span.text, only.labels[0].span.text) == ("sphere", "square")
+    assert only.labels[0].message == "`shapes2d` has this"

@@ -83,3 +83,27 @@ def test_the_smallest_model_that_fits() -> None:
     group = nsg.Group(children=(nsg.Object("square", material=material),))
     assert choose_model(nsg.Scene(nodes=(group,)), [shapes]) is None
     assert choose_model(nsg.Scene(), []) is None
+
+
+def test_names_that_no_model_has_together() -> None:
+    """Told by the first two of them, in the order of the scene."""
+    from dataclasses import replace
+
+    from scenelang.models.choose import apart
+
+    flat = shipped()[0]
+    solid = replace(flat, name="solids", geometries=("sphere", "square"), transforms=("rotate",))
+    solid = replace(solid, materials=("diffuse",))
+    twirled = nsg.Group(
+        children=(nsg.Object("sphere"),), transforms=(nsg.Rotate(angle=1.0), nsg.Twirl(k=1.0))
+    )
+    scene = nsg.Scene(nodes=(nsg.Object("square"), twirled))
+    assert apart(scene, [flat, solid]) == (
+        ("twirl", "transforms", twirled.transforms[1]),
+        ("sphere", "geometries", twirled.children[0]),
+    )
+    scene = nsg.Scene(nodes=(nsg.Object("square", material=nsg.Material(name="diffuse")), twirled))
+    pair = apart(scene, [flat, solid])
+    assert pair is not None
+    assert [name for name, _, _ in pair] == ["diffuse", "twirl"]
+    assert apart(nsg.Scene(nodes=(nsg.Object("square"),)), [flat, solid]) is None
