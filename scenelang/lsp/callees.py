@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from scenelang.lsp import words
 from scenelang.lsp.context import Cursor
-from scenelang.lsp.names import Symbol
+from scenelang.lsp.names import Names, Symbol, sight_at
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax import nodes
 
@@ -40,18 +40,18 @@ def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Callee |
     call = cursor.call
     if call is None:
         return None
-    found = find_symbol(docs, document, call.name, call.start)
+    found = find_symbol(docs, document, sight_at(document.parsed, call.start), call.name, call.start)
     if found is not None:
-        return callee_of(*found)
+        return callee_of(found[1])
     return callee_of_word(call.name, cursor.block.kind == "material")
 
 
 def find_symbol(
-    docs: Workspace, document: Document, name: str, offset: int
+    docs: Workspace, document: Document, names: Names, name: str, offset: int
 ) -> tuple[Document, Symbol] | None:
-    """The fn or module that a plain or dotted name stands for at an offset."""
+    """The fn or module that a plain or dotted name stands for at an offset; ``names`` are in sight there."""
     alias, _, rest = name.partition(".")
-    symbol = document.names.scope_at(offset).find(alias)
+    symbol = names.scope_at(offset).find(alias)
     if symbol is None:
         return None
     if rest and symbol.kind == "import" and isinstance(symbol.node, nodes.Import):
@@ -63,11 +63,11 @@ def find_symbol(
     return (document, symbol) if symbol.kind in ("fn", "module") else None
 
 
-def callee_of(document: Document, symbol: Symbol) -> Callee:
+def callee_of(symbol: Symbol) -> Callee:
     """A fn or module as a callee."""
     from scenelang.lsp.signatures import describe_symbol
 
-    head, text = describe_symbol(symbol, document)
+    head, text = describe_symbol(symbol)
     return Callee(symbol.name, head, tuple(p.name for p in symbol.params), {}, text)
 
 

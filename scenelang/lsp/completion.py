@@ -13,7 +13,7 @@ from lsprotocol import types
 from scenelang.lsp import words
 from scenelang.lsp.callees import Callee, find_callee
 from scenelang.lsp.context import COMBINE, Cursor, cursor_at
-from scenelang.lsp.names import Symbol
+from scenelang.lsp.names import Names, Symbol, sight_at
 from scenelang.lsp.signatures import describe_symbol
 from scenelang.lsp.vocabulary import vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace
@@ -79,7 +79,7 @@ def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -
         offset: where the cursor is.
         snippets: whether the client fills in placeholders.
     """
-    names = document.names
+    names = sight_at(document.parsed, offset)
     values = frozenset(
         s.name for s in names.visible(offset) if s.kind in ("let", "argument", "loop", "param")
     )
@@ -90,7 +90,7 @@ def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -
             start + 1,
             max(end - (document.text[end - 1 : end] == '"' and end - 1 > start), start + 1),
         )
-    maker = _Maker(docs, document, cursor)
+    maker = _Maker(docs, document, cursor, names)
     lines = document.lines
     place = lines.range(start, max(end, start))
     items = []
@@ -122,8 +122,8 @@ def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -
 class _Maker:
     """Collects what fits at one cursor."""
 
-    def __init__(self, docs: Workspace, document: Document, cursor: Cursor) -> None:
-        self.docs, self.document, self.cursor = docs, document, cursor
+    def __init__(self, docs: Workspace, document: Document, cursor: Cursor, names: Names) -> None:
+        self.docs, self.document, self.cursor, self.names = docs, document, cursor, names
         self.words: Vocabulary = vocabulary_of(document, docs)
 
     def items(self) -> Iterator[_Item]:
@@ -213,14 +213,14 @@ class _Maker:
         for name in sorted(self.words.geometries):
             text = f"{name} {{ ${{1:scale(0.5);}} }}"
             yield _Item(name, Kind.Class, text, rank, "geometry", words.GEOMETRIES.get(name, ""), True)
-        for symbol in self.document.names.visible(self.cursor.offset):
+        for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind == "module":
-                yield self._symbol(symbol, self.document, statement=True)
+                yield self._symbol(symbol, statement=True)
             elif symbol.kind == "import":
-                yield self._symbol(symbol, self.document)
+                yield self._symbol(symbol)
 
     def _material_values(self, rank: str) -> Iterator[_Item]:
-        for symbol in self.document.names.visible(self.cursor.offset):
+        for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind in ("let", "argument", "loop"):
                 value = getattr(symbol.node, "value", None)
                 if symbol.kind != "let" or isinstance(
@@ -235,7 +235,7 @@ class _Maker:
 
     # ------------------------------------------------------------ expressions
 
-    def _symbol(self, symbol: Symbol, where: Document, *, statement: bool = False) -> _Item:
+    def _symbol(self, symbol: Symbol, *, statement: bool = False) -> _Item:
         text, snippet = "", False
         if symbol.kind in ("fn", "module"):
             required = [p.name for p in symbol.params if not getattr(p.node, "default", None)]
@@ -244,16 +244,16 @@ class _Maker:
         elif symbol.kind == "import":
             text = symbol.name
         rank = "b" if symbol.scope.parent is not None else "d"
-        head, about = describe_symbol(symbol, where)
+        head, about = describe_symbol(symbol)
         return _Item(symbol.name, _SYMBOLS[symbol.kind], text, rank, head, about, snippet)
 
     def _expressions(self) -> Iterator[_Item]:
         callee = find_callee(self.docs, self.document, self.cursor)
         if callee is not None and self.cursor.call is not None:
             yield from self._arguments(callee)
-        for symbol in self.document.names.visible(self.cursor.offset):
+        for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind != "module":
-                yield self._symbol(symbol, self.document)
+                yield self._symbol(symbol)
         for name, word in words.FUNCTION_WORDS.items():
             yield _Item(name, Kind.Function, word.snippet, "k", word.head, word.text, True)
         for known in (words.CONSTANTS, words.ANIMATED):
@@ -302,7 +302,7 @@ class _Maker:
 
     def _members(self, before: tuple[str, ...]) -> Iterator[_Item]:
         alias = before[-2] if len(before) > 1 else ""
-        symbol = self.document.names.scope_at(self.cursor.offset).find(alias)
+        symbol = self.names.scope_at(self.cursor.offset).find(alias)
         if symbol is None or symbol.kind != "import" or not isinstance(symbol.node, nodes.Import):
             if before[-3:-2] != (".",) and re.fullmatch(r"[\w\])]+", alias):
                 for name in "xyzrgb":
@@ -314,7 +314,7 @@ class _Maker:
         statement = len(before) == 2 or (len(before) == 3 and before[0] in COMBINE)
         for found in library.names.exported():
             if not statement or found.kind in ("module", "let"):
-                yield self._symbol(found, library, statement=statement)
+                yield self._symbol(found, statement=statement)
 
     # ------------------------------------------------------------ inside tokens
 

@@ -78,8 +78,8 @@ def _arguments(
     args = call.args or ()
     if name in _CLEAR or not args:
         return []
-    found = find_symbol(docs, document, name, call.name.span.start)
-    callee = callee_of(*found) if found is not None else callee_of_word(name, False)
+    found = find_symbol(docs, document, document.names, name, call.name.span.start)
+    callee = callee_of(found[1]) if found is not None else callee_of_word(name, False)
     if callee is None or callee.variadic or len(callee.params) < 2:
         return []
     hints = []

@@ -118,7 +118,7 @@ def _argument(use: Use) -> str | None:
 
 
 def _definition(document: Document, where: Document, symbol: Symbol) -> str:
-    head, about = describe_symbol(symbol, where)
+    head, about = describe_symbol(symbol)
     parts = [_code(head)]
     if about:
         parts.append(about)

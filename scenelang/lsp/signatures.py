@@ -18,7 +18,7 @@ _LINE: Final = re.compile(r"^[ \t]*//(.*)$")
 _MAX_SHOWN: Final = 200
 
 
-def describe_symbol(symbol: Symbol, document: Document) -> tuple[str, str]:
+def describe_symbol(symbol: Symbol) -> tuple[str, str]:
     """A definition's first line, and the comment above it."""
     node = symbol.node
     if isinstance(node, nodes.Module):
@@ -31,7 +31,7 @@ def describe_symbol(symbol: Symbol, document: Document) -> tuple[str, str]:
         head = f"(parameter) {_short(node.span.text)}"
     else:
         head = _short(node.span.text)
-    return head, comment_above(document, symbol)
+    return head, comment_above(symbol)
 
 
 def _call(symbol: Symbol) -> str:
@@ -44,34 +44,27 @@ def _short(text: str) -> str:
     return text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 1] + "…"
 
 
-def comment_above(document: Document, symbol: Symbol) -> str:
+def comment_above(symbol: Symbol) -> str:
     """The lines of comment right above a definition, or behind it on its line."""
     if isinstance(symbol.node, nodes.Parameter | nodes.For):
         return ""
-    lines = document.lines
-    number = lines.position(symbol.node.span.start).line
+    # The node's own text: it may be of an older version than the document's.
+    span = symbol.node.span
+    text = span.source.text
     found: list[str] = []
-    at = number - 1
-    while at >= 0 and (match := _LINE.match(_line(document, at))):
+    start = text.rfind("\n", 0, span.start) + 1
+    while start:
+        above = text.rfind("\n", 0, start - 1) + 1
+        match = _LINE.match(text[above : start - 1].rstrip("\r"))
+        if match is None:
+            break
         found.insert(0, match[1].strip())
-        at -= 1
-    last = lines.position(symbol.node.span.end).line
-    behind = re.match(r"[ \t]*//(.*)", _line(document, last)[_column(document, symbol) :])
+        start = above
+    end = text.find("\n", span.end)
+    behind = _LINE.match(text[span.end : end if end >= 0 else len(text)].rstrip("\r"))
     if behind and not isinstance(symbol.node, nodes.Module):
         found.append(behind[1].strip())
     return "\n".join(found)
-
-
-def _line(document: Document, number: int) -> str:
-    starts = document.lines.starts
-    end = starts[number + 1] if number + 1 < len(starts) else len(document.text)
-    return document.text[starts[number] : end].rstrip("\r\n")
-
-
-def _column(document: Document, symbol: Symbol) -> int:
-    end = symbol.node.span.end
-    starts = document.lines.starts
-    return end - starts[document.lines.position(end).line]
 
 
 def signature_help(docs: Workspace, document: Document, offset: int) -> types.SignatureHelp | None:

@@ -144,8 +144,9 @@ def parse_edited(old: Parsed, source: SourceFile, edit: Edit) -> Parsed:
         What `parse_whole` gives, for less work.
     """
     if old.pieces and old.is_local:
+        splice = _Splice(old, source, edit)
         for reach in (1, _REACH):
-            new = _Splice(old, source, edit).run(reach)
+            new = None if splice.is_hopeless else splice.run(reach)
             if new is not None:
                 return new
     return parse_whole(source)
@@ -158,6 +159,7 @@ class _Splice:
         self.old = old
         self.source = source
         self.edit = edit
+        self.is_hopeless = False  # reading more would not help: braces or comments are open
 
     def run(self, reach: int) -> Parsed | None:
         """The new version, or None where reading so little does not tell.
@@ -174,6 +176,7 @@ class _Splice:
         report = Report(self.source)
         tokens = scan(self.source, report, begin, end)
         if tokens.cut or not _settled(tokens.kinds):
+            self.is_hopeless = True
             return None
         pristine = _copy(tokens)
         file = parse_tokens(tokens, report)
@@ -232,10 +235,10 @@ class _Splice:
         if not found.items:
             return True
         others = len(self.old.diagnostics)
-        if reach < _REACH or len(found) + others > _MOST_MISTAKES or any(d.code in _GLOBAL for d in found):
+        if len(found) + others > _MOST_MISTAKES or any(d.code in _GLOBAL for d in found):
             return False
-        if to_end:
-            return True
+        if to_end or reach < _REACH:
+            return to_end
         furthest = max(d.span.end for d in found if d.span is not None)
         behind = len(tokens.starts) - bisect_left(tokens.starts, furthest)
         # A string that is not closed might be closed further on in its line.
