@@ -190,7 +190,7 @@ class _Output:
             text = _for_machines(found, self.kind, self.most)
         elif found:
             from scenelang.cli.say import wants_color, width_of
-            from scenelang.diagnostics.render_text import render_text
+            from scenelang.diagnostics.render_text import in_order, render_text
 
             text = render_text(
                 found,
@@ -201,6 +201,8 @@ class _Output:
                 fixer="--fix",
                 fixable=sum(d.fix is not None and self.scenes.owner(d) is not None for d in found),
             )
+            if not self.quiet:
+                text += f"For more on an error, try `scenelang explain {in_order(found)[0].code}`.\n"
         else:
             count = len(self.scenes.sources) + len(self.scenes.unread)
             scenes = "1 scene" if count == 1 else f"{count:,} scenes"

@@ -55,7 +55,7 @@ def bind(
     """
     bound: Bound = [None] * len(params)
     shown = help or f"it is called {signature(name, params, optional)}"
-    labels = (Label(definition, "defined here"),) if definition else ()
+    labels: tuple[Label, ...] = (Label(definition, "defined here"),) if definition else ()
     good, position = True, 0
     for arg in args:
         if arg.name is None:
@@ -107,6 +107,8 @@ def bind(
     missing = [p for p, may, arg in zip(params, optional, bound, strict=True) if not may and arg is None]
     if missing:
         names = " and ".join(f"'{p}'" for p in missing)
+        if places:
+            labels = tuple([Label(places[list(params).index(p)], "needs a value") for p in missing])
         session.error("E0308", f"'{name}' needs {names}", span, help=shown, labels=labels)
         return None
     return bound

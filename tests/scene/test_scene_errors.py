@@ -130,6 +130,10 @@ def test_labels_show_both_places() -> None:
         ("square { rotate(45deg + 1); }", [("45deg", "an angle")]),
         ("if (1 == true) { square {} }", [("1", "a number")]),
         ('if ("a" < 1) { square {} }', [("1", "a number")]),
+        (
+            "module m(a, b, c = 1) { square { scale(a * b * c); } } m(c = 2);",
+            [("a", "needs a value"), ("b", "needs a value")],
+        ),
     ],
 )
 def test_labels_show_what_else_takes_part(text: str, labels: list[tuple[str, str]]) -> None:
