@@ -16,7 +16,7 @@ from scenelang.backend.errors import RenderError
 from scenelang.files import NotWritten
 
 # Command -> what `--help` says. Each lies in `scenelang/cli/<command>.py` as `command`, imported when called;
-# a keyword's file ends in an underscore.
+# a keyword's file ends in an underscore, and a dash is one.
 COMMANDS: Final = {
     "render": "Draw scenes or compiled programs.",
     "check": "Report what is wrong with scenes.",
@@ -25,6 +25,7 @@ COMMANDS: Final = {
     "compare": "Draw a scene beside its exact picture.",
     "models": "List models, or tell about one.",
     "eval": "Measure a model on unseen scenes.",
+    "stability": "Measure a model far beyond its training.",
     "train": "Train a model's weights.",
     "watch": "Draw a scene again whenever it is saved.",
     "lsp": "Serve editors over the Language Server Protocol.",
@@ -33,6 +34,7 @@ COMMANDS: Final = {
     "import": "Make a scene of a glTF file's nodes.",
     "dump": "Show what a scene is after each stage.",
     "graph": "Draw the graph of a scene.",
+    "explain-plan": "Say what drawing a scene takes.",
     "schema": "Print the JSON Schema of scenes.",
 }
 INTERRUPTED: Final = 130  # as shells report it
@@ -51,7 +53,7 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        module = f"scenelang.cli.{cmd_name}{'_' if iskeyword(cmd_name) else ''}"
+        module = f"scenelang.cli.{cmd_name.replace('-', '_')}{'_' if iskeyword(cmd_name) else ''}"
         command: click.Command = importlib.import_module(module).command
         return command
 

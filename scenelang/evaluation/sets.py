@@ -124,7 +124,7 @@ def _long_chain(rng: Rng, steps: int, scale: Scale, rotate: Rotate, translate: T
     return [*chain, rotate, translate]
 
 
-def _object(rng: Rng, config: SetConfig) -> Object:
+def random_object(rng: Rng, config: SetConfig) -> Object:
     rgb = tuple(_uniform(rng, 0.1, 1.0) for _ in range(3))
     return Object(
         geometry=GEOMETRIES[int(rng.integers(4))],
@@ -150,7 +150,7 @@ def _tree(rng: Rng, leaves: list[SceneNode]) -> SceneNode:
 def random_scene(rng: Rng, config: SetConfig) -> Scene:
     """One scene of a set."""
     count = int(rng.integers(config.objects[0], config.objects[1] + 1))
-    objects = [_object(rng, config) for _ in range(count)]
+    objects = [random_object(rng, config) for _ in range(count)]
     if config.nest == "tree":
         return Scene(model="shapes2d", canvas=config.canvas, nodes=(_tree(rng, list(objects)),))
     unions = rng.random() < config.unions
