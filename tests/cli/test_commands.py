@@ -47,8 +47,8 @@ def test_models_without_weights(folder: Folder, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_explain(folder: Folder) -> None:
-    assert folder.run("explain", "e0401").stdout.startswith("error E0401 (graph and booleans): ")
-    assert folder.run("explain", "W0501").stdout.startswith("warning W0501 ")
+    assert folder.run("explain", "e0401").stdout.startswith("error[E0401]: ")
+    assert folder.run("explain", "W0501").stdout.startswith("warning[W0501]: ")
     assert folder.run("explain", "E9999").exit_code == 2
 
 

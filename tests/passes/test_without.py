@@ -1,0 +1,30 @@
+"""Passes that only save work can be left out; the others cannot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+from scenelang.passes import OPTIONAL, PASSES
+from scenelang.program.compile import compile_scene
+
+SCENE = "square { scale(2); } star { scale(0.2); } pentagon { scale(0.1); translate(5, 0); }"
+
+
+def test_what_is_left_out_is_known() -> None:
+    assert {step.name for step in PASSES} >= OPTIONAL
+
+
+def test_rows_stay_one_to_one_without_dropping() -> None:
+    scene = nsg.loads(SCENE + "square { scale(3); }")
+    assert compile_scene(scene).objects == ("square",)
+    whole = compile_scene(scene, without=OPTIONAL)
+    assert whole.objects == ("square", "star", "pentagon", "square")
+    few = nsg.render(compile_scene(scene))
+    assert np.array_equal(np.asarray(nsg.render(whole)), np.asarray(few))
+
+
+def test_a_needed_pass_cannot_be_left_out() -> None:
+    with pytest.raises(ValueError, match="linearise"):
+        compile_scene(nsg.loads(SCENE), without={"linearise"})
