@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import Final
 
 from lsprotocol import types
 
 from scenelang.lsp import words
 from scenelang.lsp.callees import Callee, find_callee
+from scenelang.lsp.completion_items import Item, strings, units
 from scenelang.lsp.context import COMBINE, Cursor, cursor_at
-from scenelang.lsp.names import Names, Symbol, sight_at
+from scenelang.lsp.names import Names, Symbol
+from scenelang.lsp.sight import sight_at
 from scenelang.lsp.signatures import describe_symbol
 from scenelang.lsp.vocabulary import vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.scene.vocabulary import Vocabulary
 from scenelang.syntax import nodes
-from scenelang.syntax.lexer import UNITS
 
 Kind = types.CompletionItemKind
 _HEADS: Final = (
@@ -44,30 +43,6 @@ _SYMBOLS: Final = {
     "module": Kind.Module,
     "import": Kind.File,
 }
-_MAX_PATHS: Final = 200
-
-
-@dataclass(frozen=True, slots=True)
-class _Item:
-    """A proposal.
-
-    Args:
-        label: what the list shows.
-        kind: its icon.
-        text: what is inserted; the label without it.
-        rank: one letter; what is likelier comes first.
-        detail: a line beside the label.
-        about: Markdown.
-        snippet: whether ``text`` has placeholders.
-    """
-
-    label: str
-    kind: Kind
-    text: str = ""
-    rank: str = "m"
-    detail: str = ""
-    about: str = ""
-    snippet: bool = False
 
 
 def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
@@ -126,15 +101,15 @@ class _Maker:
         self.docs, self.document, self.cursor, self.names = docs, document, cursor, names
         self.words: Vocabulary = vocabulary_of(document, docs)
 
-    def items(self) -> Iterator[_Item]:
+    def items(self) -> Iterator[Item]:
         cursor, before = self.cursor, self.cursor.before
         last = before[-1] if before else ""
         if cursor.inside == "comment":
             return
         if cursor.inside == "string":
-            yield from self._strings(before)
+            yield from strings(self.docs, self.document, self.words, before)
         elif cursor.inside == "number":
-            yield from self._units()
+            yield from units(self.document.text[cursor.start : cursor.offset])
         elif cursor.inside == "colour":
             return
         elif last == ".":
@@ -144,32 +119,32 @@ class _Maker:
         elif last in ("let", "param", "fn", "module", "nsg", "as", "#") or before == ("for", "("):
             return
         elif before[:2] == ("for", "(") and len(before) == 3:
-            yield _Item("in", Kind.Keyword, "in ")
+            yield Item("in", Kind.Keyword, "in ")
         elif before[0] == "import":
             if len(before) == 2:
-                yield _Item("as", Kind.Keyword, "as ")
+                yield Item("as", Kind.Keyword, "as ")
         elif last == "material":
             yield from self._materials()
         elif len(before) == 1 and last in COMBINE:
             yield from self._children("a")
             yield from (self._keyword(word) for word in ("group", *COMBINE, "chain"))
         elif before[0] == "param" and len(before) > 3 and "in" not in before and _ends_operand(last):
-            yield _Item("in", Kind.Keyword, "in ", "a", about=words.KEYWORDS["in"].text)
+            yield Item("in", Kind.Keyword, "in ", "a", about=words.KEYWORDS["in"].text)
         elif (last == ")" and before[0] == "if") or _in_parameters(before):
             return
         elif not _ends_operand(last):
             yield from self._expressions()
         elif ".." in before or "..<" in before:
-            yield _Item("step", Kind.Keyword, "step ")
+            yield Item("step", Kind.Keyword, "step ")
 
     # ------------------------------------------------------------ statements
 
-    def _keyword(self, word: str, rank: str = "p") -> _Item:
+    def _keyword(self, word: str, rank: str = "p") -> Item:
         known = words.KEYWORDS[word]
         text = known.snippet or f"{word} {{\n\t$0\n}}"
-        return _Item(word, Kind.Keyword, text, rank, known.head, known.text, True)
+        return Item(word, Kind.Keyword, text, rank, known.head, known.text, True)
 
-    def _statements(self) -> Iterator[_Item]:
+    def _statements(self) -> Iterator[Item]:
         block = self.cursor.block
         kind = block.kind
         if kind == "material":
@@ -194,8 +169,7 @@ class _Maker:
         yield from self._children("a")
         if kind == "chain":
             yield from (
-                _Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text)
-                for word in COMBINE
+                Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text) for word in COMBINE
             )
         yield from (self._keyword(word) for word in _HEADS if kind != "chain" or word not in COMBINE)
         if kind in ("group", "chain"):
@@ -203,39 +177,39 @@ class _Maker:
             yield self._keyword("material", "n")
             yield from self._material_values("n")
 
-    def _calls(self, known: dict[str, words.Word], offered: Iterable[str], rank: str) -> Iterator[_Item]:
+    def _calls(self, known: dict[str, words.Word], offered: Iterable[str], rank: str) -> Iterator[Item]:
         for name in sorted(offered):
             word = known.get(name)
             if word is not None:
-                yield _Item(name, Kind.Method, word.snippet, rank, word.head, word.text, True)
+                yield Item(name, Kind.Method, word.snippet, rank, word.head, word.text, True)
 
-    def _children(self, rank: str) -> Iterator[_Item]:
+    def _children(self, rank: str) -> Iterator[Item]:
         for name in sorted(self.words.geometries):
             text = f"{name} {{ ${{1:scale(0.5);}} }}"
-            yield _Item(name, Kind.Class, text, rank, "geometry", words.GEOMETRIES.get(name, ""), True)
+            yield Item(name, Kind.Class, text, rank, "geometry", words.GEOMETRIES.get(name, ""), True)
         for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind == "module":
                 yield self._symbol(symbol, statement=True)
             elif symbol.kind == "import":
                 yield self._symbol(symbol)
 
-    def _material_values(self, rank: str) -> Iterator[_Item]:
+    def _material_values(self, rank: str) -> Iterator[Item]:
         for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind in ("let", "argument", "loop"):
                 value = getattr(symbol.node, "value", None)
                 if symbol.kind != "let" or isinstance(
                     value, nodes.MaterialExpr | nodes.NameRef | nodes.Member
                 ):
-                    yield _Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
+                    yield Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
 
-    def _materials(self) -> Iterator[_Item]:
+    def _materials(self) -> Iterator[Item]:
         for name in sorted(self.words.materials):
             text = f"{name} {{ ${{1:color(#d33);}} }}"
-            yield _Item(name, Kind.EnumMember, text, "a", "material", words.MATERIALS.get(name, ""), True)
+            yield Item(name, Kind.EnumMember, text, "a", "material", words.MATERIALS.get(name, ""), True)
 
     # ------------------------------------------------------------ expressions
 
-    def _symbol(self, symbol: Symbol, *, statement: bool = False) -> _Item:
+    def _symbol(self, symbol: Symbol, *, statement: bool = False) -> Item:
         text, snippet = "", False
         if symbol.kind in ("fn", "module"):
             required = [p.name for p in symbol.params if not getattr(p.node, "default", None)]
@@ -245,9 +219,9 @@ class _Maker:
             text = symbol.name
         rank = "b" if symbol.scope.parent is not None else "d"
         head, about = describe_symbol(symbol)
-        return _Item(symbol.name, _SYMBOLS[symbol.kind], text, rank, head, about, snippet)
+        return Item(symbol.name, _SYMBOLS[symbol.kind], text, rank, head, about, snippet)
 
-    def _expressions(self) -> Iterator[_Item]:
+    def _expressions(self) -> Iterator[Item]:
         callee = find_callee(self.docs, self.document, self.cursor)
         if callee is not None and self.cursor.call is not None:
             yield from self._arguments(callee)
@@ -255,15 +229,15 @@ class _Maker:
             if symbol.kind != "module":
                 yield self._symbol(symbol)
         for name, word in words.FUNCTION_WORDS.items():
-            yield _Item(name, Kind.Function, word.snippet, "k", word.head, word.text, True)
+            yield Item(name, Kind.Function, word.snippet, "k", word.head, word.text, True)
         for known in (words.CONSTANTS, words.ANIMATED):
             for name, word in known.items():
-                yield _Item(name, Kind.Constant, "", "l", about=word.text)
+                yield Item(name, Kind.Constant, "", "l", about=word.text)
         for name in ("true", "false"):
-            yield _Item(name, Kind.Keyword, "", "n")
-        yield _Item("material", Kind.Keyword, "material ", "n", about=words.KEYWORDS["material"].text)
+            yield Item(name, Kind.Keyword, "", "n")
+        yield Item("material", Kind.Keyword, "material ", "n", about=words.KEYWORDS["material"].text)
 
-    def _arguments(self, callee: Callee) -> Iterator[_Item]:
+    def _arguments(self, callee: Callee) -> Iterator[Item]:
         """Names of arguments that are left, and values that the one at hand takes."""
         call = self.cursor.call
         assert call is not None
@@ -274,39 +248,37 @@ class _Maker:
             for param in left if start else ():
                 if param not in call.given:
                     about = callee.about.get(param, "")
-                    yield _Item(f"{param} =", Kind.Field, f"{param} = ", "a", "argument", about)
+                    yield Item(f"{param} =", Kind.Field, f"{param} = ", "a", "argument", about)
             if call.index < len(callee.params) and callee.positional:
                 name = callee.params[call.index]
         yield from self._values(callee.name, name)
 
-    def _values(self, callee: str, param: str | None) -> Iterator[_Item]:
+    def _values(self, callee: str, param: str | None) -> Iterator[Item]:
         if param == "axis":
             for axis in ("X", "Y", "Z"):
-                yield _Item(axis, Kind.EnumMember, "", "0", about=words.CONSTANTS[axis].text)
+                yield Item(axis, Kind.EnumMember, "", "0", about=words.CONSTANTS[axis].text)
         elif param == "loop":
             for value in ("true", "false"):
-                yield _Item(value, Kind.EnumMember, "", "0")
+                yield Item(value, Kind.EnumMember, "", "0")
         elif param == "angle":
             for unit in ("deg", "turn", "rad"):
                 label = {"deg": "30deg", "turn": "0.25turn", "rad": "0.5rad"}[unit]
                 text = f"${{1:{label.removesuffix(unit)}}}{unit}"
-                yield _Item(label, Kind.Unit, text, "0", "an angle", "", True)
+                yield Item(label, Kind.Unit, text, "0", "an angle", "", True)
         elif callee in ("color", "background") and param == "c":
-            yield _Item("#d33", Kind.Color, "#${1:d33}", "0", "a colour", "", True)
+            yield Item("#d33", Kind.Color, "#${1:d33}", "0", "a colour", "", True)
             for name in ("rgb", "hsv"):
-                yield _Item(
-                    name, Kind.Function, words.FUNCTION_WORDS[name].snippet, "0", "a colour", "", True
-                )
+                yield Item(name, Kind.Function, words.FUNCTION_WORDS[name].snippet, "0", "a colour", "", True)
             if callee == "background":
-                yield _Item("none", Kind.EnumMember, "", "0", about=words.CONSTANTS["none"].text)
+                yield Item("none", Kind.EnumMember, "", "0", about=words.CONSTANTS["none"].text)
 
-    def _members(self, before: tuple[str, ...]) -> Iterator[_Item]:
+    def _members(self, before: tuple[str, ...]) -> Iterator[Item]:
         alias = before[-2] if len(before) > 1 else ""
         symbol = self.names.scope_at(self.cursor.offset).find(alias)
         if symbol is None or symbol.kind != "import" or not isinstance(symbol.node, nodes.Import):
             if before[-3:-2] != (".",) and re.fullmatch(r"[\w\])]+", alias):
                 for name in "xyzrgb":
-                    yield _Item(name, Kind.Field)
+                    yield Item(name, Kind.Field)
             return
         library = self.docs.imported(self.document, symbol.node.path.value)
         if library is None:
@@ -315,42 +287,6 @@ class _Maker:
         for found in library.names.exported():
             if not statement or found.kind in ("module", "let"):
                 yield self._symbol(found, statement=statement)
-
-    # ------------------------------------------------------------ inside tokens
-
-    def _units(self) -> Iterator[_Item]:
-        typed = self.document.text[self.cursor.start : self.cursor.offset]
-        number = re.match(r"[0-9]*\.?[0-9]*", typed)
-        if number is None or not number[0] or number[0] == ".":
-            return
-        rest = typed[number.end() :]
-        for unit in UNITS:
-            if rest and unit.startswith(rest):
-                yield _Item(f"{number[0]}{unit}", Kind.Unit)
-
-    def _strings(self, before: tuple[str, ...]) -> Iterator[_Item]:
-        if before == ("model",):
-            for manifest in self.words.models:
-                yield _Item(manifest.name, Kind.Module, about=manifest.summary)
-        elif before == ("import",):
-            yield from self._paths()
-
-    def _paths(self) -> Iterator[_Item]:
-        """Scenes that can be imported, below the import root."""
-        document = self.document
-        folder = document.path.parent if document.path is not None else next(iter(self.docs.folders), None)
-        if folder is None:
-            return
-        count = 0
-        for where, inner, files in os.walk(folder):
-            inner[:] = sorted(name for name in inner if not name.startswith("."))[:20]
-            for name in sorted(files):
-                path = os.path.join(where, name)
-                if name.endswith(".nsg") and path != str(document.path):
-                    count += 1
-                    if count > _MAX_PATHS:
-                        return
-                    yield _Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
 
 
 def _ends_operand(text: str) -> bool:

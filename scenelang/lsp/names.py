@@ -17,7 +17,6 @@ from scenelang.scene.functions import ANIMATED, CONSTANTS, FUNCTIONS
 from scenelang.scene.transforms import GEOMETRY, TEXTURE
 from scenelang.scene.vocabulary import SETTINGS
 from scenelang.syntax import nodes
-from scenelang.syntax.incremental import Parsed
 
 Kind = Literal["let", "param", "fn", "module", "import", "argument", "loop"]
 Role = Literal[
@@ -357,38 +356,3 @@ class Names:
             else:
                 symbol = None
         self._add(expr.name.span, expr.name.text, role, symbol)
-
-
-def sight_at(parsed: Parsed, offset: int) -> Names:
-    """The names in sight of an offset: those of its statement, and what the others define at top level.
-
-    This is what a keystroke asks for. It takes the other statements' trees where they stand, moved or not,
-    so that the nodes of their symbols are good for text and not for places.
-    """
-    index = parsed.at(offset)
-    whole = Span(parsed.source, 0, len(parsed.source.text))
-    names = Names(nodes.File(() if index is None else (parsed.statement(index),), whole))
-    top = names.top
-    for at, stmt in enumerate(parsed.heads()):
-        kind = _TOP.get(stmt.__class__)
-        if kind is None or at == index or not isinstance(stmt, _Defining):
-            continue
-        name = stmt.alias if isinstance(stmt, nodes.Import) else stmt.name
-        symbol = Symbol(name.text, kind, name.span, stmt, top, parsed.ends[at])
-        if isinstance(stmt, nodes.Fn | nodes.Module):
-            symbol.since = 0
-            symbol.params = [
-                Symbol(p.name.text, "argument", p.name.span, p, top, 0, symbol) for p in stmt.params
-            ]
-        top.symbols.setdefault(symbol.name, symbol)
-    return names
-
-
-_Defining = nodes.Param | nodes.Let | nodes.Fn | nodes.Module | nodes.Import
-_TOP: Final[dict[type, Kind]] = {
-    nodes.Param: "param",
-    nodes.Let: "let",
-    nodes.Fn: "fn",
-    nodes.Module: "module",
-    nodes.Import: "import",
-}

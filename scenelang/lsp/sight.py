@@ -1,0 +1,44 @@
+"""The names in sight of the cursor, without looking at the rest of the file."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from scenelang.diagnostics.span import Span
+from scenelang.lsp.names import Kind, Names, Symbol
+from scenelang.syntax import nodes
+from scenelang.syntax.incremental import Parsed
+
+_Defining = nodes.Param | nodes.Let | nodes.Fn | nodes.Module | nodes.Import
+_TOP: Final[dict[type, Kind]] = {
+    nodes.Param: "param",
+    nodes.Let: "let",
+    nodes.Fn: "fn",
+    nodes.Module: "module",
+    nodes.Import: "import",
+}
+
+
+def sight_at(parsed: Parsed, offset: int) -> Names:
+    """The names in sight of an offset: those of its statement, and what the others define at top level.
+
+    This is what a keystroke asks for. It takes the other statements' trees where they stand, moved or not,
+    so that the nodes of their symbols are good for text and not for places.
+    """
+    index = parsed.at(offset)
+    whole = Span(parsed.source, 0, len(parsed.source.text))
+    names = Names(nodes.File(() if index is None else (parsed.statement(index),), whole))
+    top = names.top
+    for at, stmt in enumerate(parsed.heads()):
+        kind = _TOP.get(stmt.__class__)
+        if kind is None or at == index or not isinstance(stmt, _Defining):
+            continue
+        name = stmt.alias if isinstance(stmt, nodes.Import) else stmt.name
+        symbol = Symbol(name.text, kind, name.span, stmt, top, parsed.ends[at])
+        if isinstance(stmt, nodes.Fn | nodes.Module):
+            symbol.since = 0
+            symbol.params = [
+                Symbol(p.name.text, "argument", p.name.span, p, top, 0, symbol) for p in stmt.params
+            ]
+        top.symbols.setdefault(symbol.name, symbol)
+    return names
