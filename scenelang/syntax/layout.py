@@ -102,7 +102,7 @@ def _lines(tokens: Tokens) -> list[_Line]:
     for at, kind in enumerate(tokens.kinds[:-1]):
         statement = previous in (semicolon, opening, closing) or kind == closing
         candidate = (statement or kind in starters) and tokens.on_new_line(at)
-        if candidate and (statement or brackets == 0 or _leaves_open(tokens.kinds, at)):
+        if candidate and (statement or brackets == 0 or leaves_open(tokens.kinds, at)):
             brackets = 0
             lines.append(_Line(at, _indent(tokens, at), depth - (kind == closing)))
         depth += (kind == opening) - (kind == closing)
@@ -114,7 +114,7 @@ def _lines(tokens: Tokens) -> list[_Line]:
     return lines
 
 
-def _leaves_open(kinds: list[int], at: int) -> bool:
+def leaves_open(kinds: list[int], at: int) -> bool:
     """Whether a line inside brackets is a statement by itself: they are not closed where it ends."""
     literals = tables().literals
     if kinds[at] in (literals["material"], literals["step"], literals["as"]):

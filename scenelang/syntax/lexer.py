@@ -58,6 +58,7 @@ _SLIPS = {
     "open_string": r'"(?:\\[^\n]|[^\s;,(){}\[\]"\\])*+',
     "quotes": r"'[^'\n]*+'|[“”][^“”\n]*+[“”]",
     "number": r"\.?[0-9](?:[\w°]|\.(?!\.))*+",
+    "hash": r"#[ \t!#][^\n]*+|#(?=\n|\Z)|(?<![^\n])#\w++[ \t]++[A-Za-z][^\n]*+",
     "colour": r"#\w*+",
     "name": r"[^\W\d]\w*+",
     "foreign": r"&(?!&)|\|(?!\|)|" + "|".join(re.escape(text) for text in FOREIGN if text not in "&|"),
@@ -171,7 +172,10 @@ class _Slips:
         rest = text[len(value) :]
         fix = None
         help = "numbers look like `1`, `0.5` or `1e-3`"
-        if rest in UNIT_ALIASES:
+        if re.fullmatch("(?:_[0-9]+)+", rest):
+            message, help = f"`{text}` is not a number", "digits are not grouped"
+            fix = self._fix(start, end, text.replace("_", ""))
+        elif rest in UNIT_ALIASES:
             message = f"`{rest}` is not a unit"
             fix = self._fix(start, end, value + UNIT_ALIASES[rest])
         elif rest and not rest.startswith((".", "e", "E")):
@@ -180,6 +184,12 @@ class _Slips:
         else:
             message = f"`{text}` is not a number"
         self.report.add("E0116", message, start, end, help=help, fix=fix)
+
+    def _hash(self, start: int, end: int, text: str) -> None:
+        fix = self._fix(start, start + 1, "//")
+        self.report.add(
+            "E0127", "`#` begins no comment", start, start + 1, help="comments begin with `//`", fix=fix
+        )
 
     def _colour(self, start: int, end: int, text: str) -> None:
         self._keep("COLOR", start, end)

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.syntax.repairs import REPLACEMENTS, Repair, keywords_near, word_for
+from scenelang.syntax.repairs import REPLACEMENTS, Repair
+from scenelang.syntax.spelling import keywords_near, word_for
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 
@@ -207,6 +208,8 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
     elif text in (")", "]") and new in (")", "]"):
         report.add("E0105", f"`{text}` where `{new}` belongs", start, end, fix=fix)
     elif word_for(text) == new:
+        if new == "!" and tokens.text(repair.end) != "(":
+            fix = None  # elsewhere it takes all of a comparison, here only what is next
         report.add(
             "E0127", f"`{text}` is not used here", start, end, help=f"`{new}` is the sign for it", fix=fix
         )

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 
-from scenelang.diagnostics.suggest import ranked
 from scenelang.syntax.automaton import LOOKAHEAD, advance, fits, reach
 from scenelang.syntax.completion import completion
+from scenelang.syntax.layout import leaves_open
+from scenelang.syntax.spelling import keywords_near, word_for
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Tokens
 
@@ -94,7 +95,6 @@ REPLACEMENTS = {
     "(": {"[": 1.3},
     "[": {"(": 1.3},
 }
-_WORDS = {"and": "&&", "or": "||", "not": "!", "mod": "%"}
 _DELETION, _FURTHER_DELETION = 1.5, 0.6
 _SUBSTITUTION = 1.1  # something else stands where a forgotten token belongs
 _MISSPELT = 0.9
@@ -128,18 +128,6 @@ def _replacements() -> dict[int, list[tuple[Kinds, float]]]:
         kind(name): [(tuple(map(kind, names.split())), cost) for names, cost in costs.items()]
         for name, costs in REPLACEMENTS.items()
     }
-
-
-def word_for(text: str) -> str | None:
-    """The operator that other languages write as this word."""
-    return _WORDS.get(text)
-
-
-@lru_cache(maxsize=256)
-def keywords_near(text: str) -> tuple[str, ...]:
-    """Keywords that a word may have been meant for, nearest first."""
-    words = [word for word in tables().literals if word.isalpha()]
-    return tuple(word for _, word in ranked(text, words, max(1, len(text) // 3)))
 
 
 Found = tuple[float, float, Repair, list[int]]
@@ -201,6 +189,9 @@ class Search:
         if prefixes:
             at, prefix = prefixes[-1]
             found += self._try(prefix, at, self._misspelt(at))
+        for at, prefix in prefixes:
+            if self._begins_statement(at):
+                found += self._try(prefix, at, self._broken_off(prefix, at, 0.7 - 0.1 * (self.at - at)))
         best = self._settle(found)
         if best is not None and best[0] >= self._worth(self.at + FOLLOWED) - 2:
             return best[1]
@@ -304,13 +295,18 @@ class Search:
             for word in keywords_near(self.tokens.text(at)):
                 yield Repair(at, 1, (tables().literals[word],), _MISSPELT)
 
-    def _broken_off(self, stack: list[int], at: int) -> Iterator[Repair]:
+    def _begins_statement(self, at: int) -> bool:
+        """Whether a line inside brackets is laid out like a statement of its own."""
+        inside = self.tokens.on_new_line(at) and self.open_brackets(at)
+        return bool(inside) and self.kinds[at] in (self.name, *self.keywords) and leaves_open(self.kinds, at)
+
+    def _broken_off(self, stack: list[int], at: int, cost: float = _BREAK) -> Iterator[Repair]:
         """The line before a token breaks off in the middle of a statement."""
         opening, closing = (tables().literals[text] for text in "{}")
         for goal, rest in ((self.semicolon, ()), (opening, (closing,))):
             missing = completion(stack, goal)
             if missing:
-                yield Repair(at, 0, (*missing, goal, *rest), _BREAK + 0.05 * len(missing))
+                yield Repair(at, 0, (*missing, goal, *rest), cost + 0.05 * len(missing))
 
     def _swappable(self, left: int, right: int) -> bool:
         """Whether two tokens may be the wrong way round; at most one of them is a brace."""
