@@ -78,7 +78,7 @@ def draw(
             proportion; no compiled scene has such.
     """
     width, height = canvas
-    stream = Stream(network, vectors, tokens, skip=skip)
+    stream = Stream(network, vectors, tokens, skip=skip, frames=kept.frames if kept is not None else None)
     rows = max(1, min(tile // width, -(-height // (split or threads))))
     tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     out = np.empty((height, width, 4), np.float32)
@@ -106,7 +106,7 @@ def draw(
         with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
             list(pool.map(one, range(len(tiles))))
     if kept is not None and shown is not None:
-        kept.keep(out, shown)
+        kept.keep(out, shown, stream)
     if not np.isfinite(out).all():
         raise ProgramError("numbers that the network cannot draw with")
     colour, alpha = out[..., :3], out[..., 3]

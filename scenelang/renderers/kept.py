@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.renderers.frames import ObjectFrame
 from scenelang.renderers.stream import Stream
 
 _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
@@ -35,8 +36,9 @@ class Shown:
 
 @dataclass(slots=True)
 class Kept:
-    """The last picture of a sequence and what each of its tiles showed."""
+    """The last picture of a sequence, what each of its tiles showed, and the frames of its objects."""
 
+    frames: dict[bytes, ObjectFrame] = field(default_factory=dict)
     _keys: list[bytes] = field(default_factory=list)
     _picture: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 4), np.float32))
 
@@ -62,9 +64,9 @@ class Kept:
         same = [fits and key == old for key, old in zip(keys, self._keys or keys, strict=False)]
         return Shown(keys, same, self._picture)
 
-    def keep(self, picture: npt.NDArray[np.float32], shown: Shown) -> None:
+    def keep(self, picture: npt.NDArray[np.float32], shown: Shown, stream: Stream) -> None:
         """Take a finished picture as the one before the next."""
-        self._picture, self._keys = picture.copy(), shown.keys
+        self._picture, self._keys, self.frames = picture.copy(), shown.keys, stream.frames
 
 
 def _rows(

@@ -6,6 +6,7 @@ numbers, and only points that an object can reach meet it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,6 +87,13 @@ class PixelRows:
         return self.group * first, self.group * last
 
 
+def _frames(g: np.ndarray, known: Mapping[bytes, ObjectFrame]) -> Iterator[tuple[bytes, ObjectFrame]]:
+    """The frame of each geometry vector (N, 32), by its bytes; most of the work of a stream of many."""
+    for vector in g:
+        key = vector.tobytes()
+        yield key, known.get(key) or read_frame(vector)
+
+
 class Stream:
     """A program's objects with their weights, ready to be met by points.
 
@@ -94,6 +102,7 @@ class Stream:
         vectors: (N, 64) float32, geometry and material vectors.
         tokens: (N,) boolean tokens 0 to 3.
         skip: leave out the points that an object cannot reach.
+        frames: of geometry vectors that were read before, by their bytes.
 
     Raises:
         ProgramError: an object's vector holds no way from the world to a leaf.
@@ -101,7 +110,13 @@ class Stream:
 
     @torch.no_grad()
     def __init__(
-        self, network: Framed, vectors: np.ndarray, tokens: np.ndarray, *, skip: bool = True
+        self,
+        network: Framed,
+        vectors: np.ndarray,
+        tokens: np.ndarray,
+        *,
+        skip: bool = True,
+        frames: Mapping[bytes, ObjectFrame] | None = None,
     ) -> None:
         self.network = network
         self.skip = skip
@@ -124,6 +139,7 @@ class Stream:
         self.far = network.far[:, None]
         self.vectors = vectors
         self.codes = np.unique(vectors[:, exact.CODE], axis=0)  # of the leaves in use
+        self.frames = dict(_frames(vectors[:, : exact.D_G], frames or {}))
         self.rows = self._rows(vectors, tokens)
 
     def _rows(self, vectors: np.ndarray, tokens: np.ndarray) -> list[_Row]:
@@ -140,7 +156,7 @@ class Stream:
         blends_after = np.cumsum((tokens == SMOOTH)[::-1])[::-1]  # smooth unions from this row on
         rows = []
         for i, token in enumerate(tokens.tolist()):
-            frame = read_frame(g[i])
+            frame = self.frames[g[i].tobytes()]
             if not self.skip or token == INTERSECT or (token == SUBTRACT and blends_after[i]):
                 reach = float("inf")
             else:
