@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from scenelang.graph import affine
@@ -25,7 +26,7 @@ def show_value(value: Any) -> str | None:
     if cls is bool:
         return "true" if value else "false"
     if cls is str:
-        short = value if len(value) <= 60 else value[:57] + "…"
+        short: str = value if len(value) <= 60 else value[:57] + "…"
         return '"' + short.replace("\\", "\\\\").replace('"', '\\"') + '"'
     if cls is Angle:
         return _angle(value.rad)
@@ -45,8 +46,7 @@ def show_value(value: Any) -> str | None:
 
 
 def _angle(rad: float) -> str:
-    degrees = rad * 180 / 3.141592653589793
-    return f"{show(round(degrees, 6))}deg"
+    return f"{show(round(math.degrees(rad), 6))}deg"
 
 
 def show_matrix(rows: Rows, dimension: int) -> str:

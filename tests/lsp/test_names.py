@@ -1,0 +1,118 @@
+"""What names stand for, held against the evaluator, and what is in sight of the cursor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.lsp.context import cursor_at
+from scenelang.lsp.names import Names
+from scenelang.lsp.sight import sight_at
+from scenelang.scene import references
+from scenelang.scene.evaluate import evaluate
+from scenelang.scene.scope import Binding
+from scenelang.scene.unit import Unit
+from scenelang.syntax import nodes, parse
+from scenelang.syntax.incremental import parse_whole
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))
+SHADOWS = """
+let a = 1;
+fn f(b, c = b * a) = b + c + a + g(b);
+fn g(a) = a;
+module m(a, at = [a, a]) {
+  let b = a;
+  for (i in 0..<b) { let a = i; square { scale(a + b); translate(at); } }
+  square { scale(a); let a = 2; rotate(a * 1deg); }
+}
+if (a == 1) { let a = 5; m(a); } else { m(a, at = [a, f(a)]); }
+for (a in [a, a + 1]) { m(a); }
+"""
+
+
+@pytest.mark.parametrize("text", [SHADOWS, *(path.read_text("utf-8") for path in EXAMPLES)])
+def test_names_mean_what_they_mean_to_the_evaluator(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every variable that the evaluator resolves in this file is resolved to the same place."""
+    source = SourceFile("main.nsg", text)
+    resolved: list[tuple[nodes.Name, Span]] = []
+    original = references.value_of
+
+    def watched(name: nodes.Name, binding: Binding, unit: Unit, scope: object) -> object:
+        if name.span.source is source and binding.span is not None and "." not in name.text:
+            resolved.append((name, binding.span))
+        return original(name, binding, unit, scope)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(references, "value_of", watched)
+    file = parse(source, Diagnostics())
+    evaluate(file, diagnostics=Diagnostics(), root=EXAMPLES[0].parent)
+    names = Names(file)
+    assert resolved or text is not SHADOWS
+    for name, place in resolved:
+        use = names.at(name.span.start)
+        assert use is not None
+        assert use.symbol is not None, name
+        assert use.symbol.span == place, name
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_the_sight_of_a_place_is_that_of_the_whole_file(path: Path) -> None:
+    parsed = parse_whole(SourceFile(path.name, path.read_text("utf-8")))
+    names = Names(parsed.file)
+    for offset in range(0, len(parsed.source.text), 7):
+        whole = {(symbol.name, symbol.kind) for symbol in names.visible(offset)}
+        near = {(symbol.name, symbol.kind) for symbol in sight_at(parsed, offset).visible(offset)}
+        assert near == whole, offset
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "head"),
+    [
+        ("|", "file", ""),
+        ("group { | }", "group", "group"),
+        ("group { for (i in 0..3) { | } }", "group", "group"),
+        ("chain { smooth star { | } }", "object", "star"),
+        ("chain { square; | }", "chain", "chain"),
+        ("subtract { | }", "group", "subtract"),
+        ("module m(a) { if (a) { } else { | } }", "group", "module"),
+        ("square { material flat { | } }", "material", "material"),
+        ("let m = material flat { | };", "material", "let"),
+        ("let m = 1; square { m { | } }", "material", "m"),
+        ("m(1) { | }", "object", "m"),
+        ("square { group { a } | ", "object", "square"),
+    ],
+)
+def test_the_kind_of_block_is_read_off_tokens(text: str, kind: str, head: str) -> None:
+    offset = text.index("|")
+    parsed = parse_whole(SourceFile("a.nsg", text.replace("|", "")))
+    block = cursor_at(parsed, offset, frozenset({"m"}) if "let m" in text else frozenset()).block
+    assert (block.kind, block.head) == (kind, head)
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "index", "named", "given"),
+    [
+        ("f(|", "f", 0, None, ()),
+        ("f(1, g(2, 3), |", "f", 2, None, ()),
+        ("f(1, g(2, |", "g", 1, None, ()),
+        ("f(a = 1, b = |", "f", 1, "b", ("a",)),
+        ("f([1, 2, |], 3", "f", 0, None, ()),
+        ("lib.f(1, |", "lib.f", 1, None, ()),
+        ("square { scale(0.5, | ); }", "scale", 1, None, ()),
+    ],
+)
+def test_the_call_around_the_cursor(
+    text: str, name: str, index: int, named: str | None, given: tuple[str, ...]
+) -> None:
+    offset = text.index("|")
+    call = cursor_at(parse_whole(SourceFile("a.nsg", text.replace("|", ""))), offset).call
+    assert call is not None
+    assert (call.name, call.index, call.named, call.given) == (name, index, named, frozenset(given))
+
+
+def test_parentheses_that_call_nothing_are_no_call() -> None:
+    for text in ("if (|", "let a = (1 + |", "fn f(|", "for (i in |"):
+        offset = text.index("|")
+        assert cursor_at(parse_whole(SourceFile("a.nsg", text.replace("|", ""))), offset).call is None
