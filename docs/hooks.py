@@ -6,6 +6,7 @@
 - The scenes of ``examples/`` as files to download.
 - Links of pages lead to files of the repository, as code hosts show them; here they lead to the same thing
   inside the site, and where the site has no such thing they become plain text.
+- Nothing is fetched from elsewhere, also where the site is opened as files.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ CODE_PAGES = "scenelang/diagnostics/pages"
 ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 COMMANDS_PAGE = "commands.md"
 _LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
+_SHIM = re.compile(r"<script src=\"?https://unpkg\.com/iframe-worker/shim\"?></script>")
 _CODES = re.compile(r"^(```nsg)(?: [EW]\d{4})+", re.MULTILINE)  # the codes that a test expects of a scene
 _FENCE = re.compile(r"(^```.*?^```$)", re.MULTILINE | re.DOTALL)
 
@@ -90,6 +92,16 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
 
     parts = _FENCE.split(_CODES.sub(r"\1", markdown))
     return "".join(part if part.startswith("```") else _LINK.sub(link, part) for part in parts)
+
+
+def on_post_page(output: str, *, page: Page, config: MkDocsConfig) -> str:
+    """Take out the one script that the offline plugin would fetch from elsewhere."""
+    return _SHIM.sub("", output)
+
+
+def on_post_template(output_content: str, *, template_name: str, config: MkDocsConfig) -> str:
+    """As `on_post_page`, for the page of what is not found."""
+    return _SHIM.sub("", output_content)
 
 
 def _origin(uri: str) -> Path:
