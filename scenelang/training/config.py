@@ -26,12 +26,16 @@ class Phase:
         objects: most objects of a stream; 0 trains on the leaves alone, without frames or cell.
         streams: streams B of a batch; for leaves alone the factor on the number of points of each.
         decoder_rate: the decoder's learning rate as a share of the cell's.
+        rate: the phase's highest learning rate as a share of the whole training's.
+        smooth: share of streams of unions and smooth unions only, in place of the scenes' own.
     """
 
     iterations: int
     objects: int
     streams: int
     decoder_rate: float = 1.0
+    rate: float = 1.0
+    smooth: float | None = None
 
 
 @checked(frozen=True, config={"extra": "forbid"})

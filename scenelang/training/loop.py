@@ -7,6 +7,7 @@ import math
 import subprocess
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -74,11 +75,12 @@ def train(
     sums: dict[str, float] = {}
     while done < config.iterations:
         phase, into = _phase_at(config, done)
-        share = config.rate * _schedule(into, phase.iterations)
+        share = config.rate * phase.rate * _schedule(into, phase.iterations)
         optimiser.param_groups[0]["lr"] = share
         optimiser.param_groups[1]["lr"] = share * phase.decoder_rate
         if phase.objects:
-            batch = random_batch(phase.streams, phase.objects, config.scenes, scenes)
+            drawn = config.scenes if phase.smooth is None else replace(config.scenes, smooth=phase.smooth)
+            batch = random_batch(phase.streams, phase.objects, drawn, scenes)
             loss, parts = image_loss(network, batch)
         else:
             loss, parts = leaf_loss(network, leaf_batch(phase.streams * config.scenes.points, scenes))

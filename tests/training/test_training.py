@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from scenelang.renderers.framed import FramedConfig
 from scenelang.training.checkpoint import load_tensors
 from scenelang.training.config import Phase, TrainConfig, read_config
 from scenelang.training.loop import train
-from scenelang.training.scenes import GEOMETRIES, SceneConfig, random_batch
+from scenelang.training.scenes import GEOMETRIES, Batch, SceneConfig, random_batch
 from tests.reference import oracle
 
 WORDS = ("union", "smooth", "subtract", "intersect")
@@ -97,3 +98,23 @@ def test_training_learns(tmp_path: Path) -> None:
     losses: list[float] = []
     train(config, tmp_path, report=lambda i, n, s, parts: losses.append(parts["alone"]), report_every=25)
     assert losses[-1] < losses[0] * 2 / 3
+
+
+def test_a_phase_has_a_rate_and_blends_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A phase at a rate of nothing leaves the weights where they are; the drawn share is the phase's."""
+    first = Phase(3, 2, 2)
+    config = replace(tiny_config(), phases=(first,))
+    train(config, tmp_path / "one")
+    shares: list[float] = []
+
+    def watched(b: int, n: int, scenes: SceneConfig, g: torch.Generator) -> Batch:
+        shares.append(scenes.smooth)
+        return random_batch(b, n, scenes, g)
+
+    monkeypatch.setattr("scenelang.training.loop.random_batch", watched)
+    longer = replace(config, phases=(first, Phase(3, 2, 2, rate=0.0, smooth=0.9)))
+    train(longer, tmp_path / "two")
+    one, _ = load_tensors(tmp_path / "one" / "weights.safetensors")
+    two, _ = load_tensors(tmp_path / "two" / "weights.safetensors")
+    assert all(torch.equal(one[name], two[name]) for name in one)
+    assert shares == [config.scenes.smooth] * 3 + [0.9] * 3
