@@ -34,7 +34,7 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
 
 
 @click.command("check")
-@click.argument("files", nargs=-1, required=True, metavar="FILE…")
+@click.argument("files", nargs=-1, required=True, metavar="PATH…")
 @click.option("--fix", "fixes", is_flag=True, help="Apply the safe fixes; report what is left.")
 @click.option("--diff", is_flag=True, help="Show what --fix would change, and change nothing.")
 @options.define
@@ -79,25 +79,19 @@ def command(
 ) -> None:
     """Report what is wrong with scenes, without drawing them.
 
-    FILE is a scene, or - for standard input; with --fix its text then goes to standard output and
-    everything else to standard error. CODES are codes of warnings or beginnings of them: W0501,W02.
+    PATH is a scene, a folder of scenes (*.nsg, also in folders inside; hidden ones and links are passed
+    over), or - for standard input; with --fix its text then goes to standard output and everything else to
+    standard error. CODES are codes of warnings or beginnings of them: W0501,W02.
 
     Exits with 0 where there are no errors, 1 where there are (or a difference, with --diff), 2 where a file
     cannot be read or written.
     """
     from scenelang.cli.checking import Scenes, Selection
+    from scenelang.cli.diffs import show_difference
     from scenelang.cli.inputs import STDIN, Request
-    from scenelang.cli.main import describe
-    from scenelang.cli.say import say_trouble
 
     scenes = Scenes(Request(defines, model, root, frame), Selection(select, ignore))
-    unreadable = False
-    for name in dict.fromkeys(files):
-        try:
-            scenes.read(name)
-        except OSError as error:
-            say_trouble(describe(error))
-            unreadable = True
+    unreadable = not _read(files, scenes)
     out = _Output(kind, most, quiet, color, (fixes or diff) and STDIN in scenes.sources, scenes)
     if not fixes and not diff:
         left: Sequence[Diagnostic] = scenes.check().items if scenes.sources or scenes.unread.items else ()
@@ -107,7 +101,8 @@ def command(
         changed = {n: text for n, text in settled.texts.items() if text != scenes.sources[n].text}
         left = [d for _, d in settled.left]
         if diff:
-            _show(scenes, changed, out)
+            for name, text in changed.items():
+                show_difference(scenes.sources[name].name, scenes.sources[name].text, text, color)
             ctx.exit(2 if unreadable else int(bool(changed or _wrong(left, strict))))
         unreadable |= not _store(changed, settled, scenes)
         out.fixed(settled)
@@ -115,24 +110,36 @@ def command(
     ctx.exit(2 if unreadable else int(_wrong(left, strict)))
 
 
+def _read(paths: tuple[str, ...], scenes: Scenes) -> bool:
+    """Take in all scenes, folders' too; False where something cannot be read."""
+    from scenelang.cli import folders
+    from scenelang.cli.inputs import STDIN
+    from scenelang.cli.main import describe
+    from scenelang.cli.say import say_trouble
+
+    good, count = True, 0
+    for path in paths:
+        try:
+            names = [path] if path == STDIN else list(folders.scenes(path))
+        except OSError as error:
+            say_trouble(describe(error))
+            good = False
+            continue
+        count += len(names)
+        for name in names:
+            try:
+                scenes.read(name)
+            except OSError as error:
+                say_trouble(describe(error))
+                good = False
+    if good and not count:
+        say_trouble(f"no scenes (*{folders.SUFFIX}) there")
+        return False
+    return good
+
+
 def _wrong(left: Sequence[Diagnostic], strict: bool) -> bool:
     return any(strict or d.severity == "error" for d in left)
-
-
-def _show(scenes: Scenes, changed: dict[str, str], out: _Output) -> None:
-    """Print what fixes would change."""
-    from scenelang.cli.checking import difference
-    from scenelang.cli.say import wants_color
-    from scenelang.diagnostics import cells
-
-    paint = wants_color(sys.stdout, out.color)
-    styles = {"-": "removed", "+": "added", "@": "frame"}
-    for name, text in changed.items():
-        shown = difference(scenes.sources[name].name, scenes.sources[name].text, text)
-        for line in shown.removesuffix("\n").split("\n"):
-            style = "bold" if line.startswith(("--- ", "+++ ")) else styles.get(line[:1], "")
-            safe = cells.printable(line) if paint or sys.stdout.isatty() else line
-            click.echo(cells.paint(style, safe, paint), color=True)
 
 
 def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> bool:

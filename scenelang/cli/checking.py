@@ -53,16 +53,22 @@ class Scenes:
     selection: Selection = field(default_factory=Selection)
     sources: dict[str, SourceFile] = field(default_factory=dict)
     unread: Diagnostics = field(default_factory=Diagnostics)
+    names: dict[str, str] = field(default_factory=dict)
+    """The names by the files' places on the disk."""
 
     def read(self, name: str) -> None:
-        """Take a scene in.
+        """Take a scene in, once under any name.
 
         Raises:
             OSError: it cannot be opened.
         """
+        place = _place(name)
+        if place in self.names:
+            return
         source = read_text(name, self.unread)
         if source is not None:
             self.sources[name] = source
+            self.names[place] = name
 
     def check(self) -> Diagnostics:
         """All that there is to say."""
@@ -84,24 +90,20 @@ class Scenes:
         if diagnostic.span is None:
             return None
         name = diagnostic.span.source.name
-        place = STDIN if name == "<stdin>" else _place(name)
-        return next((own for own in self.sources if _place(own) == place), None)
+        return self.names.get(STDIN if name == "<stdin>" else _place(name))
 
     def fix(self) -> Settled[str]:
         """The texts after all fixes, by the names that the user wrote, and what is left.
 
         Of imported files only those change that were named too.
         """
-        names: dict[str, str] = {}  # by the place on the disk; one file may have two names
-        for name in self.sources:
-            names.setdefault(_place(name), name)
 
         def check(texts: Mapping[str, str]) -> Iterable[tuple[str | None, Diagnostic]]:
             sources = {name: SourceFile(self.sources[name].name, text) for name, text in texts.items()}
             inside = {Path(_place(name)): text for name, text in texts.items() if name != STDIN}
             return [(self.owner(d), d) for d in self._check(sources, inside)]
 
-        return settle({name: self.sources[name].text for name in names.values()}, check)
+        return settle({name: source.text for name, source in self.sources.items()}, check)
 
 
 def _place(name: str) -> str:
@@ -131,18 +133,3 @@ def in_bytes(text: str, path: Path) -> bytes:
     with path.open("rb") as file:
         marked = file.read(3) == codecs.BOM_UTF8
     return (codecs.BOM_UTF8 if marked else b"") + text.encode("utf-8")
-
-
-def difference(name: str, before: str, after: str) -> str:
-    """A unified diff, as `patch -p0` takes it; lines end at line feeds and nowhere else."""
-    from difflib import unified_diff
-
-    old, new = ([f"{line}\n" for line in text.split("\n")] for text in (before, after))
-    for lines in (old, new):
-        # What follows the last line feed is a line only if it holds something.
-        last = lines.pop().removesuffix("\n")
-        lines += [last] if last else []
-    return "".join(
-        line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
-        for line in unified_diff(old, new, name, name)
-    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,14 +10,14 @@ from typing import Final
 
 import click
 
+from scenelang.cli.diffs import show_difference
+from scenelang.cli.folders import SUFFIX, scenes
 from scenelang.cli.main import describe
-from scenelang.cli.say import say_diagnostics, say_trouble, wants_color
+from scenelang.cli.say import say_diagnostics, say_trouble
 from scenelang.files import read_regular, write_whole
 
 STDIN: Final = "-"
-SUFFIX: Final = ".nsg"
 MAX_BYTES: Final = 10_000_000  # as every scene; the module that says so would cost half of the start-up
-_NEWLINE_LESS: Final = "\n\\ No newline at end of file\n"
 
 
 @click.command("fmt")
@@ -62,26 +61,6 @@ def _no_search_for_circles() -> Iterator[None]:
             gc.enable()
 
 
-def scenes(path: str) -> Iterator[str]:
-    """A file itself, or the scenes of a folder in order of their names; hidden ones and links are left out.
-
-    Raises:
-        OSError: a folder cannot be listed.
-    """
-    if not os.path.isdir(path):
-        yield path
-        return
-    with os.scandir(path) as entries:
-        found = sorted(entries, key=lambda entry: entry.name)
-    for entry in found:
-        if entry.name.startswith(".") or entry.is_symlink():
-            continue
-        if entry.is_dir():
-            yield from scenes(entry.path)
-        elif entry.name.endswith(SUFFIX) and entry.is_file():
-            yield entry.path
-
-
 class _Run:
     """One run over any number of files.
 
@@ -120,7 +99,7 @@ class _Run:
         else:
             self.changed += 1
             if self.diff:
-                self._show(_shown(name), text, result)
+                show_difference(_shown(name), text, result)
             elif self.check:
                 click.echo(f"would format {_shown(name)}")
         if self.writes:
@@ -156,17 +135,6 @@ class _Run:
                 self.unreadable += 1
                 self.changed -= 1
 
-    def _show(self, name: str, text: str, result: str) -> None:
-        """Print a unified diff."""
-        from difflib import unified_diff
-
-        colored = wants_color(sys.stdout)
-        for line in unified_diff(_lines(text), _lines(result), name, name):
-            shown = line if line.endswith("\n") else line + _NEWLINE_LESS
-            if colored:
-                shown = _colored(shown)
-            click.echo(shown, nl=False, color=True)
-
     def summarise(self) -> None:
         """Say how many files there were, where people read it."""
         if self.stdin or not (self.changed or self.same or self.mistaken or self.unreadable):
@@ -187,16 +155,3 @@ class _Run:
 
 def _shown(name: str) -> str:
     return "<stdin>" if name == STDIN else name
-
-
-def _lines(text: str) -> list[str]:
-    """Lines with their ends: a line ends at a newline and nowhere else."""
-    lines = [line + "\n" for line in text.split("\n")]
-    last = lines.pop()
-    return [*lines, last[:-1]] if last != "\n" else lines
-
-
-def _colored(line: str) -> str:
-    colors = {"-": "red", "+": "green", "@": "cyan"}
-    color = colors.get(line[0])
-    return click.style(line, fg=color, bold=line.startswith(("---", "+++"))) if color else line

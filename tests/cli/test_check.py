@@ -70,7 +70,18 @@ def test_unreadable_files_are_2_and_the_others_are_checked(folder: Folder) -> No
     assert result.exit_code == 2
     assert result.stderr == "Error: none.nsg: no such file or directory\n"
     assert "E0201" in result.stdout
-    assert folder.run("check", ".").exit_code == 2
+
+
+def test_folders_stand_for_their_scenes(folder: Folder) -> None:
+    for name in ("a.nsg", "in/b.nsg", ".hidden/c.nsg", "in/notes.txt"):
+        folder.write(name, "square { scale(foo); }")
+    result = folder.run("check", ".", "a.nsg", "--format", "concise")
+    assert [line.split(":")[0] for line in result.stdout.splitlines()] == ["./a.nsg", "./in/b.nsg"]
+    empty = folder.run("check", ".hidden/none.nsg", ".")
+    assert empty.exit_code == 2
+    (folder.path / "empty").mkdir()
+    result = folder.run("check", "empty")
+    assert (result.exit_code, result.stderr) == (2, "Error: no scenes (*.nsg) there\n")
 
 
 @pytest.mark.parametrize(
