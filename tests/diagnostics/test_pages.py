@@ -12,15 +12,18 @@ from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
 from scenelang.diagnostics.pages import AREAS, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
+from scenelang.graph import lower
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.passes import check_scene
 from scenelang.program.compile import find_model
+from scenelang.scene import functions, imports, session, settings, values
 from scenelang.scene.data import from_json
 from scenelang.scene.evaluate import load_source
 from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
 from scenelang.scene.unused import find_unused
-from scenelang.syntax import parse
+from scenelang.syntax import nesting, parse, tokens
+from scenelang.syntax.tables import tables
 
 PAGES = Path(scenelang.__file__).parent / "diagnostics/pages"
 ROOT = Path(__file__).parents[2]
@@ -136,3 +139,26 @@ def test_a_scene_for_two_models_is_shown_where_they_part() -> None:
     assert only.span is not None
     assert (only.span.text, only.labels[0].span.text) == ("sphere", "square")
     assert only.labels[0].message == "`shapes2d` has this"
+
+
+def test_pages_state_the_lists_and_limits_of_the_code() -> None:
+    def prose(code: str) -> str:
+        return " ".join(read_page(code).text.split())
+
+    words = {text for text in tables().literals if text[0].isalpha()} - {"step", "as"}
+    assert set(re.findall(r"`(\w+)`", read_page("E0110").meaning)) == words
+    listed = re.search(r"The functions are `([^`]*)`", prose("E0207"))
+    assert listed is not None
+    assert set(listed[1].split()) == set(functions.FUNCTIONS)
+    for code, number in {
+        "E0120": f"{nesting.MAX_DEPTH} levels",
+        "E0121": f"more than {tokens.MAX_MISTAKES} syntax",
+        "E0311": f"above {settings.MAX_SIDE_PX}",
+        "E0320": f"{session.MAX_OBJECTS:,} objects",
+        "E0321": f"{session.MAX_DEPTH} deep, or groups more than {session.MAX_NODE_DEPTH}",
+        "E0322": f"{session.MAX_STEPS // 1_000_000} million steps",
+        "E0323": f"nest more than {values.MAX_VECTOR_DEPTH} deep",
+        "E0324": f"{session.MAX_BYTES // 1_000_000} MB, or imports nest more than {imports.MAX_IMPORT_DEPTH}",
+        "E0405": f"{lower.MAX_DEPTH:,} levels",
+    }.items():
+        assert number in prose(code), code
