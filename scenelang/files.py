@@ -7,13 +7,16 @@ import errno
 import os
 import re
 import stat
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final
 
 _PIPES: Final = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
 """Where shells put the pipes of ``<(…)``; somebody writes to them."""
 _JSON_DEPTH: Final = 64
-_TOKENS: Final = re.compile(rb'"(?:[^"\\]++|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
+# Possessive: a string without end is read once, not once for each of its characters.
+_NO_BRACKETS: Final = re.compile(r'(?:"(?:[^"\\]++|\\.)*+"?|[^\[\]{}"]++)++', re.DOTALL)
+_STEPS: Final = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
 class NotWritten(OSError):
@@ -56,24 +59,17 @@ def read_json(data: bytes, *, most_depth: int = _JSON_DEPTH) -> Any:
         ValueError: it is no JSON, nests deeper than ``most_depth``, or says something twice, in which case
             two readers could take different meanings from it.
     """
-    if depth_of_json(data) > most_depth:
-        raise ValueError(f"brackets nested deeper than {most_depth}")
     import json  # not at the top: a command's help needs none
 
-    return json.loads(data.decode("utf-8"), object_pairs_hook=_once, parse_constant=_no_number)
+    text = data.decode("utf-8")
+    if depth_of_json(text) > most_depth:
+        raise ValueError(f"brackets nested deeper than {most_depth}")
+    return json.loads(text, object_pairs_hook=_once, parse_constant=_no_number)
 
 
-def depth_of_json(data: bytes) -> int:
+def depth_of_json(text: str) -> int:
     """How deep brackets nest, those in strings left out."""
-    depth = deepest = 0
-    for token in _TOKENS.finditer(data):
-        first = token.group()[:1]
-        if first in b"[{":
-            depth += 1
-            deepest = max(deepest, depth)
-        elif first in b"]}":
-            depth -= 1
-    return deepest
+    return max(accumulate(map(_STEPS.__getitem__, _NO_BRACKETS.sub("", text))), default=0)
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Literal
 from scenelang.diagnostics.span import Span
 
 Severity = Literal["error", "warning"]
+MOST_CHARS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +78,9 @@ class Diagnostics:
         help: str | None = None,
         fix: Fix | None = None,
     ) -> None:
-        """Record one diagnostic."""
+        """Record one diagnostic; a message that quotes half a file is cut."""
+        if len(message) > MOST_CHARS:
+            message = f"{message[:MOST_CHARS]}…"
         if span is not None:
             key = (code, span.source.name, span.start, span.end)
             if key in self._seen:

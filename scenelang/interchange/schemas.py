@@ -69,11 +69,11 @@ def manifest_schema() -> dict[str, Any]:
     word = {"type": "string", "pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}
     words = {"type": "array", "items": word, "uniqueItems": True}
     pair = {"type": "array", "prefixItems": [{"type": "number"}] * 2, "minItems": 2, "maxItems": 2}
-    limit = {"type": "integer", "minimum": 0, "maximum": 1_000_000}
+    limit = {"type": "integer", "minimum": 0, "exclusiveMaximum": 1 << 31}
     whole = _object(
         {
             "format": {"const": 1},
-            "name": {"description": 'as in `model "name";`', "type": "string", "pattern": "^[a-z0-9_]+$"},
+            "name": {"description": 'as in `model "name";`', "type": "string", "pattern": '^[^"\\\\]+$'},
             "summary": {"description": "one line for people", "type": "string"},
             "dimension": {"enum": [2, 3]},
             "renderer": word,

@@ -130,7 +130,15 @@ def available() -> list[str]:
 
 
 def load_manifest(name: str) -> Manifest:
-    """The manifest of a shipped model; raises KeyError for an unknown name."""
+    """The manifest of a shipped model.
+
+    Raises:
+        KeyError: there is no such model.
+        ValueError: it is damaged, or that of another model: its name leads to its files.
+    """
     if name not in available():
         raise KeyError(name)
-    return Manifest.from_json((ROOT / name / "manifest.json").read_text("utf-8"))
+    found = Manifest.from_json((ROOT / name / "manifest.json").read_text("utf-8"))
+    if found.name != name:
+        raise ValueError(f"the manifest of `{name}` calls itself `{found.name[:40]}`")
+    return found

@@ -16,8 +16,9 @@ from pydantic_core import ErrorDetails, PydanticSerializationError
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.files import depth_of_json
 from scenelang.scene import schema
-from scenelang.scene.json_places import Key, Value, follow, read_places, record_places, too_deep
+from scenelang.scene.json_places import Key, Value, deeper_than, follow, read_places, record_places
 from scenelang.scene.schema import Scene, SceneNode
 from scenelang.scene.session import MAX_NODE_DEPTH, deep_stack
 from scenelang.scene.spans import SpanMap
@@ -116,11 +117,12 @@ def _read(source: SourceFile) -> Scene:
     text = source.text
     if len(text) > MAX_CHARS:
         raise _failure(f"more than {MAX_CHARS:,} characters of JSON")
-    bracket = too_deep(text, (MAX_NODE_DEPTH + 4) * _BRACKETS_PER_NODE)
-    if bracket is not None:
+    depth, most = depth_of_json(text), (MAX_NODE_DEPTH + 4) * _BRACKETS_PER_NODE
+    if depth > most:
+        bracket = deeper_than(text, most)
         raise _failure(f"nodes nested deeper than {MAX_NODE_DEPTH}", Span(source, bracket, bracket + 1))
     try:
-        if too_deep(text, _PLAIN_DEPTH) is None:
+        if depth <= _PLAIN_DEPTH:
             return Scene.model_validate_json(text)
         with deep_stack():
             return _read_deep(source)

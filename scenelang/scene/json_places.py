@@ -35,8 +35,8 @@ class Value:
         return self.items.get(key, self)
 
 
-def too_deep(text: str, most: int) -> int | None:
-    """Where brackets first nest deeper than ``most``, or None."""
+def deeper_than(text: str, most: int) -> int:
+    """Where brackets first nest deeper than ``most``, in a text where they do."""
     depth = 0
     for token in _TOKENS.finditer(text):
         first = text[token.start()]
@@ -46,7 +46,7 @@ def too_deep(text: str, most: int) -> int | None:
                 return token.start()
         elif first in "]}":
             depth -= 1
-    return None
+    return len(text)
 
 
 def read_places(text: str) -> Value:

@@ -1,0 +1,49 @@
+"""Whole processes of the command line, which must end soon, in words and without leavings."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+SOON_S = 60
+"""No command here needs a tenth of it on an idle machine."""
+READY = "import sys, scenelang.cli.start as s; print('ready', flush=True); s.main()"
+
+
+def run(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end; fails where it hangs."""
+    command = [sys.executable, "-m", "scenelang", *arguments]
+    options = {"stdout": subprocess.PIPE, "stdin": subprocess.DEVNULL, **options}
+    return subprocess.run(command, stderr=subprocess.PIPE, text=True, timeout=SOON_S, check=False, **options)
+
+
+@contextmanager
+def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A process whose command has just begun; its standard output is the rest of its words."""
+    command = [sys.executable, "-c", READY, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def one_line(done: subprocess.CompletedProcess[str], code: int = 2) -> str:
+    """The one error that a command told; usage errors have a hint before it."""
+    assert done.returncode == code, (done.returncode, done.stderr)
+    assert "Traceback" not in done.stderr
+    errors = [line for line in done.stderr.splitlines() if line.startswith("Error: ")]
+    assert len(errors) == 1, done.stderr
+    return errors[0].removeprefix("Error: ")
+
+
+def leavings(folder: Path) -> set[str]:
+    """Every file under a folder, hidden ones too."""
+    return {os.path.relpath(Path(at) / name, folder) for at, _, names in os.walk(folder) for name in names}
