@@ -19,6 +19,7 @@ from scenelang.renderers.frames import BLEND_REACH, FAR, ObjectFrame, local_poin
 
 UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
 CHUNK = 4096  # points that go through the network at once; their activations stay in the L2 cache
+_ROUNDING = 1e-6  # world units
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
 
 
@@ -141,6 +142,9 @@ class Stream:
         self.codes = np.unique(vectors[:, exact.CODE], axis=0)  # of the leaves in use
         self.frames = dict(_frames(vectors[:, : exact.D_G], frames or {}))
         self.rows = self._rows(vectors, tokens)
+        self._reach = np.array(
+            [(r.frame.centre[1], *r.frame.half[1], r.reach, r.frame.growth) for r in self.rows], np.float64
+        ).reshape(-1, 5)
 
     def _rows(self, vectors: np.ndarray, tokens: np.ndarray) -> list[_Row]:
         if not len(vectors):
@@ -183,7 +187,7 @@ class Stream:
         edge = torch.full((count,), torch.inf, device=x.device)
         touched = torch.zeros(count, dtype=torch.bool, device=x.device)
         evaluated = 0
-        for row in self.rows:
+        for row in self.rows if rows is None else self._near(rows, pad):
             index, qx, qy, radius = self._meet(row, x, y, touched, pad, rows)
             evaluated += qx.numel()
             for start in range(0, qx.numel(), CHUNK):
@@ -195,6 +199,15 @@ class Stream:
                 edge[part] = torch.minimum(edge[part], features[0].abs() / row.frame.stretch)
         edge = torch.minimum(edge, state[0].abs() / self.unit)
         return Shade(colour, (0.5 - state[0] * self.slope).clamp_(0.0, 1.0), edge, evaluated)
+
+    def _near(self, rows: PixelRows, pad: float) -> list[_Row]:
+        """The objects that may meet points in some rows; `_meet` finds none for the others."""
+        if not len(rows.down):
+            return []
+        y, slope, more, reach, growth = self._reach.T
+        high = slope * (reach + pad * growth) + more + rows.spread + _ROUNDING
+        near = ((y + high >= -rows.down[-1]) & (y - high <= -rows.down[0])) | np.isinf(reach)
+        return [self.rows[i] for i in np.flatnonzero(near).tolist()]
 
     def _meet(
         self, row: _Row, x: Tensor, y: Tensor, touched: Tensor, pad: float, rows: PixelRows | None
