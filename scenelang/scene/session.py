@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.scene.damage import Damage
+from scenelang.scene.damage import NONE, Damage
 from scenelang.scene.schema import Animation
 from scenelang.scene.spans import Calls, SpanMap
 from scenelang.scene.still import Needs
@@ -124,6 +124,7 @@ class Session:
     settings: Settings = field(default_factory=Settings)
     damaged: dict[int, Damage] = field(default_factory=dict)
     reported: dict[tuple[int, int, int], str] = field(default_factory=dict)
+    blamed: dict[tuple[int, int], Span] = field(default_factory=dict)
     unknown: dict[tuple[str, str, int], int] = field(default_factory=dict)
     names_in: dict[int, dict[str, list[Span]]] = field(default_factory=dict)
     replays: bool = False
@@ -153,9 +154,16 @@ class Session:
         return labels
 
     def follows(self, code: str, span: Span) -> bool:
-        """Whether a diagnostic may follow from a syntax mistake that has been reported."""
-        damage = self.damaged.get(id(span.source)) if self.damaged else None
-        return damage is not None and damage.explains(code, span)
+        """Whether a diagnostic may follow from a syntax mistake, there or in a call that is running."""
+        if not self.damaged:
+            return False
+        damage = self.damaged.get(id(span.source), NONE)
+        calls = self.calls
+        while calls is not None:
+            if self.damaged.get(id(calls.span.source), NONE).holds(calls.span):
+                return True
+            calls = calls.outer
+        return damage.explains(code, span)
 
     def error(
         self,
@@ -183,6 +191,8 @@ class Session:
         operand = None
         if problem.operand is not None and problem.operand < len(operands):
             operand = operands[problem.operand]
+        if operand is not None and self._is_blamed(problem.code, operand):
+            return
         fix = angle_fix(operand) if problem.fix == "angle" and operand is not None else None
         labels = [
             Label(other.span, words)
@@ -195,6 +205,18 @@ class Session:
                 labels.append(Label(defined, f"'{operand.name.text}' is defined here"))
         place = operand.span if operand else span
         self.error(problem.code, problem.message, place, help=problem.help, fix=fix, labels=tuple(labels))
+
+    def _is_blamed(self, code: str, operand: nodes.Expr) -> bool:
+        """Whether the same is wrong with a variable that has been reported where it was used before."""
+        while isinstance(operand, nodes.Member | nodes.Index):
+            operand = operand.value
+        if code != "E0301" or not isinstance(operand, nodes.NameRef):
+            return False
+        definition = self.defined.get((id(operand.span.source), operand.span.start))
+        if definition is None:
+            return False
+        key = (id(definition.source), definition.start)
+        return self.blamed.setdefault(key, operand.span) != operand.span
 
     def halt(self, code: str, message: str, span: Span, help: str | None = None) -> Halt:
         """Report a limit that was met; the caller raises what this returns."""

@@ -63,6 +63,7 @@ _INSERTIONS = {
     "nsg": 1.6,
     "model": 1.7,
     "import": 1.6,
+    "material": 1.6,
     "BAD_EXPRESSION": 1.6,
     "NAME": 1.7,
     "STRING": 1.8,
@@ -81,6 +82,7 @@ _ONLY_BEFORE = {
     "nsg": "NUMBER",
     "model": "STRING",
     "import": "STRING",
+    "material": "NAME",
 }
 _ONLY_AFTER = {"as": "STRING", "as NAME": "STRING"}
 REPLACEMENTS = {
@@ -165,7 +167,8 @@ class Search:
         self.name = tables().kind("NAME")
         self.keywords = {kind for text, kind in literals.items() if text.isalpha()}
         self.equal = literals["="]
-        self.definitions = {literals["fn"], literals["module"]}
+        self.bodies = {literals["fn"], literals["module"]}
+        self.definitions = {literals["let"], literals["param"], *self.bodies}
         self.comma = literals[","]
 
     def run(self, base: list[int], stack: list[int]) -> Repair | None:
@@ -269,7 +272,7 @@ class Search:
         if kind in self.fixed:
             return
         for insert, cost in _replacements().get(kind, ()):
-            header = kind == self.equal and self.kinds[self.first] in self.definitions
+            header = kind == self.equal and self.kinds[self.first] in self.bodies
             yield Repair(at, 1, insert, cost + 0.5 * header)
         if kind in self.keywords:
             yield Repair(at, 1, (self.name,), _KEYWORD_AS_NAME + (at < self.at))
@@ -297,7 +300,9 @@ class Search:
 
     def _begins_statement(self, at: int) -> bool:
         """Whether a line inside brackets is laid out like a statement of its own."""
-        inside = self.tokens.on_new_line(at) and self.open_brackets(at)
+        if not self.tokens.on_new_line(at):
+            return False
+        inside = self.kinds[at - 1] in self.definitions or self.open_brackets(at)
         return bool(inside) and self.kinds[at] in (self.name, *self.keywords) and leaves_open(self.kinds, at)
 
     def _broken_off(self, stack: list[int], at: int, cost: float = _BREAK) -> Iterator[Repair]:
