@@ -22,6 +22,7 @@ from scenelang.cli.main import main
 
 ROOT = Path(__file__).parents[1]
 PAGES = ("index", "tutorial", "cookbook", "embedding", "language", "formatting")
+SLOW = ("animation",)
 _BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```\n(?:\n```text\n(.*?)^```$)?", re.MULTILINE | re.DOTALL)
 VENV = ".venv/bin/"
 _LONG = {"watch", "train", "eval", "lsp"}  # commands that do not end, or not soon
@@ -61,7 +62,7 @@ def run_shell(text: str, expected: str | None, place: str, monkeypatch: pytest.M
         assert like(expected).fullmatch(printed.strip()), f"{place} prints\n{printed}"
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", [*PAGES, *(pytest.param(page, marks=pytest.mark.slow) for page in SLOW)])
 def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / f"docs/{page}.md").read_text("utf-8")
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
@@ -86,7 +87,7 @@ def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def test_pages_have_something_to_run() -> None:
     """The pattern finds the blocks that a simple count finds, and outputs among them."""
-    for page in PAGES:
+    for page in (*PAGES, *SLOW):
         text = (ROOT / f"docs/{page}.md").read_text("utf-8")
         counted = len(re.findall(r"^```\w", text, re.MULTILINE))
         found = list(_BLOCK.finditer(text))
