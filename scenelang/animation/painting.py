@@ -75,8 +75,6 @@ class Painter:
     @property
     def place(self) -> str:
         """The torch device."""
-        if self.device == "cpu":
-            return "cpu"
         from scenelang.backend.neural import choose_device
 
         return choose_device(self.device)

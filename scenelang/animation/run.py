@@ -144,6 +144,8 @@ def _drawn(
     alpha = False
     workers: Workers | None = None
     spent_s = 0.0
+    if painter.backend == "neural":
+        _ = painter.place  # loads torch, which is no part of a frame
     try:
         for index, number in enumerate(numbers):
             started = time.perf_counter()

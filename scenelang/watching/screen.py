@@ -54,9 +54,16 @@ class Screen:
         self._write(render_text(found, self.colour))
 
     def show(self, picture: PIL.Image.Image) -> None:
-        """Show a picture, no larger than the screen."""
+        """Show a picture, no larger than the screen; where a terminal misbehaves, say so once and go on."""
         if self._shown is None:
             return
+        try:
+            self._print(picture)
+        except (ArithmeticError, LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
+            self._shown = None
+            self.say(f"cannot show pictures in this terminal: {error}")
+
+    def _print(self, picture: PIL.Image.Image) -> None:
         from rich.console import Console
 
         columns, lines = shutil.get_terminal_size()

@@ -219,6 +219,21 @@ def test_pictures_in_terminals(capsys: pytest.CaptureFixture[str]) -> None:
     assert 4 <= shown.count("\n") <= 24
 
 
+def test_terminals_that_misbehave(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some report a size of 0 columns: the watcher says so once and goes on."""
+    pytest.importorskip("textual_image")
+    from scenelang.watching import screen as module
+
+    monkeypatch.setattr(module, "_cell", lambda: 1 // 0)
+    screen = module.Screen("always", False)
+    picture = Image.new("RGB", (8, 8))
+    screen.show(picture)
+    screen.show(picture)
+    assert capsys.readouterr().out.count("cannot show pictures in this terminal") == 1
+
+
 def test_folders_that_are_not_there(tmp_path: Path) -> None:
     (tmp_path / "b").mkdir()
     assert folders([tmp_path / "a.nsg", tmp_path / "b/c/d.nsg"]) == {tmp_path, tmp_path / "b"}
