@@ -222,7 +222,9 @@ def joined(parts: Sequence[Part]) -> str | None:
             return None
         else:
             flat += part.flat
-    return flat if len(flat) <= WIDTH else None
+        if len(flat) > WIDTH:
+            return None
+    return flat
 
 
 def ends_of(doc: AnyDoc, first: Part, last: Part) -> AnyDoc:

@@ -59,7 +59,8 @@ def format_text(text: str, *, name: str = "<text>") -> str:
 def _without_strays(text: str, diagnostics: Diagnostics) -> str:
     """A text without the semicolons that stand for nothing, all that a parse warns about."""
     for d in sorted(diagnostics, key=lambda d: -d.span.start if d.span is not None else 0):
-        assert d.code == "W0101" and d.span is not None, "a warning about more than stray semicolons"
+        assert d.code == "W0101", "a warning about more than stray semicolons"
+        assert d.span is not None
         text = text[: d.span.start] + text[d.span.end :]
     return text
 

@@ -22,7 +22,7 @@ class Comment(NamedTuple):
 
     Args:
         text: from its first sign to its last, trailing white space of its lines taken off.
-        column: code points before it on its line; None where tabs make that meaningless.
+        column: code points before it on its line, if it has several; None where tabs make that meaningless.
         ends_line: nothing may follow it on its last line: it is a line comment or has several lines.
         own_line: it stands on lines of its own.
         blank: a blank line stands before it.
@@ -128,12 +128,17 @@ class _Gap:
             begins = match.start()
             newlines.append(text.count("\n", at, begins))
             at = match.end()
-            line = text[text.rfind("\n", 0, begins) + 1 : begins]
             words = _stripped(match[0])
-            ends_line = words.startswith("//") or "\n" in words
-            comments.append(Comment(words, None if "\t" in line else len(line), ends_line))
+            several = "\n" in words
+            column = self._column(begins) if several else None
+            comments.append(Comment(words, column, several or words.startswith("//")))
         newlines.append(text.count("\n", at, end))
         return comments, newlines
+
+    def _column(self, offset: int) -> int | None:
+        text = self.tokens.source.text
+        line = text[text.rfind("\n", 0, offset) + 1 : offset]
+        return None if "\t" in line else len(line)
 
     def _behind(self, comments: Sequence[Comment], newlines: Sequence[int]) -> int:
         """How many comments stand on the line of the token before."""

@@ -116,6 +116,9 @@ def test_refuses_exactly_what_the_parser_refuses(data: st.DataObject) -> None:
     if not mistakes:
         holds(text)
         return
+    if all(d.severity == "warning" for d in mistakes):  # stray semicolons, which go
+        holds(format_text(text))
+        return
     with pytest.raises(SceneError) as caught:
         format_text(text)
     assert list(caught.value.diagnostics) == mistakes
