@@ -95,19 +95,19 @@ def _fix_all(document: Document, found: Sequence[Diagnostic]) -> types.CodeActio
 
 
 def formatted(document: Document, place: types.Range | None = None) -> list[types.TextEdit]:
-    """The edits that lay a text out in the canonical way, or those of them in a range.
+    """The edits that lay a text out in the canonical way, or the statements that a range touches.
 
     Raises:
         SceneError: the text has syntax errors.
     """
-    from scenelang.formatting import format_text
+    from scenelang.formatting import format_range, format_text
 
-    text = format_text(document.text, name=document.source.name)
-    edits = text_edits(document, text)
+    text, name = document.text, document.source.name
     if place is None:
-        return edits
-    first, last = place.start.line, place.end.line - (place.end.character == 0 and place.end != place.start)
-    return [e for e in edits if e.range.start.line <= last and e.range.end.line >= first]
+        return text_edits(document, format_text(text, name=name))
+    low, high = document.lines.offset(place.start), document.lines.offset(place.end)
+    start, end, new = format_range(text, low, high, name=name)
+    return text_edits(document, text[:start] + new + text[end:])
 
 
 def text_edits(document: Document, text: str) -> list[types.TextEdit]:

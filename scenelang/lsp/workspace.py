@@ -21,8 +21,11 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.lsp.names import Names, Symbol, Use
 from scenelang.lsp.text import Encoding, Lines, applied
 from scenelang.scene.imports import Unreadable, read_source
+from scenelang.scene.session import MAX_BYTES
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Edit, Parsed, parse_edited, parse_whole
+from scenelang.syntax.tables import END
+from scenelang.syntax.tokens import Tokens
 
 if TYPE_CHECKING:
     from lsprotocol import types
@@ -80,7 +83,7 @@ class Document:
         """Take over one change of the client's."""
         text, edit = applied(self.lines, change)
         source = SourceFile(self.source.name, text)
-        self.parsed = parse_edited(self.parsed, source, edit)
+        self.parsed = parse_edited(self.parsed, source, edit) if len(text) <= MAX_BYTES else too_large(source)
         self.edits.append(edit)
         self.semantic = [moved for d in self.semantic if (moved := _carried(d, edit, source)) is not None]
         for name in ("lines", "names"):
@@ -139,7 +142,8 @@ class Workspace:
         """Open a buffer, or open it anew."""
         path = path_of(uri)
         source = SourceFile(str(path) if path is not None else uri, text)
-        document = Document(uri, _resolved(path), parse_whole(source), version, self.encoding)
+        parsed = parse_whole(source) if len(text) <= MAX_BYTES else too_large(source)
+        document = Document(uri, _resolved(path), parsed, version, self.encoding)
         self.open[uri] = document
         return document
 
@@ -254,6 +258,14 @@ class Workspace:
                 target = self.definition(other, use)
                 if target is not None and target[1] is symbol:
                     yield other, use
+
+
+def too_large(source: SourceFile) -> Parsed:
+    """A text that nobody would draw: it has no tree, and says why."""
+    tokens = Tokens(source)
+    tokens.append(END, len(source.text), len(source.text))
+    message = f"a file of more than {MAX_BYTES // 1_000_000} MB"
+    return Parsed(source, [], [], tokens, (Diagnostic("E0324", message, Span(source, 0, 0)),), [])
 
 
 def path_of(uri: str) -> Path | None:

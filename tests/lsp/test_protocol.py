@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import socket
 import subprocess
 import sys
 import time
@@ -128,6 +130,44 @@ def test_typing_goes_on_while_a_long_scene_is_evaluated() -> None:
         assert client.stop() == 0
     finally:
         client.kill()
+
+
+def test_a_text_beyond_the_limit_is_refused_at_once(client: Client) -> None:
+    uri = client.open("untitled:a", "square { }\n" * 1_000_000)
+    found = client.next_diagnostics(uri, 60)
+    assert [d["code"] for d in found] == ["E0324"]
+    client.replace(uri, "squar { }\n")
+    assert [d["code"] for d in client.diagnostics(uri)] == ["E0204"]
+    assert client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+
+
+def test_a_port_serves_as_well_as_pipes() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = [sys.executable, "-m", "scenelang", "lsp", "--tcp", str(port)]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    try:
+        for _ in range(100):
+            try:
+                connection = socket.create_connection(("127.0.0.1", port))
+                break
+            except OSError:
+                time.sleep(0.1)
+        with connection, connection.makefile("rwb") as stream:
+            params = {"processId": None, "rootUri": None, "capabilities": {}}
+            message: Json = {"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": params}
+            data = json.dumps(message).encode()
+            stream.write(b"Content-Length: %d\r\n\r\n" % len(data) + data)
+            stream.flush()
+            length = 0
+            while line := stream.readline().strip():
+                if line.lower().startswith(b"content-length:"):
+                    length = int(line.split(b":")[1])
+            assert json.loads(stream.read(length))["result"]["serverInfo"]["name"] == "scenelang"
+    finally:
+        process.kill()
+        process.wait(20)
 
 
 def test_many_documents_are_open_at_once() -> None:
