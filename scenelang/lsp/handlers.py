@@ -299,7 +299,7 @@ _HANDLERS: Final = (
     (
         types.TEXT_DOCUMENT_COMPLETION,
         on_completion,
-        types.CompletionOptions(trigger_characters=[".", "(", ",", "=", '"', "/", " "]),
+        types.CompletionOptions(trigger_characters=[".", "(", ",", "=", '"', "/"]),
     ),
     (
         types.TEXT_DOCUMENT_SIGNATURE_HELP,
