@@ -10,7 +10,7 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from scenelang.cli.checking import Scenes
     from scenelang.diagnostics.diagnostic import Diagnostic
@@ -103,9 +103,11 @@ def command(
         if diff:
             for name, text in changed.items():
                 show_difference(scenes.sources[name].name, scenes.sources[name].text, text, color)
+            out.fixed(settled, "would fix")
             ctx.exit(2 if unreadable else int(bool(changed or _wrong(left, strict))))
-        unreadable |= not _store(changed, settled, scenes)
-        out.fixed(settled)
+        lost = _store(changed, settled, scenes)
+        unreadable |= bool(lost)
+        out.fixed(settled, "fixed", lost)
         out.write(left)
     ctx.exit(2 if unreadable else int(_wrong(left, strict)))
 
@@ -142,8 +144,8 @@ def _wrong(left: Sequence[Diagnostic], strict: bool) -> bool:
     return any(strict or d.severity == "error" for d in left)
 
 
-def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> bool:
-    """Write what changed, and standard input to standard output; False where a file cannot be written."""
+def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> set[str]:
+    """Write what changed, and standard input to standard output; returns what cannot be written."""
     from pathlib import Path
 
     from scenelang.cli.checking import in_bytes
@@ -152,7 +154,7 @@ def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> bo
     from scenelang.cli.say import say_trouble
     from scenelang.files import write_whole
 
-    good = True
+    lost = set()
     for name, text in changed.items():
         if name == STDIN:
             continue
@@ -160,10 +162,10 @@ def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> bo
             write_whole(Path(name), in_bytes(text, Path(name)))
         except OSError as error:
             say_trouble(describe(error))
-            good = False
+            lost.add(name)
     if STDIN in scenes.sources:
         sys.stdout.buffer.write(settled.texts[STDIN].encode("utf-8"))
-    return good
+    return lost
 
 
 class _Output:
@@ -209,25 +211,25 @@ class _Output:
                 fixable=sum(d.fix is not None and self.scenes.owner(d) is not None for d in found),
             )
             if not self.quiet:
-                text += f"For more on an error, try `scenelang explain {in_order(found)[0].code}`.\n"
+                text += f"For more, try `scenelang explain {in_order(found)[0].code}`.\n"
         else:
             count = len(self.scenes.sources) + len(self.scenes.unread)
             scenes = "1 scene" if count == 1 else f"{count:,} scenes"
             text = f"no mistakes in {scenes}\n" if count and not self.quiet else ""
         click.echo(text, nl=False, err=self.to_stderr, color=True)
 
-    def fixed(self, settled: Settled[str]) -> None:
-        """Say what was fixed, file by file."""
+    def fixed(self, settled: Settled[str], done: str, lost: Collection[str] = ()) -> None:
+        """Say what was fixed, file by file, but for files that could not be written."""
         from scenelang.diagnostics.cells import printable
         from scenelang.diagnostics.render_text import plural
 
         if self.quiet:
             return
         for name, applied in settled.applied.items():
-            if applied:
+            if applied and name not in lost:
                 codes = ", ".join(sorted({d.code for d in applied}))
                 shown = printable(self.scenes.sources[name].name)
-                click.echo(f"{shown}: fixed {plural(len(applied), 'mistake')} ({codes})", err=True)
+                click.echo(f"{shown}: {done} {plural(len(applied), 'mistake')} ({codes})", err=True)
         if not settled.stable:
             click.echo("Some fixes undo each other and were left out.", err=True)
 

@@ -164,9 +164,7 @@ def test_summary_counts_what_can_be_fixed(folder: Folder) -> None:
     )
     assert folder.run("check", name).stdout.splitlines()[-2] == "3 errors; 2 fixable with `--fix`"
     assert folder.run("check", name, "lib.nsg").stdout.splitlines()[-2] == "3 errors; 3 fixable with `--fix`"
-    assert folder.run("check", name).stdout.endswith(
-        "\nFor more on an error, try `scenelang explain E0302`.\n"
-    )
+    assert folder.run("check", name).stdout.endswith("\nFor more, try `scenelang explain E0302`.\n")
     assert not re.search("fixable|explain", folder.run("check", name, "--quiet").stdout)
     assert folder.run("check", folder.write("b.nsg"), "-q").stdout == ""
 

@@ -80,7 +80,10 @@ def test_a_file_that_cannot_be_written(folder: Folder, monkeypatch: pytest.Monke
     monkeypatch.setattr("scenelang.files.write_whole", refuse)
     result = folder.run("check", first, other, "--fix")
     assert result.exit_code == 2
-    assert "Error: a.nsg: permission denied" in result.stderr
+    assert result.stderr.splitlines() == [
+        "Error: a.nsg: permission denied",
+        "b.nsg: fixed 3 mistakes (E0102, E0127, E0302)",
+    ]
     assert (read(folder, first), read(folder, other)) == (BAD, GOOD)
 
 
@@ -113,6 +116,7 @@ def test_diff_shows_and_writes_nothing(folder: Folder) -> None:
     assert result.exit_code == 1
     assert read(folder, name) == BAD
     assert result.stdout.splitlines()[:3] == ["--- a.nsg", "+++ a.nsg", "@@ -1,2 +1,2 @@"]
+    assert result.stderr == "a.nsg: would fix 3 mistakes (E0102, E0127, E0302)\n"
     good = folder.write("b.nsg", GOOD)
     assert (folder.run("check", good, "--diff").exit_code, folder.run("check", good, "--diff").stdout) == (
         0,
