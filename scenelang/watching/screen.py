@@ -58,12 +58,12 @@ class Screen:
         if self._shown is None:
             return
         try:
-            self._print(picture)
+            self._print(picture, self._shown)
         except (ArithmeticError, LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
             self._shown = None
             self.say(f"cannot show pictures in this terminal: {error}")
 
-    def _print(self, picture: PIL.Image.Image) -> None:
+    def _print(self, picture: PIL.Image.Image, shown: Any) -> None:
         from rich.console import Console
 
         columns, lines = shutil.get_terminal_size()
@@ -77,11 +77,13 @@ class Screen:
         room = max(4, lines - _LINES)
         cell_width, cell_height = _cell()
         wide, high = picture.width / cell_width, picture.height / cell_height
-        scale = min(1.0, room / high, columns / wide)
+        scale = min(room / high, columns / wide)
+        if not shown.__module__.endswith("halfcell"):  # coarse pictures are better large
+            scale = min(1.0, scale)
         size = max(1, round(wide * scale)), max(1, round(high * scale))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # between two libraries
-            console.print(self._shown(over_grey(picture), width=size[0], height=size[1]))
+            console.print(shown(over_grey(picture), width=size[0], height=size[1]))
         sys.stdout.flush()
 
     def _write(self, text: str) -> None:
