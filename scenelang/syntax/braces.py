@@ -98,7 +98,8 @@ class _Mender:
             return
         more = kinds.count(self.opening) - kinds.count(self.closing)
         depth = kinds[:at].count(self.opening) - kinds[:at].count(self.closing)
-        if more <= 0 if kinds[at] == self.opening else more >= 0 or depth == 0:
+        ended = kinds[at - 1] in (tables().literals[";"], self.opening, self.closing)
+        if more <= 0 if kinds[at] == self.opening else more >= 0 or (depth == 0 and ended):
             return
         reach(start, kinds, 0, at)
         end = min(at + 2 * _BEHIND, len(kinds))

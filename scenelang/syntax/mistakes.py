@@ -193,7 +193,7 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
     start, end = tokens.starts[repair.at], tokens.ends[repair.end - 1]
     text = tokens.source.text[start:end]
     new = "".join(names)
-    fix = _change(f"write `{new}`", tokens, start, end, new)
+    fix: Fix | None = _change(f"write `{new}`", tokens, start, end, new)
     if repair.delete == 2:
         first, second = tokens.text(repair.at), tokens.text(repair.at + 1)
         gap = tokens.source.text[tokens.ends[repair.at] : tokens.starts[repair.at + 1]]
