@@ -71,7 +71,7 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Framed
         network.load_state_dict(tensors, assign=True)
     except Exception as error:
         # safetensors raises its own class, torch a RuntimeError; both say what does not fit
-        raise ModelError(f"damaged weights: {error}") from None
+        raise ModelError(f"damaged weights: {' '.join(str(error).split())[:300]}") from None
     for name, parameter in network.named_parameters():
         if parameter.dtype != torch.float32 or not torch.isfinite(parameter).all():
             raise ModelError(f"weights '{name}' are not finite float32 numbers")

@@ -55,17 +55,24 @@ def pack_training(
 def unpack_training(
     tensors: dict[str, Tensor], network: nn.Module, optimiser: torch.optim.Adam, scenes: torch.Generator
 ) -> None:
-    """The inverse of `pack_training`, in place."""
-    network.load_state_dict(
-        {k.removeprefix("network."): v for k, v in tensors.items() if k.startswith("network.")}
-    )
-    parameters = [p for g in optimiser.param_groups for p in g["params"]]
-    for i, parameter in enumerate(parameters):
-        state = {
-            k: tensors[f"adam.{i}.{k}"]
-            for k in ("step", "exp_avg", "exp_avg_sq")
-            if f"adam.{i}.{k}" in tensors
-        }
-        if state:
-            optimiser.state[parameter].update(state)
-    scenes.set_state(tensors["random"].cpu())
+    """The inverse of `pack_training`, in place.
+
+    Raises:
+        ModelError: the tensors are those of another training.
+    """
+    try:
+        network.load_state_dict(
+            {k.removeprefix("network."): v for k, v in tensors.items() if k.startswith("network.")}
+        )
+        parameters = [p for g in optimiser.param_groups for p in g["params"]]
+        for i, parameter in enumerate(parameters):
+            state = {
+                k: tensors[f"adam.{i}.{k}"]
+                for k in ("step", "exp_avg", "exp_avg_sq")
+                if f"adam.{i}.{k}" in tensors
+            }
+            if state:
+                optimiser.state[parameter].update(state)
+        scenes.set_state(tensors["random"].cpu())
+    except (KeyError, RuntimeError, TypeError) as error:
+        raise ModelError(f"a damaged checkpoint: {' '.join(str(error).split())[:300]}") from None

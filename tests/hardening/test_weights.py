@@ -1,0 +1,216 @@
+"""Weights, checkpoints and manifests that mean harm: an error in words, soon and in bounded memory."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from safetensors.numpy import load, save
+
+from scenelang.models import manifest as manifests
+from scenelang.models.load import load_network
+from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.models.weights import ModelError, codes_of, read_header, weights_path
+from scenelang.training.checkpoint import load_tensors
+from tests.cli.conftest import Folder
+
+SHAPES = load_manifest("shapes2d")
+DATA = weights_path("shapes2d").read_bytes()
+
+
+def outer(data: bytes = DATA) -> dict[str, Any]:
+    """The safetensors header."""
+    (length,) = struct.unpack("<Q", data[:8])
+    return json.loads(data[8 : 8 + length])  # type: ignore[no-any-return]
+
+
+def joined(header: dict[str, Any] | bytes, length: int | None = None) -> bytes:
+    """The shipped weights behind another header."""
+    (old,) = struct.unpack("<Q", DATA[:8])
+    text = header if isinstance(header, bytes) else json.dumps(header).encode()
+    return struct.pack("<Q", len(text) if length is None else length) + text + DATA[8 + old :]
+
+
+def tensor(name: str, **change: Any) -> bytes:
+    header = outer()
+    header[name] = {**header[name], **change}
+    return joined(header)
+
+
+def arrays(**change: np.ndarray | None) -> bytes:
+    """The shipped weights with other tensors, well-formed."""
+    kept = {key: value for key, value in {**load(DATA), **change}.items() if value is not None}
+    return save(kept, metadata=outer()["__metadata__"])
+
+
+def network(**change: Any) -> bytes:
+    """The shipped weights whose header names other sizes."""
+    header = outer()
+    told = json.loads(header["__metadata__"]["scenelang"])
+    told["config"]["network"].update(change)
+    header["__metadata__"]["scenelang"] = json.dumps(told)
+    return joined(header)
+
+
+def twice() -> bytes:
+    text = json.dumps(outer()).encode()
+    again = json.dumps(outer()["codes"]).encode()
+    return joined(text[:-1] + b', "codes": ' + again + b"}")
+
+
+CODES = load(DATA)["codes"]
+HARM = {
+    "nothing": b"",
+    "a few bytes": b"\0" * 7,
+    "a header of 2^63 bytes": joined(outer(), length=1 << 63),
+    "a header longer than the file": joined(outer(), length=len(DATA)),
+    "a header of 2 MB": joined(b" " * (2 << 20)),
+    "deep brackets": joined(b"[" * 500_000),
+    "no JSON": joined(b"{]"),
+    "not an object": joined(b"[1]"),
+    "a key given twice": twice(),
+    "overlapping offsets": tensor("codes", data_offsets=outer()["material_codes"]["data_offsets"]),
+    "offsets beyond the file": tensor("codes", data_offsets=[0, 1 << 40]),
+    "offsets in the wrong order": tensor("codes", data_offsets=[64, 0]),
+    "negative offsets": tensor("codes", data_offsets=[-64, 0]),
+    "a negative shape": tensor("codes", shape=[-4, -4]),
+    "a huge shape": tensor("codes", shape=[1 << 40, 1 << 40]),
+    "a shape that overflows": tensor("codes", shape=[1 << 62, 4]),
+    "a shape of text": tensor("codes", shape="4, 4"),
+    "an unknown type": tensor("codes", dtype="F31"),
+    "cut short": DATA[:-100],
+    "too long": DATA + b"\0" * 100,
+    "no codes": arrays(codes=None),
+    "codes of another type": arrays(codes=CODES.astype(np.float64)),
+    "codes of too few shapes": arrays(codes=CODES[:3]),
+    "codes without rows": arrays(codes=CODES.reshape(-1)),
+    "codes that are not numbers": arrays(codes=np.full_like(CODES, np.nan)),
+    "codes without end": arrays(codes=np.full_like(CODES, np.inf)),
+}  # fmt: skip
+OF_THE_NETWORK = {
+    "a parameter that is not a number": arrays(bump=np.full_like(load(DATA)["bump"], np.nan)),
+    "a parameter of another type": arrays(bump=load(DATA)["bump"].astype(np.float16)),
+    "a parameter too many": arrays(extra=CODES),
+    "a parameter too few": arrays(bump=None),
+    "a parameter of another shape": arrays(bump=np.zeros((4, 9), np.float32)),
+    "a network without a size": network(decoder_width=None),
+    "a network of no size": network(decoder_width=0),
+    "a network of negative size": network(features=-1),
+    "a network of a huge decoder": network(decoder_width=1024),
+    "a network of a huge cell": network(cell_width=1024, features=1024, state=1024),
+    "a network of true size": network(state=True),
+    "a network with a size unknown": network(depth=3),
+}
+
+
+@pytest.mark.parametrize("name", HARM)
+def test_codes(name: str) -> None:
+    with pytest.raises(ModelError):
+        codes_of(SHAPES, HARM[name])
+
+
+@pytest.mark.parametrize("name", [*HARM, *OF_THE_NETWORK])
+def test_networks(name: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        load_network({**HARM, **OF_THE_NETWORK}[name], SHAPES)
+    assert str(caught.value)
+
+
+def test_the_shipped_weights_are_none_of_these() -> None:
+    assert codes_of(SHAPES, DATA).geometry.keys() == set(SHAPES.geometries)
+    load_network(arrays(), SHAPES)
+    assert read_header(DATA)["model"] == "shapes2d"
+
+
+@pytest.mark.parametrize(
+    "name", ["nothing", "a header of 2^63 bytes", "cut short", "deep brackets", "no codes"]
+)
+def test_commands_say_so(folder: Folder, name: str) -> None:
+    Path("bad.safetensors").write_bytes(HARM[name])
+    result = folder.run("eval", "shapes2d", "--scenes", "1", "--weights", "bad.safetensors", "-o", "out")
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.startswith("Error: ")
+
+
+@pytest.mark.parametrize("name", HARM)
+def test_checkpoints(tmp_path: Path, name: str) -> None:
+    """What the file says is tested against the training later; here nothing may break."""
+    path = tmp_path / "checkpoint.safetensors"
+    path.write_bytes(HARM[name])
+    if name.startswith(("codes", "no codes")):
+        load_tensors(path)
+        return
+    with pytest.raises(ModelError):
+        load_tensors(path)
+
+
+def test_a_damaged_checkpoint_ends_a_training_in_words(folder: Folder) -> None:
+    from tests.cli.test_commands import tiny_config
+
+    Path("run").mkdir()
+    Path("run/checkpoint.safetensors").write_bytes(DATA[:500])
+    result = folder.run("train", tiny_config(folder), "-o", "run", "--device", "cpu")
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[-1].startswith("Error: ")
+
+
+def test_a_checkpoint_of_other_tensors(folder: Folder) -> None:
+    """Its configuration is the right one, its tensors are another training's."""
+    import torch
+
+    from scenelang.training.checkpoint import save_tensors
+    from scenelang.training.config import read_config
+    from tests.cli.test_commands import tiny_config
+
+    name = tiny_config(folder)
+    Path("run").mkdir()
+    header = {"format": 1, "config": read_config(name).to_json(), "iteration": 1, "seconds": 1.0}
+    save_tensors(Path("run/checkpoint.safetensors"), {"network.codes": torch.zeros(2)}, header)
+    result = folder.run("train", name, "-o", "run", "--device", "cpu")
+    assert result.exit_code == 2
+    assert "checkpoint" in result.stderr.splitlines()[-1]
+
+
+MANIFEST = json.loads((manifests.ROOT / "shapes2d" / "manifest.json").read_text("utf-8"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"format": 2}, {"unknown": 1}, {"name": None}, {"name": 3}, {"name": 'a"b'}, {"dimension": 4},
+        {"dimension": True}, {"dimension": "2"}, {"geometries": "star"}, {"geometries": ["../star"]},
+        {"geometries": ["star", "star"]}, {"geometries": [1]}, {"materials": []}, {"renderer": "../../x"},
+        {"lifting": "a/b"}, {"default_material": "gold"}, {"limits": {"canvas": 1e300}},
+        {"limits": {"canvas": -1}}, {"limits": {"canvas": 1 << 60}}, {"limits": [1]},
+        {"trained": {"twirl": [2]}},
+        {"trained": {"twirl": [2, 1]}}, {"trained": {"twirl": ["a", "b"]}},
+        {"trained": {"twirl": [0, 1e308]}},
+        {"trained": 3}, {"measured": []},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_manifests(change: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r".") as caught:
+        Manifest.from_json(json.dumps({**MANIFEST, **change}))
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "null", "{", "[" * 100_000, '{"format": 1, "format": 1}', '{"format": NaN}']
+)
+def test_no_manifests(text: str) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        Manifest.from_json(text)
+
+
+def test_a_manifest_cannot_point_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "good").mkdir()
+    (tmp_path / "good" / "manifest.json").write_text(json.dumps({**MANIFEST, "name": "../../etc"}))
+    monkeypatch.setattr(manifests, "ROOT", tmp_path)
+    with pytest.raises(ValueError, match="calls itself"):
+        load_manifest("good")
