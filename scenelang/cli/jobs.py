@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +18,6 @@ from scenelang.program.compile import compile_scene
 if TYPE_CHECKING:
     from scenelang.program.program import Program
 
-After = Callable[[str, Graph], None]
 PROGRAM = ".safetensors"
 
 
@@ -56,7 +54,6 @@ def prepare(
     *,
     compiled: bool = True,
     verbose: bool = False,
-    after: After | None = None,
     source: SourceFile | None = None,
 ) -> Job:
     """Read an input and compile it if it is a scene.
@@ -67,7 +64,6 @@ def prepare(
         clock: takes the time.
         compiled: whether a scene has to be compiled to be drawn.
         verbose: make notes of what the passes did.
-        after: called with the name of each pass and the graph it left.
         source: the scene's text, where it was read before.
 
     Raises:
@@ -78,7 +74,7 @@ def prepare(
     found = read_input(name, request, clock, source)
     job = Job(name, source=found)
     if found.scene is not None and compiled:
-        passes = PassNotes(further=after)
+        passes = PassNotes()
         try:
             with clock("compile"):
                 job.program = compile_scene(
@@ -86,7 +82,7 @@ def prepare(
                     spans=found.spans,
                     diagnostics=found.diagnostics,
                     model=request.model,
-                    after=passes.after if verbose else after,
+                    after=passes.after if verbose else None,
                 )
             job.notes = [*program_notes(job.program, _why(found, request)), *passes.lines]
         except SceneError:
@@ -154,11 +150,9 @@ class PassNotes:
 
     Args:
         lines: one for each pass with an effect.
-        further: called as `after` is.
     """
 
     lines: list[str] = field(default_factory=list)
-    further: After | None = None
     _before: tuple[int, int, int] | None = None
 
     def after(self, name: str, graph: Graph) -> None:
@@ -170,5 +164,3 @@ class PassNotes:
             now = f"{counts[0]} objects, {counts[1]} folds, {counts[2]} moves"
             self.lines.append(f"{name}: {now}" if self._before else f"as written: {now}")
         self._before = counts
-        if self.further is not None:
-            self.further(name, graph)

@@ -19,7 +19,7 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.files import depth_of_json
 from scenelang.scene import schema
 from scenelang.scene.json_places import Key, Value, deeper_than, follow, read_places, record_places
-from scenelang.scene.schema import Scene, SceneNode
+from scenelang.scene.schema import Link, Object, Scene, SceneNode
 from scenelang.scene.session import MAX_NODE_DEPTH, deep_stack
 from scenelang.scene.spans import SpanMap
 
@@ -125,13 +125,26 @@ def _read(source: SourceFile) -> Scene:
         if depth <= _PLAIN_DEPTH:
             return Scene.model_validate_json(text)
         with deep_stack():
-            return _read_deep(source)
+            scene = _read_deep(source)
+        if _node_depth(scene) > MAX_NODE_DEPTH:
+            raise _failure(f"nodes nested deeper than {MAX_NODE_DEPTH}")
+        return scene
     except ValidationError as error:
         raise SceneError(_problems(error, source)) from None
     except UnicodeEncodeError as error:
         raise _failure(
             f"half of a character at {error.start}", Span(source, error.start, error.end)
         ) from None
+
+
+def _node_depth(scene: Scene) -> int:
+    """How deep nodes nest: 0 where none holds another."""
+    depth, level = -1, list(scene.nodes)
+    while level:
+        depth += 1
+        inside = [child for node in level if not isinstance(node, Object) for child in node.children]
+        level = [child.node if isinstance(child, Link) else child for child in inside]
+    return depth
 
 
 def _read_deep(source: SourceFile) -> Scene:
