@@ -31,6 +31,7 @@ from PIL import Image as pillow
 from PIL import ImageDraw, ImageFont
 
 import scenelang as nsg
+from scenelang.evaluation.chart import stability_chart
 from scenelang.evaluation.run import Case, worst_sheet
 from scenelang.models.load import load_model
 
@@ -201,6 +202,13 @@ def worst_cases(name: str, count: int) -> bytes:
     return png(sheet.quantize(128))
 
 
+def stability() -> bytes:
+    """Charts of the stability suite, from what `scenelang stability` wrote."""
+    report = json.loads((DOCS / "results" / "stability.json").read_text("utf-8"))
+    with pillow.open(io.BytesIO(stability_chart([report], "png"))) as chart:
+        return png(chart.convert("RGB").quantize(64))
+
+
 def plan() -> dict[str, Callable[[], bytes]]:
     """What `docs/pictures` holds, and how each file of it is made."""
     made: dict[str, Callable[[], bytes]] = {}
@@ -221,6 +229,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
             made[name] = lambda draw=draw, source=Source(text=text): draw(source)
     made["gallery.png"] = gallery
     made[f"{COMPARED}-compared.png"] = compared
+    made["stability.png"] = stability
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
     return made
 

@@ -69,11 +69,13 @@ def _line(probe: dict[str, Any]) -> str:
 
 
 def _chart(found: dict[str, Any], out: Path) -> None:
-    try:
-        from scenelang.evaluation.chart import chart_stability
+    from scenelang.files import write_whole
 
-        for suffix in ("png", "svg"):
-            chart_stability([found], out / f"stability.{suffix}")
+    try:
+        from scenelang.evaluation.chart import stability_chart
+
+        for kind in ("png", "svg"):
+            write_whole(out / f"stability.{kind}", stability_chart([found], kind))
     except ImportError:
         click.echo("no chart: matplotlib is missing; pip install 'scenelang[charts]'", err=True)
 

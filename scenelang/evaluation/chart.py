@@ -1,38 +1,40 @@
-"""Charts of measurements, drawn from their JSON by matplotlib: PNG or SVG as the suffix says."""
+"""Charts of measurements, drawn from their JSON by matplotlib as PNG or SVG."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
-from scenelang.files import write_whole
+from scenelang.evaluation.metrics import MOST_DB
 
 INK, FAINT, LINE, WARN = "#22303c", "#c9d1d8", "#1f77b4", "#c8452f"
 COLUMNS = 3
 
 
-def chart_stability(results: Sequence[Mapping[str, Any]], path: Path) -> None:
+def stability_chart(results: Sequence[Mapping[str, Any]], kind: str) -> bytes:
     """PSNR of every probe: the mean as a line, from the 5th percentile up shaded, the worst as dots.
 
     Args:
         results: of `run_stability`, one a model; the first is drawn in full.
-        path: PNG or SVG; written whole.
+        kind: "png" or "svg".
     """
     plt = pyplot()
     first = results[0]
     names = list(first["probes"])
     lines = (len(names) + COLUMNS - 1) // COLUMNS
     figure, axes = plt.subplots(lines, COLUMNS, figsize=(4.2 * COLUMNS, 2.7 * lines), squeeze=False)
+    lowest = min(row["psnr"]["worst"] for r in results for p in r["probes"].values() for row in p["rows"])
     for axis, name in zip(axes.flat, names, strict=False):
         _probe(axis, [r["probes"][name] for r in results if name in r["probes"]])
+        axis.set_ylim(min(40.0, lowest - 1), MOST_DB + 1)
     for axis in axes.flat[len(names) :]:
         axis.set_axis_off()
     if len(results) > 1:
         axes.flat[0].legend([r["model"] for r in results], fontsize=7, frameon=False)
-    _save(figure, path)
+    data = _bytes(figure, kind)
     plt.close(figure)
+    return data
 
 
 def _probe(axis: Any, curves: Sequence[Mapping[str, Any]]) -> None:
@@ -50,7 +52,6 @@ def _probe(axis: Any, curves: Sequence[Mapping[str, Any]]) -> None:
     axis.set_xticks(values, [f"{v:g}" for v in values])
     axis.minorticks_off()
     axis.axvline(first["healthy"], color=FAINT, linewidth=5, zorder=0)
-    axis.set_ylim(top=51)
     axis.set_title(first["title"], fontsize=8.5, color=INK)
     axis.set_xlabel(first["quantity"], fontsize=8)
     axis.set_ylabel("PSNR, dB", fontsize=8)
@@ -77,10 +78,9 @@ def pyplot() -> Any:
     return plt
 
 
-def _save(figure: Any, path: Path) -> None:
-    kind = path.suffix.removeprefix(".")
+def _bytes(figure: Any, kind: str) -> bytes:
     data = io.BytesIO()
     figure.tight_layout()
     about = {"Date": None} if kind == "svg" else {"Software": None}
-    figure.savefig(data, format=kind, dpi=110, metadata=about)
-    write_whole(path, data.getvalue())
+    figure.savefig(data, format=kind, dpi=80, metadata=about)
+    return data.getvalue()
