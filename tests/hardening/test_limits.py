@@ -64,7 +64,9 @@ LIMITS = {
 }
 
 
-@pytest.mark.parametrize("name", LIMITS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "steps" else name for name in LIMITS]
+)
 def test_text(folder: Folder, name: str) -> None:
     text, expected = LIMITS[name]
     found = codes(text)
@@ -78,7 +80,7 @@ def test_text(folder: Folder, name: str) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (objects(100_000), []),
+        pytest.param(objects(100_000), [], marks=pytest.mark.slow),
         (objects(100_001), ["E0320"]),
         (nested(400), []),
         (nested(401), ["E0313"]),
