@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, listing
+from scenelang.scene.misfits import Misfit, report_misfit
 from scenelang.scene.session import Session
 from scenelang.scene.unknown import told_at_definition
 from scenelang.syntax import nodes
@@ -33,7 +34,7 @@ def bind(
     *,
     spread: bool = False,
     help: str | None = None,
-    definition: Span | None = None,
+    definition: nodes.Fn | nodes.Module | None = None,
     places: Sequence[Span] = (),
 ) -> Bound | None:
     """The argument of each parameter, None where it is left out.
@@ -47,7 +48,7 @@ def bind(
         span: the call's name, for what is missing.
         spread: one positional argument may be a vector of all.
         help: advice for a wrong number of arguments; by default the signature.
-        definition: where what is called was defined.
+        definition: what is called, unless the language has it.
         places: where its parameters were.
 
     Returns:
@@ -55,14 +56,24 @@ def bind(
     """
     bound: Bound = [None] * len(params)
     shown = help or f"it is called {signature(name, params, optional)}"
-    labels: tuple[Label, ...] = (Label(definition, "defined here"),) if definition else ()
+    labels: tuple[Label, ...] = (Label(definition.name.span, "defined here"),) if definition else ()
     good, position = True, 0
     for arg in args:
         if arg.name is None:
             if position >= len(params):
                 takes = "1 argument" if len(params) == 1 else f"{len(params) or 'no'} arguments"
-                message = f"'{name}' takes {takes}"
-                session.error("E0308", message, arg.span, help=shown if params else help, labels=labels)
+                surplus = Misfit(
+                    "E0308",
+                    ("surplus",),
+                    f"'{name}' takes {takes}",
+                    span,
+                    arg.span,
+                    everywhere="but all its calls give more",
+                    here="surplus",
+                    help=shown if params else help,
+                    labels=labels,
+                )
+                report_misfit(session, surplus, definition)
                 return None
             index = position
             position += 1
@@ -79,24 +90,34 @@ def bind(
         else:
             hint, fix = did_you_mean(arg.name.text, params, arg.name.span)
             hint = hint or (f"its arguments are {listing(params)}" if params else "it takes no arguments")
-            session.error(
+            foreign = Misfit(
                 "E0206",
+                ("foreign", arg.name.text),
                 f"'{name}' has no argument '{arg.name.text}'",
+                span,
                 arg.name.span,
+                everywhere="but all its calls give it",
+                here=f"no argument '{arg.name.text}'",
                 help=hint,
                 fix=fix,
                 labels=labels,
             )
+            report_misfit(session, foreign, definition)
             good = False
             continue
         earlier = bound[index]
         if earlier is not None:
-            session.error(
+            twice = Misfit(
                 "E0308",
+                ("twice", params[index]),
                 f"argument '{params[index]}' of '{name}' is given twice",
+                span,
                 arg.span,
+                everywhere="in all its calls",
+                here="given twice",
                 labels=(Label(earlier.span, "first given here"), *labels),
             )
+            report_misfit(session, twice, definition)
             good = False
             continue
         bound[index] = arg
@@ -107,8 +128,21 @@ def bind(
     missing = [p for p, may, arg in zip(params, optional, bound, strict=True) if not may and arg is None]
     if missing:
         names = " and ".join(f"'{p}'" for p in missing)
-        if places:
-            labels = tuple([Label(places[list(params).index(p)], "needs a value") for p in missing])
-        session.error("E0308", f"'{name}' needs {names}", span, help=shown, labels=labels)
+        needy = [places[list(params).index(p)] for p in missing] if places else []
+        if needy:
+            labels = tuple([Label(place, "needs a value") for place in needy])
+        lacking = Misfit(
+            "E0308",
+            ("missing", *missing),
+            f"'{name}' needs {names}",
+            span,
+            span,
+            everywhere=f"but no call gives {'them' if missing[1:] else 'it'}",
+            here=f"{names} not given",
+            help=shown,
+            labels=labels,
+            blamed=needy[0] if needy else None,
+        )
+        report_misfit(session, lacking, definition)
         return None
     return bound

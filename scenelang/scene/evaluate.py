@@ -18,6 +18,7 @@ from scenelang.models.manifest import Manifest
 from scenelang.scene import calls, params  # noqa: F401  (they register their statements)
 from scenelang.scene.build import Builder, make
 from scenelang.scene.imports import Loader, Unreadable, prepare_file, read_source
+from scenelang.scene.misfits import report_misfits
 from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
 from scenelang.scene.session import UNBOUND, Halt, Session, Watch, deep_stack
@@ -124,6 +125,7 @@ class Evaluation:
                     inputs.report_unused(diagnostics)
             except Halt:
                 pass
+            report_misfits(session)
         self.wanted = tuple(loader.wanted)
         """All files that it imports, also those that are not there."""
         self.sources = (file.span.source, *(imported.span.source for imported in loader.parsed.values()))

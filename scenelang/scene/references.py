@@ -268,7 +268,7 @@ def entering(
         [p.default is not None for p in params],
         args,
         span,
-        definition=definition.node.name.span,
+        definition=definition.node,
         places=[p.name.span for p in params],
     )
     if bound is None:

@@ -125,7 +125,12 @@ class Session:
     damaged: dict[int, Damage] = field(default_factory=dict)
     reported: dict[tuple[int, int, int], str] = field(default_factory=dict)
     blamed: dict[tuple[int, int], Span] = field(default_factory=dict)
-    unknown: dict[tuple[str, str, int], int] = field(default_factory=dict)
+    unknown: dict[tuple[str, str, int], tuple[int, tuple[Label, ...], list[Span]]] = field(
+        default_factory=dict
+    )
+    """Reports of unknown names: index, labels of their own, further places."""
+    misfits: dict[int, tuple[nodes.Fn | nodes.Module, list[Any]]] = field(default_factory=dict)
+    """Calls that do not fit (`misfits.Misfit`), by what they call, until they are reported."""
     names_in: dict[int, dict[str, list[Span]]] = field(default_factory=dict)
     replays: bool = False
     roots: list[list[Any]] = field(default_factory=list)

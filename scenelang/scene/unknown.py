@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -22,7 +22,7 @@ from scenelang.syntax.tokens import Report
 VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of bindings that are values."""
 
-_SHOWN: Final = 3
+_SHOWN: Final = 3  # places of one report
 _CODES: Final = {"module": "E0204", "fn": "E0207"}
 
 
@@ -43,6 +43,22 @@ def uses(session: Session, source: SourceFile) -> dict[str, list[Span]]:
 def is_unused(session: Session, name: str, span: Span | None) -> bool:
     """Whether nothing in a text bears a name but its definition at ``span``."""
     return span is not None and len(uses(session, span.source).get(name, ())) == 1
+
+
+def shown_places(places: Sequence[Span], words: str | Sequence[str], rest: str = "") -> tuple[Label, ...]:
+    """Labels for the places that share one report: the first few, and how many there are beyond.
+
+    Args:
+        places: in the order in which they were met.
+        words: what is said at each place, or at all.
+        rest: how the number of the others is put: "in" for "and in 2 more".
+    """
+    each = [words] * len(places) if isinstance(words, str) else words
+    labels = [Label(place, text) for place, text in zip(places[:_SHOWN], each, strict=False)]
+    if len(places) > _SHOWN:
+        more = f"{rest} {len(places) - _SHOWN} more".strip()
+        labels[-1] = Label(places[_SHOWN - 1], f"{each[_SHOWN - 1]}, and {more}")
+    return tuple(labels)
 
 
 def told_at_definition(
@@ -73,7 +89,7 @@ def told_at_definition(
         span,
         help=f"did you mean to define '{text}'?",
         fix=Fix(f"rename to '{text}'", (Edit(span, text),)),
-        labels=tuple(Label(place, "used here") for place in places[:_SHOWN]),
+        labels=shown_places(places, "used here"),
     )
     return True
 
@@ -103,12 +119,14 @@ def report_unknown(
     """
     session = unit.session
     key = (code, name.text, id(unit.source))
-    first = session.unknown.get(key)
+    known = session.unknown.get(key)
     items = session.diagnostics.items
-    if first is not None and first < len(items) and items[first].code == code:
-        shown = items[first]
-        if len(shown.labels) < _SHOWN and shown.span != name.span:
-            items[first] = replace(shown, labels=(*shown.labels, Label(name.span, "also here")))
+    if known is not None and known[0] < len(items) and items[known[0]].code == code:
+        first, own, again = known
+        if name.span != items[first].span and name.span not in again:
+            again.append(name.span)
+            labels = (*own, *shown_places(again, "also here"))
+            items[first] = replace(items[first], labels=labels)
         return
     around = [(n, b) for n, b in scope.visible() if b.kind in kinds]
     defined = [(n, b.span, b.kind) for n, b in around]
@@ -124,7 +142,7 @@ def report_unknown(
     before = len(items)
     session.error(code, message, name.span, help=help, fix=fix, labels=labels)
     if len(items) > before:
-        session.unknown[key] = before
+        session.unknown[key] = before, items[before].labels, []
 
 
 def _suggested(help: str | None, around: list[tuple[str, Binding]]) -> Binding | None:

@@ -113,13 +113,13 @@ class _Mender:
         """Mend one line: by one change where that does, else brace by brace."""
         count = abs(slip.shift)
         if count > 1:
-            mend, fits = self._best(slip.first, slip.stop, slip.shift > 0, count)
+            mend, fits = self._best(slip, slip.stop, count)
             if fits:
                 self._apply(mend)
                 return
         stop = slip.stop
         for _ in range(count):
-            mend, _ = self._best(slip.first, stop, slip.shift > 0, 1)
+            mend, _ = self._best(slip, stop, 1)
             if mend.at < stop:
                 stop += len(mend.insert) - mend.delete
             self._apply(mend)
@@ -128,16 +128,17 @@ class _Mender:
         """Whether a slip makes sense of its line, and does not just undo a block that stands flush left."""
         if slip.shift < 0:
             return self.tokens.kinds[slip.stop - 1] != self.opening
-        return self._best(slip.first, slip.stop, True, 1)[1]
+        return self._best(slip, slip.stop, 1)[1]
 
-    def _best(self, first: int, stop: int, opens: bool, count: int) -> tuple[_Mend, bool]:
-        """How to mend the tokens ``[first, stop)``, and whether all fits then.
+    def _best(self, slip: Slip, stop: int, count: int) -> tuple[_Mend, bool]:
+        """How to mend a line, and whether all fits then.
 
         Args:
-            opens: the line lacks `{` or has `}` too many; otherwise the other way about.
+            slip: the line; it lacks `{` or has `}` too many, or the other way about.
+            stop: index of the first token of the next line.
             count: how many braces it is about.
         """
-        kinds = self.tokens.kinds
+        kinds, first, opens = self.tokens.kinds, slip.first, slip.shift > 0
         # The layout cannot tell a brace at the end of a line from one at the start of the next.
         limit = stop
         while kinds[limit] in (self.opening, self.closing):
@@ -150,17 +151,22 @@ class _Mender:
             stack = self.behind_if.copy()
         misfit = reach(stack.copy(), kinds, first, end)
         places = range(max(first, min(misfit, limit) - _LONGEST), min(misfit, limit) + 1)
+        depth = slip.depth + (kinds[first] == self.closing)
         for at in range(first, places.start):
+            depth += (kinds[at] == self.opening) - (kinds[at] == self.closing)
             advance(stack, kinds[at])
         found = []  # how far all fits then, how likely it is, and what to do
         for at in places:
             for likely, mend in self._mends(stack, at, stop, limit, opens, count):
+                if mend.insert.count(self.closing) > depth:
+                    continue  # it would close more than is open
                 trial = stack.copy()
                 if all(advance(trial, kind) for kind in mend.insert):
                     got = reach(trial, kinds, at + mend.delete, end)
                     if got == end == len(kinds) - 1 and not fits(trial, self.closing):
                         got -= 1  # the text would end in the middle of a statement
                     found.append((got, likely, at, mend))
+            depth += (kinds[at] == self.opening) - (kinds[at] == self.closing)
             if not advance(stack, kinds[at]):
                 break
         got, _, _, mend = max(found, key=lambda one: one[:3], default=(-1, 0.0, 0, self._at_end(stop, opens)))
@@ -199,9 +205,11 @@ class _Mender:
         self, stack: list[int], at: int, wanted: tuple[int, ...]
     ) -> Iterator[tuple[float, _Mend]]:
         """The line breaks off before a token: what its statement lacks, and the braces after that."""
-        if fits(stack, self.closing):
-            return  # nothing is unfinished
         semicolon = tables().literals[";"]
+        if fits(stack, self.closing):  # nothing is unfinished inside the block
+            if wanted[0] == self.closing:
+                yield 0.25, _Mend(at, 0, (*wanted, semicolon))
+            return
         if wanted[0] == self.opening:
             missing = completion(stack, self.opening)
         else:
@@ -231,16 +239,17 @@ class _Mender:
         elif mend.insert[0] != self.closing:
             report_broken_off(tokens, self.report, at, names)
         elif not tokens.cut:
-            self._report_unclosed(at, len(names))
+            self._report_unclosed(at, names.count("}"), names[-1] == ";")
         tokens.replace(at, mend.delete, mend.insert)
 
-    def _report_unclosed(self, at: int, count: int) -> None:
+    def _report_unclosed(self, at: int, count: int, ends: bool = False) -> None:
         end = self.tokens.end_before(at)
         labels = [
             Label(self._span(index), "this block is not closed") for index in self._open(at)[-count:][-3:]
         ]
         times = f" {count} times" if count > 1 else ""
-        self.report.add("E0104", f"missing `}}`{times}", end, end, labels=labels)
+        brace = "`};`" if ends else "`}`"
+        self.report.add("E0104", f"missing {brace}{times}", end, end, labels=labels)
 
     def _report_unmatched(self, at: int) -> None:
         span = self._span(at)

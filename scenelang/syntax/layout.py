@@ -23,11 +23,15 @@ _ASTRAY = 4  # so many lines at the wrong depth make hidden slips likely
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """Between the tokens ``first`` and ``stop`` the depth meant goes ``shift`` away from the one written."""
+    """Between the tokens ``first`` and ``stop`` the depth meant goes ``shift`` away from the one written.
+
+    ``depth`` is the one meant on that line, which is less by 1 than before its `}` if it begins with one.
+    """
 
     first: int
     stop: int
     shift: int
+    depth: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +53,7 @@ def find_slips(tokens: Tokens) -> list[Slip]:
 def _unbalanced_line(lines: list[_Line]) -> list[Slip]:
     """In a text without indentation whose lines each close what they open: the one that does not."""
     pairs = [(line, after, after.depth - line.depth) for line, after in pairwise(lines)]
-    wrong = [Slip(line.first, after.first, -more) for line, after, more in pairs if more]
+    wrong = [Slip(line.first, after.first, -more, line.depth) for line, after, more in pairs if more]
     return wrong if len(wrong) == 1 and len(lines) > 2 else []
 
 
@@ -86,7 +90,9 @@ def _slips(lines: list[_Line]) -> list[Slip]:
     for number in range(len(lines) - 1, 0, -1):
         source = came_from[number][state]
         if source != state:
-            slips.append(Slip(lines[number - 1].first, lines[number].first, state - source))
+            line = lines[number - 1]
+            depth = line.depth + source - _WIDEST
+            slips.append(Slip(line.first, lines[number].first, state - source, depth))
         state = source
     return slips[::-1]
 
