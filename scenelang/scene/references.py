@@ -233,6 +233,7 @@ def _call_fn(
     if enter is None:
         return POISONED
     session = unit.session
+    session.defined[id(expr.name.span.source), expr.name.span.start] = definition.node.name.span
 
     def run(env: Env) -> Any:
         frame = enter(env)
@@ -273,6 +274,7 @@ def entering(
     )
     if bound is None:
         return None
+    session.given.setdefault(id(definition.node), []).append(bound)
     given = [codes[id(arg)].run if arg is not None else None for arg in bound]
     link = _link(definition, scope)
 

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix, Label
 from scenelang.diagnostics.span import Span
@@ -19,6 +19,10 @@ from scenelang.scene.still import Needs
 from scenelang.scene.values import Problem
 from scenelang.scene.vocabulary import Vocabulary
 from scenelang.syntax import nodes
+
+if TYPE_CHECKING:
+    from scenelang.scene.blame import Shared
+    from scenelang.scene.misfits import Misfit
 
 MAX_OBJECTS: Final = 100_000
 MAX_PARTS: Final = 1_000_000  # nodes, transforms and texture operations together; bounds memory
@@ -124,19 +128,26 @@ class Session:
     settings: Settings = field(default_factory=Settings)
     damaged: dict[int, Damage] = field(default_factory=dict)
     reported: dict[tuple[int, int, int], str] = field(default_factory=dict)
-    blamed: dict[tuple[int, int], Span] = field(default_factory=dict)
+    blamed: dict[tuple[int, int, str], Shared] = field(default_factory=dict)
+    """Reports of values of the wrong kind, by the definitions they may come from and what is said."""
     unknown: dict[tuple[str, str, int], tuple[int, tuple[Label, ...], list[Span]]] = field(
         default_factory=dict
     )
     """Reports of unknown names: index, labels of their own, further places."""
-    misfits: dict[int, tuple[nodes.Fn | nodes.Module, list[Any]]] = field(default_factory=dict)
-    """Calls that do not fit (`misfits.Misfit`), by what they call, until they are reported."""
+    misfits: dict[int, tuple[nodes.Fn | nodes.Module, list[Misfit]]] = field(default_factory=dict)
+    """Calls that do not fit by what they call, until they are reported."""
     names_in: dict[int, dict[str, list[Span]]] = field(default_factory=dict)
     replays: bool = False
     roots: list[list[Any]] = field(default_factory=list)
     needs: Needs = field(default_factory=Needs)
     defined: dict[tuple[int, int], Span] = field(default_factory=dict)
-    """Where variables are defined, by the file and place of each use."""
+    """Where variables and functions are defined, by the file and place of each use."""
+    origins: dict[tuple[int, int], nodes.Expr] = field(default_factory=dict)
+    """The values of lets and the bodies of functions, by the file and place of their names."""
+    parameters: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)
+    """What a parameter belongs to, as a key of ``given``, and its index; by its file and place."""
+    given: dict[int, list[list[nodes.Argument | None]]] = field(default_factory=dict)
+    """The arguments of all calls of a function or module."""
     watch: Watch | None = None
 
     def restart(self, frame: int) -> None:
@@ -196,7 +207,15 @@ class Session:
         operand = None
         if problem.operand is not None and problem.operand < len(operands):
             operand = operands[problem.operand]
-        if operand is not None and self._is_blamed(problem.code, operand):
+        place = operand.span if operand else span
+        if (id(place.source), place.start, place.end) in self.reported:
+            return
+        from scenelang.scene.blame import joined, remember  # only mistakes need it
+
+        blamed = (operand,) if operand is not None else tuple([one for one in operands if one is not None])
+        if not self.follows(problem.code, place) and joined(
+            self, problem.code, problem.message, blamed, place
+        ):
             return
         fix = angle_fix(operand) if problem.fix == "angle" and operand is not None else None
         labels = [
@@ -208,20 +227,10 @@ class Session:
             defined = self.defined.get((id(operand.span.source), operand.span.start))
             if defined is not None:
                 labels.append(Label(defined, f"'{operand.name.text}' is defined here"))
-        place = operand.span if operand else span
+        before = len(self.diagnostics)
         self.error(problem.code, problem.message, place, help=problem.help, fix=fix, labels=tuple(labels))
-
-    def _is_blamed(self, code: str, operand: nodes.Expr) -> bool:
-        """Whether the same is wrong with a variable that has been reported where it was used before."""
-        while isinstance(operand, nodes.Member | nodes.Index):
-            operand = operand.value
-        if code != "E0301" or not isinstance(operand, nodes.NameRef):
-            return False
-        definition = self.defined.get((id(operand.span.source), operand.span.start))
-        if definition is None:
-            return False
-        key = (id(definition.source), definition.start)
-        return self.blamed.setdefault(key, operand.span) != operand.span
+        if len(self.diagnostics) > before:
+            remember(self, problem.code, problem.message, blamed)
 
     def halt(self, code: str, message: str, span: Span, help: str | None = None) -> Halt:
         """Report a limit that was met; the caller raises what this returns."""

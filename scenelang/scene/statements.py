@@ -175,6 +175,8 @@ def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
 @states(nodes.Let)
 def _let(stmt: nodes.Let, place: Place) -> Action | None:
     code = prepare(stmt.value, place.unit, place.scope)
+    name = stmt.name.span
+    place.unit.session.origins[id(name.source), name.start] = stmt.value
     frame = place.scope.frame
     slot = frame.slot()
     known = code.value is not VARIES
@@ -211,7 +213,9 @@ def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: 
     defaults = []
     slots = [frame.slot() for _ in stmt.params]
     optional = False
-    for param, slot in zip(stmt.params, slots, strict=True):
+    for index, (param, slot) in enumerate(zip(stmt.params, slots, strict=True)):
+        at = param.name.span
+        unit.session.parameters[id(at.source), at.start] = id(stmt), index
         if param.default is not None:
             optional = True
             defaults.append(prepare(param.default, unit, scope).run)
@@ -225,6 +229,8 @@ def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: 
     before = unit.weight
     around, unit.session.needs = unit.session.needs, definition.needs
     if isinstance(stmt, nodes.Fn):
+        name = stmt.name.span
+        unit.session.origins[id(name.source), name.start] = stmt.body
         definition.run = prepare(stmt.body, unit, scope).run
         definition.weight = 1 + (unit.weight - before) // 8
     else:

@@ -125,8 +125,7 @@ def report_unknown(
         first, own, again = known
         if name.span != items[first].span and name.span not in again:
             again.append(name.span)
-            labels = (*own, *shown_places(again, "also here"))
-            items[first] = replace(items[first], labels=labels)
+            items[first] = replace(items[first], labels=(*own, *shown_places(again, "also here")))
         return
     around = [(n, b) for n, b in scope.visible() if b.kind in kinds]
     defined = [(n, b.span, b.kind) for n, b in around]
