@@ -10,6 +10,12 @@ from itertools import groupby
 from unicodedata import category, east_asian_width
 
 TAB = 4
+LONGEST = 4000
+"""Of a line with more code points only so many are laid out, near what is shown of it.
+
+A file of one line may have 10 MB and 200 mistakes.
+"""
+_BEFORE = 500
 
 STYLES = {
     "error": "\x1b[1;31m",
@@ -73,6 +79,11 @@ def in_cells(text: str) -> Line:
                 cells.append("")
     starts.append(len(cells))
     return Line(cells, starts)
+
+
+def left_out(text: str, at: int) -> int:
+    """How many code points in front of offset ``at`` are not laid out: none but in a very long line."""
+    return max(0, at - _BEFORE) if len(text) > LONGEST else 0
 
 
 def window(line: Line, first: int, last: int, width: int) -> tuple[list[str], int]:

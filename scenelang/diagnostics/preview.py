@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenelang.diagnostics.cells import Canvas, in_cells, paint, window
+from scenelang.diagnostics.cells import LONGEST, Canvas, in_cells, left_out, paint, window
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import SourceFile
 
@@ -63,6 +63,8 @@ def _inserted(
 ) -> list[str]:
     old, at = source.line(number), 0
     start = edits[0].span.start - edits[0].span.locate()[0][1] + 1
+    skipped = left_out(old, edits[0].span.start - start)
+    start, old = start + skipped, old[skipped : skipped + LONGEST]
     new, marks = "", []
     for edit in edits:
         cut = min(edit.span.start - start, len(old))
@@ -93,7 +95,10 @@ def _changed(
     source: SourceFile, first: int, last: int, edits: list[Edit], gutter: int, width: int, color: bool
 ) -> list[str]:
     start = edits[0].span.start - edits[0].span.locate()[0][1] + 1
-    stop = start + sum(len(line) + 1 for line in source.text[start:].split("\n")[: last - first + 1])
+    stop = start
+    for _ in range(first, last + 1):
+        stop = source.text.find("\n", stop) + 1 or len(source.text) + 1
+    at_first = edits[0].span.start - start
     old = source.text[start:stop]
     new, at = "", 0
     for edit in edits:
@@ -104,10 +109,18 @@ def _changed(
     for sign, text, style in (("-", old, "removed"), ("+", new, "added")):
         lines = text.removesuffix("\n").split("\n") if text.strip() or sign == "-" else []
         for offset, line in enumerate(lines[:_MOST_LINES]):
-            cells, _ = window(in_cells(line.rstrip("\r")), 0, 0, max(width - gutter - 3, 30))
+            cells = _shown(line.rstrip("\r"), 0 if offset else at_first, max(width - gutter - 3, 30))
             head = paint("frame", f"{first + offset:>{gutter}}", color)
             shown = "".join(cells)
             rows.append(f"{head} {paint(style, f'{sign} {shown}'.rstrip(), color)}")
         if len(lines) > _MOST_LINES:
             rows.append(paint("frame", "...", color))
     return rows
+
+
+def _shown(text: str, at: int, width: int) -> list[str]:
+    """The beginning of a line, or of a very long one what is near offset ``at``."""
+    cut = left_out(text, at)
+    line = in_cells(text[cut : cut + LONGEST])
+    near = line.cell(at - cut + 1) if cut else 0
+    return window(line, near, near, width)[0]

@@ -16,14 +16,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from scenelang.diagnostics.cells import Canvas, Line, in_cells, paint, printable, window
+from scenelang.diagnostics.cells import LONGEST, Canvas, Line, in_cells, left_out, paint, printable, window
 from scenelang.diagnostics.span import SourceFile, Span
 
 _LEAST_WIDTH = 30
 _HEAD, _TAIL = 2, 1
 """Of a mark over many lines so many are shown after its first line and before its last."""
-_BEFORE, _LONGEST = 500, 4000
-"""A line with more code points than the second has so many laid out, from the first before a mark on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,16 +106,11 @@ class Snippet:
             self.bars.append(_Bar(mark, top, start, bottom, max(end, 1)))
 
     def _lay(self, number: int) -> tuple[Line, int]:
-        """A line in cells, and how many of its code points are left out in front.
-
-        A file of one line may have 10 MB and 200 mistakes.
-        """
+        """A line in cells, and how many of its code points are left out in front."""
         if number not in self.laid:
             text = self.source.line(number)
-            cut = 0
-            if len(text) > _LONGEST:
-                cut = max(0, self.columns.get(number, 1) - 1 - _BEFORE)
-            self.laid[number] = in_cells(text[cut : cut + _LONGEST]), cut
+            cut = left_out(text, self.columns.get(number, 1) - 1)
+            self.laid[number] = in_cells(text[cut : cut + LONGEST]), cut
         return self.laid[number]
 
     def _cell(self, number: int, column: int) -> int:

@@ -29,12 +29,12 @@ from scenelang.syntax.tables import tables
 
 def test_snippets_of_a_very_long_line_lay_out_only_what_is_near_their_marks() -> None:
     """Each of 200 diagnostics laid out the whole line seven times: minutes for a file of one line."""
-    source = SourceFile("long.nsg", "x" * 2_000_000 + " \0" * 300 + "y" * 2_000_000)
+    source = SourceFile("long.nsg", "x" * 300_000 + " \0" * 300 + "y" * 300_000)
     found = Diagnostics()
     parse(source, found)
     before = time.process_time()
     text = render_text(list(found))
-    assert time.process_time() - before < 5
+    assert time.process_time() - before < 2
     assert max(map(len, text.splitlines())) < 200
     lines = text.splitlines()
     carets = [index for index, line in enumerate(lines) if line.endswith("^")]
@@ -123,11 +123,15 @@ def test_vectors_that_lead_nowhere_are_refused_when_drawn(frame: list[float], st
         render(replace(program, vectors=vectors), device="cpu", threads=1)
 
 
-@pytest.mark.parametrize("moves", ["twirl(-1e19); scale(1e-29);", "bend(1e25); scale(1e20); translate(1e29, 0);"])
+@pytest.mark.parametrize(
+    "moves", ["twirl(-1e19); scale(1e-29);", "bend(1e25); scale(1e20); translate(1e29, 0);"]
+)
 @pytest.mark.parametrize("after", ["smooth square { scale(0.5); }", "intersect square { }", ""])
 def test_pictures_are_numbers_however_large_the_moves(moves: str, after: str) -> None:
     """Angles beyond float32 have no cosine: pixels were NaN, and bytes whatever the processor made of it."""
-    scene = loads(f"canvas(9, 7); background(#123); chain {{ square {{ }} smooth star {{ {moves} }} {after} }}")
+    scene = loads(
+        f"canvas(9, 7); background(#123); chain {{ square {{ }} smooth star {{ {moves} }} {after} }}"
+    )
     picture = render(scene, device="cpu", threads=1)
     assert np.isfinite(picture).all()
     assert picture.to_uint8().shape == (7, 9, 3)
@@ -166,7 +170,7 @@ def test_reserved_words_are_those_of_the_grammar() -> None:
     ("text", "laid"),
     [
         ("star {};\n", "star {}\n"),
-        ("let a = 1; ;; // one\nlet b = 2;", "let a = 1; // one\nlet b = 2;\n"),
+        ("let a = 1; ;; // one\nlet b = 2;", "let a = 1;  // one\nlet b = 2;\n"),
         ("group { star { } /* two */; }", "group { star {} /* two */ }\n"),
         ("star { }\r\n;\r\n", "star {}\r\n"),
         (";", ""),
