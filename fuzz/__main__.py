@@ -1,4 +1,4 @@
-"""The command: ``python -m fuzz TARGET [--minutes M]``, ``--replay FILE``, ``--minimise FILE``, ``--table``."""
+"""The command: ``python -m fuzz TARGET [--minutes M | --replay FILE | --minimise FILE]`` or ``--table``."""
 
 from __future__ import annotations
 
@@ -6,20 +6,26 @@ import argparse
 import sys
 from pathlib import Path
 
-from fuzz.target import TARGETS, load_target
+from fuzz.target import PROPERTIES, TARGETS, load_target
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; returns the exit status, 1 where there are findings."""
     parser = argparse.ArgumentParser(prog="python -m fuzz", description="Fuzz scenelang.")
-    parser.add_argument("target", nargs="?", choices=TARGETS, help="what to fuzz")
+    parser.add_argument("target", nargs="?", choices=(*TARGETS, PROPERTIES), help="what to fuzz")
     parser.add_argument("--minutes", type=float, default=60.0, help="wall time of the run (60)")
     parser.add_argument("--seed", type=int, default=1, help="of the fuzzer's random numbers (1)")
-    parser.add_argument("--work", type=Path, default=Path("out/fuzz"), help="corpus, log and findings (out/fuzz)")
+    parser.add_argument(
+        "--work", type=Path, default=Path("out/fuzz"), help="corpus, log and findings (out/fuzz)"
+    )
     parser.add_argument("--record", action="store_true", help="keep the record in fuzz/records")
     parser.add_argument("--replay", type=Path, metavar="FILE", help="run the target once on this input")
-    parser.add_argument("--minimise", type=Path, metavar="FILE", help="print a smaller input that fails alike")
-    parser.add_argument("--table", action="store_true", help="write the table of records into docs/fuzzing.md")
+    parser.add_argument(
+        "--minimise", type=Path, metavar="FILE", help="print a smaller input that fails alike"
+    )
+    parser.add_argument(
+        "--table", action="store_true", help="write the table of records into docs/fuzzing.md"
+    )
     wanted = parser.parse_args(arguments)
     if wanted.table:
         from fuzz.table import update
@@ -34,7 +40,8 @@ def main(arguments: list[str] | None = None) -> int:
     if wanted.minimise is not None:
         return _minimise(wanted.target, wanted.minimise)
     try:
-        import atheris  # noqa: F401
+        if wanted.target != PROPERTIES:
+            import atheris  # type: ignore[import-untyped]  # noqa: F401
     except ImportError:
         print("fuzzing needs atheris: pip install 'scenelang[fuzz]'", file=sys.stderr)
         return 2

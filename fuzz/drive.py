@@ -19,7 +19,7 @@ LEFT_OUT = ("scenelang.training", "scenelang.evaluation", "scenelang.cli", "scen
 
 def main(name: str, folder: Path, seed: int, options: list[str]) -> None:
     """Fuzz until libFuzzer ends the process."""
-    import atheris
+    import atheris  # type: ignore[import-untyped]
 
     hook = atheris.instrument_imports(include=["scenelang"])
     # Branches are followed, operands of comparisons are not: that takes four times as long, and the
@@ -58,7 +58,13 @@ def main(name: str, folder: Path, seed: int, options: list[str]) -> None:
     words.write_text("\n".join(entries) + "\n", encoding="ascii")
     if entries:
         options = [f"-dict={words}", *options]
-    command = [sys.argv[0], *options, f"-max_len={target.most_bytes}", f"-seed={seed}", str(folder / "corpus")]
+    command = [
+        sys.argv[0],
+        *options,
+        f"-max_len={target.most_bytes}",
+        f"-seed={seed}",
+        str(folder / "corpus"),
+    ]
     atheris.Setup(command, one, custom_mutator=mutate)
     atheris.Fuzz()
 

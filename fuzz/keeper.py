@@ -95,6 +95,7 @@ class Keeper:
         self.target = target
         self.folder = folder
         self.every_s = every_s
+        self.slow_s = SLOW_S * target.runs
         self.state = State()
         self.written_s = 0.0
         (folder / "findings").mkdir(parents=True, exist_ok=True)
@@ -116,8 +117,8 @@ class Keeper:
         grown, state.peak_bytes = peak - state.peak_bytes, max(peak, state.peak_bytes)
         if found is not None:
             self._note(data, *found)
-        if cpu_s > SLOW_S:
-            self._note(data, "slow", f"more than {SLOW_S:g} s of CPU time", f"{cpu_s:.2f} s", cpu_s)
+        if cpu_s > self.slow_s:
+            self._note(data, "slow", f"more than {self.slow_s:g} s of CPU time", f"{cpu_s:.2f} s", cpu_s)
         if grown > MOST_BYTES:
             self._note(data, "memory", f"more than {MOST_BYTES:,} bytes", f"{grown:,} bytes", grown)
         if cpu_s > state.slowest.cpu_s:

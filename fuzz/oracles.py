@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
+from itertools import pairwise
 from typing import Any
 
 from fuzz.target import Failure, hold
@@ -55,7 +56,7 @@ def check_diagnostics(found: Sequence[Diagnostic], texts: Iterable[SourceFile] |
             if known is not None:
                 hold(any(span.source is text for text in known), "diagnostics are in the text", d.code)
         ordered = sorted(edits, key=lambda edit: (edit.span.start, edit.span.end))
-        for one, other in zip(ordered, ordered[1:], strict=False):
+        for one, other in pairwise(ordered):
             hold(one.span.end <= other.span.start, "edits of a fix do not overlap", d)
     check_rendering(found)
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fuzz.keeper import SLOW_S, Finding, minimise, shows_signature
-from fuzz.target import Target, load_target
+from fuzz.target import PROPERTIES, Target, load_target
 
 ROOT: Final = Path(__file__).resolve().parent.parent
 RECORDS: Final = ROOT / "fuzz" / "records"
@@ -76,7 +76,8 @@ def fuzz(name: str, minutes: float, work: Path, seed: int = 1, records: Path | N
             if record.processes >= 3 and record.executions == 0:
                 raise SystemExit(f"the fuzzing process does not start: see {folder / 'log.txt'}")
     record.wall_s = round(time.monotonic() - start_s, 1)
-    record.corpus = sum(1 for _ in (folder / "corpus").iterdir())
+    if name != PROPERTIES:
+        record.corpus = sum(1 for _ in (folder / "corpus").iterdir())
     _settle(target, folder, record)
     told = json.dumps(asdict(record), indent=2) + "\n"
     (folder / "record.json").write_text(told, encoding="utf-8")
@@ -98,6 +99,8 @@ def _one_process(target: Target, folder: Path, log: Any, left_s: int, seed: int,
         "-print_final_stats=1",
     ]
     command = [sys.executable, "-m", "fuzz.drive", target.name, str(folder), str(seed), *options]
+    if target.name == PROPERTIES:
+        command = [sys.executable, "-m", "fuzz.properties", str(folder), str(left_s), str(seed)]
     begin = log.tell()
     before = {path.name for path in (folder / "findings").glob("*")}
     cpu_s = _children_s()
@@ -145,14 +148,14 @@ def _settle(target: Target, folder: Path, record: Record) -> None:
         if path.suffix != ".bin" or not path.exists():
             continue
         data = path.read_bytes()
-        if finding["kind"] in ("crash", "oracle"):
+        if finding["kind"] in ("crash", "oracle") and target.name != PROPERTIES:
             small = minimise(data, shows_signature(target, finding["signature"]))
             path.write_bytes(small)
             finding["bytes"] = len(small)
         elif finding["kind"] == "slow":
             seconds = min(_seconds(target, data) for _ in range(3))
             finding["error"] += f"; {seconds:.2f} s without instrumentation"
-            if seconds < SLOW_S:
+            if seconds < SLOW_S * target.runs:
                 record.findings.remove(finding)
     record.crashes = len(record.findings)
 

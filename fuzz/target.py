@@ -9,8 +9,19 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Final
 
-TARGETS: Final = ("parse", "evaluate", "scene_json", "program", "weights", "formatting", "incremental")
+TARGETS: Final = (
+    "parse",
+    "evaluate",
+    "scene_json",
+    "program",
+    "weights",
+    "formatting",
+    "incremental",
+    "gltf",
+)
 """Names of the modules in `fuzz.targets`."""
+PROPERTIES: Final = "properties"
+"""What Hypothesis drives, in `fuzz.properties`."""
 
 
 class Failure(AssertionError):
@@ -44,6 +55,7 @@ class Target:
         mutate: a mutation that knows the structure of the input.
         dictionary: byte strings that belong together, for atheris's own mutations.
         most_bytes: longest input.
+        runs: how many uses of the library one input stands for, which together may take as much longer.
     """
 
     name: str
@@ -53,13 +65,20 @@ class Target:
     mutate: Callable[[bytes, Random], bytes] = field(repr=False)
     dictionary: Callable[[], list[bytes]] = field(repr=False, default=list)
     most_bytes: int = 4096
+    runs: int = 1
 
 
 def load_target(name: str) -> Target:
     """The target of a name; raises KeyError for another one."""
+    if name == PROPERTIES:
+        return _target("fuzz.properties")
     if name not in TARGETS:
         raise KeyError(name)
-    target: Target = importlib.import_module(f"fuzz.targets.{name}").TARGET
+    return _target(f"fuzz.targets.{name}")
+
+
+def _target(module: str) -> Target:
+    target: Target = importlib.import_module(module).TARGET
     return target
 
 

@@ -10,11 +10,22 @@ from typing import Any, Final
 
 from fuzz import trees
 
-SIZES: Final = {"F64": 8, "F32": 4, "F16": 2, "BF16": 2, "I64": 8, "I32": 4, "I16": 2, "I8": 1, "U8": 1, "BOOL": 1}
+SIZES: Final = {
+    "F64": 8,
+    "F32": 4,
+    "F16": 2,
+    "BF16": 2,
+    "I64": 8,
+    "I32": 4,
+    "I16": 2,
+    "I8": 1,
+    "U8": 1,
+    "BOOL": 1,
+}
 LENGTHS: Final = (0, 1, 7, 8, 2, 1 << 20, (1 << 20) + 1, 1 << 31, 1 << 62, (1 << 64) - 1)
 FLOATS: Final = (
-    0.0, -0.0, 1.0, -1.0, 1e-45, 1e-38, 1e-20, 1e-6, 0.5, 2.0, 1e3, 1e6, 1e10, 1e19, 1e20, 1e30, 3.4e38, -3.4e38,
-    math.inf, -math.inf, math.nan,
+    0.0, -0.0, 1.0, -1.0, 1e-45, 1e-38, 1e-20, 1e-6, 0.5, 2.0, 1e3, 1e6, 1e10, 1e19, 1e20, 1e30, 3.4e38,
+    -3.4e38, math.inf, -math.inf, math.nan,
 )  # fmt: skip
 
 
@@ -62,7 +73,7 @@ def _inner(outer: dict[str, Any], generator: Random) -> dict[str, Any]:
     """The header of scenelang changed, which stands as text in the outer one."""
     metadata = outer.get("__metadata__")
     text = metadata.get("scenelang") if isinstance(metadata, dict) else None
-    if not isinstance(text, str):
+    if not isinstance(metadata, dict) or not isinstance(text, str):
         return outer
     try:
         inner = json.loads(text)
@@ -74,14 +85,15 @@ def _inner(outer: dict[str, Any], generator: Random) -> dict[str, Any]:
 
 def _entries(outer: dict[str, Any], body: bytes) -> dict[str, tuple[str, list[int], int, int]]:
     """Type, shape, start and end of the tensors that lie inside the body."""
-    found = {}
+    found: dict[str, tuple[str, list[int], int, int]] = {}
     for name, entry in outer.items():
         if not isinstance(entry, dict) or str(entry.get("dtype")) not in SIZES:
             continue
         offsets, shape = entry.get("data_offsets"), entry.get("shape")
-        whole = isinstance(shape, list) and all(type(side) is int and 0 <= side < 1 << 20 for side in shape)
-        placed = isinstance(offsets, list) and len(offsets) == 2 and all(type(o) is int for o in offsets)
-        if whole and placed and 0 <= offsets[0] <= offsets[1] <= len(body):
+        if not isinstance(shape, list) or not isinstance(offsets, list) or len(offsets) != 2:
+            continue
+        whole = all(type(number) is int and 0 <= number < 1 << 20 for number in (*shape, *offsets))
+        if whole and offsets[0] <= offsets[1] <= len(body):
             found[name] = entry["dtype"], shape, offsets[0], offsets[1]
     return found
 

@@ -16,14 +16,81 @@ from scenelang.syntax.tables import tables
 ROOT: Final = Path(__file__).resolve().parent.parent
 FOLDERS: Final = ("examples", "examples/lib", "tests/syntax", "tests/scene", "tests/conformance/cases")
 
-NUMBERS: Final = (
-    "0 1 -1 2 3 0.5 1e-320 1e308 -1e308 1e309 1e999999 4e-324 1e16 9007199254740993 100000 100001 1000000 "
-    "10000001 8192 8193 0.1 .5 1. 007 1e 1.2.3 1e-7 6.2832 0.30000000000000004 1e22 1e-5"
-).split()
-ODD: Final = (
-    "\0 \ufeff \u202e \u2066 \u200b \u0301 \ud800 \U0001f600 \U0001d7d8 \u0660 \u00b5 \x7f \x1b[31m \x85 \u2028 "
-    "\u2029 \x0b \x0c \x1c \r \r\n \n \t \u00a0 \\ \" ' ` @ $ ~ /* */ // \ufffd \U0010ffff é ß ﬁ ：；，（）"
-).split(" ")
+NUMBERS: Final = [
+    "0",
+    "1",
+    "-1",
+    "2",
+    "3",
+    "0.5",
+    "1e-320",
+    "1e308",
+    "-1e308",
+    "1e309",
+    "1e999999",
+    "4e-324",
+    "1e16",
+    "9007199254740993",
+    "100000",
+    "100001",
+    "1000000",
+    "10000001",
+    "8192",
+    "8193",
+    "0.1",
+    ".5",
+    "1.",
+    "007",
+    "1e",
+    "1.2.3",
+    "1e-7",
+    "6.2832",
+    "0.30000000000000004",
+    "1e22",
+    "1e-5",
+]
+ODD: Final = [
+    "\x00",
+    "\ufeff",
+    "\u202e",
+    "\u2066",
+    "\u200b",
+    "́",
+    "�",
+    "😀",
+    "𝟘",
+    "٠",
+    "µ",
+    "\x7f",
+    "\x1b[31m",
+    "\x85",
+    "\u2028",
+    "\u2029",
+    "\x0b",
+    "\x0c",
+    "\x1c",
+    "\r",
+    "\r\n",
+    "\n",
+    "\t",
+    "\xa0",
+    "\\",
+    '"',
+    "'",
+    "`",
+    "@",
+    "$",
+    "~",
+    "/*",
+    "*/",
+    "//",
+    "�",
+    "\U0010ffff",
+    "é",
+    "ß",
+    "ﬁ",
+    "：；，（）",
+]
 PIECES: Final = (
     "for (i in 0..<3) { square { translate(i, 0); } }",
     "for (i in 0..1000000) { }",
@@ -32,15 +99,15 @@ PIECES: Final = (
     "module m(a, b = 2) { square { scale(a); } }",
     "m(1) { rotate(30deg); }",
     "m(m = 1);",
-    "let v = [1, [2, 3], \"s\", #d33];",
+    'let v = [1, [2, 3], "s", #d33];',
     "param k = 0.5 in 0..1;",
     "param a = 30deg in 0deg..90deg step 10deg;",
     "animate(2s, 24, loop = true);",
     "canvas(8, 8);",
     "background(none);",
-    "model \"shapes2d\";",
-    "import \"lib/parts.nsg\" as lib;",
-    "import \"../outside.nsg\" as up;",
+    'model "shapes2d";',
+    'import "lib/parts.nsg" as lib;',
+    'import "../outside.nsg" as up;',
     "let mist = material flat { color(#d33); hue(1turn); };",
     "mist { grayscale(0.5); }",
     "chain { square { } smooth star { } subtract pentagon { scale(0.5); } intersect square { } }",
@@ -53,13 +120,15 @@ PIECES: Final = (
     "0..1e6 step 1e-9",
 )
 
-_TOKEN: Final = re.compile(r'"(?:\\.|[^"\n])*"|[\w#.°]+|\s+|//[^\n]*|/\*.*?\*/|[-<>=!&|*.]{1,3}|[\s\S]', re.DOTALL)
+_TOKEN: Final = re.compile(
+    r'"(?:\\.|[^"\n])*"|[\w#.°]+|\s+|//[^\n]*|/\*.*?\*/|[-<>=!&|*.]{1,3}|[\s\S]', re.DOTALL
+)
 
 
 @cache
 def texts() -> tuple[str, ...]:
     """All scene texts of examples, documentation and tests."""
-    found = []
+    found: list[str] = []
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).rglob("*.nsg*")):
             if folder in ("examples", "examples/lib") and path.parent != ROOT / folder:

@@ -8,8 +8,9 @@ from random import Random
 from typing import Any, Final
 
 EXTREME: Final[tuple[Any, ...]] = (
-    None, True, False, 0, -1, 1, 2**31, 2**63, -(2**63) - 1, 10**400, 0.0, -0.0, 0.1, 1e-320, 1e308, -1e308,
-    float("inf"), float("-inf"), float("nan"), "", "x", "union", "\0", "\ud800", "\u202e", "a" * 5000, "1", "é",
+    None, True, False, 0, -1, 1, 2**31, 2**63, -(2**63) - 1, 10**400, 0.0, -0.0, 0.1, 1e-320, 1e308,
+    -1e308, float("inf"), float("-inf"), float("nan"), "", "x", "union", "\0", "\ud800", "\u202e",
+    "a" * 5000, "1", "é",
     [], {}, [[]], [{}], {"kind": "object"}, [0, 0, 0], [1, 2], [1, 2, 3, 4, 5], {"__metadata__": {}},
 )  # fmt: skip
 
@@ -55,7 +56,9 @@ def mutate(value: Any, generator: Random, others: tuple[Any, ...] = ()) -> Any:
         number = holder[key]
         holder[key] = generator.choice((-number, number + 1, number * 1000, number // 3, 0))
     elif change == 6 and isinstance(holder[key], str):
-        holder[key] = generator.choice((holder[key] * 2, holder[key][:-1], holder[key] + "\n", f'"{holder[key]}'))
+        holder[key] = generator.choice(
+            (holder[key] * 2, holder[key][:-1], holder[key] + "\n", f'"{holder[key]}')
+        )
     else:
         holder[key] = _new(generator, others, holder[key])
     return value

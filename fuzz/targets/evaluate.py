@@ -11,8 +11,8 @@ import re
 import shutil
 import sys
 import tempfile
-from contextlib import contextmanager
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -37,8 +37,9 @@ SMALL: Final = {
 }
 """Limits while fuzzing: the text says the same with larger numbers, only later."""
 
-LIBRARY: Final = {
-    "lib/parts.nsg": 'param size = 1 in 0..2; let a = 1; fn f(x) = x; module dot(p = 1) { star { scale(p); } }\n',
+LIBRARY: Final[dict[str, str | bytes]] = {
+    "lib/parts.nsg": "param size = 1 in 0..2; let a = 1; fn f(x) = x;\n"
+    "module dot(p = 1) { star { scale(p); } }",
     "lib/loop.nsg": 'import "loop.nsg" as again; let a = 1;\n',
     "lib/bad.nsg": "let a = ; square { scale(; }\n",
     "lib/bytes.nsg": b"let a = \xff;\n",
@@ -131,14 +132,17 @@ def _check_scene(scene: Scene) -> None:
 def seeds() -> list[bytes]:
     """Scene texts, some with values from outside."""
     extra = [
-        '//! k=0.9\nparam k = 0.6 in 0..1; square { twirl(k); }\n',
-        '//! frame=5\nanimate(1s, 12); square { rotate(1turn * u); translate(t, frame / frames); }\n',
-        '//! a=30deg c=#d33 b=true s=x v=[1,2]\nparam a = 1rad; param c = #fff; param b = false; param s = "q";\n'
-        "param v = [0, 0]; if (b) { square { rotate(a); translate(v.x, v.y); material flat { color(c); } } }\n",
+        "//! k=0.9\nparam k = 0.6 in 0..1; square { twirl(k); }\n",
+        "//! frame=5\nanimate(1s, 12); square { rotate(1turn * u); translate(t, frame / frames); }\n",
+        "//! a=30deg c=#d33 b=true s=x v=[1,2]\nparam a = 1rad; param c = #fff;"
+        ' param b = false; param s = "q";\n'
+        "param v = [0, 0];\n"
+        "if (b) { square { rotate(a); translate(v.x, v.y); material flat { color(c); } } }\n",
         'import "lib/parts.nsg" as p; p.dot(p.f(0.5)); square { scale(p.size + p.a); }\n',
         'import "lib/loop.nsg" as l; import "lib/bad.nsg" as b; import "lib/bytes.nsg" as y;\n',
         'import "lib/deep.nsg" as d; d.m() { rotate(1rad); } import "link.nsg" as k;\n',
-        'import "lib" as a; import "nothing.nsg" as b; import "/etc/passwd" as c; import "lib/../lib/parts.nsg" as e;\n',
+        'import "lib" as a; import "nothing.nsg" as b; import "/etc/x" as c;\n'
+        'import "lib/../lib/parts.nsg" as e;\n',
         "fn f(n) = n < 1 ? 0 : 1 + f(n - 1); square { scale(f(100)); }\n",
         "module m(n) { group { if (n > 0) { m(n - 1); m(n - 1); } } } m(20);\n",
     ]
@@ -156,8 +160,9 @@ def mutate(data: bytes, generator: Random) -> bytes:
 
 TARGET = Target(
     name="evaluate",
-    summary="any text, with imports, params and frames, ends in a Scene or diagnostics, the same each time and "
-    "within 2 s; Scenes go to JSON, text and Program and back unchanged, and compiling raises only SceneError",
+    summary="any text, with imports, params and frames, ends in a Scene or diagnostics, the same each time "
+    "and within 2 s; Scenes go to JSON, text and Program and back unchanged, and compiling raises "
+    "only SceneError",
     check=check,
     seeds=seeds,
     mutate=mutate,

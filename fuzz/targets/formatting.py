@@ -64,8 +64,8 @@ def comments_cut(scene: str) -> str:
 
 TARGET = Target(
     name="formatting",
-    summary="a text without mistakes is formatted to one with the same tree and the same comments, which is not "
-    "changed again; any other is refused with its mistakes",
+    summary="a text without mistakes is formatted to one with the same tree and the same comments, which is "
+    "not changed again; any other is refused with its mistakes",
     check=check,
     seeds=text.seeds,
     mutate=text.mutate,

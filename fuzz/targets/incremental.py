@@ -48,7 +48,9 @@ def _equal(one: Parsed, other: Parsed) -> None:
     with deep_stack():
         hold(one.file == other.file, "an edited tree is a parsed tree", where)
     hold(one.diagnostics == other.diagnostics, "mistakes after an edit are those of a parse", where)
-    hold((one.starts, one.ends) == (other.starts, other.ends), "statements stand where they are parsed", where)
+    hold(
+        (one.starts, one.ends) == (other.starts, other.ends), "statements stand where they are parsed", where
+    )
     mine, whole = one.tokens, other.tokens
     same = (mine.kinds, mine.starts, mine.ends) == (whole.kinds, whole.starts, whole.ends)
     hold(same, "tokens after an edit are those of the text", where)
@@ -56,8 +58,8 @@ def _equal(one: Parsed, other: Parsed) -> None:
 
 TARGET = Target(
     name="incremental",
-    summary="after each of four edits of any text, tree, spans, tokens and diagnostics of the incremental parser are "
-    "those of a whole parse, also for the versions before",
+    summary="after each of four edits of any text, tree, spans, tokens and diagnostics of the incremental "
+    "parser are those of a whole parse, also for the versions before",
     check=check,
     seeds=text.seeds,
     mutate=text.mutate,

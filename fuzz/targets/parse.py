@@ -20,8 +20,8 @@ from scenelang.syntax.tokens import MAX_MISTAKES
 MOST_FOR_LARK = 400
 """Characters of a text that Lark is asked about, too: it is slow."""
 
-BEYOND = {"E0119", "E0125"}
-"""Mistakes that a grammar does not know: unknown escapes in strings, numbers without a float64."""
+BEYOND = {"E0119", "E0125", "E0128"}
+"""Mistakes that the grammar does not know: unknown escapes, numbers without a float64, calls of no name."""
 
 
 def check(data: bytes) -> None:

@@ -79,14 +79,17 @@ def seeds() -> list[bytes]:
 
 def dictionary() -> list[bytes]:
     """Words of the headers."""
-    words = "vectors tokens bounds objects places dtype shape data_offsets F32 I8 I32 __metadata__ scenelang format"
-    return [f'"{word}"'.encode() for word in (*words.split(), *"canvas background model weights files".split())]
+    words = "vectors tokens bounds objects places dtype shape data_offsets F32 I8 I32 __metadata__ scenelang"
+    return [
+        f'"{word}"'.encode()
+        for word in (*words.split(), *["canvas", "background", "model", "weights", "files"])
+    ]
 
 
 TARGET = Target(
     name="program",
-    summary="any bytes are a Program or a ProgramError; a Program stays as it is through its file, and is drawn "
-    "without a warning in numbers within [0, 1]",
+    summary="any bytes are a Program or a ProgramError; a Program stays as it is through its file, and is "
+    "drawn without a warning in numbers within [0, 1]",
     check=check,
     seeds=seeds,
     mutate=tensors.mutate,

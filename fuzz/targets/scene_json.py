@@ -20,6 +20,22 @@ from scenelang.scene.schema import Scene
 from scenelang.scene.session import deep_stack
 from scenelang.scene.to_python import to_python
 
+_PLAIN = (
+    *(
+        ast.Module,
+        ast.Import,
+        ast.alias,
+        ast.Assign,
+        ast.Expr,
+        ast.Call,
+        ast.keyword,
+        ast.Name,
+        ast.Attribute,
+    ),
+    *(ast.Constant, ast.Tuple, ast.List, ast.UnaryOp, ast.USub, ast.Load, ast.Store),
+)
+"""What code of a Scene is made of."""
+
 
 def check(data: bytes) -> None:
     """A Scene that comes out equals itself after JSON and after text, and compiles or is refused."""
@@ -67,10 +83,13 @@ def _check_python(scene: Scene) -> None:
     """Python code of a Scene makes that Scene; only calls of our own names with literals are run."""
     code = to_python(scene)
     tree = ast.parse(code)
-    allowed = (ast.Module, ast.Import, ast.alias, ast.Assign, ast.Expr, ast.Call, ast.keyword, ast.Name, ast.Load,
-               ast.Store, ast.Attribute, ast.Constant, ast.Tuple, ast.List, ast.UnaryOp, ast.USub)  # fmt: skip
-    odd = [type(node).__name__ for node in ast.walk(tree) if not isinstance(node, allowed)]
+    odd = [type(node).__name__ for node in ast.walk(tree) if not isinstance(node, _PLAIN)]
     hold(not odd, "Python code of calls and literals", (odd, code[:500]))
+    assigned = {
+        node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    }
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - assigned
+    hold(used <= {"nsg"}, "Python code of our own names", (used, code[:500]))
     names: dict[str, Any] = {}
     exec(compile(tree, "<scene>", "exec"), names)
     made = [value for value in names.values() if isinstance(value, Scene)]
@@ -147,7 +166,12 @@ def seeds() -> list[bytes]:
         {"kind": "grayscale", "amount": 0.5},
         {"kind": "hue", "angle": 0.5},
     ]
-    leaf = {"kind": "object", "geometry": "square", "transforms": transforms, "material": {"name": "flat", "ops": ops}}
+    leaf = {
+        "kind": "object",
+        "geometry": "square",
+        "transforms": transforms,
+        "material": {"name": "flat", "ops": ops},
+    }
     link = {"op": "smooth", "node": {"kind": "object", "geometry": "star"}}
     everything = {
         "version": 1,
@@ -155,12 +179,25 @@ def seeds() -> list[bytes]:
         "canvas": [16, 16],
         "background": None,
         "animation": {"seconds": 2, "fps": 24, "loop": False},
-        "nodes": [leaf, {"kind": "chain", "children": [{"node": leaf}, link]}, {"kind": "group", "children": [leaf]}],
+        "nodes": [
+            leaf,
+            {"kind": "chain", "children": [{"node": leaf}, link]},
+            {"kind": "group", "children": [leaf]},
+        ],
     }
     deep: Any = {"kind": "object", "geometry": "star"}
     for _ in range(90):
         deep = {"kind": "group", "children": [deep]}
-    odd = [everything, {"nodes": [deep]}, {}, [], {"nodes": {}}, {"canvas": [0, 0]}, {"model": '"'}, {"version": 2}]
+    odd = [
+        everything,
+        {"nodes": [deep]},
+        {},
+        [],
+        {"nodes": {}},
+        {"canvas": [0, 0]},
+        {"model": '"'},
+        {"version": 2},
+    ]
     return [*_scenes(), *(trees.dump(value) for value in odd), b"", b"\xff", b'{"nodes": [', b"[" * 3000]
 
 
@@ -177,18 +214,73 @@ def mutate(data: bytes, generator: Random) -> bytes:
 
 def dictionary() -> list[bytes]:
     """Field names and values of the schema."""
-    words = (
-        "version model canvas background animation nodes kind object group boolean chain geometry transforms material "
-        "ops name children op node union smooth subtract intersect translate rotate scale shear matrix twirl bend "
-        "twist displace x y z angle axis axes k rows amount frequency flip color rgb grayscale hue seconds fps loop"
-    ).split()
-    return [*(f'"{word}"'.encode() for word in words), b"null", b"true", b"1e308", b"NaN", b"-0.0", b"\\ud800"]
+    words = [
+        "version",
+        "model",
+        "canvas",
+        "background",
+        "animation",
+        "nodes",
+        "kind",
+        "object",
+        "group",
+        "boolean",
+        "chain",
+        "geometry",
+        "transforms",
+        "material",
+        "ops",
+        "name",
+        "children",
+        "op",
+        "node",
+        "union",
+        "smooth",
+        "subtract",
+        "intersect",
+        "translate",
+        "rotate",
+        "scale",
+        "shear",
+        "matrix",
+        "twirl",
+        "bend",
+        "twist",
+        "displace",
+        "x",
+        "y",
+        "z",
+        "angle",
+        "axis",
+        "axes",
+        "k",
+        "rows",
+        "amount",
+        "frequency",
+        "flip",
+        "color",
+        "rgb",
+        "grayscale",
+        "hue",
+        "seconds",
+        "fps",
+        "loop",
+    ]
+    return [
+        *(f'"{word}"'.encode() for word in words),
+        b"null",
+        b"true",
+        b"1e308",
+        b"NaN",
+        b"-0.0",
+        b"\\ud800",
+    ]
 
 
 TARGET = Target(
     name="scene_json",
-    summary="any bytes are a Scene or E0313; a Scene equals itself after JSON and, where a model has its names, "
-    "after text; compiling raises only SceneError",
+    summary="any bytes are a Scene or E0313; a Scene equals itself after JSON and, where a model has its "
+    "names, after text; compiling raises only SceneError",
     check=check,
     seeds=seeds,
     mutate=mutate,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from contextlib import suppress
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -33,8 +34,10 @@ from scenelang.scene.evaluate import load_source
 from scenelang.scene.load import loads
 
 MODEL = "shapes2d"
-SCENE = "canvas(8, 6); chain { square { bend(0.3); rotate(20deg); } smooth star { translate(0.2, 0.1); twirl(1); } }"
-WORDS = "nsg 1; chain { square { twirl(3); scale(9); } subtract star { material flat { color(#d33); hue(9deg); } } }"
+SCENE = """canvas(8, 6);
+chain { square { bend(0.3); rotate(20deg); } smooth star { translate(0.2, 0.1); twirl(1); } }"""
+WORDS = """nsg 1;
+chain { square { twirl(3); scale(9); } subtract star { material flat { color(#d33); hue(9deg); } } }"""
 
 
 def check(data: bytes) -> None:
@@ -69,10 +72,8 @@ def _check_weights(data: bytes) -> None:
     manifest = load_manifest(MODEL)
     _facts(data)
     codes = None
-    try:
+    with suppress(ModelError):
         codes = codes_of(manifest, data)
-    except ModelError:
-        pass
     try:
         network = load_network(data, manifest)
     except ModelError:
@@ -157,14 +158,25 @@ def mutate(data: bytes, generator: Random) -> bytes:
 def dictionary() -> list[bytes]:
     """Words of the headers and of manifests."""
     words: list[Any] = [*asdict(load_manifest(MODEL)), "format", "config", "network", "code", "decoder_width"]
-    words += ["dtype", "shape", "data_offsets", "F32", "F16", "__metadata__", "scenelang", "codes", "material_codes"]
+    words += [
+        "dtype",
+        "shape",
+        "data_offsets",
+        "F32",
+        "F16",
+        "__metadata__",
+        "scenelang",
+        "codes",
+        "material_codes",
+    ]
     return [f'"{word}"'.encode() for word in words]
 
 
 TARGET = Target(
     name="weights",
-    summary="any bytes are the weights of a network or a ModelError, or a manifest or a ValueError; what loads is "
-    "saved and loaded unchanged, draws finite numbers, and no scene makes a manifest raise anything else",
+    summary="any bytes are the weights of a network or a ModelError, or a manifest or a ValueError; what "
+    "loads is saved and loaded unchanged, draws finite numbers, and no scene makes a manifest raise "
+    "anything else",
     check=check,
     seeds=seeds,
     mutate=mutate,
