@@ -15,12 +15,14 @@ from scenelang.syntax.incremental import Edit, Parsed, parse_edited, parse_whole
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = [path.read_text("utf-8") for path in sorted(ROOT.glob("examples/**/*.nsg"))]
-LONG = "".join(
+PARTS = [
     f"// part {i}\nmodule part{i}(at, c = #d3{i % 16:x}) {{\n"
     f"  star {{ scale(0.{i + 1}); translate(at); }}\n}}\n"
     f"let a{i} = [{i}, 0.5] * 2;\npart{i}(at = a{i});\nsquare {{ rotate({i}deg); }}\n"
     for i in range(40)
-)
+]
+LONG, SHORT = "".join(PARTS), "".join(PARTS[:2])
+TYPED = ["let x = mix(1, 2, t);\n", "star { scale(0.5); }\n", "canvas(64, 64);"]
 SNIPPETS = [
     *"{}()[];,\"'\n =.é°\t𝄞a\\-",
     *("/*", "*/", "//", "..", "let x = 1;", "square { }", "else { }", "if (a) ", "fn f(x) = ", "group {\n  "),
@@ -81,7 +83,7 @@ def edits(draw: st.DrawFn) -> tuple[str, list[tuple[float, int, str]]]:
     return text, draw(st.lists(one, min_size=1, max_size=5))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(edits())
 def test_random_edits_equal_a_whole_parse(case: tuple[str, list[tuple[float, int, str]]]) -> None:
     text, changes = case
@@ -92,17 +94,27 @@ def test_random_edits_equal_a_whole_parse(case: tuple[str, list[tuple[float, int
         same(version, version.source.text)
 
 
-@settings(max_examples=60, deadline=None)
-@given(
-    st.integers(0, len(LONG)),
-    st.sampled_from(["let x = mix(1, 2, t);\n", "star { scale(0.5); }\n", "canvas(64, 64);"]),
-)
-def test_typing_letter_by_letter_equals_a_whole_parse(at: int, typed: str) -> None:
-    at = LONG.find("\n", at) + 1
-    version = parse_whole(SourceFile("t.nsg", LONG))
+def typed_into(text: str, at: int, typed: str) -> None:
+    """Type letter by letter at the start of a line, each version held against a parse of its whole text."""
+    at = text.find("\n", at) + 1
+    version = parse_whole(SourceFile("t.nsg", text))
     for count, letter in enumerate(typed):
         version = replaced(version, at + count, at + count, letter)
         same(version, version.source.text)
+
+
+@pytest.mark.parametrize("typed", TYPED)
+def test_typing_letter_by_letter_equals_a_whole_parse(typed: str) -> None:
+    for line in range(SHORT.count("\n")):
+        start = len("".join(SHORT.splitlines(keepends=True)[:line]))
+        typed_into(SHORT, max(0, start - 1), typed)
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, len(LONG)), st.sampled_from(TYPED))
+def test_typing_into_a_long_text_equals_a_whole_parse(at: int, typed: str) -> None:
+    typed_into(LONG, at, typed)
 
 
 def test_only_the_statements_near_an_edit_are_read() -> None:

@@ -23,7 +23,7 @@ from tests.syntax.mutations import (
     together,
 )
 
-EACH = 120
+EACH = 90
 """Slips of a kind in the default run."""
 
 
