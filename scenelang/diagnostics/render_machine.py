@@ -177,7 +177,12 @@ def _uri(name: str) -> str:
     """A file name as a relative or absolute URI reference."""
     from urllib.parse import quote
 
-    path = quote(_relative(name), safe="/~")
+    path = _relative(name)
+    try:
+        data = path.encode("utf-8", "surrogateescape")  # how Python names files that are no UTF-8
+    except UnicodeEncodeError:
+        data = path.encode("utf-8", "surrogatepass")
+    path = quote(data, safe="/~")
     return f"file://{path}" if path.startswith("/") else path
 
 

@@ -10,10 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fuzz.oracles import check_rendering
 from scenelang.backend.errors import RenderError
 from scenelang.backend.render import render
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
-from scenelang.diagnostics.render import render_text
+from scenelang.diagnostics.render import render_sarif, render_text
 from scenelang.diagnostics.span import SourceFile
 from scenelang.formatting import format_text
 from scenelang.models.manifest import ROOT, Manifest
@@ -179,3 +180,18 @@ def test_reserved_words_are_those_of_the_grammar() -> None:
 def test_formatting_takes_stray_semicolons_out(text: str, laid: str) -> None:
     """They are only warned about, and the formatter took a text without errors for one the grammar reads."""
     assert format_text(text) == laid
+
+
+@pytest.mark.parametrize(
+    ("name", "uri"),
+    [("a\udcff.nsg", "a%FF.nsg"), ("\ud800.nsg", "%ED%A0%80.nsg"), ("/é b.nsg", "file:///%C3%A9%20b.nsg")],
+)
+def test_files_whose_names_are_no_text(name: str, uri: str) -> None:
+    """Python names a file that is no UTF-8 by lone surrogates, of which SARIF made no URI."""
+    source = SourceFile(name, "let")
+    found = Diagnostics()
+    parse(source, found)
+    check_rendering(list(found))
+    log = json.loads(render_sarif(list(found)))
+    place = log["runs"][0]["results"][0]["locations"][0]["physicalLocation"]
+    assert place["artifactLocation"]["uri"] == uri
