@@ -6,6 +6,7 @@ words and share a variable or function, directly or by way of others, are places
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
@@ -43,6 +44,26 @@ class Shared:
     again: list[Span] = field(default_factory=list)
 
 
+_FOUND: Final = re.compile(r"found (?!a number$)(.*)$|of (.*), which is no vector$")
+_PAIR: Final = re.compile(r"^cannot \w+ (.*) and (.*)$")
+_ANGLE: Final = "a bare number beside an angle"
+_OUTSIDE: Final = "outside"
+
+
+def _complaint(message: str) -> str:
+    """What a message says is odd about a value, whatever was going to be done with it."""
+    if _OUTSIDE in message:
+        return _OUTSIDE
+    if message == _ANGLE:
+        return "an angle"
+    pair = _PAIR.match(message)
+    if pair is not None:
+        odd = [kind for kind in pair.groups() if kind != "a number"]
+        return odd[0] if len(odd) == 1 else message
+    found = _FOUND.search(message)
+    return message if found is None else found[1] or found[2]
+
+
 def joined(session: Session, code: str, message: str, operands: tuple[nodes.Expr, ...], place: Span) -> bool:
     """Whether a problem is one more place of an earlier report, which then shows it.
 
@@ -55,7 +76,7 @@ def joined(session: Session, code: str, message: str, operands: tuple[nodes.Expr
     if code not in _KINDS:
         return False
     for origin, definition in origins(session, operands).items():
-        for words in (message, ""):
+        for words in (_complaint(message), ""):
             shared = session.blamed.get((*origin, words))
             if shared is not None:
                 _add(session, shared, definition, place)
@@ -74,10 +95,16 @@ def remember(session: Session, code: str, message: str, operands: tuple[nodes.Ex
         return
     index = len(session.diagnostics.items) - 1
     shared = Shared(index, session.diagnostics.items[index].labels)
+    complaint = _complaint(message)
+    direct = _direct(session, operands[0]) if operands else None
+    if complaint == _OUTSIDE:
+        # One wrong index is one; of a second on, it is the vector that is too short.
+        if direct is not None and session.blamed.setdefault((*direct, code), shared) is not shared:
+            session.blamed.setdefault((*direct, complaint), shared)
+        return
     for origin in origins(session, operands):
-        session.blamed.setdefault((*origin, message), shared)
-    direct = _direct(session, operands[0]) if len(operands) == 1 and code == "E0301" else None
-    if direct is not None:
+        session.blamed.setdefault((*origin, complaint), shared)
+    if direct is not None and code == "E0301" and len(operands) == 1:
         session.blamed.setdefault((*direct, code), shared)
 
 

@@ -107,7 +107,7 @@ def _range(expr: nodes.Range, unit: Unit, scope: Scope) -> Code:
 COMPONENTS: Final = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
 
 
-def member(code: Code, name: nodes.Name, unit: Unit) -> Code:
+def member(code: Code, name: nodes.Name, unit: Unit, of: nodes.Expr | None = None) -> Code:
     """``code.name``, a component of a vector."""
     index = COMPONENTS.get(name.text)
     if index is None:
@@ -129,7 +129,7 @@ def member(code: Code, name: nodes.Name, unit: Unit) -> Code:
         return value.items[at] if value.__class__ is Vec and len(value.items) > at else slow(value)
 
     get = code.run
-    slow = guarded(unit, pick, name.span, ())
+    slow = guarded(unit, pick, name.span, (of,))
     return folded(unit, [code], pick, run)
 
 

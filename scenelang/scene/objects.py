@@ -195,7 +195,6 @@ def _combined(stmt: nodes.Combined, place: Place) -> Action | None:
             return
         if not out.children and op in ("subtract", "intersect"):
             session.error("E0335", f"'{op}' with nothing before it", stmt.keyword)
-            return
         out.op = op if out.children else "union"
         act(env, out)
         out.op = "union"

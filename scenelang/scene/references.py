@@ -23,7 +23,7 @@ from scenelang.scene.scope import Binding, Definition, Env, Scope
 from scenelang.scene.session import MAX_DEPTH, UNBOUND
 from scenelang.scene.spans import Calls
 from scenelang.scene.unit import Unit
-from scenelang.scene.unknown import VALUES, unknown, unknown_member
+from scenelang.scene.unknown import VALUES, report_shared, unknown, unknown_member
 from scenelang.scene.values import POISON
 from scenelang.syntax import nodes
 
@@ -89,7 +89,9 @@ def wrong_kind(name: nodes.Name, binding: Binding, unit: Unit, wanted: str, help
     kinds = {"fn": "a function", "module": "a module", "import": "an imported file"}
     kind = kinds.get(binding.kind, "a value")
     labels = (Label(binding.span, "defined here"),) if binding.span else ()
-    unit.session.error("E0213", f"'{name.text}' is {kind}, not {wanted}", name.span, labels=labels, help=help)
+    message = f"'{name.text}' is {kind}, not {wanted}"
+    where = id(unit.source), binding.span.start if binding.span else -1
+    report_shared(unit.session, ("E0213", message, *where), "E0213", message, name.span, help, labels)
 
 
 @prepares(nodes.NameRef)
@@ -153,7 +155,7 @@ def _member(expr: nodes.Member, unit: Unit, scope: Scope) -> Code:
         # lib.v.x: the inner member is the qualified name
         return member(_member(value, unit, scope), expr.name, unit)
     code = prepare(value, unit, scope)
-    return POISONED if code.value is POISON else member(code, expr.name, unit)
+    return POISONED if code.value is POISON else member(code, expr.name, unit, value)
 
 
 def _imported(name: nodes.Name, binding: Binding, unit: Unit, scope: Scope) -> Code:

@@ -134,6 +134,10 @@ class Session:
         default_factory=dict
     )
     """Reports of unknown names: index, labels of their own, further places."""
+    shared: dict[tuple[str | int, ...], tuple[int, list[Span]]] = field(default_factory=dict)
+    """Other reports that several places share, by what they have in common: index, further places."""
+    blocks: list[Any] = field(default_factory=list)
+    """The blocks with such reports."""
     misfits: dict[int, tuple[nodes.Fn | nodes.Module, list[Misfit]]] = field(default_factory=dict)
     """Calls that do not fit by what they call, until they are reported."""
     names_in: dict[int, dict[str, list[Span]]] = field(default_factory=dict)
@@ -212,7 +216,8 @@ class Session:
             return
         from scenelang.scene.blame import joined, remember  # only mistakes need it
 
-        blamed = (operand,) if operand is not None else tuple([one for one in operands if one is not None])
+        alone = operand is not None and problem.code == "E0301"
+        blamed = tuple([one for one in ((operand,) if alone else operands) if one is not None])
         if not self.follows(problem.code, place) and joined(
             self, problem.code, problem.message, blamed, place
         ):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Any, Final, Literal, NamedTuple, TypeVar
 
@@ -14,6 +15,7 @@ from scenelang.scene.scope import Binding, Definition, Env, Frame, Scope
 from scenelang.scene.session import MAX_NESTING, UNBOUND
 from scenelang.scene.still import Needs, Still
 from scenelang.scene.unit import Unit
+from scenelang.scene.unknown import report_shared
 from scenelang.scene.values import POISON, Problem, RangeValue, Vec, describe
 from scenelang.scene.vocabulary import LANGUAGE, SETTINGS
 from scenelang.syntax import nodes
@@ -33,6 +35,7 @@ class Place(NamedTuple):
         kind: the kind of block around it.
         nested: whether a ``for`` or ``if`` stands between it and that block's braces.
         repeated: whether a ``for`` stands around it, however far out.
+        block: the names of that block, which tell it from others.
     """
 
     unit: Unit
@@ -40,6 +43,7 @@ class Place(NamedTuple):
     kind: Kind
     nested: bool = False
     repeated: bool = False
+    block: Scope | None = None
 
 
 class Body(NamedTuple):
@@ -137,14 +141,24 @@ def inner(place: Place, kind: Kind | None = None) -> Place:
     """The place inside a block: a new scope, and a new kind unless control flow passes it on."""
     scope = Scope(place.scope.frame, place.scope)
     if kind is None:
-        return Place(place.unit, scope, place.kind, True, place.repeated)
-    return Place(place.unit, scope, kind, False, place.repeated)
+        return Place(place.unit, scope, place.kind, True, place.repeated, place.block)
+    return Place(place.unit, scope, kind, False, place.repeated, scope)
 
 
 def misplaced(place: Place, span: Span, message: str, help: str | None = None) -> bool:
-    """Report a statement in the wrong place, unless nothing is known about the place."""
-    if place.kind != "unknown":
-        place.unit.session.error("E0330", message, span, help=help)
+    """Report a statement in the wrong place, unless nothing is known about the place.
+
+    Several of a sort in one block are told as one: it is the block that is of the wrong kind.
+    """
+    session = place.unit.session
+    if place.kind == "unknown":
+        return True
+    if place.block is None:
+        session.error("E0330", message, span, help=help)
+    else:
+        sort = re.sub(r"'[^']*'", "", message)
+        report_shared(session, ("E0330", id(place.block), sort), "E0330", message, span, help)
+        session.blocks.append(place.block)  # as long as it is kept, no other block has its number
     return True
 
 

@@ -61,6 +61,30 @@ def shown_places(places: Sequence[Span], words: str | Sequence[str], rest: str =
     return tuple(labels)
 
 
+def report_shared(
+    session: Session,
+    key: tuple[str | int, ...],
+    code: str,
+    message: str,
+    span: Span,
+    help: str | None = None,
+    labels: tuple[Label, ...] = (),
+) -> None:
+    """Report a mistake, or show its place at the report of the same one with the same key."""
+    items = session.diagnostics.items
+    known = session.shared.get(key)
+    if known is not None:
+        index, again = known
+        if span != items[index].span and span not in again and not session.follows(code, span):
+            again.append(span)
+            items[index] = replace(items[index], labels=(*labels, *shown_places(again, "also here")))
+        return
+    before = len(items)
+    session.error(code, message, span, help=help, labels=labels)
+    if len(items) > before:
+        session.shared[key] = before, []
+
+
 def told_at_definition(
     session: Session, text: str, source: SourceFile, defined: Iterable[tuple[str, Span | None, str]]
 ) -> bool:
