@@ -13,6 +13,12 @@ from scenelang.syntax.spelling import FOREIGN_HEADS, word_for
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 
+_IMPORT = re.compile(
+    r"""(?P<word>use|include|require)[ \t]*
+        (?:<(?P<angled>[^<>"'\n]+)>|"(?P<quoted>[^"\\\n]+)")[ \t]*(?:;|(?=//)|$)""",
+    re.VERBOSE,
+)
+
 
 class Habits:
     """Tells well known mistakes from others and mends their tokens.
@@ -87,6 +93,32 @@ class Habits:
         self.report.add("E0126", f"expected a string, found `{span.text}`", start, end, fix=fix)
         tokens.replace(at, stop - at, [])
         self._insert(at, "STRING")
+        return True
+
+    def _import_of_others(self, first: int) -> bool:
+        """`use <lib.scad>`, `include "parts.nsg";`: a file without a name for it."""
+        tokens, text = self.tokens, self.tokens.source.text
+        start = tokens.starts[first]
+        line = text[start : text.find("\n", start) if "\n" in text[start:] else len(text)]
+        found = _IMPORT.match(line)
+        if found is None:
+            return False
+        path = found["angled"] or found["quoted"]
+        alias = re.sub(r"\W", "_", path.rpartition("/")[2].partition(".")[0]) or "parts"
+        alias = f"_{alias}" if alias[0].isdigit() or alias in tables().literals else alias
+        end = start + found.end()
+        written = f'import "{path}" as {alias};'
+        message = f"`{found['word']}` without a name for the file"
+        fix: Fix | None = Fix(f"write `{written}`", (Edit(Span(tokens.source, start, end), written),))
+        fix = fix if path.endswith(".nsg") else None  # the file has to be written anew
+        help = f"write {written} and use what it defines as {alias}.…"
+        self.report.add("E0126", message, start, end, help=help, fix=fix)
+        stop = first
+        while not self._at_end(stop) and tokens.starts[stop] < end:
+            tokens.reported.add(tokens.starts[stop])
+            stop += 1
+        tokens.replace(first, stop - first, [tables().kind("BAD_STATEMENT")])
+        tokens.starts[first], tokens.ends[first] = start, end
         return True
 
     def _bare_parameters(self, states: list[int], at: int) -> bool:

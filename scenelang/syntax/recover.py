@@ -57,7 +57,9 @@ class Recovery(Habits):
         if start is not None:
             return start
         first = self._index(values[depth]) if depth < len(values) else at
-        if first < at and (self._loop_of_c(first) or self._grouped_digits(at)):
+        if first < at and (
+            self._loop_of_c(first) or self._grouped_digits(at) or self._import_of_others(first)
+        ):
             del states[depth + 1 :], values[depth:]
             return first
         known = self._head_mistake(states, first, at) if first < at else self._start_mistake(states, at)

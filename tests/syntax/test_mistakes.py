@@ -84,6 +84,10 @@ ONE_LINERS: list[tuple[str, list[tuple[int, str]]]] = [
     ("translate(0, 0.5 *\nscale(2);", [(19, "E0108")]),
     ("for (i in 0..<\nsquare { }", [(15, "E0108")]),
     ("else { star; }", [(1, "E0101")]),
+    ("use <lib.nsg>", [(1, "E0126")]),
+    ('include "lib.nsg";  // parts', [(1, "E0126")]),
+    ('import "lib.nsg";', [(17, "E0126")]),
+    ("let m = material flat { color(#d33);\nstar { m; }\nsquare { m; }", [(37, "E0104")]),
 ]
 
 
@@ -95,6 +99,16 @@ def too_many() -> str:
 def test_malformed_scene(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert mistakes(read(text)[1]) == expected(text)
+
+
+@pytest.mark.parametrize("line", ["use <lib/my-parts.nsg>", 'include "lib/my-parts.nsg";'])
+def test_a_file_of_another_language_is_imported_under_a_name(line: str) -> None:
+    text = f"{line}\nstar;\n"
+    (found,) = read(text)[1]
+    assert found.fix is not None
+    assert apply(text, found.fix) == 'import "lib/my-parts.nsg" as my_parts;\nstar;\n'
+    assert found.help is not None
+    assert 'import "lib/my-parts.nsg" as my_parts;' in found.help
 
 
 def test_there_are_ten_malformed_scenes() -> None:

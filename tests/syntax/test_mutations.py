@@ -32,14 +32,14 @@ def table() -> Table:
     return study(sample(EACH, seed=1))
 
 
-def hold(table: Table, all_: float, each: float) -> None:
+def hold(table: Table, all_: float, each: float, most: float) -> None:
     """The figures that the language promises."""
     everything = together(table)
     assert everything.share("good") >= all_
     assert everything.share("tree") == 1
     assert not [outcome.mutation for outcome in everything.outcomes if outcome.count == 0]
     too_many = [o for o in everything.outcomes if o.count > 3]
-    assert len(too_many) <= 0.001 * len(everything.outcomes), [o.mutation.what for o in too_many]
+    assert len(too_many) <= most * len(everything.outcomes), [o.mutation.what for o in too_many]
     assert parsed_only(everything).share("good") >= all_
     for (kind, fault), tally in table.items():
         if len(tally.outcomes) >= 50:
@@ -47,7 +47,7 @@ def hold(table: Table, all_: float, each: float) -> None:
 
 
 def test_one_slip_is_one_diagnostic(table: Table) -> None:
-    hold(table, all_=0.96, each=0.9)
+    hold(table, all_=0.96, each=0.9, most=0)
 
 
 def test_every_kind_of_slip_makes_mistakes(table: Table) -> None:
@@ -59,7 +59,7 @@ def test_every_kind_of_slip_makes_mistakes(table: Table) -> None:
 
 @pytest.mark.slow
 def test_one_slip_anywhere_is_one_diagnostic() -> None:
-    hold(study(exhaust(seed=3, tries=1)), all_=0.96, each=0.9)
+    hold(study(exhaust(seed=3, tries=1)), all_=0.96, each=0.9, most=0.0005)
 
 
 def test_scenes_are_sound() -> None:
