@@ -53,6 +53,9 @@ class Body(NamedTuple):
     weight: int
 
 
+CALL_STEPS: Final = 8
+"""A call of a function takes as long as so many passes of an empty loop; a limit of steps is one of time."""
+
 Prepare = Callable[[Any, Place], Action | None]
 S = TypeVar("S", bound=Prepare)
 _PREPARE: Final[dict[type, Prepare]] = {}
@@ -246,7 +249,7 @@ def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: 
         name = stmt.name.span
         unit.session.origins[id(name.source), name.start] = stmt.body
         definition.run = prepare(stmt.body, unit, scope).run
-        definition.weight = 1 + (unit.weight - before) // 8
+        definition.weight = CALL_STEPS + (unit.weight - before) // 8
     else:
         body = prepare_block(stmt.body.statements, Place(unit, Scope(frame, scope), "group"), stmt.body.span)
         definition.run = body.actions
