@@ -22,6 +22,7 @@ from fuzz import text
 from fuzz.oracles import check_diagnostics, same
 from fuzz.target import Target, hold, sampled
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.render import render_json
 from scenelang.diagnostics.span import SourceFile
 from scenelang.program.compile import compile_scene
 from scenelang.program.store import parse_program, program_bytes
@@ -94,6 +95,22 @@ def check(data: bytes) -> None:
                 hold(one == other, "the same text gives the same Scene")
         if one is not None:
             _check_scene(one)
+
+
+def outcome(data: bytes) -> bytes:
+    """All that comes of a text: diagnostics, Scene, and Program or why there is none."""
+    scene_text = text.decode(data)
+    values, frame = _outside(scene_text)
+    with small_limits():
+        scene, found = _evaluate(scene_text, values, frame)
+    told = render_json(list(found)).replace(str(root()), "")
+    if scene is not None:
+        try:
+            program = compile_scene(scene)
+        except SceneError as error:
+            return f"{told}{scene.to_json()}{render_json(error.diagnostics)}".encode("utf-8", "surrogatepass")
+        return f"{told}{scene.to_json()}".encode() + program_bytes(program)
+    return told.encode("utf-8", "surrogatepass")
 
 
 def _outside(scene_text: str) -> tuple[dict[str, str], int]:
