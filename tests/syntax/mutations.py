@@ -295,7 +295,8 @@ def judge(scene: Scene, mutation: Mutation) -> Outcome | None:
     """
     diagnostics, tree, meant = check(scene, mutation.text)
     sound = is_language(mutation.text)
-    syntax = [d for d in diagnostics if d.code[1:3] == "01"]
+    # `a.f()` is what the grammar reads and the tree has no place for.
+    syntax = [d for d in diagnostics if d.code[1:3] == "01" and d.code != "E0128"]
     if sound == bool(syntax):
         raise Disagreement(f"Lark says {sound}, the parser {syntax}: {mutation.what} in\n{mutation.text}")
     if sound and meant:
