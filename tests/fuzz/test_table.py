@@ -1,0 +1,39 @@
+"""The page on fuzzing shows the records there are, and each of the five readers has run for an hour."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+
+import pytest
+
+from fuzz.runner import ROOT
+from fuzz.table import PAGE, page, records
+
+HOURS = ("parse", "evaluate", "scene_json", "program", "weights")
+
+
+def test_tables_are_those_of_the_records() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    assert page(text) == text, "run python -m fuzz --table"
+
+
+@pytest.mark.parametrize("name", HOURS)
+def test_an_hour_without_findings_is_recorded(name: str) -> None:
+    runs = [run for run in records() if run["target"] == name and run["wall_s"] >= 3600]
+    assert runs
+    assert runs[-1]["findings"] == []
+    assert runs[-1]["crashes"] == 0
+    assert runs[-1]["executions"] > 5000
+
+
+def test_commits_of_what_was_mended_exist() -> None:
+    commits = re.findall(r"\| `([0-9a-f]{7})` \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(commits) > 10
+    asked = ["git", "rev-parse", "--is-shallow-repository"]
+    told = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=False)
+    if told.stdout.strip() != "false":
+        pytest.skip("no checkout with its history")
+    for commit in commits:
+        asked = ["git", "cat-file", "-e", f"{commit}^{{commit}}"]
+        assert subprocess.run(asked, cwd=ROOT, capture_output=True, check=False).returncode == 0, commit
