@@ -126,7 +126,7 @@ def draw_program(
         program: compiled for this model's weights.
         model: from `open_model`.
         threads: tiles drawn at the same time; by default one for each usable core.
-        split: how many threads the picture is split for, which shows in the last bits; by default ``threads``.
+        split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
         progress: called with the share done, in [0, 1], from any thread.
 

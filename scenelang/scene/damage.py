@@ -17,7 +17,8 @@ from scenelang.syntax.tables import tables
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _DEFINITION = re.compile(
-    r"(?:let|param|fn|module)\b(?P<name>[ \t]+[A-Za-z_]\w*)?|(?:import|include|use|require)\b(?P<alias>.*\bas\s+\w+)?"
+    r"(?:let|param|fn|module)\b(?P<name>[ \t]+[A-Za-z_]\w*)?"
+    r"|(?:import|include|use|require)\b(?P<alias>.*\bas\s+\w+)?"
 )
 _NAMES = frozenset(("E0201", "E0202", "E0203", "E0204", "E0206", "E0207", "E0208", "E0212", "E0213"))
 _PLACES = frozenset(("E0330", "E0331", "E0332", "E0333", "E0334", "E0335"))

@@ -69,9 +69,9 @@ class Vocabulary:
         return {name for m in self.in_use for name in m.material_ops}
 
     def owner(self, name: str) -> str | None:
-        """The first model at hand that has a geometry, material or operation ``name``."""
+        """The first model at hand but the chosen one that has a geometry, material or operation ``name``."""
         for m in self.models:
-            if name in (*m.geometries, *m.materials, *m.transforms, *m.material_ops):
+            if m is not self.chosen and name in (*m.geometries, *m.materials, *m.transforms, *m.material_ops):
                 return m.name
         return None
 
