@@ -10,7 +10,7 @@ import pytest
 from fuzz.runner import ROOT
 from fuzz.table import PAGE, page, records
 
-HOURS = ("parse", "evaluate", "scene_json", "program", "weights")
+HOURS = ("parse", "evaluate")
 
 
 def test_tables_are_those_of_the_records() -> None:
