@@ -65,4 +65,5 @@ TARGET = Target(
     mutate=text.mutate,
     dictionary=text.dictionary,
     most_bytes=1200,
+    runs=13,
 )

@@ -99,6 +99,8 @@ def _invert(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         linear = np.linalg.inv(frame.reshape(2, 3)[:, :2])
     except np.linalg.LinAlgError:
         raise ProgramError("a frame without an inverse") from None
+    if not np.abs(linear).max() < MOST:  # before squares of it overflow
+        raise ProgramError("a frame beyond float32")
     return linear, -linear @ frame[[2, 5]]
 
 

@@ -112,7 +112,15 @@ def test_a_program_has_a_colour_behind_it(background: list[float]) -> None:
 
 
 @pytest.mark.parametrize(
-    "frame", [[0] * 6, [1, 1, 0, 1, 1, 0], [1e35, 0, 0, 0, 1, 0], [1e-40, 0, 0, 0, 1e-40, 0]], ids=str
+    "frame",
+    [
+        [0] * 6,
+        [1, 1, 0, 1, 1, 0],
+        [1e35, 0, 0, 0, 1, 0],
+        [1e-40, 0, 0, 0, 1e-40, 0],
+        [1e-45, 3e38, 0, 1e-45, 1, 0],
+    ],
+    ids=str,
 )
 @pytest.mark.parametrize("start", [5, 20])
 def test_vectors_that_lead_nowhere_are_refused_when_drawn(frame: list[float], start: int) -> None:
