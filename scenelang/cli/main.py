@@ -27,6 +27,7 @@ COMMANDS: Final = {
     "eval": "Measure a model on unseen scenes.",
     "stability": "Measure a model far beyond its training.",
     "train": "Train a model's weights.",
+    "experiment": "Train several designs alike and compare them.",
     "watch": "Draw a scene again whenever it is saved.",
     "lsp": "Serve editors over the Language Server Protocol.",
     "explain": "Say what a diagnostic's code means.",

@@ -133,11 +133,11 @@ def _header(config: TrainConfig, iteration: int, seconds: float, device: str) ->
         "device": device,
         "threads": torch.get_num_threads(),
         "torch": torch.__version__.split("+")[0],
-        "revision": _revision(),
+        "revision": revision(),
     }
 
 
-def _revision() -> str:
+def revision() -> str:
     """The git revision of the source, or 'unknown' outside a checkout."""
     try:
         out = subprocess.run(

@@ -5,6 +5,8 @@ An image here has colour, coverage and distance, as renderers write them side by
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
@@ -32,8 +34,14 @@ def image_loss(network: Framed, batch: Batch) -> tuple[Tensor, dict[str, float]]
     return trace_loss(trace, batch)
 
 
-def trace_loss(trace: Trace, batch: Batch) -> tuple[Tensor, dict[str, float]]:
-    """Loss of what a network answered along the streams of a batch; see `image_loss`."""
+def trace_loss(trace: Trace, batch: Batch, unasked: Collection[str] = ()) -> tuple[Tensor, dict[str, float]]:
+    """Loss of what a network answered along the streams of a batch; see `image_loss`.
+
+    Args:
+        trace: the answers.
+        batch: what they should be.
+        unasked: names of terms to leave out.
+    """
     n = batch.leaf.shape[1]
     used = (torch.arange(n, device=batch.leaf.device) < batch.count[:, None]).float()[..., None]  # (B, N, 1)
     entries = used.sum() * batch.distance.shape[2]
@@ -51,12 +59,12 @@ def trace_loss(trace: Trace, batch: Batch) -> tuple[Tensor, dict[str, float]]:
         "depth": depth * used * (batch.depth < FAR_WORLD),
         "colour": (12 * gap.square() + 3 * gap.abs()).sum(-1) * covered * used,
     }
-    parts = {name: term.sum() / entries for name, term in terms.items()}
+    parts = {name: term.sum() / entries for name, term in terms.items() if name not in unasked}
     return torch.stack(list(parts.values())).sum(), {k: v.item() for k, v in parts.items()}
 
 
 def leaf_loss(
-    network: Framed, batch: LeafBatch, codes: Tensor | None = None
+    network: Framed, batch: LeafBatch, codes: Tensor | None = None, unasked: Collection[str] = ()
 ) -> tuple[Tensor, dict[str, float]]:
     """Loss of the leaves alone, in their own frames: coverage and distance, as in `image_loss`.
 
@@ -64,13 +72,15 @@ def leaf_loss(
         network: its decoder is what is trained.
         batch: points.
         codes: of the leaves (G, C), if they are not the network's own.
+        unasked: names of terms to leave out.
     """
     codes = network.codes if codes is None else codes
     one = torch.ones(len(codes), device=batch.q.device)
     features = network.decode(batch.q, one, network.decoder_weights(codes))[..., 0]
     inside = (batch.distance < 0).float()
-    parts = {
+    terms = {
         "alone": cross_entropy(features * network.edge_slope.exp(), 1 - inside),
         "shape": ((features - batch.distance).abs() / (batch.distance.abs() + SHARP)).mean(),
     }
+    parts = {name: term for name, term in terms.items() if name not in unasked}
     return torch.stack(list(parts.values())).sum(), {k: v.item() for k, v in parts.items()}

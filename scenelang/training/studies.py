@@ -222,8 +222,9 @@ class Study:
 
     def _framed_loss(self, student: FramedStudent, scenes: Scenes, share: float) -> Tensor:
         p = self.config.points
-        if share < LEAVES_ALONE and self.config.student.lifting == "exact":
-            return leaf_loss(student.renderer, leaf_batch(4 * p, self.generator), student.leaf_codes)[0]
+        if share < LEAVES_ALONE and student.leaves_first:
+            leaves = leaf_batch(4 * p, self.generator)
+            return leaf_loss(student.renderer, leaves, student.leaf_codes, student.unasked)[0]
         maps, singular = scenes.affine[..., :2, [0, 1, 3]], stretch(scenes)
         near = SceneConfig(points=p, extent=1.0)
         points = points_of(
@@ -242,7 +243,7 @@ class Study:
             depth=torch.stack([depth for depth, _ in steps], 1),
             colour=torch.stack([colour.expand(*depth.shape, 3) for depth, colour in steps], 1),
         )
-        return trace_loss(student.trace(scenes, x, y), batch)[0]
+        return trace_loss(student.trace(scenes, x, y), batch, student.unasked)[0]
 
     @torch.no_grad()
     def _average(self) -> None:
