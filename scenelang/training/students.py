@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import torch
 from torch import Tensor, nn
@@ -26,7 +26,10 @@ RendererName = Literal["framed", "streaming", "reading"]
 
 @dataclass(frozen=True, slots=True)
 class StudentConfig:
-    """Which lifting and renderer, and their sizes; those of the others are not looked at."""
+    """Which lifting and renderer, and their sizes; those of the others are not looked at.
+
+    `variant` names a `framed` renderer that lacks a part (`scenelang.training.ablations`), or is empty.
+    """
 
     renderer: RendererName
     lifting: LiftingName
@@ -34,6 +37,7 @@ class StudentConfig:
     framed: FramedConfig = field(default_factory=FramedConfig)
     streaming: StreamingConfig = field(default_factory=StreamingConfig)
     reading: ReadingConfig = field(default_factory=ReadingConfig)
+    variant: str = ""
 
 
 class ExactCodes(nn.Module):
@@ -141,6 +145,9 @@ class ReadingStudent(PointStudent):
 class FramedStudent(PointStudent):
     """The framed renderer, which reads codes and frames out of the vectors whoever lifted them."""
 
+    network: ClassVar[type[Framed]] = Framed
+    unasked: ClassVar[frozenset[str]] = frozenset()  # terms of the loss that are left out
+
     def __init__(self, config: StudentConfig) -> None:
         super().__init__(config)
         if self.vector != exact.D_G + exact.D_M:
@@ -150,27 +157,41 @@ class FramedStudent(PointStudent):
                 codes = self.lifting.codes
                 codes[:, exact.CODE.stop :] = 0.0
                 codes[:, exact.FRAME] = codes[:, exact.MIDDLE] = torch.tensor([1.0, 0, 0, 0, 1, 0])
-        self.renderer = Framed(config.framed, len(GEOMETRIES), 1)
+        self.renderer = self.network(config.framed, len(GEOMETRIES), 1)
         # the codes are the lifting's
         self.renderer.codes.requires_grad_(False)
         self.renderer.material_codes.requires_grad_(False)
+
+    @property
+    def leaves_first(self) -> bool:
+        """Whether its leaves can be learned alone before its streams."""
+        return self.config.lifting == "exact"
 
     @property
     def leaf_codes(self) -> Tensor:
         """Codes (G, C) of the leaves as the decoder takes them."""
         return self.lifting.codes[:, exact.CODE]
 
+    def read(self, g: Tensor, scenes: Scenes, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """What the decoder is shown at world points (B, P) of geometry vectors (B, N, 32).
+
+        Returns:
+            Points (B, N, P, 2), distance scales (B, N), codes (B, N, C).
+        """
+        q, scale = read_points(g, x, y)
+        return q, scale, g[..., exact.CODE]
+
     def trace(self, scenes: Scenes, x: Tensor, y: Tensor) -> Trace:
         """What the network answers along the streams at world points (B, P)."""
         vectors = self.lifting.lift(scenes)
         g, m = vectors[..., : exact.D_G], vectors[..., exact.D_G :]
-        q, scale = read_points(g, x, y)
+        q, scale, code = self.read(g, scenes, x, y)
         b, n = scenes.leaf.shape
         material = m[..., exact.MATERIAL_CODE].reshape(b * n, -1)
         albedo = self.renderer.object_albedo(material).view(b, n, 3)
         mix = m[..., exact.COLOUR].reshape(b, n, 3, 4)
         colours = (mix[..., :3] @ albedo[..., None])[..., 0] + mix[..., 3]
-        return self.renderer.trace(q, scale, g[..., exact.CODE], colours, scenes.tokens)
+        return self.renderer.trace(q, scale, code, colours, scenes.tokens)
 
     def points(self, scenes: Scenes, x: Tensor, y: Tensor) -> Tensor:
         trace = self.trace(scenes, x, y)
@@ -216,4 +237,10 @@ def make_student(config: StudentConfig, *, grown: bool = False) -> Student:
     """Build a student with random parameters."""
     if config.renderer == "streaming":
         return StreamingStudent(config, grown=grown)
-    return ReadingStudent(config) if config.renderer == "reading" else FramedStudent(config)
+    if config.renderer == "reading":
+        return ReadingStudent(config)
+    if config.variant:
+        from scenelang.training.ablations import VARIANTS  # which derive from what is defined here
+
+        return VARIANTS[config.variant](config)
+    return FramedStudent(config)
