@@ -21,6 +21,7 @@ from torch import Tensor
 from scenelang.evaluation.metrics import MOST_DB, measure
 from scenelang.image import Image
 from scenelang.renderers.streaming import StreamingConfig
+from scenelang.training.ablations import ablation_runs
 from scenelang.training.encoders import LiftingConfig
 from scenelang.training.loop import revision
 from scenelang.training.pictures import PictureConfig, Scenes, pictures, random_scenes
@@ -32,6 +33,7 @@ STRIP = 8  # scenes of a strip
 CHUNK = 8  # scenes drawn at once
 POINTS = 6  # of a curve over time
 SIDE = 32  # pixels along a side of the pictures: what `streaming` reaches on a processor in minutes
+PARTS_SIDE = 128  # where only renderers that answer points are compared
 RATES: dict[RendererName, float] = {"framed": 3e-3, "streaming": 1e-3, "reading": 2e-3}
 RENDERERS: tuple[RendererName, ...] = ("framed", "reading", "streaming")
 LIFTINGS: tuple[LiftingName, ...] = ("exact", "learned")
@@ -47,12 +49,14 @@ class Run:
         group: runs that are compared with one another.
         study: what is trained.
         seen: measure on the fixed scenes it was trained on.
+        side: pixels along a side of the pictures that are measured.
     """
 
     name: str
     group: str
     study: StudyConfig
     seen: bool = False
+    side: int = SIDE
 
     @property
     def folder(self) -> str:
@@ -154,6 +158,11 @@ def seeds(budget_s: float, seed: int) -> list[Run]:
     ]
 
 
+def parts(budget_s: float, seed: int) -> list[Run]:
+    """`framed` without one of its parts at a time, and at other sizes: what each of them buys."""
+    return [Run(*run, side=PARTS_SIDE) for run in ablation_runs(budget_s, seed)]
+
+
 EXPERIMENTS: dict[str, Callable[[float, int], list[Run]]] = {
     "overfit": overfit,
     "compare": compare,
@@ -163,6 +172,7 @@ EXPERIMENTS: dict[str, Callable[[float, int], list[Run]]] = {
     "table4": table4,
     "losses": losses,
     "seeds": seeds,
+    "parts": parts,
 }
 
 
@@ -242,7 +252,7 @@ def run_one(
                 report(run, study, curve[-1][1])
     finite = finite and all(bool(p.isfinite().all()) for p in study.averaged.parameters())
     scenes = _scenes(run, study, settings.scenes, settings)
-    shown, exact = draw(study.averaged, scenes, SIDE)
+    shown, exact = draw(study.averaged, scenes, run.side)
     figures = _figures(shown, exact)
     if report is not None:
         report(run, study, figures["psnr"]["mean"])
@@ -254,7 +264,7 @@ def run_one(
         "steps": study.progress.step,
         "parameters": sum(p.numel() for p in study.averaged.parameters()),
         "finite": finite,
-        "resolution": SIDE,
+        "resolution": run.side,
         "scenes": len(scenes.leaf),
         **figures,
         "curve": curve,
@@ -344,7 +354,7 @@ def _lpips(shown: Tensor, exact: Tensor) -> dict[str, float] | None:
 def _strips(run: Run, shown: Tensor, exact: Tensor, folder: Path) -> str:
     """Write the first scenes in a row, and the exact ones beside it; returns the file's name."""
     name = f"{run.folder}.png"
-    truth = f"exact-{SIDE}px{'-seen' if run.seen else ''}.png"
+    truth = f"exact-{run.side}px{'-seen' if run.seen else ''}.png"
     for file, images in ((name, shown), (truth, exact)):
         row: Sequence[Tensor] = [image.nan_to_num(0.5).permute(1, 2, 0) for image in images[:STRIP]]
         picture = np.ascontiguousarray(torch.cat(list(row), 1).numpy(), np.float32)
