@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from typing import Any
 
 from scenelang.scene import schema
 
@@ -112,3 +113,81 @@ def blob_scene(seed: int) -> schema.Scene:
         head = schema.Link(op="union", node=schema.Group(children=nodes))
         return schema.Scene(nodes=(schema.Chain(children=(head, tail)),))
     return schema.Scene(nodes=nodes)
+
+
+EYE = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+NOTHING: tuple[schema.Transform, ...] = (
+    schema.Translate(x=0.0, y=0.0),
+    schema.Rotate(angle=0.0),
+    schema.Scale(x=1.0, y=1.0, z=1.0),
+    schema.Shear(axes="xy", k=0.0),
+    schema.Matrix(rows=EYE),
+    schema.Twirl(k=0.0),
+    schema.Bend(k=0.0),
+)
+"""Transforms that leave everything where it is."""
+
+SMALL = {(256, 256): (64, 64), (320, 192): (80, 48), (64, 200): (16, 50)}
+"""Canvases of the same shapes whose every sample can be looked at."""
+
+
+def full_scene(seed: int) -> schema.Scene:
+    """A `random_scene` with all that passes look for.
+
+    Transforms that do nothing and whole matrices among the others, objects drawn twice, objects off the
+    canvas, and small ones under a large one.
+    """
+    rng = random.Random(f"full {seed}")
+    scene = random_scene(rng.randrange(1 << 30), warps=rng.random() < 0.7)
+    nodes = [_enriched(node, rng) for node in scene.nodes]
+    for extra in range(len(nodes), 0, -1):
+        draw = rng.random()
+        if draw < 0.2:
+            away = schema.Translate(x=rng.choice([-4.0, 4.0]), y=rng.uniform(-3.0, 3.0))
+            nodes.insert(extra, schema.Group(children=(random_leaf(rng, False),), transforms=(away,)))
+        elif draw < 0.4:
+            nodes[extra:extra] = _hidden(rng)
+    return scene.model_copy(update={"nodes": tuple(nodes), "canvas": SMALL[scene.canvas]})
+
+
+def _hidden(rng: random.Random) -> list[schema.SceneNode]:
+    """A small leaf, and a larger one over it."""
+    at = schema.Translate(x=rng.uniform(-0.6, 0.6), y=rng.uniform(-0.6, 0.6))
+    turn, size = schema.Rotate(angle=rng.uniform(0, 6)), rng.uniform(0.3, 0.6)
+    return [
+        schema.Object(
+            geometry=rng.choice(GEOMETRIES),
+            transforms=(schema.Scale(x=s, y=s, z=1.0), turn, at),
+            material=random_material(rng),
+        )
+        for s in (0.2 * size, size)
+    ]
+
+
+def _moves(moves: tuple[schema.Transform, ...], rng: random.Random) -> tuple[schema.Transform, ...]:
+    """With transforms that do nothing, and a matrix, in between."""
+    out = list(moves)
+    while rng.random() < 0.35:
+        out.insert(rng.randint(0, len(out)), rng.choice(NOTHING))
+    if rng.random() < 0.15:
+        a, b, c, d = (rng.uniform(-0.3, 0.3) for _ in range(4))
+        rows = ((1 + a, b, 0.0, c), (b, 1 - a, 0.0, d), *EYE[2:])
+        out.insert(rng.randint(0, len(out)), schema.Matrix(rows=rows))
+    return tuple(out)
+
+
+def _enriched(node: schema.SceneNode, rng: random.Random) -> schema.SceneNode:
+    changes: dict[str, object] = {"transforms": _moves(node.transforms, rng)}
+    if isinstance(node, schema.Chain):
+        links = [link.model_copy(update={"node": _enriched(link.node, rng)}) for link in node.children]
+        changes["children"] = _doubled(links, rng)
+    elif not isinstance(node, schema.Object):
+        changes["children"] = _doubled([_enriched(child, rng) for child in node.children], rng)
+    return node.model_copy(update=changes)
+
+
+def _doubled(children: list[Any], rng: random.Random) -> tuple[Any, ...]:
+    """With one of them drawn twice, now and then."""
+    if children and rng.random() < 0.15:
+        children.append(rng.choice(children))
+    return tuple(children)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_scenes import blob_scene, random_scene
-from tree_oracle import assert_same_picture, graph_picture, stream_picture, tree_picture
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
 from scenelang.passes.context import Context
+from tests.passes.random_scenes import blob_scene, random_scene
+from tests.passes.tree_oracle import assert_same_picture, graph_picture, stream_picture, tree_picture
 
 MANIFEST = load_manifest("shapes2d")
 CHECKS = {"check_levels", "check_trained"}
