@@ -18,10 +18,12 @@ from functools import lru_cache
 import torch
 
 from scenelang.backend.errors import RenderError
-from scenelang.models.load import Model, ModelError, load_model
+from scenelang.models.load import Model, ModelError, load_model, place_of
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing, draw
+from scenelang.renderers.framed import Framed
 from scenelang.renderers.kept import Kept
+from scenelang.renderers.whole import draw_whole
 
 KEEP_BYTES = 256 << 20
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
@@ -142,10 +144,20 @@ def draw_program(
             f"these are {model.digest[:12]}…: compile the scene again"
         )
     threads = usable_cores() if threads is None else threads
-    if model.network.codes.device.type != "cpu":
+    if place_of(model.network).type != "cpu":
         threads, split = 1, 1  # the device is busy with one tile
     with _drawing, _one_torch_thread():
         try:
+            if not isinstance(model.network, Framed):
+                torch.set_num_threads(threads)
+                return draw_whole(
+                    model.network,
+                    program.vectors,
+                    program.tokens,
+                    program.canvas,
+                    program.background,
+                    progress=progress,
+                )
             return draw(
                 model.network,
                 program.vectors,

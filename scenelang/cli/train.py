@@ -16,6 +16,8 @@ from scenelang.cli import options
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
+    from scenelang.training.config import StudentFile
+
 Report = Callable[[int, int, float, dict[str, float]], None]
 
 
@@ -59,7 +61,7 @@ def command(
     from pydantic import ValidationError
 
     from scenelang.backend.neural import choose_device, keep_memory
-    from scenelang.training.config import read_config
+    from scenelang.training.config import StudentFile, read_config
     from scenelang.training.loop import train
 
     try:
@@ -69,6 +71,12 @@ def command(
     keep_memory()
     torch.set_num_threads(threads or 1)
     place = choose_device(device)
+    if isinstance(wanted, StudentFile):
+        try:
+            _student(wanted, out, math.inf if budget is None else 60 * budget, place, every)
+        except ValueError as error:
+            raise click.UsageError(str(error)) from None
+        ctx.exit(0)
     click.echo(f"training {wanted.model}: {wanted.iterations:,} steps on {place}, into {out}", err=True)
     last: dict[str, float] = {}
     try:
@@ -103,6 +111,41 @@ def command(
     else:
         click.echo(f"out of time{reached}: the same command goes on from the checkpoint in {out}")
     ctx.exit(0)
+
+
+def _student(file: StudentFile, out: Path, budget_s: float, device: str, every: int) -> None:
+    """Train a student, or go on with it."""
+    from scenelang.training.export import export
+    from scenelang.training.studies import Study
+
+    config = file.study
+    click.echo(
+        f"training {file.model}: {config.seconds:g} s of processor time on {device}, into {out}", err=True
+    )
+    perceptual = None
+    if config.perceptual:
+        from scenelang.evaluation.lpips import LpipsError, load_lpips
+
+        try:
+            perceptual = load_lpips("alexnet").to(device)
+        except LpipsError as error:
+            raise ValueError(str(error)) from None
+    study = Study(config, out, device, perceptual)
+    total = 0.0
+    for progress in study.run(budget_s):
+        total += progress.loss
+        if progress.step % every == 0:
+            mean, total = total / every, 0.0
+            click.echo(
+                f"{progress.step:,} steps, {progress.seconds:.0f} of {config.seconds:g} s, "
+                f"mean loss {mean:.4g}",
+                err=True,
+            )
+    if study.progress.seconds < config.seconds:
+        click.echo(f"out of time: the same command goes on from the checkpoint in {out}")
+        return
+    export(study, file, out / "weights.safetensors", device)
+    click.echo(f"done: {out / 'weights.safetensors'}")
 
 
 @contextmanager

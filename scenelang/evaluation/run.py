@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.backend.neural import draw_program
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.evaluation.metrics import MOST_DB, measure
 from scenelang.evaluation.sets import scenes
@@ -22,7 +23,6 @@ from scenelang.models.manifest import Manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import TOKENS, Program
 from scenelang.reference.image import reference_image
-from scenelang.renderers.draw import draw
 from scenelang.scene.schema import Scene
 
 PROBE = 48  # pixels along a side of the picture that tells how much a scene covers
@@ -64,10 +64,7 @@ def scenes_of(model: Model, name: str, seed: int) -> Callable[[int], Scene]:
 def draw_scene(model: Model, scene: Scene, threads: int = 1) -> tuple[Program, Image]:
     """Compile a scene and draw it with a model."""
     program = compile_scene(scene, model=model.manifest.name, codes=model.codes())
-    drawing = draw(
-        model.network, program.vectors, program.tokens, program.canvas, program.background, threads=threads
-    )
-    return program, drawing.image
+    return program, draw_program(program, model, threads=threads).image
 
 
 def _worst(cases: list[Case], count: int = 12) -> list[Case]:

@@ -7,6 +7,7 @@ errors, averaged over channels, over the number of such pixels.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import platform
 import time
@@ -17,26 +18,30 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.backend.neural import draw_program as paint
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.evaluation.metrics import flip, psnr
 from scenelang.evaluation.probes import PROBES, Probe, animated, apart, rng_of, union_of
 from scenelang.evaluation.run import coverage, spread
 from scenelang.graph.lower import lower
-from scenelang.graph.steps import Affine
+from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.graph.transforms import step_of
 from scenelang.image import Image
 from scenelang.lifting import exact
+from scenelang.lifting.learned import lift_geometry
 from scenelang.models.load import Model
 from scenelang.passes import OPTIONAL
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
 from scenelang.reference.image import reference_image
 from scenelang.renderers.draw import draw
+from scenelang.renderers.framed import Framed
 from scenelang.scene.schema import Chain, Object, Scene
 
 EDGE = 2 / 255  # a pixel of an edge differs by more from a neighbour
 LEAST_COVER = 0.02  # share of the canvas; scenes with less are drawn again
 FRAMES = 8
+SIZES = {"canvas"}  # probes that only models of any size can take
 
 Array = npt.NDArray[np.float64]
 Report = Callable[[str, int, int], None]
@@ -51,12 +56,14 @@ class Errors:
         flip: mean FLIP in [0, 1].
         per_edge: absolute error per edge pixel.
         per_covered: absolute error per covered pixel.
+        square: mean squared error, which no cap hides.
     """
 
     psnr: float
     flip: float
     per_edge: float
     per_covered: float
+    square: float
 
 
 def exact_picture(scene: Scene, model: Model) -> tuple[Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
@@ -83,19 +90,31 @@ def compare(picture: Image, reference: tuple[Array, Any, Any]) -> Errors:
         flip(picture, exact_one),
         gap / max(1, edge.sum()),
         gap / max(1, covered.sum()),
+        float(np.square(np.asarray(picture, np.float64)[..., :3] - exact_one).mean()),
     )
 
 
-def unfolded(scene: Scene, program: Program) -> Program:
-    """The same Program, its geometry vectors lifted one affine map after the other, in float32.
+def unfolded(scene: Scene, program: Program, model: Model) -> Program:
+    """The same Program, its geometry vectors lifted one affine map after the other.
+
+    The exact lifting does so in float32, to show what rounding adds up to.
 
     Args:
         scene: one chain of objects, deformations first.
         program: compiled of it without dropping rows.
+        model: that it was compiled for.
     """
     (chain,) = scene.nodes
     assert isinstance(chain, Chain)
     vectors = program.vectors.copy()
+    lifting = model.codes().lifting
+    if lifting is not None:
+        nodes = [link.node for link in chain.children if isinstance(link.node, Object)]
+        steps = [[step_of(t, 2) for t in node.transforms] for node in nodes]
+        leaves = [model.manifest.geometries.index(node.geometry) for node in nodes]
+        chains: list[list[Step]] = [[s for s in chain if isinstance(s, Affine | Warp)] for chain in steps]
+        vectors[:, : lifting.codes.shape[1]] = lift_geometry(lifting, chains, leaves)
+        return dataclasses.replace(program, vectors=vectors)
     for row, link in zip(vectors, chain.children, strict=True):
         assert isinstance(link.node, Object)
         g = exact.leaf_vector(row[exact.CODE].tolist()).astype(np.float32)
@@ -107,21 +126,13 @@ def unfolded(scene: Scene, program: Program) -> Program:
                 matrix = exact.warp_matrix(step, exact.INNER)  # type: ignore[arg-type]
             g = matrix.astype(np.float32) @ g
         row[: exact.D_G] = g
-    return Program(
-        vectors,
-        program.tokens,
-        program.bounds,
-        program.canvas,
-        program.background,
-        program.model,
-        program.weights,
-        program.objects,
-        program.places,
-    )
+    return dataclasses.replace(program, vectors=vectors)
 
 
 def draw_program(model: Model, program: Program, **options: Any) -> Image:
-    """A Program's picture."""
+    """A Program's picture; options are those of `renderers.draw.draw`."""
+    if not isinstance(model.network, Framed):
+        return paint(program, model, threads=1).image
     return draw(
         model.network, program.vectors, program.tokens, program.canvas, program.background, **options
     ).image
@@ -130,14 +141,20 @@ def draw_program(model: Model, program: Program, **options: Any) -> Image:
 def _drawn(model: Model, scene: Scene, folded: bool) -> Image:
     without = () if folded else OPTIONAL
     program = compile_scene(scene, model=model.manifest.name, codes=model.codes(), without=without)
-    return draw_program(model, program if folded else unfolded(scene, program))
+    return draw_program(model, program if folded else unfolded(scene, program, model))
+
+
+def _sized(scene: Scene, model: Model) -> Scene:
+    """The scene on a canvas that the model draws."""
+    sizes = model.manifest.sizes
+    return scene.model_copy(update={"canvas": sizes[0]}) if sizes else scene
 
 
 def scene_of(probe: Probe, value: float, index: int, seed: int, model: Model) -> Scene:
     """The scene of a probe at a value; drawn again while it covers too little of the canvas."""
     scale = 1.0
     for attempt in range(200):
-        scene = probe.make(rng_of(seed, index, attempt), value)
+        scene = _sized(probe.make(rng_of(seed, index, attempt), value), model)
         if coverage(scene, model.manifest) >= LEAST_COVER * scale:
             return scene
         scale *= 0.97  # thin and tiny objects never cover that much
@@ -147,10 +164,11 @@ def scene_of(probe: Probe, value: float, index: int, seed: int, model: Model) ->
 def run_probe(
     model: Model, name: str, scenes: int, seed: int, report: Report | None = None
 ) -> dict[str, Any]:
-    """A curve: errors at every value of a probe."""
+    """A curve: errors at every value of a probe; none for one that the model's canvas rules out."""
     probe = PROBES[name]
     rows = []
-    for at, value in enumerate(probe.values):
+    values = probe.values if name not in SIZES or not model.manifest.sizes else ()
+    for at, value in enumerate(values):
         found = []
         for index in range(scenes):
             scene = scene_of(probe, value, index, seed, model)
@@ -160,6 +178,7 @@ def run_probe(
                 "value": value,
                 "psnr": spread([e.psnr for e in found], 5),
                 "flip": spread([e.flip for e in found], 95),
+                "db": round(-10 * math.log10(max(1e-12, float(np.mean([e.square for e in found])))), 3),
                 "per_edge": round(float(np.mean([e.per_edge for e in found])), 6),
                 "per_covered": round(float(np.mean([e.per_covered for e in found])), 6),
             }
@@ -175,8 +194,8 @@ def order_of_disjoint(model: Model, scenes: int, seed: int) -> dict[str, float]:
     for index in range(scenes):
         rng = rng_of(seed, index)
         nodes = apart(rng)
-        first = union_of(nodes)
-        second = union_of([nodes[i] for i in rng.permutation(len(nodes))])
+        first = _sized(union_of(nodes), model)
+        second = _sized(union_of([nodes[i] for i in rng.permutation(len(nodes))]), model)
         a, b = _drawn(model, first, True), _drawn(model, second, True)
         most = max(most, float(np.abs(np.asarray(a) - np.asarray(b)).max()))
         values.append(psnr(a, exact_picture(first, model)[0]))
@@ -190,7 +209,7 @@ def flicker(model: Model, scenes: int, seed: int) -> dict[str, float]:
     """
     ratios = []
     for index in range(scenes):
-        frames = animated(rng_of(seed, index), FRAMES)
+        frames = [_sized(f, model) for f in animated(rng_of(seed, index), FRAMES)]
         ours = [np.asarray(_drawn(model, f, True), np.float64) for f in frames]
         exact_ones = [exact_picture(f, model)[0] for f in frames]
         extra = real = 0.0
@@ -207,6 +226,8 @@ def arithmetic(model: Model, scenes: int, seed: int) -> dict[str, float]:
     """What tiles, threads and skipping change of a picture at most, on base scenes."""
     probe = PROBES["objects"]
     most = {"tiles": 0.0, "threads": 0.0, "skipping": 0.0}
+    if not isinstance(model.network, Framed):
+        return most  # draws whole pictures
     for index in range(scenes):
         scene = scene_of(probe, 4, index, seed, model)
         program = compile_scene(scene, model=model.manifest.name, codes=model.codes())
@@ -249,6 +270,7 @@ def run_stability(
     """
     started = time.perf_counter()
     probes = {n: run_probe(model, n, scenes, seed, report) for n in PROBES if not only or n in only}
+    probes = {name: probe for name, probe in probes.items() if probe["rows"]}
     invariants = {}
     for name, measure in INVARIANTS.items():
         if not only or name in only:

@@ -67,6 +67,21 @@ def lower(
             spans.span(scene) if spans else None,
             help="render smaller with `canvas(w, h)` or `--size`",
         )
+    elif manifest.sizes and scene.canvas not in manifest.sizes:
+        sizes = " or ".join(f"{w} x {h}" for w, h in manifest.sizes)
+        diagnostics.add(
+            "E0509",
+            f"a canvas of {width} x {height} pixels; model `{manifest.name}` draws {sizes} alone",
+            spans.span(scene) if spans else None,
+            help="give that size with `canvas(w, h)` or `--size`, or draw with another model",
+        )
+    if manifest.white and scene.background != WHITE:
+        diagnostics.add(
+            "E0510",
+            f"model `{manifest.name}` draws over white alone",
+            spans.span(scene) if spans else None,
+            help="leave `background` out, or draw with another model",
+        )
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
     lowering = _Lowering(manifest, spans, diagnostics, old, None if memory is None else {})
     root = lowering.run(scene)

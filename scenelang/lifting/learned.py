@@ -12,6 +12,7 @@ import numpy.typing as npt
 from scenelang.graph.steps import Affine, Step
 
 Array = npt.NDArray[np.float64]
+MOST = 1e4  # of an entry: far outside all that was trained, and what float32 networks still take in
 
 # Numbers that a transformation hands to its encoder.
 GEOMETRY_INPUTS = {"affine": 16, "twirl": 1, "bend": 1}
@@ -51,6 +52,7 @@ def read_lifting(tensors: Mapping[str, npt.NDArray[Any]], prefix: str = "lifting
 
     Raises:
         KeyError: something is missing.
+        ValueError: shapes do not fit each other, or numbers are not finite.
     """
 
     def array(name: str) -> Array:
@@ -66,7 +68,25 @@ def read_lifting(tensors: Mapping[str, npt.NDArray[Any]], prefix: str = "lifting
         )
         for side, kind in kinds
     }
-    return Lifting(array("codes"), array("material_codes"), encoders)
+    lifting = Lifting(array("codes"), array("material_codes"), encoders)
+    for side, kind in kinds:
+        _check(
+            kind, encoders[kind], (lifting.codes if side == "geometry" else lifting.material_codes).shape[1]
+        )
+    return lifting
+
+
+def _check(kind: str, layers: tuple[tuple[Array, Array], ...], size: int) -> None:
+    """An encoder's layers must fit one another and end in a matrix (size, size)."""
+    width = {**GEOMETRY_INPUTS, **MATERIAL_INPUTS}[kind]
+    for weight, bias in layers:
+        if weight.ndim != 2 or bias.shape != weight.shape[:1] or weight.shape[1] != width:
+            raise ValueError(f"a layer of `{kind}` has the wrong shape")
+        if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
+            raise ValueError(f"a layer of `{kind}` is not finite")
+        width = len(bias)
+    if width != size * size:
+        raise ValueError(f"`{kind}` ends in {width} numbers, where {size} x {size} are needed")
 
 
 def step_numbers(step: Step) -> tuple[str, list[float]]:
@@ -96,8 +116,9 @@ def lift_geometry(lifting: Lifting, chains: Sequence[Sequence[Step]], leaves: Se
                 groups.setdefault(kind, []).append((row, numbers))
         for kind, members in groups.items():
             rows = [row for row, _ in members]
-            made = lifting.matrices(kind, [numbers for _, numbers in members])
-            out[rows] = np.einsum("mij,mj->mi", made, out[rows])
+            given = np.clip([numbers for _, numbers in members], -MOST, MOST)
+            made = lifting.matrices(kind, given)
+            out[rows] = np.clip(np.einsum("mij,mj->mi", made, out[rows]), -MOST, MOST)
     return out
 
 

@@ -1,4 +1,4 @@
-"""The model for a scene that names none: the smallest that fits."""
+"""The model for a scene that names none: the most exact of the smallest that fit."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ from collections.abc import Iterable, Iterator, Sequence
 from scenelang.models.manifest import Manifest
 from scenelang.scene.schema import Chain, Object, Scene, SceneNode
 
+WHITE = (1.0, 1.0, 1.0)
+
 
 def choose_model(scene: Scene, models: Iterable[Manifest]) -> Manifest | None:
-    """The smallest of ``models`` that has every name the scene uses.
+    """The smallest of ``models`` that has every name the scene uses and draws its canvas.
 
     Args:
         scene: a scene; if it names a model, only that one fits.
         models: manifests to choose from.
 
     Returns:
-        The fitting manifest with the fewest geometries, then the fewest other words, then the first by
-        name; None if none fits.
+        The fitting manifest with the fewest geometries, then the fewest other words, then the least measured
+        error, then the first by name; None if none fits.
     """
     geometries, materials, transforms, operations = names_used(scene)
     fitting = [
@@ -28,13 +30,21 @@ def choose_model(scene: Scene, models: Iterable[Manifest]) -> Manifest | None:
         and materials.issubset(m.materials)
         and transforms.issubset(m.transforms)
         and operations.issubset(m.material_ops)
+        and paints(m, scene)
     ]
     return min(fitting, key=_size, default=None)
 
 
-def _size(model: Manifest) -> tuple[int, int, str]:
+def paints(model: Manifest, scene: Scene) -> bool:
+    """Whether a model draws a scene's canvas and background."""
+    return not (model.sizes and scene.canvas not in model.sizes) and not (
+        model.white and scene.background != WHITE
+    )
+
+
+def _size(model: Manifest) -> tuple[int, int, float, str]:
     others = len(model.materials) + len(model.transforms) + len(model.material_ops)
-    return len(model.geometries), others, model.name
+    return len(model.geometries), others, model.flip(), model.name
 
 
 def names_used(scene: Scene) -> tuple[set[str], set[str], set[str], set[str]]:

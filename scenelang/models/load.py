@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import torch
 from safetensors.torch import load
+from torch import Tensor
 
 from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.models.weights import MOST_BYTES, Codes, read_header, read_weights, weights_path
+from scenelang.models.weights import MOST_BYTES, Codes, codes_of, read_header, read_weights, weights_path
 from scenelang.models.weights import ModelError as ModelError
+from scenelang.program.program import WIDTH
 from scenelang.renderers.framed import Framed, FramedConfig
+from scenelang.renderers.reading import Reading, ReadingConfig
+from scenelang.renderers.streaming import Streaming, StreamingConfig
 
 MOST_WIDTH = 1024
+RENDERER = "renderer."
+"""In front of the names of a renderer's tensors, where a file holds it beside a lifting's."""
+
+Network = Framed | Streaming | Reading
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,23 +36,39 @@ class Model:
         network: the trained network, in evaluation mode, without gradients.
         digest: SHA-256 of the weights file, hex.
         header: how the weights were trained (config, seed, revision, budget).
+        lifted: the codes, of a network that does not hold them itself.
     """
 
     manifest: Manifest
-    network: Framed
+    network: Network
     digest: str
     header: dict[str, Any]
+    lifted: Codes | None = None
 
     def codes(self) -> Codes:
         """The codes of these weights, as `compile_scene` takes them."""
+        if not isinstance(self.network, Framed):
+            assert self.lifted is not None
+            return self.lifted
         return Codes(
             dict(zip(self.manifest.geometries, map(tuple, self.network.codes.tolist()), strict=True)),
             dict(zip(self.manifest.materials, map(tuple, self.network.material_codes.tolist()), strict=True)),
             self.digest,
         )
 
+    @property
+    def framed(self) -> Framed:
+        """The network of a model that meets objects in their frames.
 
-def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Framed:
+        Raises:
+            ModelError: it is another one.
+        """
+        if not isinstance(self.network, Framed):
+            raise ModelError(f"model `{self.manifest.name}` has no framed renderer")
+        return self.network
+
+
+def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Network:
     """Build the network that a weights file holds.
 
     Raises:
@@ -52,22 +77,23 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Framed
     if len(data) > MOST_BYTES:
         raise ModelError(f"weights of more than {MOST_BYTES} bytes")
     header = read_header(data)
+    make = _MAKERS.get(manifest.renderer)
+    if make is None:
+        raise ModelError(f"an unknown renderer '{manifest.renderer}'")
     try:
-        sizes = header["config"]["network"]
-        if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes.values()):
-            raise ModelError("a network size is out of range")
-        config = FramedConfig(**sizes)
-    except (KeyError, TypeError, AttributeError) as error:
+        with torch.random.fork_rng(devices=[]):
+            # Not on the meta device, which takes no memory but 1.8 s to import what it stands on.
+            network = make(header["config"], manifest, len(data))
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise ModelError(f"bad network sizes: {error}") from None
-    decoder = (config.code + 1) * config.decoder_width * (config.decoder_width + config.features)
-    cell = (config.features + config.state) * config.cell_width + config.features * config.state
-    if 4 * max(decoder, cell) > len(data):
-        raise ModelError("a network larger than its file")
-    # Not on the meta device, which takes no memory but 1.8 s to import what it stands on.
-    with torch.random.fork_rng(devices=[]):
-        network = Framed(config, len(manifest.geometries), len(manifest.materials))
     try:
         tensors = load(data)
+        if not isinstance(network, Framed):
+            tensors = {
+                name.removeprefix(RENDERER): tensor
+                for name, tensor in tensors.items()
+                if name.startswith(RENDERER)
+            }
         network.load_state_dict(tensors, assign=True)
     except Exception as error:
         # safetensors raises its own class, torch a RuntimeError; both say what does not fit
@@ -76,6 +102,43 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Framed
         if parameter.dtype != torch.float32 or not torch.isfinite(parameter).all():
             raise ModelError(f"weights '{name}' are not finite float32 numbers")
     return network.requires_grad_(False).eval().to(device)
+
+
+def _framed(config: dict[str, Any], manifest: Manifest, size: int) -> Framed:
+    sizes = config["network"]
+    if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes.values()):
+        raise ModelError("a network size is out of range")
+    known = FramedConfig(**sizes)
+    decoder = (known.code + 1) * known.decoder_width * (known.decoder_width + known.features)
+    cell = (known.features + known.state) * known.cell_width + known.features * known.state
+    if 4 * max(decoder, cell) > size:
+        raise ModelError("a network larger than its file")
+    return Framed(known, len(manifest.geometries), len(manifest.materials))
+
+
+def _streaming(config: dict[str, Any], manifest: Manifest, size: int) -> Streaming:
+    sizes = config["student"]["streaming"]
+    known = StreamingConfig(**{**sizes, "vector": WIDTH})
+    if manifest.sizes != ((known.resolution, known.resolution),):
+        raise ModelError(f"a network for {known.resolution} pixels, which the manifest does not say")
+    filters = known.filters(known.resolution)
+    if 4 * 25 * (2 * filters + 4) * 4 * filters > size:
+        raise ModelError("a network larger than its file")
+    return Streaming(known)
+
+
+def _reading(config: dict[str, Any], manifest: Manifest, size: int) -> Reading:
+    sizes = {**config["student"]["reading"], "vector": WIDTH}
+    if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes.values()):
+        raise ModelError("a network size is out of range")
+    known = ReadingConfig(**sizes)
+    if 4 * 9 * known.hidden**2 > size or known.reads > 64 or known.octaves > 16:
+        raise ModelError("a network larger than its file, or that reads too often")
+    return Reading(known)
+
+
+_Make = Callable[[dict[str, Any], Manifest, int], Network]
+_MAKERS: dict[str, _Make] = {"framed": _framed, "streaming": _streaming, "reading": _reading}
 
 
 def load_model(name: str, device: str = "cpu", path: Path | None = None) -> Model:
@@ -93,4 +156,11 @@ def load_model(name: str, device: str = "cpu", path: Path | None = None) -> Mode
             f"cannot read the weights of '{name}': {(error.strerror or str(error)).lower()}"
         ) from None
     network = load_network(data, manifest, device)
-    return Model(manifest, network, hashlib.sha256(data).hexdigest(), read_header(data))
+    lifted = None if isinstance(network, Framed) else codes_of(manifest, data)
+    return Model(manifest, network, hashlib.sha256(data).hexdigest(), read_header(data), lifted)
+
+
+def place_of(network: Network) -> torch.device:
+    """The device that a network lies on."""
+    parameter: Tensor = next(network.parameters())
+    return parameter.device

@@ -33,6 +33,9 @@ class Manifest:
         trained: ranges that were trained or, where the network never sees the quantity because frames are
             exact, measured to hold its figures, ``name -> [low, high]``; beyond them is a warning.
         measured: figures of its evaluation and stability suite.
+        set: name of the scenes it was trained on, which models of different speed and error share.
+        sizes: canvases (width, height) that it draws; any within its limits where there are none.
+        white: whether it draws over white alone, knowing colours but no coverage.
     """
 
     name: str
@@ -48,6 +51,9 @@ class Manifest:
     limits: dict[str, int]
     trained: dict[str, tuple[float, float]]
     measured: dict[str, Any]
+    set: str = ""
+    sizes: tuple[tuple[int, int], ...] = ()
+    white: bool = False
 
     @staticmethod
     def from_json(text: str) -> Manifest:
@@ -59,6 +65,7 @@ class Manifest:
         data = read_json(text.encode("utf-8"))
         if not isinstance(data, dict) or data.pop("format", None) != 1:
             raise ValueError("not a model manifest of format 1")
+        data = {"set": data.get("name"), "sizes": [], "white": False, **data}
         if data.keys() != _KINDS.keys():
             raise ValueError(f"fields missing or unknown: {', '.join(sorted(data.keys() ^ _KINDS.keys()))}")
         for key, fits in _KINDS.items():
@@ -68,7 +75,13 @@ class Manifest:
             raise ValueError("the default material is none of the materials")
         lists = {key: tuple(data[key]) for key in ("geometries", "materials", "transforms", "material_ops")}
         trained = {key: (float(low), float(high)) for key, (low, high) in data["trained"].items()}
-        return Manifest(**{**data, **lists, "trained": trained})
+        sizes = tuple((width, height) for width, height in data["sizes"])
+        return Manifest(**{**data, **lists, "trained": trained, "sizes": sizes})
+
+    def flip(self) -> float:
+        """Mean FLIP on the scenes of its set, 1 where it was not measured."""
+        value = self.measured.get("sets", {}).get(self.set, {}).get("flip", 1.0)
+        return float(value) if type(value) in (int, float) else 1.0
 
 
 def _is_text(value: Any) -> bool:
@@ -94,6 +107,14 @@ def _is_range(value: Any) -> bool:
     return bool(-MOST <= value[0] <= value[1] <= MOST)
 
 
+def _are_sizes(value: Any) -> bool:
+    """Pairs of sides in pixels."""
+    return isinstance(value, list) and all(
+        isinstance(size, list) and len(size) == 2 and all(type(v) is int and 1 <= v <= 8192 for v in size)
+        for size in value
+    )
+
+
 def _are_ranges(value: Any) -> bool:
     return isinstance(value, dict) and all(map(_is_range, value.values()))
 
@@ -102,7 +123,9 @@ def _are_figures(value: Any) -> bool:
     """Whatever was measured; of the stability suite a line of text for each quantity."""
     if not isinstance(value, dict):
         return False
-    lines = value.get("stability", {})
+    lines, sets = value.get("stability", {}), value.get("sets", {})
+    if not isinstance(sets, dict) or not all(isinstance(figures, dict) for figures in sets.values()):
+        return False
     return isinstance(lines, dict) and all(map(_is_text, lines.values()))
 
 
@@ -120,6 +143,9 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "limits": _are_limits,
     "trained": _are_ranges,
     "measured": _are_figures,
+    "set": _is_text,
+    "sizes": _are_sizes,
+    "white": lambda value: type(value) is bool,
 }
 """What each field may hold."""
 

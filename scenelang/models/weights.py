@@ -8,12 +8,17 @@ import struct
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scenelang.files import read_json, read_regular
 from scenelang.models.manifest import ROOT, Manifest, load_manifest
 
+if TYPE_CHECKING:
+    from scenelang.lifting.learned import Lifting
+
 MOST_BYTES = 64 << 20
+LIFTING = "lifting."
+"""In front of the names of a lifting's tensors, where a file holds it beside a renderer's."""
 _MOST_HEADER = 1 << 20
 
 
@@ -26,14 +31,16 @@ class Codes:
     """The learned codes that a Program carries, and which weights they belong to.
 
     Args:
-        geometry: leaf name to code, 4 numbers.
-        material: material name to code, 12 numbers.
+        geometry: leaf name to code, 4 numbers; of a learned lifting the whole vector.
+        material: material name to code, 12 numbers; likewise.
         digest: SHA-256 of the weights file, hex.
+        lifting: the encoders of a learned lifting.
     """
 
     geometry: dict[str, tuple[float, ...]]
     material: dict[str, tuple[float, ...]]
     digest: str
+    lifting: Lifting | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,11 +151,19 @@ def codes_of(manifest: Manifest, data: bytes) -> Codes:
         tensors = load(data)
     except (SafetensorError, ValueError, KeyError, TypeError) as error:
         raise ModelError(f"damaged weights: {error}") from None
-    return Codes(
-        geometry=_rows(manifest.geometries, tensors.get("codes")),
-        material=_rows(manifest.materials, tensors.get("material_codes")),
-        digest=hashlib.sha256(data).hexdigest(),
-    )
+    digest = hashlib.sha256(data).hexdigest()
+    prefix = "" if manifest.renderer == "framed" else LIFTING
+    geometry = _rows(manifest.geometries, tensors.get(f"{prefix}codes"))
+    material = _rows(manifest.materials, tensors.get(f"{prefix}material_codes"))
+    lifting = None
+    if manifest.lifting == "learned":
+        from scenelang.lifting.learned import read_lifting
+
+        try:
+            lifting = read_lifting(tensors, LIFTING)
+        except (KeyError, ValueError) as error:
+            raise ModelError(f"damaged weights: the lifting: {error}") from None
+    return Codes(geometry, material, digest, lifting)
 
 
 def _rows(names: tuple[str, ...], table: Any) -> dict[str, tuple[float, ...]]:

@@ -6,6 +6,7 @@ from scenelang.graph.chain import Moves, normal
 from scenelang.graph.nodes import Graph
 from scenelang.graph.walk import map_moves
 from scenelang.passes.context import Context
+from scenelang.passes.drop_identities import drop_identities
 
 
 def fold_warps(graph: Graph, context: Context) -> Graph:
@@ -13,7 +14,12 @@ def fold_warps(graph: Graph, context: Context) -> Graph:
 
     Before: AT_LEAVES. After: MERGED, NO_IDENTITIES, and each leaf's moves are in the normal form of
     `scenelang.graph.chain.normal`, where the rules are proved.
+
+    A learned lifting knows twirls and bends by themselves, as they are written, and no merged ones: for it
+    identities alone are dropped.
     """
+    if context.manifest.lifting != "exact":
+        return drop_identities(graph, context)
 
     def change(moves: Moves) -> Moves:
         return normal(moves, graph.dimension)

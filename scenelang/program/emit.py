@@ -10,6 +10,7 @@ from scenelang.graph.bounds import Box, felt_level, leaf_box
 from scenelang.graph.levels import split_levels
 from scenelang.graph.nodes import Graph, Leaf
 from scenelang.lifting.exact import lift_colours, lift_many
+from scenelang.lifting.learned import lift_geometry, lift_material
 from scenelang.models.manifest import Manifest
 from scenelang.models.weights import Codes
 from scenelang.program.program import TOKENS, WIDTH, Place, Program, ProgramError
@@ -29,7 +30,7 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     Raises:
         ProgramError: the model's lifting is not one of this version.
     """
-    if manifest.lifting != "exact":
+    if manifest.lifting != "exact" and codes.lifting is None:
         raise ProgramError(f"model `{manifest.name}` needs the lifting `{manifest.lifting}`")
     rows = [(link.op, link.node) for link in graph.root.links if isinstance(link.node, Leaf)]
     return Program(
@@ -65,7 +66,19 @@ def _vectors(rows: Rows, manifest: Manifest, codes: Codes) -> npt.NDArray[np.flo
 
 def _lifted(rows: Rows, manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
     vectors = np.zeros((len(rows), WIDTH), dtype=np.float32)  # (N, 64)
-    if rows:
+    if rows and codes.lifting is not None:
+        lifting = codes.lifting
+        geometry = lift_geometry(
+            lifting,
+            [[move.step for move in leaf.moves] for _, leaf in rows],
+            [manifest.geometries.index(leaf.geometry) for _, leaf in rows],
+        )
+        materials = [manifest.materials.index(leaf.material) for _, leaf in rows]
+        made = [geometry, lift_material(lifting, [leaf.rgb for _, leaf in rows], materials)]
+        if (width := sum(v.shape[1] for v in made)) != WIDTH:
+            raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")
+        vectors[:] = np.concatenate(made, 1)
+    elif rows:
         levels = [split_levels([move.step for move in leaf.moves], manifest.limits) for _, leaf in rows]
         geometry = lift_many(levels, [codes.geometry[leaf.geometry] for _, leaf in rows])
         material = lift_colours(
@@ -73,7 +86,7 @@ def _lifted(rows: Rows, manifest: Manifest, codes: Codes) -> npt.NDArray[np.floa
         )
         vectors[:, : WIDTH // 2] = geometry
         vectors[:, WIDTH // 2 :] = material
-        vectors += 0.0  # one zero only, so that equal scenes give equal bytes
+    vectors += 0.0  # one zero only, so that equal scenes give equal bytes
     return vectors
 
 

@@ -12,6 +12,7 @@ from pydantic.dataclasses import dataclass as checked
 from scenelang.files import read_regular
 from scenelang.renderers.framed import FramedConfig
 from scenelang.training.scenes import SceneConfig
+from scenelang.training.studies import StudyConfig
 
 CONFIGS = Path(__file__).parent / "configs"
 _MOST_BYTES = 1 << 20
@@ -66,7 +67,20 @@ class TrainConfig:
         return asdict(self)
 
 
-def read_config(name: str) -> TrainConfig:
+@checked(frozen=True, config={"extra": "forbid"})
+class StudentFile:
+    """A model of another renderer or lifting, trained by a study.
+
+    Args:
+        model: name of the model that the weights are for.
+        study: what is trained.
+    """
+
+    model: str
+    study: StudyConfig
+
+
+def read_config(name: str) -> TrainConfig | StudentFile:
     """Read a configuration by path or by the name of a shipped one.
 
     Raises:
@@ -76,4 +90,6 @@ def read_config(name: str) -> TrainConfig:
     path = Path(name)
     if not path.suffix and (CONFIGS / f"{name}.json").exists():
         path = CONFIGS / f"{name}.json"
-    return TypeAdapter(TrainConfig).validate_json(read_regular(path, _MOST_BYTES))
+    data = read_regular(path, _MOST_BYTES)
+    kind = StudentFile if b'"study"' in data else TrainConfig
+    return TypeAdapter[TrainConfig | StudentFile](kind).validate_json(data)

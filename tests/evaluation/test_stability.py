@@ -54,7 +54,7 @@ def test_lifting_one_map_after_the_other_gives_the_same_chain(model: Model) -> N
     scene = scene_of(PROBES["affine"], 16, 0, 5, model)
     program = compile_scene(scene, model="shapes2d", without=OPTIONAL)
     x, y = torch.rand(2, 50, generator=torch.Generator().manual_seed(1)) * 2 - 1
-    for one, other in zip(unfolded(scene, program).vectors, program.vectors, strict=True):
+    for one, other in zip(unfolded(scene, program, model).vectors, program.vectors, strict=True):
         # merged deformations and single ones are other numbers for the same map
         ways = [torch.stack(local_points(read_frame(g[:32]), x, y)) for g in (one, other)]
         torch.testing.assert_close(*ways, rtol=1e-3, atol=1e-3)
@@ -110,7 +110,7 @@ def test_recorded_bounds_hold(model: Model) -> None:
             scene = scene_of(PROBES[name], row["value"], 0, recorded["seed"], model)
             program = compile_scene(scene, model="shapes2d", without=OPTIONAL)
             if not PROBES[name].folded:
-                program = unfolded(scene, program)
+                program = unfolded(scene, program, model)
             found = compare(draw_program(model, program), exact_picture(scene, model))
             assert found.psnr >= row["psnr"]["worst"] - 0.5, (name, row["value"])
     invariants = recorded["invariants"]

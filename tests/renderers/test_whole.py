@@ -1,0 +1,58 @@
+"""Programs drawn by the paper's renderers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from scenelang.program.program import ProgramError
+from scenelang.renderers.reading import Reading, ReadingConfig
+from scenelang.renderers.streaming import Streaming, StreamingConfig
+from scenelang.renderers.whole import draw_whole
+
+WHITE = (1.0, 1.0, 1.0)
+
+
+def some(count: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(3)
+    return rng.normal(size=(count, 64)).astype(np.float32), rng.integers(0, 4, count).astype(np.int8)
+
+
+def reading() -> Reading:
+    torch.manual_seed(2)
+    return Reading(ReadingConfig(hidden=8, reads=2, octaves=3)).eval()
+
+
+def test_a_pixel_is_the_mean_of_its_four_samples() -> None:
+    network, (vectors, tokens) = reading(), some(3)
+    picture = np.asarray(draw_whole(network, vectors, tokens, (6, 4), WHITE).image)
+    assert picture.shape == (4, 6, 3)
+    v, t = torch.from_numpy(vectors)[None], torch.from_numpy(tokens.astype(np.int64))[None]
+    for row, column in ((0, 0), (1, 4), (3, 5)):
+        # the shorter side spans [-1, 1]: a pixel is half a unit wide
+        x, y = (column + 0.5 - 3) * 0.5, (2 - 0.5 - row) * 0.5
+        points = [[x + dx, y + dy] for dx in (-0.125, 0.125) for dy in (-0.125, 0.125)]
+        with torch.no_grad():
+            expected = network(v, t, torch.tensor([points]))[0].mean(0).clamp(0, 1).numpy()
+        np.testing.assert_allclose(picture[row, column], expected, atol=1e-6)
+
+
+def test_streaming_draws_its_own_size_alone() -> None:
+    torch.manual_seed(2)
+    network, (vectors, tokens) = Streaming(StreamingConfig(resolution=8, width=1 / 32)).eval(), some(2)
+    picture = np.asarray(draw_whole(network, vectors, tokens, (8, 8), WHITE).image)
+    with torch.no_grad():
+        image = network(torch.from_numpy(vectors)[None], torch.from_numpy(tokens.astype(np.int64))[None])[0]
+    np.testing.assert_allclose(picture, image.clamp(0, 1).permute(1, 2, 0).numpy(), atol=1e-6)
+    with pytest.raises(ProgramError, match="8 x 8"):
+        draw_whole(network, vectors, tokens, (16, 16), WHITE)
+
+
+def test_white_only_and_nothing_is_white() -> None:
+    vectors, tokens = some(1)
+    for background in (None, (1.0, 0.9, 1.0)):
+        with pytest.raises(ProgramError, match="white"):
+            draw_whole(reading(), vectors, tokens, (4, 4), background)
+    empty = draw_whole(reading(), vectors[:0], tokens[:0], (5, 4), WHITE)
+    assert np.array_equal(np.asarray(empty.image), np.ones((4, 5, 3), np.float32))
