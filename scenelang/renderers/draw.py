@@ -54,6 +54,8 @@ def draw(
     kept: Kept | None = None,
     skip: bool = True,
     adaptive: bool = True,
+    refine: bool = True,
+    make_stream: Callable[..., Stream] = Stream,
     tile: int = TILE,
     progress: Callable[[float], None] | None = None,
 ) -> Drawing:
@@ -70,6 +72,8 @@ def draw(
         kept: the picture before this one, of which tiles that show the same are taken over.
         skip: leave out points that an object cannot reach.
         adaptive: sample once where no outline is near, instead of four times everywhere.
+        refine: sample four times near outlines; without it pixels are hard-edged and faster.
+        make_stream: `Stream`, or one that computes it another way.
         tile: pixels at a time, at least one row.
         progress: called with the share done, from any thread.
 
@@ -78,7 +82,8 @@ def draw(
             proportion; no compiled scene has such.
     """
     width, height = canvas
-    stream = Stream(network, vectors, tokens, skip=skip, frames=kept.frames if kept is not None else None)
+    frames = kept.frames if kept is not None else None
+    stream = make_stream(network, vectors, tokens, skip=skip, frames=frames)
     rows = max(1, min(tile // width, -(-height // (split or threads))))
     tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     out = np.empty((height, width, 4), np.float32)
@@ -92,7 +97,7 @@ def draw(
         if shown is not None and shown.same[index]:
             out[band.start : band.stop] = shown.before[band.start : band.stop]
         else:
-            picture, pairs[index], refined[index] = _tile(stream, canvas, band, adaptive)
+            picture, pairs[index], refined[index] = _tile(stream, canvas, band, adaptive, refine)
             out[band.start : band.stop] = picture.reshape(len(band), width, 4)
         finished.append(index)
         if progress is not None:
@@ -116,7 +121,9 @@ def draw(
     return Drawing(from_samples(colour, None), sum(pairs), sum(refined))
 
 
-def _tile(stream: Stream, canvas: tuple[int, int], rows: range, adaptive: bool) -> tuple[Tensor, int, int]:
+def _tile(
+    stream: Stream, canvas: tuple[int, int], rows: range, adaptive: bool, refine: bool
+) -> tuple[Tensor, int, int]:
     """Premultiplied colour and coverage (pixels, 4) of some rows, pairs evaluated, pixels refined."""
     width, height = canvas
     px = 2 / min(width, height)  # world units
@@ -128,8 +135,10 @@ def _tile(stream: Stream, canvas: tuple[int, int], rows: range, adaptive: bool) 
     if not adaptive:
         sampled, pairs = _four(stream, x, y, px)
         return sampled, pairs, x.numel()
-    shade = stream.shade(x, y, CORNER * px, PixelRows(-y.cpu().numpy()))
+    shade = stream.shade(x, y, CORNER * px if refine else 0.0, PixelRows(-y.cpu().numpy()))
     picture = shade.premultiplied().T.contiguous()
+    if not refine:
+        return picture.cpu(), shade.evaluated, 0
     near = (shade.edge < NEAR * px).nonzero()[:, 0]
     pairs = shade.evaluated
     if near.numel():
