@@ -105,7 +105,7 @@ def command(
         from scenelang.evaluation.record import record_measured
 
         weights = out / "weights.safetensors"
-        figures = record_measured(weights, wanted.model)
+        figures = record_measured(weights, wanted.cell or wanted.model)
         means = ", ".join(f"{k[5:]} {v['mean']:.1f}" for k, v in figures.items() if k.startswith("psnr_"))
         click.echo(f"done{reached}; PSNR of unseen scenes (dB): {means}: {weights}")
     else:

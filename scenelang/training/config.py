@@ -50,6 +50,8 @@ class TrainConfig:
         phases: run one after the other.
         network: sizes of the renderer.
         scenes: the training distribution.
+        cell: name of a model whose cell and colours the weights get, so that the phases train the decoder
+            alone: a cell works on distances, whichever decoder they come from.
     """
 
     model: str
@@ -58,6 +60,7 @@ class TrainConfig:
     phases: tuple[Phase, ...]
     network: FramedConfig
     scenes: SceneConfig
+    cell: str | None = None
 
     @property
     def iterations(self) -> int:

@@ -13,6 +13,7 @@ from typing import Any
 
 import torch
 
+from scenelang.models.load import load_model
 from scenelang.renderers.framed import Framed
 from scenelang.training.checkpoint import load_tensors, pack_training, save_tensors, unpack_training
 from scenelang.training.config import TrainConfig
@@ -62,7 +63,8 @@ def train(
     checkpoint = folder / "checkpoint.safetensors"
     if checkpoint.exists():
         tensors, header = load_tensors(checkpoint, device)
-        if header["config"] != json.loads(json.dumps(config.to_json())):
+        known = {"cell": None, **header["config"]}  # checkpoints from before there was one
+        if known != json.loads(json.dumps(config.to_json())):
             raise ValueError(f"{checkpoint} was trained with another configuration")
         unpack_training(tensors, network, optimiser, scenes)
         done, spent_s = header["iteration"], header["seconds"]
@@ -105,8 +107,24 @@ def train(
             break
     if done < config.iterations:
         return False
+    if config.cell is not None:
+        take_cell(network, config.cell)
     save("weights.safetensors", dict(network.state_dict()))
     return True
+
+
+def take_cell(network: Framed, model: str) -> None:
+    """Give a network the cell, the materials and the slopes of a shipped framed model.
+
+    Raises:
+        ModelError: its weights are missing, damaged or of another renderer.
+        RuntimeError: its cell has other sizes.
+    """
+    given = load_model(model).framed.state_dict()
+    decoder, _ = network.parts()
+    own = {id(parameter) for parameter in decoder}
+    names = [name for name, parameter in network.named_parameters() if id(parameter) not in own]
+    network.load_state_dict({name: given[name] for name in names}, strict=False)
 
 
 def _phase_at(config: TrainConfig, iteration: int) -> tuple[Any, int]:

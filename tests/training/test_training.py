@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from scenelang.models.load import load_model
 from scenelang.renderers.framed import FramedConfig
 from scenelang.training.checkpoint import load_tensors
 from scenelang.training.config import Phase, TrainConfig, read_config
@@ -98,6 +99,22 @@ def test_training_learns(tmp_path: Path) -> None:
     losses: list[float] = []
     train(config, tmp_path, report=lambda i, n, s, parts: losses.append(parts["alone"]), report_every=25)
     assert losses[-1] < losses[0] * 2 / 3
+
+
+def test_a_decoder_gets_the_cell_of_a_model(tmp_path: Path) -> None:
+    """Trained on the leaves alone, it draws with the colours and gates of the shipped one."""
+    config = replace(
+        tiny_config(), network=FramedConfig(decoder_width=8), phases=(Phase(3, 0, 2),), cell="shapes2d"
+    )
+    train(config, tmp_path)
+    found, _ = load_tensors(tmp_path / "weights.safetensors")
+    donor = load_model("shapes2d").framed.state_dict()
+    same = {
+        name for name in found if found[name].shape == donor[name].shape and found[name].equal(donor[name])
+    }
+    assert {"cell_w1", "cell_b2", "albedo", "material_codes", "read_slope"} <= same
+    assert not same & {"codes", "far"}
+    assert found["decoder_w.1"].shape == (5, 8, 8)
 
 
 def test_a_phase_has_a_rate_and_blends_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
