@@ -20,7 +20,7 @@ from scenelang.image import Image, from_samples
 from scenelang.program.program import ProgramError
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.kept import Kept
-from scenelang.renderers.stream import PixelRows, Stream
+from scenelang.renderers.stream import PixelRows, Shade, Stream
 
 TILE = 1 << 15  # pixels that are drawn at a time
 NEAR = 0.85  # pixels: farther from an outline a pixel has one colour
@@ -35,11 +35,13 @@ class Drawing:
         image: (H, W, 3), or (H, W, 4) with straight alpha.
         pairs: (object, sample) pairs that went through the network.
         refined: pixels that were sampled four times.
+        met: pixels that an object reached; the others show the background, unseen by the network.
     """
 
     image: Image
     pairs: int
     refined: int
+    met: int
 
 
 def draw(
@@ -87,7 +89,7 @@ def draw(
     rows = max(1, min(tile // width, -(-height // (split or threads))))
     tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     out = np.empty((height, width, 4), np.float32)
-    pairs, refined = [0] * len(tiles), [0] * len(tiles)
+    pairs, refined, met = [0] * len(tiles), [0] * len(tiles), [0] * len(tiles)
     finished: list[int] = []
 
     shown = kept.compare(stream, canvas, tiles) if kept is not None and skip and adaptive else None
@@ -97,7 +99,7 @@ def draw(
         if shown is not None and shown.same[index]:
             out[band.start : band.stop] = shown.before[band.start : band.stop]
         else:
-            picture, pairs[index], refined[index] = _tile(stream, canvas, band, adaptive, refine)
+            picture, pairs[index], refined[index], met[index] = _tile(stream, canvas, band, adaptive, refine)
             out[band.start : band.stop] = picture.reshape(len(band), width, 4)
         finished.append(index)
         if progress is not None:
@@ -116,15 +118,15 @@ def draw(
         raise ProgramError("numbers that the network cannot draw with")
     colour, alpha = out[..., :3], out[..., 3]
     if background is None:
-        return Drawing(from_samples(colour, alpha), sum(pairs), sum(refined))
+        return Drawing(from_samples(colour, alpha), sum(pairs), sum(refined), sum(met))
     colour += (1 - alpha)[..., None] * np.asarray(background, np.float32)
-    return Drawing(from_samples(colour, None), sum(pairs), sum(refined))
+    return Drawing(from_samples(colour, None), sum(pairs), sum(refined), sum(met))
 
 
 def _tile(
     stream: Stream, canvas: tuple[int, int], rows: range, adaptive: bool, refine: bool
-) -> tuple[Tensor, int, int]:
-    """Premultiplied colour and coverage (pixels, 4) of some rows, pairs evaluated, pixels refined."""
+) -> tuple[Tensor, int, int, int]:
+    """Premultiplied colour and coverage (pixels, 4) of some rows, pairs evaluated, pixels refined, met."""
     width, height = canvas
     px = 2 / min(width, height)  # world units
     # float64 up to here: at 8192 pixels float32 would move samples by a hundredth of a pixel
@@ -133,26 +135,30 @@ def _tile(
     x = x.float().to(stream.device).repeat(len(rows))
     y = y.float().to(stream.device).repeat_interleave(width)
     if not adaptive:
-        sampled, pairs = _four(stream, x, y, px)
-        return sampled, pairs, x.numel()
+        shade = _four(stream, x, y, px)
+        return _means(shade).cpu(), shade.evaluated, x.numel(), int(shade.met.view(-1, 4).any(1).sum())
     shade = stream.shade(x, y, CORNER * px if refine else 0.0, PixelRows(-y.cpu().numpy()))
     picture = shade.premultiplied().T.contiguous()
+    met = int(shade.met.sum())
     if not refine:
-        return picture.cpu(), shade.evaluated, 0
+        return picture.cpu(), shade.evaluated, 0, met
     near = (shade.edge < NEAR * px).nonzero()[:, 0]
     pairs = shade.evaluated
     if near.numel():
-        sampled, more = _four(stream, x[near], y[near], px)
-        picture[near] = sampled
-        pairs += more
-    return picture.cpu(), pairs, near.numel()
+        closer = _four(stream, x[near], y[near], px)
+        picture[near] = _means(closer)
+        pairs += closer.evaluated
+    return picture.cpu(), pairs, near.numel(), met
 
 
-def _four(stream: Stream, x: Tensor, y: Tensor, px: float) -> tuple[Tensor, int]:
-    """Means (M, 4) over the four samples of pixels centred at x, y, and pairs evaluated."""
+def _four(stream: Stream, x: Tensor, y: Tensor, px: float) -> Shade:
+    """The four samples, side by side, of pixels centred at x, y."""
     offsets = torch.tensor([-0.25, 0.25], device=x.device) * px
     sx = (x[:, None, None] + offsets[None, None, :]).expand(-1, 2, 2).reshape(-1)
     sy = (y[:, None, None] + offsets[None, :, None]).expand(-1, 2, 2).reshape(-1)
-    shade = stream.shade(sx, sy, 0.0, PixelRows(-y.cpu().numpy(), 4, 0.3 * px))
-    samples = shade.premultiplied()  # (4, 4 M)
-    return samples.view(4, -1, 4).mean(2).T.contiguous().cpu(), shade.evaluated
+    return stream.shade(sx, sy, 0.0, PixelRows(-y.cpu().numpy(), 4, 0.3 * px))
+
+
+def _means(shade: Shade) -> Tensor:
+    """Premultiplied colour and coverage (M, 4) of pixels of four samples each."""
+    return shade.premultiplied().view(4, -1, 4).mean(2).T.contiguous()

@@ -55,12 +55,14 @@ class Shade:
         coverage: (M,) in [0, 1].
         edge: (M,) world distance to the nearest outline, as the network sees it, at most.
         evaluated: number of (object, point) pairs that went through the network.
+        met: (M,) which points went through it at all; the others show the background.
     """
 
     colour: Tensor
     coverage: Tensor
     edge: Tensor
     evaluated: int
+    met: Tensor
 
     def premultiplied(self) -> Tensor:
         """Colour times coverage, and coverage (4, M)."""
@@ -198,7 +200,8 @@ class Stream:
                 state[:, part], colour[:, part] = self._step(old, row, s)
                 edge[part] = torch.minimum(edge[part], features[0].abs() / row.frame.stretch)
         edge = torch.minimum(edge, state[0].abs() / self.unit)
-        return Shade(colour, (0.5 - state[0] * self.slope).clamp_(0.0, 1.0), edge, evaluated)
+        met = touched if self.skip else torch.full_like(touched, bool(self.rows))
+        return Shade(colour, (0.5 - state[0] * self.slope).clamp_(0.0, 1.0), edge, evaluated, met)
 
     def _near(self, rows: PixelRows, pad: float) -> list[_Row]:
         """The objects that may meet points in some rows; `_meet` finds none for the others."""

@@ -49,7 +49,7 @@ def draw_whole(
         raise ProgramError("this model draws on white only")
     width, height = canvas
     if not len(vectors):
-        return Drawing(from_samples(np.ones((height, width, 3), np.float32), None), 0, 0)
+        return Drawing(from_samples(np.ones((height, width, 3), np.float32), None), 0, 0, 0)
     device = next(network.parameters()).device
     v = torch.from_numpy(vectors)[None].to(device)
     t = torch.from_numpy(tokens.astype(np.int64))[None].to(device)
@@ -65,7 +65,7 @@ def draw_whole(
     if progress is not None:
         progress(1.0)
     picture = found.clamp(0.0, 1.0).cpu().numpy()
-    return Drawing(from_samples(np.ascontiguousarray(picture), None), pairs, 0)
+    return Drawing(from_samples(np.ascontiguousarray(picture), None), pairs, 0, width * height)
 
 
 def _sampled(
