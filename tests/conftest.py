@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import signal
 
+from hypothesis import HealthCheck, settings
+
+# Seconds decide no test, as they hang on the machine: neither those of an example nor those of drawing it.
+settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("untimed")
+
 # A test run that was started in the background ignores interrupts, and so would the processes that tests
 # start and interrupt: without this, `pytest &` waits for them for ever.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

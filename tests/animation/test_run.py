@@ -283,7 +283,7 @@ def test_a_killed_run_is_taken_up(tmp_path: Path) -> None:
 def test_ctrl_c(tmp_path: Path) -> None:
     process = started(tmp_path, "a.gif")
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=30)
+    _, said = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "Traceback" not in said
     assert left(tmp_path) == [".a.gif.frames"]

@@ -263,7 +263,7 @@ def test_a_change_of_many_lines_is_cut() -> None:
 # ---------------------------------------------------------------- whatever is marked
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     text=st.text(alphabet="ab {};\n\t日é\u0301\u202e\x1b", max_size=80),
     places=st.lists(st.tuples(st.integers(0, 90), st.integers(0, 90)), min_size=1, max_size=5),

@@ -87,7 +87,7 @@ def test_comments_anywhere(seed: int, rate: float) -> None:
     holds(text)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(laid_out())
 def test_random_programs(text: str) -> None:
     assert read(text)[1] == []
@@ -95,14 +95,14 @@ def test_random_programs(text: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=1500, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=1500, suppress_health_check=list(HealthCheck))
 @given(laid_out())
 def test_many_random_programs(text: str) -> None:
     assert read(text)[1] == []
     holds(text)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(st.data())
 def test_refuses_exactly_what_the_parser_refuses(data: st.DataObject) -> None:
     """A text is formatted if and only if the parser finds no mistake; the mistakes told are the parser's."""

@@ -76,7 +76,7 @@ ODD = [
 ]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.lists(st.sampled_from([*tables().literals, *ODD, "// c\n", "/* m\n */", '"s\\""', "\n"]), max_size=30)
 )

@@ -14,7 +14,7 @@ import numpy as np
 import pygltflib
 import pytest
 import trimesh
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import scenelang as nsg
@@ -378,7 +378,7 @@ KEYS += ["scale", "materials", "primitives"]
 ATOMS = st.none() | st.booleans() | st.floats() | st.integers(-3, 9) | st.text(max_size=5)
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=200)
 @given(
     st.recursive(
         ATOMS,

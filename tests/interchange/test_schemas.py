@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
@@ -66,7 +66,7 @@ def test_every_property_says_its_kind() -> None:
     assert described == [("Animation", "seconds"), ("Shear", "k")]
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=30)
 @given(scenes)
 def test_what_scenes_write_is_valid(scene: nsg.Scene) -> None:
     SCENE.validate(json.loads(scene.to_json()))
@@ -131,7 +131,7 @@ def damaged(data: Any, rng: random.Random) -> Any:
     return data
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=120)
 @given(scenes, st.integers(0, 2**32 - 1))
 def test_schema_and_reader_agree_on_damage(scene: nsg.Scene, seed: int) -> None:
     data = damaged(json.loads(scene.to_json()), random.Random(seed))

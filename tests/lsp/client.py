@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 Json = dict[str, Any]
+PATIENCE_S = 120.0
+"""How long an answer is waited for before the server counts as hanging; most take milliseconds."""
 CAPABILITIES: Json = {
     "general": {"positionEncodings": ["utf-16"]},
     "workspace": {
@@ -149,7 +151,7 @@ class Client:
             self._answers[message["id"]] = message
         return True
 
-    def answer(self, request: int, seconds: float = 30.0) -> Json:
+    def answer(self, request: int, seconds: float = PATIENCE_S) -> Json:
         """The whole answer to a request."""
         end = time.monotonic() + seconds
         while request not in self._answers:
@@ -249,7 +251,7 @@ class Client:
             at = end
         return "".join([*out, text[at:]])
 
-    def diagnostics(self, uri: str, seconds: float = 20.0) -> list[Json]:
+    def diagnostics(self, uri: str, seconds: float = PATIENCE_S) -> list[Json]:
         """What is published for the latest text of a document, once its check has ended too."""
         end = time.monotonic() + seconds
         count = len(self.published.get(uri, []))
@@ -260,7 +262,7 @@ class Client:
                 return list(found[-1]["diagnostics"])
             assert self._take(end - time.monotonic()), f"only {count} publications for {uri}"
 
-    def next_diagnostics(self, uri: str, seconds: float = 20.0) -> list[Json]:
+    def next_diagnostics(self, uri: str, seconds: float = PATIENCE_S) -> list[Json]:
         """The publication after those that have come so far."""
         end = time.monotonic() + seconds
         count = len(self.published.get(uri, []))
@@ -272,12 +274,12 @@ class Client:
         """Shut the server down; its exit code."""
         self.request("shutdown", None)
         self.notify("exit", None)
-        return self.process.wait(20)
+        return self.process.wait(PATIENCE_S)
 
     def kill(self) -> None:
         if self.process.poll() is None:
             self.process.kill()
-        self.process.wait(20)
+        self.process.wait(PATIENCE_S)
         for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
             if stream is not None:
                 stream.close()

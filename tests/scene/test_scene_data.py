@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from scene_cases import run_text
 
 import scenelang as nsg
@@ -13,7 +13,7 @@ from scenelang.scene.session import MAX_NODE_DEPTH, deep_stack
 from tests.strategies import scenes
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150)
 @given(scenes)
 def test_text_reads_back(scene: nsg.Scene) -> None:
     text = scene.to_nsg()
@@ -23,7 +23,7 @@ def test_text_reads_back(scene: nsg.Scene) -> None:
     assert again.to_nsg() == text
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100)
 @given(scenes)
 def test_json_reads_back(scene: nsg.Scene) -> None:
     assert nsg.Scene.from_json(scene.to_json()) == scene

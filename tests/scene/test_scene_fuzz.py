@@ -55,7 +55,7 @@ statements = st.recursive(
     ),
     max_leaves=6,
 )
-OPTIONS = settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
+OPTIONS = settings(max_examples=400, suppress_health_check=list(HealthCheck))
 
 
 @OPTIONS

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 
 import scenelang as nsg
 from scenelang.program.store import program_bytes
@@ -27,7 +27,7 @@ def run(code: str) -> nsg.Scene:
     return made
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100)
 @given(scenes)
 def test_code_makes_an_equal_scene(scene: nsg.Scene) -> None:
     code = scene.to_python()
@@ -37,7 +37,7 @@ def test_code_makes_an_equal_scene(scene: nsg.Scene) -> None:
     assert made.to_python() == code
 
 
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=50)
 @given(scenes)
 def test_readable_json_reads_back(scene: nsg.Scene) -> None:
     again = nsg.Scene.from_json(to_readable_json(scene))
@@ -45,7 +45,7 @@ def test_readable_json_reads_back(scene: nsg.Scene) -> None:
     assert again.to_json() == scene.to_json()
 
 
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=50)
 @given(scenes)
 def test_repr_is_code(scene: nsg.Scene) -> None:
     assert eval(repr(scene), dict(vars(nsg)) | {name: getattr(nsg, name) for name in nsg.__all__}) == scene

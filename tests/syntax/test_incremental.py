@@ -83,7 +83,7 @@ def edits(draw: st.DrawFn) -> tuple[str, list[tuple[float, int, str]]]:
     return text, draw(st.lists(one, min_size=1, max_size=5))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(edits())
 def test_random_edits_equal_a_whole_parse(case: tuple[str, list[tuple[float, int, str]]]) -> None:
     text, changes = case
@@ -111,7 +111,7 @@ def test_typing_letter_by_letter_equals_a_whole_parse(typed: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, len(LONG)), st.sampled_from(TYPED))
 def test_typing_into_a_long_text_equals_a_whole_parse(at: int, typed: str) -> None:
     typed_into(LONG, at, typed)
