@@ -155,7 +155,7 @@ def _order(rng: Rng, kind: float) -> Scene:
 
 
 PROBES: dict[str, Probe] = {
-    "objects": Probe("objects of a scene", "objects", (1, 2, 4, 8, 16, 32), 4, _objects),
+    "objects": Probe("objects of a scene", "objects", (1, 2, 4, 8, 16, 32, 64, 128), 4, _objects),
     "operators": Probe(
         "operators in a row: smooth, subtract, intersect",
         "operators",
@@ -175,7 +175,7 @@ PROBES: dict[str, Probe] = {
     "warp": Probe(
         "deformations beyond the base set's ±0.8", "times the range", (0.5, 1, 1.5, 2, 2.5, 3), 1, _warp
     ),
-    "size": Probe("sizes beyond the base set's", "times the size", (0.1, 0.3, 1, 2, 3), 1, _size),
+    "size": Probe("sizes beyond the base set's", "times the size", (0.03, 0.1, 0.3, 1, 2, 4, 8), 1, _size),
     "thin": Probe("thin objects", "ratio of the scales", (1, 3, 10, 30, 100, 300), 3, _thin),
     "shear": Probe("sheared objects", "shear", (0, 0.5, 1, 2, 4, 8), 0, _sheared),
     "order": Probe(

@@ -42,6 +42,7 @@ EDGE = 2 / 255  # a pixel of an edge differs by more from a neighbour
 LEAST_COVER = 0.02  # share of the canvas; scenes with less are drawn again
 FRAMES = 8
 SIZES = {"canvas"}  # probes that only models of any size can take
+IDEAL = 8  # samples along a pixel's side of a picture whose own sampling hardly shows
 
 Array = npt.NDArray[np.float64]
 Report = Callable[[str, int, int], None]
@@ -66,10 +67,19 @@ class Errors:
     square: float
 
 
-def exact_picture(scene: Scene, model: Model) -> tuple[Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """The exact picture over white (H, W, 3), which pixels are covered, and which are on an edge."""
+def exact_picture(
+    scene: Scene, model: Model, per_side: int = 2
+) -> tuple[Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """The exact picture over white (H, W, 3), which pixels are covered, and which are on an edge.
+
+    Args:
+        scene: what is drawn.
+        model: that its names are known by.
+        per_side: samples along each side of a pixel; 2 is the definition.
+    """
     clear = scene.model_copy(update={"background": None})
-    found = np.asarray(reference_image(lower(clear, model.manifest, None, Diagnostics())), np.float64)
+    graph = lower(clear, model.manifest, None, Diagnostics())
+    found = np.asarray(reference_image(graph, per_side=per_side), np.float64)
     alpha = found[..., 3:]
     picture = found[..., :3] * alpha + (1 - alpha)
     edge = np.zeros(alpha.shape[:2], bool)
@@ -169,10 +179,13 @@ def run_probe(
     rows = []
     values = probe.values if name not in SIZES or not model.manifest.sizes else ()
     for at, value in enumerate(values):
-        found = []
+        found, ideal = [], []
         for index in range(scenes):
             scene = scene_of(probe, value, index, seed, model)
-            found.append(compare(_drawn(model, scene, probe.folded), exact_picture(scene, model)))
+            picture = _drawn(model, scene, probe.folded)
+            found.append(compare(picture, exact_picture(scene, model)))
+            if name in SIZES:
+                ideal.append(compare(picture, exact_picture(scene, model, IDEAL)).per_edge)
         rows.append(
             {
                 "value": value,
@@ -183,6 +196,8 @@ def run_probe(
                 "per_covered": round(float(np.mean([e.per_covered for e in found])), 6),
             }
         )
+        if name in SIZES:
+            rows[-1]["per_edge_ideal"] = round(float(np.mean(ideal)), 6)
         if report is not None:
             report(name, at + 1, len(probe.values))
     return {"title": probe.title, "quantity": probe.quantity, "healthy": probe.healthy, "rows": rows}
