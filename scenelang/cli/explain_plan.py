@@ -38,9 +38,9 @@ def command(
 ) -> None:
     """Say what drawing a scene takes and what the compiler and the renderer leave out.
 
-    FILE is a scene, or - for standard input. Shows objects, matrices and folds after each pass, the model
-    and the next best, how many samples met how many objects, the time of a frame, and the error against the
-    exact picture.
+    FILE is a scene, or - for standard input. Shows objects, matrices and tokens after each pass, the model
+    and the next best, how many pixels an object reached, how many samples met how many objects, the
+    parameters, the time of a frame, and the error against the exact picture.
     """
     from scenelang.cli.inputs import Request
     from scenelang.cli.say import say_diagnostics
@@ -69,28 +69,42 @@ def command(
 
 def _text(plan: dict[str, Any]) -> str:
     cost = plan["drawing"]
-    lines = [
-        f"model {plan['model']} ({plan['why']}), {cost['parameters']:,} parameters; "
-        + (f"next best {plan['runner_up']}" if plan["runner_up"] else "no other has all the scene uses")
-    ]
+    if plan["runner_up"]:
+        others = f"next best {plan['runner_up']}"
+    else:
+        others = "no other has all the scene uses" if plan["lacking"] else "there is no other"
+    lines = [f"model {plan['model']} ({plan['why']}), {cost['parameters']:,} parameters; {others}"]
     lines += [f"  {name} lacks {', '.join(names)}" for name, names in plan["lacking"].items()]
-    lines += ["", f"{'after':16} {'objects':>8} {'matrices':>9} {'affine':>7} {'deform':>7} {'folds':>6}"]
-    for row in plan["stages"]:
-        mark = "" if row["changed"] or row["stage"] == "lower" else "  ="
-        lines.append(
-            f"{row['stage']:16} {row['objects']:8,} {row['matrices']:9,} {row['affines']:7,} "
-            f"{row['deformations']:7,} {row['folds']:6,}{mark}"
-        )
+    lines += ["", *_table(plan["stages"]), ""]
     tokens = ", ".join(f"{number:,} {word}" for word, number in plan["tokens"].items())
-    unskipped = cost["meetings_unskipped"]
-    share = cost["meetings"] / unskipped if unskipped else 0.0
+    error = f"{cost['psnr']:.2f} dB PSNR (50 at most)"
+    if cost["flip"] is not None:
+        error += f", FLIP {cost['flip']:.4f},"
     lines += [
-        "",
         f"stream     {plan['rows']:,} rows of 64 numbers ({tokens or 'empty'})",
-        f"pixels     {cost['pixels']:,}, of which {cost['refined']:,} sampled four times "
-        f"({100 * cost['refined'] / cost['pixels']:.1f} %)",
-        f"meetings   {cost['meetings']:,} of a sample and an object, {100 * share:.1f} % of {unskipped:,}",
+        f"pixels     {cost['evaluated']:,} of {cost['pixels']:,} evaluated "
+        f"({_share(cost['evaluated'], cost['pixels'])}), {cost['refined']:,} of them sampled four times "
+        f"({_share(cost['refined'], cost['pixels'])})",
+        f"meetings   {cost['meetings']:,} of a sample and an object, "
+        f"{_share(cost['meetings'], cost['meetings_unskipped'])} of {cost['meetings_unskipped']:,}",
         f"frame      {cost['ms']:.1f} ms",
-        f"error      {cost['psnr']:.2f} dB PSNR against the exact picture (50 at most)",
+        f"error      {error} against the exact picture",
     ]
     return "\n".join(lines)
+
+
+def _table(stages: list[dict[str, Any]]) -> list[str]:
+    """A line for each stage; a column for each word that joins something in one of them."""
+    words = [w for w in ("union", "smooth", "subtract", "intersect") if any(w in s["tokens"] for s in stages)]
+    heads = ["objects", "matrices", "affine", "deform", "folds", *words]
+    lines = [f"{'after':16}" + "".join(f"{head:>10}" for head in heads) + "  (= as before)"]
+    for row in stages:
+        values = [row[key] for key in ("objects", "matrices", "affines", "deformations", "folds")]
+        values += [row["tokens"].get(word, 0) for word in words]
+        mark = "" if row["changed"] or row["stage"] == "lower" else "  ="
+        lines.append(f"{row['stage']:16}" + "".join(f"{value:10,}" for value in values) + mark)
+    return lines
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{100 * part / whole if whole else 0.0:.1f} %"
