@@ -28,6 +28,7 @@ COMMANDS: Final = {
     "stability": "Measure a model far beyond its training.",
     "train": "Train a model's weights.",
     "experiment": "Train several designs alike and compare them.",
+    "chart": "Draw tables and charts of experiments.",
     "watch": "Draw a scene again whenever it is saved.",
     "lsp": "Serve editors over the Language Server Protocol.",
     "explain": "Say what a diagnostic's code means.",

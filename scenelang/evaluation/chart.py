@@ -32,7 +32,7 @@ def stability_chart(results: Sequence[Mapping[str, Any]], kind: str) -> bytes:
         axis.set_axis_off()
     if len(results) > 1:
         axes.flat[0].legend([r["model"] for r in results], fontsize=7, frameon=False)
-    data = _bytes(figure, kind)
+    data = figure_bytes(figure, kind)
     plt.close(figure)
     return data
 
@@ -78,7 +78,7 @@ def pyplot() -> Any:
     return plt
 
 
-def _bytes(figure: Any, kind: str) -> bytes:
+def figure_bytes(figure: Any, kind: str) -> bytes:
     data = io.BytesIO()
     figure.tight_layout()
     about = {"Date": None} if kind == "svg" else {"Software": None}
