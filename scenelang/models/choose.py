@@ -35,6 +35,14 @@ def choose_model(scene: Scene, models: Iterable[Manifest]) -> Manifest | None:
     return min(fitting, key=_size, default=None)
 
 
+def best_of_sets(models: Iterable[Manifest]) -> list[Manifest]:
+    """Of models that share a set, the one of the least error; they know the same names."""
+    best: dict[str, Manifest] = {}
+    for model in sorted(models, key=_size):
+        best.setdefault(model.set or model.name, model)
+    return list(best.values())
+
+
 def paints(model: Manifest, scene: Scene) -> bool:
     """Whether a model draws a scene's canvas and background."""
     return not (model.sizes and scene.canvas not in model.sizes) and not (

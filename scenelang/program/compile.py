@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from scenelang.diagnostics.diagnostic import Diagnostics, Label, SceneError
 from scenelang.graph.lower import Memory, Spans
 from scenelang.graph.nodes import Graph
-from scenelang.models.choose import apart, choose_model
+from scenelang.models.choose import apart, best_of_sets, choose_model
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.models.weights import Codes
 from scenelang.passes import check_scene
@@ -84,12 +84,14 @@ def find_model(
         return None
     manifests = [load_manifest(k) for k in known]
     fitting = choose_model(scene, manifests)
-    if fitting is None and len(manifests) == 1:
+    if fitting is not None:
+        return fitting
+    best = best_of_sets(manifests)
+    if len(best) == 1:
         # Compiling for the only model there is says what exactly it lacks.
-        return manifests[0]
-    if fitting is None:
-        _no_model(scene, manifests, diagnostics, spans)
-    return fitting
+        return best[0]
+    _no_model(scene, best, diagnostics, spans)
+    return None
 
 
 def _no_model(
