@@ -1,13 +1,20 @@
-"""Write the table of docs/results.md from the JSON files that ``scenelang eval`` left in docs/results/.
+"""Write the tables of docs/results.md from the JSON files in docs/results/.
 
-python docs/make_results.py
+python docs/make_results.py            writes the page
+python docs/make_results.py --check    fails where it is out of date
+
+What `scenelang eval` measured lies in docs/results/, what `scenelang experiment` did in
+docs/results/experiments/; charts and strips of the latter are drawn by `scenelang chart`.
 """
 
 from __future__ import annotations
 
 import json
-import re
+import sys
+from collections.abc import Callable
 from pathlib import Path
+
+from scenelang.evaluation.tables import markdown, table_of
 
 HERE = Path(__file__).parent
 WHAT = {
@@ -27,10 +34,10 @@ WHAT = {
     "strong": "deformations up to ±2.4",
     "large": "three times the size",
 }
-BEGIN, END = "<!-- table: python docs/make_results.py -->", "<!-- end of table -->"
+EXPERIMENTS = ("overfit", "compare", "table1", "table2", "table3", "table4", "losses", "seeds")
 
 
-def table() -> str:
+def accuracy() -> str:
     """The Markdown table of all sets that were measured."""
     lines = [
         "| set | what | scenes | PSNR, dB | 5th percentile | worst | SSIM | FLIP | FLIP, 95th percentile |",
@@ -49,11 +56,66 @@ def table() -> str:
     return "\n".join(lines)
 
 
+def experiment(name: str) -> Callable[[], str]:
+    """The table of an experiment, with what it was run with."""
+
+    def block() -> str:
+        path = HERE / "results" / "experiments" / f"{name}.json"
+        if not path.exists():
+            return "*Not measured yet.*"
+        found = json.loads(path.read_text())
+        scenes, side = found["runs"][0]["scenes"], found["runs"][0]["resolution"]
+        said = (
+            f"`scenelang experiment {name} --budget {found['budget_s'] / 60:g}`: {scenes} scenes at {side}², "
+            f"seed {found['seed']}, {found['device']}, {found['threads']} thread, torch {found['torch']}, "
+            f"revision `{found['revision'][:8]}`"
+        )
+        return f"{table_of(found)}\n\n{said}"
+
+    return block
+
+
+def stability() -> str:
+    """Mean and worst PSNR at the healthy value and at both ends of every probe, of every model measured."""
+    rows = []
+    for path in sorted((HERE / "results").glob("stability*.json")):
+        found = json.loads(path.read_text())
+        for probe in found["probes"].values():
+            healthy = next(row for row in probe["rows"] if row["value"] == probe["healthy"])
+            cells = [f"{row['value']:g}: {row['psnr']['mean']:.1f}" for row in probe["rows"]]
+            rows.append(
+                [f"`{found['model']}`", probe["title"], f"{healthy['psnr']['mean']:.1f}", ", ".join(cells)]
+            )
+    return markdown(("model", "what", "healthy, dB", "value: mean PSNR, dB"), rows)
+
+
+BLOCKS: dict[str, Callable[[], str]] = {
+    "accuracy": accuracy,
+    "stability": stability,
+    **{name: experiment(name) for name in EXPERIMENTS},
+}
+"""What stands between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``."""
+
+
+def filled(text: str) -> str:
+    """The page with every block written again."""
+    for name, block in BLOCKS.items():
+        begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
+        before, found, rest = text.partition(begin)
+        if found:
+            _, _, after = rest.partition(end)
+            text = f"{before}{begin}\n\n{block()}\n\n{end}{after}"
+    return text
+
+
 def main() -> None:
     page = HERE / "results.md"
     text = page.read_text("utf-8")
-    pattern = re.escape(BEGIN) + r".*?" + re.escape(END)
-    page.write_text(re.sub(pattern, f"{BEGIN}\n{table()}\n{END}", text, flags=re.DOTALL), "utf-8")
+    if "--check" in sys.argv:
+        if filled(text) != text:
+            raise SystemExit("docs/results.md is out of date: python docs/make_results.py")
+        return
+    page.write_text(filled(text), "utf-8")
 
 
 if __name__ == "__main__":

@@ -263,3 +263,10 @@ def test_site_is_built(tmp_path: Path) -> None:
 def test_every_public_name_is_in_the_embedding_guide() -> None:
     page = (ROOT / "docs/embedding.md").read_text("utf-8")
     assert [name for name in scenelang.__all__ if f"`{name}`" not in page] == []
+
+
+def test_tables_of_results_are_those_of_the_measurements() -> None:
+    done = subprocess.run(
+        [sys.executable, ROOT / "docs/make_results.py", "--check"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
