@@ -12,18 +12,14 @@ from scenelang.cli import options
 if TYPE_CHECKING:
     import numpy as np
 
+    from scenelang.cli.inputs import Request
     from scenelang.image import Image
-    from scenelang.scene.params import Defines
 
 
 @click.command("compare")
 @click.argument("scene", metavar="SCENE")
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Picture; by default SCENE-compare.png.")
-@options.define
-@options.model
-@options.size
-@options.frame
-@options.root
+@options.request
 @options.device
 @options.threads
 @click.pass_context
@@ -31,11 +27,7 @@ def command(
     ctx: click.Context,
     scene: str,
     out: Path | None,
-    defines: Defines,
-    model: str | None,
-    size: tuple[int, int] | None,
-    frame: int,
-    root: str | None,
+    request: Request,
     device: str,
     threads: int | None,
 ) -> None:
@@ -45,12 +37,11 @@ def command(
     """
     from scenelang.cli.clock import Clock
     from scenelang.cli.eval import need_metrics
-    from scenelang.cli.inputs import Request, read_input, unused_defines
+    from scenelang.cli.inputs import read_input, unused_defines
     from scenelang.cli.say import say_diagnostics
     from scenelang.diagnostics.diagnostic import SceneError
 
     need_metrics()
-    request = Request(defines, model, root, frame, size)
     found = read_input(scene, request, Clock())
     found.diagnostics.items += unused_defines(request)
     if found.scene is None or found.diagnostics.errors:
@@ -63,14 +54,16 @@ def command(
     from scenelang.program.compile import compile_scene
 
     try:
-        program = compile_scene(found.scene, spans=found.spans, diagnostics=found.diagnostics, model=model)
+        program = compile_scene(
+            found.scene, spans=found.spans, diagnostics=found.diagnostics, model=request.model
+        )
     except SceneError:
         say_diagnostics(found.diagnostics)
         ctx.exit(1)
     say_diagnostics(found.diagnostics)
     opened = open_model(program.model, choose_device(device))
     picture = _over_white(draw_program(program, opened, threads=threads).image)
-    exact = _over_white(draw_exact(found.scene, spans=found.spans, model=model))
+    exact = _over_white(draw_exact(found.scene, spans=found.spans, model=request.model))
     figures = measure(picture, exact)
     text = f"PSNR {figures['psnr']:.2f} dB  SSIM {figures['ssim']:.4f}  FLIP {figures['flip']:.4f}"
     stem = "stdin" if scene == "-" else Path(scene).stem

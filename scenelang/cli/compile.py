@@ -9,30 +9,22 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-    from scenelang.scene.params import Defines
+    from scenelang.cli.inputs import Request
 
 
 @click.command("compile")
 @click.argument("file", metavar="FILE")
 @click.option("-o", "--out", required=True, metavar="OUT", help="The program's file, .safetensors.")
-@options.size
-@options.define
-@options.frame
-@options.model
+@options.request
 @options.strict
-@options.root
 @options.verbose
 @click.pass_context
 def command(
     ctx: click.Context,
     file: str,
     out: str,
-    size: tuple[int, int] | None,
-    defines: Defines,
-    frame: int,
-    model: str | None,
+    request: Request,
     strict: bool,
-    root: str | None,
     verbose: bool,
 ) -> None:
     """Compile a scene to a program that `scenelang render` draws and other software can read.
@@ -40,7 +32,7 @@ def command(
     FILE is a scene, or - for standard input. `scenelang dump` shows what the compiler made of it.
     """
     from scenelang.cli.clock import Clock
-    from scenelang.cli.inputs import Request, unused_defines
+    from scenelang.cli.inputs import unused_defines
     from scenelang.cli.jobs import PROGRAM, prepare
     from scenelang.cli.say import say_diagnostics
 
@@ -49,7 +41,6 @@ def command(
     if not out.endswith(PROGRAM):
         raise click.UsageError(f"A program's file ends in {PROGRAM}, '{out}' does not.")
     clock = Clock()
-    request = Request(defines, model, root, frame, size)
     job = prepare(file, request, clock, verbose=verbose)
     job.diagnostics = [*job.diagnostics, *unused_defines(request)]
     say_diagnostics(job.diagnostics)

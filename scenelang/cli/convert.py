@@ -10,7 +10,7 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-    from scenelang.scene.params import Defines
+    from scenelang.cli.inputs import Request
     from scenelang.scene.schema import Scene
 
 Kind = Literal["nsg", "json", "python"]
@@ -19,29 +19,21 @@ SUFFIXES: Final[dict[str, Kind]] = {".nsg": "nsg", ".json": "json", ".py": "pyth
 
 @click.command("convert")
 @click.argument("file", metavar="FILE")
-@click.option("-o", "--out", metavar="OUT", help="A file instead of standard output.")
+@options.out
 @click.option(
     "--to",
     "kind",
     type=click.Choice(["nsg", "json", "python"]),
     help="What to write; by default what OUT's suffix names (.nsg, .json, .py).",
 )
-@options.define
-@options.size
-@options.frame
-@options.model
-@options.root
+@options.request
 @click.pass_context
 def command(
     ctx: click.Context,
     file: str,
     out: str | None,
     kind: Kind | None,
-    defines: Defines,
-    size: tuple[int, int] | None,
-    frame: int,
-    model: str | None,
-    root: str | None,
+    request: Request,
 ) -> None:
     """Write a scene as text, JSON or Python code.
 
@@ -49,14 +41,13 @@ def command(
     loops or imports left, only objects and numbers, which are kept exactly: it reads back as the same scene.
     """
     from scenelang.cli.clock import Clock
-    from scenelang.cli.inputs import Request, read_input, unused_defines
+    from scenelang.cli.inputs import read_input, unused_defines
     from scenelang.cli.say import say_diagnostics
     from scenelang.cli.texts import put_text
 
     wanted = kind or SUFFIXES.get(Path(out or "").suffix.lower())
     if wanted is None:
         raise click.UsageError("Say what to write: --to nsg, json or python, or -o with such a suffix.")
-    request = Request(defines, model, root, frame, size)
     found = read_input(file, request, Clock())
     found.diagnostics.items += unused_defines(request)
     say_diagnostics(found.diagnostics)

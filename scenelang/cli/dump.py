@@ -11,8 +11,8 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
+    from scenelang.cli.inputs import Request
     from scenelang.cli.stages import Stages
-    from scenelang.scene.params import Defines
 
 
 @click.command("dump")
@@ -26,12 +26,8 @@ if TYPE_CHECKING:
 )
 @click.option("--diff", is_flag=True, help="Only what each pass changed.")
 @click.option("--format", "kind", type=click.Choice(["text", "json"]), default="text", show_default=True)
-@click.option("-o", "--out", metavar="OUT", help="A file instead of standard output.")
-@options.define
-@options.size
-@options.frame
-@options.model
-@options.root
+@options.out
+@options.request
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -40,11 +36,7 @@ def command(
     diff: bool,
     kind: Literal["text", "json"],
     out: str | None,
-    defines: Defines,
-    size: tuple[int, int] | None,
-    frame: int,
-    model: str | None,
-    root: str | None,
+    request: Request,
 ) -> None:
     """Show what a scene is after stages of the compiler.
 
@@ -52,7 +44,6 @@ def command(
     written), the passes in their order (`--after help` lists them) and program. A scene with mistakes is
     shown as far as it goes; then the exit code is 1.
     """
-    from scenelang.cli.inputs import Request
     from scenelang.cli.say import say_diagnostics
     from scenelang.cli.stages import known_stages, run_stages, stage_names
     from scenelang.cli.texts import put_text
@@ -61,7 +52,7 @@ def command(
         click.echo("\n".join(stage_names()))
         return
     wanted = known_stages(stages)
-    made = run_stages(file, Request(defines, model, root, frame, size))
+    made = run_stages(file, request)
     say_diagnostics(made.diagnostics)
     shown = list(_changes(made, wanted) if diff else _whole(made, wanted or ("program",), kind))
     if kind == "json":

@@ -13,9 +13,9 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
+    from scenelang.cli.inputs import Request
     from scenelang.cli.stages import Stages
     from scenelang.interchange.drawing import Drawing
-    from scenelang.scene.params import Defines
 
 _PATIENCE_S: Final = 60
 _SUFFIXES: Final = (".mmd", ".dot", ".svg", ".png")
@@ -41,11 +41,7 @@ _SUFFIXES: Final = (".mmd", ".dot", ".svg", ".png")
 @click.option(
     "--most", type=click.IntRange(1, 10_000), default=200, show_default=True, help="Boxes to draw at most."
 )
-@options.define
-@options.size
-@options.frame
-@options.model
-@options.root
+@options.request
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -54,18 +50,13 @@ def command(
     kind: str | None,
     stage: str,
     most: int,
-    defines: Defines,
-    size: tuple[int, int] | None,
-    frame: int,
-    model: str | None,
-    root: str | None,
+    request: Request,
 ) -> None:
     """Draw the graph of a scene: its tree with transforms, materials and booleans.
 
     FILE is a scene, or - for standard input. Mermaid and DOT are text; .svg and .png need the program `dot`
     of Graphviz. Large scenes are cut, and a box says how many nodes are left out.
     """
-    from scenelang.cli.inputs import Request
     from scenelang.cli.say import say_diagnostics
     from scenelang.cli.stages import known_stages, run_stages
     from scenelang.cli.texts import put_text
@@ -74,7 +65,7 @@ def command(
     wanted = _kind(out, kind)
     known_stages((stage,), without=("syntax",))
     dot = _find_dot(wanted)
-    made = run_stages(file, Request(defines, model, root, frame, size))
+    made = run_stages(file, request)
     say_diagnostics(made.diagnostics)
     drawing = _drawing(made, stage, most)
     if drawing is None or made.diagnostics.errors:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 if TYPE_CHECKING:
     from scenelang.scene.params import Defines
 
+Backend = Literal["neural", "reference"]
 Color = Literal["auto", "always", "never"]
 
 
@@ -57,6 +60,21 @@ size = click.option(
 frame = click.option(
     "--frame", type=click.IntRange(0), default=0, metavar="N", help="Frame of the animation, from 0."
 )
+frames = click.option(
+    "--frames",
+    metavar="A..B",
+    help="Frames of an animation, where OUT is one: 0..23, 0..<24, 12.. to the end, or 7.",
+)
+still = click.option(
+    "--frame", type=click.IntRange(0), metavar="N", help="One frame of an animation, from 0, as a picture."
+)
+fps = click.option(
+    "--fps",
+    type=click.FloatRange(0, 1000, min_open=True),
+    metavar="N",
+    help="Frames a second instead of the scene's; its seconds stay.",
+)
+out = click.option("-o", "--out", metavar="OUT", help="A file instead of standard output.")
 color = click.option(
     "--color",
     type=click.Choice(["auto", "always", "never"]),
@@ -65,6 +83,13 @@ color = click.option(
     help="Colour what is printed; auto does so on terminals, unless NO_COLOR is set.",
 )
 strict = click.option("--strict", is_flag=True, help="Count warnings as errors.")
+backend = click.option(
+    "--backend",
+    type=click.Choice(["neural", "reference"]),
+    default="neural",
+    show_default=True,
+    help="Draw with the trained network, or by the exact definition.",
+)
 device = click.option(
     "--device",
     type=click.Choice(["auto", "cpu", "cuda"]),
@@ -74,3 +99,28 @@ device = click.option(
 )
 threads = click.option("--threads", type=click.IntRange(1), metavar="N", help="Threads on the CPU.")
 verbose = click.option("-v", "--verbose", is_flag=True, help="Say what was compiled and where the time went.")
+
+
+def request(command: Callable[..., Any]) -> Callable[..., Any]:
+    """How one scene is read: -D, --size, --frame, --model and --root, handed over as a `Request`."""
+
+    @define
+    @size
+    @frame
+    @model
+    @root
+    @wraps(command)
+    def with_request(
+        *arguments: Any,
+        defines: Defines,
+        size: tuple[int, int] | None,
+        frame: int,
+        model: str | None,
+        root: str | None,
+        **others: Any,
+    ) -> Any:
+        from scenelang.cli.inputs import Request
+
+        return command(*arguments, request=Request(defines, model, root, frame, size), **others)
+
+    return with_request

@@ -36,18 +36,9 @@ if TYPE_CHECKING:
 )
 @options.size
 @options.define
-@click.option(
-    "--frame", type=click.IntRange(0), metavar="N", help="One frame of an animation, from 0, as a picture."
-)
-@click.option(
-    "--frames", metavar="A..B", help="Frames of an animation: 0..23, 0..<24, 12.. to the end, or 7."
-)
-@click.option(
-    "--fps",
-    type=click.FloatRange(0, 1000, min_open=True),
-    metavar="N",
-    help="Frames a second instead of the scene's; its seconds stay.",
-)
+@options.still
+@options.frames
+@options.fps
 @click.option(
     "--jobs",
     type=click.IntRange(1, 256),
@@ -63,13 +54,7 @@ if TYPE_CHECKING:
 )
 @click.option("--dither", is_flag=True, help="Dither what a GIF's palette lacks.")
 @options.model
-@click.option(
-    "--backend",
-    type=click.Choice(["neural", "reference"]),
-    default="neural",
-    show_default=True,
-    help="Draw with the trained network, or by the exact definition.",
-)
+@options.backend
 @options.device
 @options.threads
 @options.strict
@@ -89,7 +74,7 @@ def command(
     palette: Literal["auto", "global", "frame"],
     dither: bool,
     model: str | None,
-    backend: Literal["neural", "reference"],
+    backend: options.Backend,
     device: Literal["auto", "cpu", "cuda"],
     threads: int | None,
     strict: bool,
@@ -157,7 +142,7 @@ def command(
 class _Painting(NamedTuple):
     """How pictures are drawn, and what is said about them."""
 
-    backend: Literal["neural", "reference"]
+    backend: options.Backend
     device: Literal["auto", "cpu", "cuda"]
     threads: int | None
     strict: bool

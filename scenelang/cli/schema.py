@@ -6,6 +6,8 @@ import json
 
 import click
 
+from scenelang.cli import options
+
 
 @click.command("schema")
 @click.option(
@@ -15,7 +17,7 @@ import click
     show_default=True,
     help="Scenes as JSON, what `check --format json` prints, or a model's manifest.",
 )
-@click.option("-o", "--out", metavar="OUT", help="A file instead of standard output.")
+@options.out
 def command(kind: str, out: str | None) -> None:
     """Print the JSON Schema (draft 2020-12) of scenes as JSON.
 

@@ -22,14 +22,9 @@ if TYPE_CHECKING:
 @click.option("-o", "--out", metavar="OUT", help="The picture, or an animation; by default STEM.png.")
 @options.size
 @options.define
-@click.option("--frame", type=click.IntRange(0), metavar="N", help="Frame of an animation, from 0.")
-@click.option("--frames", metavar="A..B", help="Frames of an animation, where OUT is one.")
-@click.option(
-    "--fps",
-    type=click.FloatRange(0, 1000, min_open=True),
-    metavar="N",
-    help="Frames a second instead of the scene's; its seconds stay.",
-)
+@options.still
+@options.frames
+@options.fps
 @options.model
 @click.option(
     "--show",
@@ -39,13 +34,7 @@ if TYPE_CHECKING:
     help="Show the picture in the terminal; always does with coloured characters if need be.",
 )
 @click.option("--poll", is_flag=True, help="Look for changes every now and then: for network folders.")
-@click.option(
-    "--backend",
-    type=click.Choice(["neural", "reference"]),
-    default="neural",
-    show_default=True,
-    help="Draw with the trained network, or by the exact definition.",
-)
+@options.backend
 @options.device
 @options.threads
 @options.root
@@ -60,7 +49,7 @@ def command(
     model: str | None,
     show: Literal["auto", "never", "always"],
     poll: bool,
-    backend: Literal["neural", "reference"],
+    backend: options.Backend,
     device: Literal["auto", "cpu", "cuda"],
     threads: int | None,
     root: str | None,
