@@ -32,6 +32,8 @@ from PIL import ImageDraw, ImageFont
 
 import scenelang as nsg
 from scenelang.evaluation.chart import stability_chart
+from scenelang.evaluation.experiment_charts import experiment_chart
+from scenelang.evaluation.experiment_charts import strips as experiment_strips
 from scenelang.evaluation.run import Case, worst_sheet
 from scenelang.models.load import load_model
 
@@ -42,6 +44,8 @@ PICTURES = DOCS / "pictures"
 GALLERY = ("gear", "flower", "lava", "walker", "logo", "mandala", "night", "vortex")
 GALLERY_FRAMES = {"vortex": 8, "lava": 30}
 COMPARED = "chain"
+CHARTED = ("compare", "table1")  # experiments whose chart the documentation shows
+STRIPPED = ("overfit", "compare", "table1", "table3")  # and whose pictures
 GAP_PX = 8
 LOUDER = 20  # factor on the difference of two pictures
 SHARPER = 2  # strips and the gallery are drawn larger by this and made smaller again, for screens' sake
@@ -203,10 +207,30 @@ def worst_cases(name: str, count: int) -> bytes:
 
 
 def stability() -> bytes:
-    """Charts of the stability suite, from what `scenelang stability` wrote."""
-    report = json.loads((DOCS / "results" / "stability.json").read_text("utf-8"))
-    with pillow.open(io.BytesIO(stability_chart([report], "png"))) as chart:
-        return png(chart.convert("RGB").quantize(64))
+    """Charts of the stability suite, from what `scenelang stability` wrote: of every model measured."""
+    paths = sorted((DOCS / "results").glob("stability*.json"))
+    reports = [json.loads(path.read_text("utf-8")) for path in paths]
+    return _few_colours(stability_chart(reports, "png"))
+
+
+def _few_colours(chart: bytes) -> bytes:
+    with pillow.open(io.BytesIO(chart)) as picture:
+        return png(picture.convert("RGB").quantize(64))
+
+
+def experiments() -> dict[str, Callable[[], bytes]]:
+    """Charts of experiments, and strips of what their runs draw, from what `scenelang experiment` wrote."""
+    made: dict[str, Callable[[], bytes]] = {}
+    folder = DOCS / "results" / "experiments"
+    for path in sorted(folder.glob("*.json")):
+        found = json.loads(path.read_text("utf-8"))
+        if path.stem in CHARTED:
+            name = f"experiments/{path.stem}.png"
+            made[name] = lambda found=found: _few_colours(experiment_chart(found, "png"))
+        if path.stem in STRIPPED:
+            name = f"experiments/{path.stem}-strips.png"
+            made[name] = lambda found=found: png(experiment_strips(found, folder).to_pil().quantize(128))
+    return made
 
 
 def plan() -> dict[str, Callable[[], bytes]]:
@@ -230,6 +254,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
     made["gallery.png"] = gallery
     made[f"{COMPARED}-compared.png"] = compared
     made["stability.png"] = stability
+    made |= experiments()
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
     return made
 

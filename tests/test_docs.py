@@ -266,7 +266,6 @@ def test_every_public_name_is_in_the_embedding_guide() -> None:
 
 
 def test_tables_of_results_are_those_of_the_measurements() -> None:
-    done = subprocess.run(
-        [sys.executable, ROOT / "docs/make_results.py", "--check"], capture_output=True, text=True, check=False
-    )
+    command = [sys.executable, ROOT / "docs/make_results.py", "--check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
