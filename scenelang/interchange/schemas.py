@@ -70,6 +70,8 @@ def manifest_schema() -> dict[str, Any]:
     words = {"type": "array", "items": word, "uniqueItems": True}
     pair = {"type": "array", "prefixItems": [{"type": "number"}] * 2, "minItems": 2, "maxItems": 2}
     limit = {"type": "integer", "minimum": 0, "exclusiveMaximum": 1 << 31}
+    side = {"type": "integer", "minimum": 1, "maximum": 8192}
+    size = {"type": "array", "prefixItems": [side] * 2, "minItems": 2, "maxItems": 2}
     whole = _object(
         {
             "format": {"const": 1},
@@ -90,7 +92,15 @@ def manifest_schema() -> dict[str, Any]:
                 "additionalProperties": pair,
             },
             "measured": {"description": "figures of its evaluation", "type": "object"},
+            "set": {"description": "the scenes it was trained on; by default its name", "type": "string"},
+            "sizes": {
+                "description": "canvases (width, height) that it draws; any within its limits if none",
+                "type": "array",
+                "items": size,
+            },
+            "white": {"description": "whether it draws over white alone", "type": "boolean"},
         },
+        optional=("set", "sizes", "white"),
         title="Manifest",
         description="What a model states about itself.",
     )
@@ -104,13 +114,13 @@ def _headed(name: str, schema: dict[str, Any]) -> dict[str, Any]:
     return {"$schema": _DRAFT, "$id": f"urn:scenelang:schema:{name}:1", **schema}
 
 
-def _object(properties: dict[str, Any], **further: Any) -> dict[str, Any]:
-    """An object that has these properties and no others."""
+def _object(properties: dict[str, Any], *, optional: tuple[str, ...] = (), **further: Any) -> dict[str, Any]:
+    """An object that has these properties, but for those that are optional, and no others."""
     return {
         "type": "object",
         **further,
         "properties": properties,
-        "required": list(properties),
+        "required": [name for name in properties if name not in optional],
         "additionalProperties": False,
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import random
+from contextlib import nullcontext
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -167,6 +168,27 @@ def test_manifests_are_valid(path: Path) -> None:
 
 def test_the_schema_of_manifests_names_their_fields() -> None:
     assert {field.name for field in fields(Manifest)} | {"format"} == set(SCHEMAS["manifest"]()["properties"])
+
+
+@pytest.mark.parametrize(
+    ("change", "good"),
+    [
+        ({}, True),
+        ({"set": "shapes2d", "sizes": [[128, 96], [64, 64]], "white": True}, True),
+        ({"sizes": [[0, 64]]}, False),
+        ({"sizes": [[64]]}, False),
+        ({"sizes": [[64, 8193]]}, False),
+        ({"white": 1}, False),
+        ({"set": 1}, False),
+        ({"colour": "red"}, False),
+    ],
+    ids=str,
+)
+def test_schema_and_reader_agree_on_manifests(change: dict[str, object], good: bool) -> None:
+    data = {**json.loads((ROOT / "shapes2d" / "manifest.json").read_text("utf-8")), **change}
+    assert Draft202012Validator(SCHEMAS["manifest"]()).is_valid(data) == good
+    with nullcontext() if good else pytest.raises(ValueError, match=r"."):
+        Manifest.from_json(json.dumps(data))
 
 
 def test_diagnostics_are_valid() -> None:
