@@ -34,6 +34,7 @@ import scenelang as nsg
 from scenelang.evaluation.chart import stability_chart
 from scenelang.evaluation.experiment_charts import experiment_chart
 from scenelang.evaluation.experiment_charts import strips as experiment_strips
+from scenelang.evaluation.parsimony import parts_chart
 from scenelang.evaluation.run import Case, worst_sheet
 from scenelang.models.load import load_model
 
@@ -41,6 +42,7 @@ DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
 REFERENCE = EXAMPLES / "reference"
 PICTURES = DOCS / "pictures"
+PARTS = DOCS / "results/experiments/parts.json"
 GALLERY = ("gear", "flower", "lava", "walker", "logo", "mandala", "night", "vortex")
 GALLERY_FRAMES = {"vortex": 8, "lava": 30}
 COMPARED = "chain"
@@ -233,6 +235,11 @@ def experiments() -> dict[str, Callable[[], bytes]]:
     return made
 
 
+def parts() -> bytes:
+    """What each part of the renderer buys, from what `scenelang experiment parts` wrote."""
+    return _few_colours(parts_chart(json.loads(PARTS.read_text("utf-8")), "png"))
+
+
 def plan() -> dict[str, Callable[[], bytes]]:
     """What `docs/pictures` holds, and how each file of it is made."""
     made: dict[str, Callable[[], bytes]] = {}
@@ -254,6 +261,8 @@ def plan() -> dict[str, Callable[[], bytes]]:
     made["gallery.png"] = gallery
     made[f"{COMPARED}-compared.png"] = compared
     made["stability.png"] = stability
+    if PARTS.exists():
+        made["parts.png"] = parts
     made |= experiments()
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
     return made
