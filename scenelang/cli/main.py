@@ -25,6 +25,7 @@ COMMANDS: Final = {
     "compare": "Draw a scene beside its exact picture.",
     "models": "List models, or tell about one.",
     "eval": "Measure a model on unseen scenes.",
+    "frontier": "Measure speed against error of every way to draw.",
     "stability": "Measure a model far beyond its training.",
     "train": "Train a model's weights.",
     "experiment": "Train several designs alike and compare them.",
