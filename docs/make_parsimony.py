@@ -1,0 +1,251 @@
+"""Write the tables of docs/parsimony.md from the JSON files in docs/results/.
+
+python docs/make_parsimony.py
+python docs/make_parsimony.py --measure
+
+`plans.json` is measured here with --measure; `experiments/parts.json` is what `scenelang experiment parts`
+writes, and `passes.json` what `python -m tests.passes.prove` writes. docs/make_pictures.py draws the chart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from scenelang.evaluation.parsimony import (
+    WAYS,
+    measure_examples,
+    size_groups,
+    size_of,
+    verdict,
+    whole_psnr,
+    whole_runs,
+)
+from scenelang.files import write_whole
+
+HERE = Path(__file__).parent
+RESULTS = HERE / "results"
+PAGE = HERE / "parsimony.md"
+PARTS = {
+    "no register": "the colour gate and its register; colour lies in eight more numbers of LSTM state",
+    "no distance scale": "the factor that turns leaf units into world units",
+    "no frame": "leaf coordinates; the decoder meets the world's, and the geometry vector picks its weights",
+    "token as input": "a set of weights for each token; the token is a further input",
+    "no sharpened inputs": "signs of distance and state at three slopes, beside the numbers themselves",
+    "pictures alone": "the asking for distances; colour and coverage alone train it",
+}
+WORDS = {"pays": "it pays", "no difference": "no difference", "costs": "better without"}
+Record = Mapping[str, Any]
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table, its first column to the left and all others to the right."""
+    lines = [f"| {' | '.join(head)} |", "|---|" + "--:|" * (len(head) - 1)]
+    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
+
+
+def read(name: str) -> Record | None:
+    """A record, or None where it was not made yet."""
+    path = RESULTS / f"{name}.json"
+    return json.loads(path.read_text("utf-8")) if path.exists() else None
+
+
+def parts_text(parts: Record | None) -> str:
+    """What each part buys: a table, and the chart."""
+    if parts is None:
+        return "*Not measured yet.*"
+    mean, spread = whole_psnr(parts)
+    whole = whole_runs(parts)[0]
+    seeds = len(whole_runs(parts))
+    rows = [["nothing", *_figures(whole), "", ""]]
+    for run in parts["runs"]:
+        if run["group"] == "parts":
+            found = verdict(run, parts)
+            taken = f"**{run['name']}**: {PARTS[run['name']]}"
+            rows.append([taken, *_figures(run), f"{found.change:+.1f}", WORDS[found.word]])
+    head = ("taken away", "parameters", "steps", "PSNR, dB", "5th percentile", "change", "the part")
+    about = (
+        f"{parts['budget_s']:.0f} s of processor time each, seed {parts['seed']}, {whole['scenes']} unseen "
+        f"scenes at {whole['resolution']}², revision `{parts['revision'][:9]}`, {parts['machine']}. "
+        f"The whole renderer with {seeds} seeds: {mean:.1f} dB, {spread:.1f} dB apart."
+    )
+    chart = "![PSNR without each part, and by each size](pictures/parts.png)"
+    return "\n\n".join([markdown(head, rows), about, chart])
+
+
+def _figures(run: Record) -> list[str]:
+    p = run["psnr"]
+    return [f"{run['parameters']:,}", f"{run['steps']:,}", f"{p['mean']:.1f}", f"{p['p5']:.1f}"]
+
+
+def sizes_text(parts: Record | None) -> str:
+    """Every size that was tried: a table, the shipped value in bold."""
+    if parts is None:
+        return "*Not measured yet.*"
+    whole = whole_runs(parts)[0]
+    rows = []
+    for group, runs in size_groups(parts).items():
+        for run in sorted([whole, *runs], key=lambda r: size_of(r, group)):
+            value = str(size_of(run, group))
+            shipped = run is whole
+            change = "" if shipped else f"{verdict(run, parts).change:+.1f}"
+            name = group.replace("_", " ")
+            rows.append([f"{name} **{value}**" if shipped else f"{name} {value}", *_figures(run), change])
+    return markdown(("size", "parameters", "steps", "PSNR, dB", "5th percentile", "change"), rows)
+
+
+def passes_text(proof: Record, plans: Record) -> str:
+    """What each pass does in random scenes and in the examples."""
+    rows = []
+    for name, tally in proof["passes"].items():
+        if tally["changed"]:
+            saved = _saved(plans["plans"], name)
+            rows.append(
+                [
+                    f"`{name}`",
+                    f"{tally['changed']:,}",
+                    f"{tally['largest']:.0e}" if tally["largest"] else "0",
+                    *(f"{saved[key]:,}" for key in ("examples", "objects", "matrices", "folds")),
+                ]
+            )
+    head = ("pass", "scenes changed", "largest change of a colour", "examples changed")
+    return markdown((*head, "objects taken away", "matrices", "folds"), rows)
+
+
+def proof_text(proof: Record) -> str:
+    """How the passes were proven, in one paragraph."""
+    differing = sum(tally["differing"] for tally in proof["passes"].values())
+    words = ", ".join(f"{number:,} {word}" for word, number in proof["words"].items())
+    return (
+        f"{proof['scenes']:,} random scenes of {proof['objects']:,} objects and {proof['matrices']:,} "
+        f"transforms, {proof['samples']:,} samples, {proof['covered']:,} of them covered; in the streams "
+        f"{words}. "
+        f"The boolean rule refused {proof['refused']:,} more, and {proof['bare']:,} showed too little. "
+        f"Coverage differs at {differing} samples; {proof['aside']} lay within {proof['edge']:.0e} of an "
+        "outline."
+    )
+
+
+def _saved(plans: Sequence[Record], name: str) -> dict[str, int]:
+    """What a pass took away from all examples, and from how many."""
+    saved = dict.fromkeys(("examples", "objects", "matrices", "folds"), 0)
+    for plan in plans:
+        rows = plan["stages"]
+        at = next(i for i, row in enumerate(rows) if row["stage"] == name)
+        saved["examples"] += rows[at]["changed"]
+        for key in ("objects", "matrices", "folds"):
+            saved[key] += rows[at - 1][key] - rows[at][key]
+    return saved
+
+
+def ways_text(plans: Record) -> str:
+    """What skipping and adaptive sampling save, over all examples together."""
+    found = [plan["ways"] for plan in plans["plans"] if plan["ways"]]
+    shipped = _way(found, "as shipped")
+    rows = []
+    for name in WAYS:
+        meetings, ms, error, worst = _way(found, name)
+        rows.append(
+            [
+                name,
+                f"{meetings:,.0f}",
+                f"{meetings / shipped[0]:.1f} ×",
+                f"{ms / shipped[1]:.1f} ×",
+                f"{error:.2f}",
+                f"{worst:.2f}",
+            ]
+        )
+    head = ("how it is drawn", "meetings", "of those shipped", "time", "PSNR, dB", "worst")
+    about = f"All {len(found)} examples together, one thread, one run on {plans['machine']}."
+    return f"{markdown(head, rows)}\n\n{about}"
+
+
+def _way(found: Sequence[Record], name: str) -> tuple[float, float, float, float]:
+    """Meetings and milliseconds in all, mean and lowest PSNR."""
+    of = [ways[name] for ways in found]
+    errors = [w["psnr"] for w in of]
+    return sum(w["meetings"] for w in of), sum(w["ms"] for w in of), sum(errors) / len(errors), min(errors)
+
+
+def examples_text(plans: Record) -> str:
+    """A line for every example."""
+    rows = []
+    for plan in plans["plans"]:
+        first, last, cost = plan["stages"][0], plan["stages"][-1], plan["drawing"]
+        rows.append(
+            [
+                f"[{plan['file'].removesuffix('.nsg')}](../examples/{plan['file']})",
+                f"{first['objects']} → {last['objects']}",
+                f"{first['matrices']} → {last['matrices']}",
+                f"{sum(first['tokens'].values())} → {plan['rows']}",
+                plan["model"],
+                plan["runner_up"] or "–",
+                f"{cost['parameters']:,}",
+                f"{_percent(cost['evaluated'], cost['pixels'])} of {cost['pixels']:,}",
+                _percent(cost["refined"], cost["pixels"]),
+                _percent(cost["meetings"], cost["meetings_unskipped"]),
+                f"{cost['ms']:.0f}",
+                f"{cost['psnr']:.1f}",
+                "–" if cost["flip"] is None else f"{cost['flip']:.4f}",
+            ]
+        )
+    head = ("scene", "objects", "matrices", "tokens", "model", "runner-up", "parameters", "pixels evaluated")
+    table = markdown((*head, "sampled four times", "meetings", "ms", "PSNR, dB", "FLIP"), rows)
+    weights = ", ".join(f"`{name}` {digest[:8]}…" for name, digest in plans["weights"].items())
+    about = f"One thread, {plans['machine']}, torch {plans['torch']}, one run; weights of {weights}."
+    return f"{table}\n\n{about}"
+
+
+def _percent(part: float, whole: float) -> str:
+    return f"{100 * part / whole:.1f} %" if whole else "–"
+
+
+def tables() -> dict[str, str]:
+    """What stands in the page, by the names of its places."""
+    parts, plans, proof = read("experiments/parts"), read("plans"), read("passes")
+    assert plans is not None
+    assert proof is not None
+    return {
+        "parts": parts_text(parts),
+        "sizes": sizes_text(parts),
+        "ways": ways_text(plans),
+        "passes": passes_text(proof, plans),
+        "proof": proof_text(proof),
+        "examples": examples_text(plans),
+    }
+
+
+def filled(page: str, made: Mapping[str, str]) -> str:
+    """A page with its generated places written anew.
+
+    Raises:
+        ValueError: it lacks a place.
+    """
+    for name, text in made.items():
+        begin, end = f"<!-- {name}: python docs/make_parsimony.py -->", f"<!-- end of {name} -->"
+        pattern = re.compile(re.escape(begin) + r".*?" + re.escape(end), re.DOTALL)
+        if not pattern.search(page):
+            raise ValueError(f"no place for {name}")
+        page = pattern.sub(lambda _, t=f"{begin}\n{text}\n{end}": t, page)
+    return page
+
+
+def main() -> None:
+    """Measure if asked to, and write the page."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--measure", action="store_true", help="draw all examples first, which takes minutes")
+    if parser.parse_args().measure:
+        paths = sorted((HERE.parent / "examples").glob("*.nsg"))
+        found = measure_examples(
+            paths, lambda plan: print(plan["file"], f"{plan['drawing']['ms']:.0f} ms", flush=True)
+        )
+        write_whole(RESULTS / "plans.json", (json.dumps(found, indent=1) + "\n").encode())
+    write_whole(PAGE, filled(PAGE.read_text("utf-8"), tables()).encode())
+
+
+if __name__ == "__main__":
+    main()
