@@ -81,7 +81,7 @@ def _text(plan: dict[str, Any]) -> str:
     if cost["flip"] is not None:
         error += f", FLIP {cost['flip']:.4f},"
     lines += [
-        f"stream     {plan['rows']:,} rows of 64 numbers ({tokens or 'empty'})",
+        f"stream     {plan['rows']:,} row{'s' * (plan['rows'] != 1)} of 64 numbers ({tokens or 'empty'})",
         f"pixels     {cost['evaluated']:,} of {cost['pixels']:,} evaluated "
         f"({_share(cost['evaluated'], cost['pixels'])}), {cost['refined']:,} of them sampled four times "
         f"({_share(cost['refined'], cost['pixels'])})",
