@@ -11,18 +11,17 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
 
     from scenelang.animation.targets import Target
+    from scenelang.backend.render import Precision, Samples
     from scenelang.cli.animation import Wanted
+    from scenelang.cli.choosing import Limits
     from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import Job
     from scenelang.diagnostics.span import SourceFile
     from scenelang.image import Image
     from scenelang.scene.params import Defines
-
-    Draw = Callable[[Job, Callable[[float], None]], Image]
 
 
 @click.command("render")
@@ -55,6 +54,32 @@ if TYPE_CHECKING:
 @click.option("--dither", is_flag=True, help="Dither what a GIF's palette lacks.")
 @options.model
 @options.backend
+@click.option(
+    "--precision",
+    type=click.Choice(["float32", "int8"]),
+    default="float32",
+    show_default=True,
+    help="Draw in 8 bits, with models that have such a form.",
+)
+@click.option(
+    "--samples",
+    type=click.Choice(["adaptive", "four", "one"]),
+    default="adaptive",
+    show_default=True,
+    help="Samples of a pixel: four near outlines, four everywhere, or one, with hard edges.",
+)
+@click.option(
+    "--max-ms",
+    type=click.FloatRange(0, min_open=True),
+    metavar="N",
+    help="Choose the most exact way to draw that takes at most so long on one thread.",
+)
+@click.option(
+    "--max-flip",
+    type=click.FloatRange(0, 1),
+    metavar="E",
+    help="Choose the fastest way to draw whose promised FLIP error is at most so large.",
+)
 @options.device
 @options.threads
 @options.strict
@@ -75,6 +100,10 @@ def command(
     dither: bool,
     model: str | None,
     backend: options.Backend,
+    precision: Precision,
+    samples: Samples,
+    max_ms: float | None,
+    max_flip: float | None,
     device: Literal["auto", "cpu", "cuda"],
     threads: int | None,
     strict: bool,
@@ -95,9 +124,14 @@ def command(
       frame-%04d.png                numbered pictures
       FOLDER/                       FOLDER/STEM-0000.png and so on
     A run that was interrupted goes on where it stopped.
+
+    With --max-ms or --max-flip each scene is drawn by what `scenelang frontier` measured to suffice, model,
+    precision and samples; -v says which, why, and what was next.
     """
     from scenelang.cli.animation import Wanted, wanted_target
+    from scenelang.cli.choosing import Limits, check_options
     from scenelang.cli.clock import Clock
+    from scenelang.cli.drawing import chosen, exact, neural
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import PROGRAM
     from scenelang.cli.outputs import targets
@@ -109,11 +143,14 @@ def command(
         raise click.UsageError("--frame asks for a picture, --frames and --fps for an animation.")
     if len(files) > 1 and wanted.certain:
         raise click.UsageError("--frames and --fps take one scene.")
+    limits = Limits(max_ms, max_flip)
+    check_options(ctx, limits, device)
     request = Request(defines, model, root, frame or 0, size)
     source = None
     if len(files) == 1 and frame is None and not files[0].endswith(PROGRAM):
         target = wanted_target(files[0], out, wanted)
         if target is not None:
+            _only_stills(limits, precision, samples)
             painting = _Painting(backend, device, threads, strict, verbose)
             code, source = _animate(files[0], out, target, request, wanted, painting)
             if source is None:
@@ -125,7 +162,13 @@ def command(
     ready = [(job, path) for job, path in zip(found, paths, strict=True) if job and not job.failed(strict)]
     if not ready:
         ctx.exit(code)
-    draw = _exact(request, clock) if backend == "reference" else _neural(clock, device, threads)
+    if limits:
+        draw, ready, code = chosen(limits, request, clock, threads, ready, code)
+    elif backend == "reference":
+        _only_network(precision, samples)
+        draw = exact(request, clock)
+    else:
+        draw = neural(clock, device, threads, precision, samples)
     with Bar("drawing", len(ready)) as bar:
         for index, (job, path) in enumerate(ready):
             image = draw(job, partial(bar.part, index))
@@ -254,38 +297,16 @@ def _prepared(
     return jobs, max(code, int(any(job.failed(strict) for job in read)))
 
 
-def _neural(clock: Clock, device: str, threads: int | None) -> Draw:
-    with clock("load torch"):
-        from scenelang.backend.neural import choose_device, draw_program, open_model
-    place = choose_device(device)
-
-    def draw(job: Job, progress: Callable[[float], None]) -> Image:
-        assert job.program is not None
-        with clock("load model"):
-            model = open_model(job.program.model, place)
-        with clock("draw"):
-            drawing = draw_program(job.program, model, threads=threads, progress=progress)
-        width, height = job.program.canvas
-        once = width * height - drawing.refined
-        job.notes.append(f"drew {once:,} pixels by one sample and {drawing.refined:,} by four, on {place}")
-        job.notes.append(f"{drawing.pairs:,} meetings of a sample and an object")
-        return drawing.image
-
-    return draw
+def _only_stills(limits: Limits, precision: str, samples: str) -> None:
+    """Refuse for animations what chooses or changes how one picture is drawn."""
+    if limits or precision != "float32" or samples != "adaptive":
+        what = "--max-ms and --max-flip" if limits else "--precision and --samples"
+        raise click.UsageError(f"{what} are for single pictures; --frame draws one of an animation.")
 
 
-def _exact(request: Request, clock: Clock) -> Draw:
-    from scenelang.backend.exact import draw_exact
-
-    def draw(job: Job, progress: Callable[[float], None]) -> Image:
-        assert job.source is not None
-        assert job.source.scene is not None
-        with clock("draw"):
-            image = draw_exact(job.source.scene, spans=job.source.spans, model=request.model)
-        job.notes.append("drew the exact picture, four samples a pixel")
-        return image
-
-    return draw
+def _only_network(precision: str, samples: str) -> None:
+    if precision != "float32" or samples != "adaptive":
+        raise click.UsageError("--precision and --samples are for the network, not for the reference.")
 
 
 def _save(image: Image, path: Path) -> None:
