@@ -73,7 +73,7 @@ def _chart(
             markeredgewidth=1.4,
             linestyle="none",
             zorder=3,
-            gid=point.title,  # `place_labels` reads it
+            label=point.title,  # `place_labels` reads it
         )
     _front(axis, drawn, low_is_good)
     timed = [p for p in frontier.points if value(p) is None]

@@ -17,7 +17,7 @@ Box = tuple[float, float, float, float]
 
 
 def place_labels(figure: Any, axis: Any) -> None:
-    """Label every marker that has a ``gid`` with it.
+    """Label every marker that has one, as matplotlib calls it, beside it.
 
     Args:
         figure: laid out, so that positions are final.
@@ -26,7 +26,7 @@ def place_labels(figure: Any, axis: Any) -> None:
     figure.canvas.draw()
     render = figure.canvas.get_renderer()
     window = axis.get_window_extent(render)
-    marks = [line for line in axis.get_lines() if line.get_gid()]
+    marks = [line for line in axis.get_lines() if not line.get_label().startswith("_")]
     taken: list[Box] = []
     for mark in marks:
         x, y = axis.transData.transform((mark.get_xdata()[0], mark.get_ydata()[0]))
@@ -37,7 +37,7 @@ def place_labels(figure: Any, axis: Any) -> None:
         best: tuple[float, Any, Box] | None = None
         for dx, dy in _PLACES:
             label = axis.annotate(
-                mark.get_gid(),
+                mark.get_label(),
                 data,
                 xytext=(dx, dy),
                 textcoords="offset points",
