@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.formatting.documents import Part
@@ -11,9 +9,9 @@ from scenelang.formatting.layout import Layout
 from scenelang.formatting.printer import render
 from scenelang.formatting.trivia import attach, comments_of
 from scenelang.syntax import parse
+from scenelang.syntax.automaton import run
 from scenelang.syntax.lexer import scan
 from scenelang.syntax.nesting import limit_nesting
-from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
 
 _BOM = "\ufeff"
@@ -66,47 +64,9 @@ def _without_strays(text: str, diagnostics: Diagnostics) -> str:
 
 
 def _document(layout: Layout) -> Part | None:
-    """The document of a text: the parser's loop with callbacks that lay out; None at a mistake."""
-    language = tables()
-    actions, gotos, final = language.actions, language.gotos, language.final
-    rules = [
-        (length, origin, call)
-        for (length, origin, _), call in zip(language.rules, layout.callbacks(), strict=True)
-    ]
-    kinds = layout.tokens.kinds
-    states = [language.start]
-    values: list[Any] = []
-    state = language.start
-    at = 0
-    kind = kinds[0]
-    while True:
-        action = actions[state].get(kind)
-        if action is None:
-            return None
-        if action >= 0:
-            states.append(action)
-            values.append(at)
-            state = action
-            at += 1
-            kind = kinds[at]
-            continue
-        length, origin, call = rules[~action]
-        if call is None:
-            states.pop()
-        elif length == 1:
-            states.pop()
-            values[-1] = call(values[-1])
-        elif length:
-            parts = values[-length:]
-            del values[-length:], states[-length:]
-            values.append(call(*parts))
-        else:
-            values.append(call())
-        state = gotos[states[-1]][origin]
-        states.append(state)
-        if state == final:
-            document: Part = values[0]
-            return document
+    """The document of a text, read as the parser reads it; None at a mistake."""
+    document: Part | None = run(layout.tokens.kinds, layout.callbacks(), lambda states, values, at: None)
+    return document
 
 
 def _compare(before: Tokens, result: str) -> None:

@@ -1,11 +1,78 @@
-"""Trying tokens out on a stack of LALR states, without building anything."""
+"""The LALR automaton: reading tokens to their end, and trying some out without building anything.
+
+Lark's own loop feeds token objects through several layers and cannot resume; this one works on the same
+tables, keeps token indices on its stack and hands over at a mistake.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
 
 from scenelang.syntax.tables import END, tables
 
 LOOKAHEAD = 8
 """How far past a mistake a repair is followed; further on it tells nothing more."""
+
+
+Mend = Callable[[list[int], list[Any], int], int | None]
+"""Changes states, values and tokens at the index of one that does not fit, and says where reading goes on."""
+
+
+def run(kinds: list[int], callbacks: Iterable[Callable[..., Any] | None], mend: Mend) -> Any:
+    """Read tokens to their end and build what they stand for.
+
+    Args:
+        kinds: of each token, the last of them `END`; ``mend`` may change the list.
+        callbacks: what builds the value of each rule, in the order of `Tables.rules`, from the values of its
+            parts; that of a token is its index. None passes the only value on.
+        mend: is asked at a token that does not fit; None gives up.
+
+    Returns:
+        What the last rule's callback made, None where ``mend`` gave up.
+    """
+    language = tables()
+    actions, gotos, final = language.actions, language.gotos, language.final
+    rules = [
+        (length, origin, call) for (length, origin, _), call in zip(language.rules, callbacks, strict=True)
+    ]
+    states = [language.start]
+    values: list[Any] = []
+    state = language.start
+    at = 0
+    kind = kinds[0]
+    while True:
+        action = actions[state].get(kind)
+        if action is None:
+            resumed = mend(states, values, at)
+            if resumed is None:
+                return None
+            at = resumed
+            kind = kinds[at]
+            state = states[-1]
+        elif action >= 0:
+            states.append(action)
+            values.append(at)
+            state = action
+            at += 1
+            kind = kinds[at]
+        else:
+            length, origin, call = rules[~action]
+            if call is None:
+                states.pop()
+            elif length == 1:
+                states.pop()
+                values[-1] = call(values[-1])
+            elif length:
+                parts = values[-length:]
+                del values[-length:], states[-length:]
+                values.append(call(*parts))
+            else:
+                values.append(call())
+            state = gotos[states[-1]][origin]
+            states.append(state)
+            if state == final:
+                return values[0]
 
 
 def advance(stack: list[int], kind: int) -> bool:

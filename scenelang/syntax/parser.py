@@ -1,8 +1,4 @@
-"""The LALR loop: tokens to a tree, with recovery where a token does not fit.
-
-Lark's own loop feeds token objects through several layers and cannot resume; this one works on the same
-tables, keeps token indices on its stack and hands over to `syntax.recover` at a mistake.
-"""
+"""Text to tree: braces, the automaton, and `syntax.recover` where a token does not fit."""
 
 from __future__ import annotations
 
@@ -11,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.syntax import nodes
+from scenelang.syntax.automaton import run
 from scenelang.syntax.build import Builder
 from scenelang.syntax.lexer import scan
 from scenelang.syntax.nesting import limit_nesting
@@ -68,56 +65,20 @@ def _unbalanced(tokens: Tokens) -> bool:
 def parse_tokens(tokens: Tokens, report: Report) -> nodes.File:
     """The tree of tokens whose braces match; recovery edits them and reports to ``report``."""
     limit_nesting(tokens, report)
-    language = tables()
-    actions, gotos, final = language.actions, language.gotos, language.final
-    callbacks = Builder(tokens, report).callbacks()
-    rules = [
-        (length, origin, call) for (length, origin, _), call in zip(language.rules, callbacks, strict=True)
-    ]
     recovery: Recovery | None = None
-    kinds = tokens.kinds
-    states = [language.start]
-    values: list[Any] = []
-    state = language.start
-    at = 0
-    kind = kinds[0]
-    while True:
-        action = actions[state].get(kind)
-        if action is None:
-            if recovery is None:
-                from scenelang.syntax.recover import Recovery
+    unfinished: list[Any] = []
 
-                recovery = Recovery(tokens, report)
-            resumed = recovery.resume(states, values, at)
-            if resumed is None:
-                return _abandoned(tokens, values)
-            at = resumed
-            kind = kinds[at]
-            state = states[-1]
-        elif action >= 0:
-            states.append(action)
-            values.append(at)
-            state = action
-            at += 1
-            kind = kinds[at]
-        else:
-            length, origin, call = rules[~action]
-            if call is None:
-                states.pop()
-            elif length == 1:
-                states.pop()
-                values[-1] = call(values[-1])
-            elif length:
-                parts = values[-length:]
-                del values[-length:], states[-length:]
-                values.append(call(*parts))
-            else:
-                values.append(call())
-            state = gotos[states[-1]][origin]
-            states.append(state)
-            if state == final:
-                file: nodes.File = values[0]
-                return file
+    def mend(states: list[int], values: list[Any], at: int) -> int | None:
+        nonlocal recovery, unfinished
+        if recovery is None:
+            from scenelang.syntax.recover import Recovery
+
+            recovery = Recovery(tokens, report)
+        unfinished = values
+        return recovery.resume(states, values, at)
+
+    file: nodes.File | None = run(tokens.kinds, Builder(tokens, report).callbacks(), mend)
+    return _abandoned(tokens, unfinished) if file is None else file
 
 
 def _abandoned(tokens: Tokens, values: list[Any]) -> nodes.File:
