@@ -13,7 +13,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
 from scenelang.diagnostics.pages import AREAS, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
 from scenelang.graph import lower
-from scenelang.models.manifest import Manifest, available, load_manifest
+from scenelang.models.manifest import available, load_manifest
 from scenelang.passes import check_scene
 from scenelang.program.compile import find_model
 from scenelang.scene import functions, imports, session, settings, values
@@ -24,26 +24,12 @@ from scenelang.scene.schema import Scene
 from scenelang.scene.unused import find_unused
 from scenelang.syntax import nesting, parse, tokens
 from scenelang.syntax.tables import tables
+from tests.models import SOLIDS
 
 PAGES = Path(scenelang.__file__).parent / "diagnostics/pages"
 ROOT = Path(__file__).parents[2]
 
-# A 3D model as `language.md` has it: pages about what models lack need a second one.
-SOLIDS = Manifest(
-    name="solids3d",
-    summary="sphere and torus under a point light",
-    dimension=3,
-    renderer="framed",
-    lifting="exact",
-    geometries=("sphere", "torus"),
-    materials=("diffuse", "volumetric"),
-    default_material="diffuse",
-    transforms=("translate", "rotate", "scale", "shear", "matrix", "twist", "displace"),
-    material_ops=("color", "grayscale", "hue"),
-    limits={"canvas": 2048},
-    trained={},
-    measured={},
-)
+# Pages about what models lack need a second one.
 MODELS = [SOLIDS, *(load_manifest(name) for name in available() if name != SOLIDS.name)]
 
 

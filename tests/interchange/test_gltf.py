@@ -24,8 +24,9 @@ from scenelang.graph.transforms import step_of
 from scenelang.interchange import gltf as module
 from scenelang.interchange.gltf import GltfError, geometry_of, import_gltf, load_gltf, srgb
 from scenelang.interchange.gltf_file import MOST_BYTES, parse_gltf
-from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.models.manifest import load_manifest
 from tests.interchange.documents import Json, document, write
+from tests.models import SOLIDS
 
 
 def read(data: Json, **options: Any) -> module.Imported:
@@ -53,14 +54,6 @@ def oracle(path: Path) -> dict[str, np.ndarray]:
     """World matrices of the nodes with geometry, by name, as trimesh reads them."""
     scene = trimesh.load_scene(path)
     return {name: scene.graph.get(name)[0] for name in scene.graph.nodes_geometry}
-
-
-SOLIDS = Manifest(
-    name="solids3d", summary="", dimension=3, renderer="framed", lifting="exact",
-    geometries=("sphere", "torus"),
-    materials=("diffuse",), default_material="diffuse", transforms=("translate",), material_ops=("color",),
-    limits={}, trained={}, measured={},
-)  # fmt: skip
 
 
 @pytest.fixture

@@ -9,26 +9,12 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.models.manifest import load_manifest
 from scenelang.scene.evaluate import load_source
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap
+from tests.models import SOLIDS
 
-SOLIDS = Manifest(
-    name="solids3d",
-    summary="sphere and torus under a point light",
-    dimension=3,
-    renderer="framed",
-    lifting="exact",
-    geometries=("sphere", "torus"),
-    materials=("diffuse", "volumetric"),
-    default_material="diffuse",
-    transforms=("translate", "rotate", "scale", "shear", "matrix", "twist", "displace"),
-    material_ops=("color", "grayscale", "hue"),
-    limits={},
-    trained={},
-    measured={},
-)
 MODELS = (load_manifest("shapes2d"), SOLIDS)
 
 

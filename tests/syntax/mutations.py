@@ -27,6 +27,7 @@ from scenelang.syntax.generate import grammar_path
 from scenelang.syntax.lexer import scan
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report
+from tests.models import SOLIDS
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -130,22 +131,7 @@ def scenes() -> tuple[Scene, ...]:
 @cache
 def models() -> tuple[Manifest, ...]:
     """The shipped model, and one in space that some scenes name."""
-    solids = Manifest(
-        name="solids3d",
-        summary="sphere and torus under a point light",
-        dimension=3,
-        renderer="framed",
-        lifting="exact",
-        geometries=("sphere", "torus"),
-        materials=("diffuse", "volumetric"),
-        default_material="diffuse",
-        transforms=("translate", "rotate", "scale", "shear", "matrix", "twist", "displace"),
-        material_ops=("color", "grayscale", "hue"),
-        limits={},
-        trained={},
-        measured={},
-    )
-    return load_manifest("shapes2d"), solids
+    return load_manifest("shapes2d"), SOLIDS
 
 
 # ---------------------------------------------------------------- making slips

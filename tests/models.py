@@ -1,0 +1,21 @@
+"""A model in space for tests: one as `language.md` has it, where the shipped ones are flat."""
+
+from __future__ import annotations
+
+from scenelang.models.manifest import Manifest
+
+SOLIDS = Manifest(
+    name="solids3d",
+    summary="sphere and torus under a point light",
+    dimension=3,
+    renderer="framed",
+    lifting="exact",
+    geometries=("sphere", "torus"),
+    materials=("diffuse", "volumetric"),
+    default_material="diffuse",
+    transforms=("translate", "rotate", "scale", "shear", "matrix", "twist", "displace"),
+    material_ops=("color", "grayscale", "hue"),
+    limits={"canvas": 2048},
+    trained={},
+    measured={},
+)
