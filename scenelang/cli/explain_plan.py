@@ -10,16 +10,12 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-    from scenelang.scene.params import Defines
+    from scenelang.cli.inputs import Request
 
 
 @click.command("explain-plan")
 @click.argument("file", metavar="FILE")
-@options.define
-@options.size
-@options.frame
-@options.model
-@options.root
+@options.request
 @options.device
 @options.threads
 @click.option("--format", "kind", type=click.Choice(["text", "json"]), default="text", show_default=True)
@@ -27,11 +23,7 @@ if TYPE_CHECKING:
 def command(
     ctx: click.Context,
     file: str,
-    defines: Defines,
-    size: tuple[int, int] | None,
-    frame: int,
-    model: str | None,
-    root: str | None,
+    request: Request,
     device: str,
     threads: int | None,
     kind: Literal["text", "json"],
@@ -42,11 +34,10 @@ def command(
     and the next best, how many pixels an object reached, how many samples met how many objects, the
     parameters, the time of a frame, and the error against the exact picture.
     """
-    from scenelang.cli.inputs import Request
     from scenelang.cli.say import say_diagnostics
     from scenelang.cli.stages import run_stages
 
-    made = run_stages(file, Request(defines, model, root, frame, size))
+    made = run_stages(file, request)
     say_diagnostics(made.diagnostics)
     if made.program is None or made.source.scene is None or made.diagnostics.errors:
         ctx.exit(1)
@@ -58,7 +49,7 @@ def command(
     plan: dict[str, Any] = {
         "version": 1,
         "file": file,
-        **choice(scene, program.model, asked=model is not None),
+        **choice(scene, program.model, asked=request.model is not None),
         "stages": stages(made.graphs),
         "rows": len(program),
         "tokens": token_counts(program.tokens.tolist()),
