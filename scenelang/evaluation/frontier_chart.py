@@ -13,7 +13,13 @@ from scenelang.evaluation.frontier_chart_labels import place_labels
 FLOOR: Final = 2e-4
 """FLIP below which points lie on the chart's lower edge; 0 has no place on a logarithmic axis."""
 COLOURS: Final = {"framed": "#1f77b4", "streaming": "#c8452f", "reading": "#7b5ea7", "reference": "#2f8f5b"}
-MARKS: Final = {"adaptive": "o", "four": "s", "one": "^"}
+MARKS: Final = {
+    "int8": ("D", "int8"),
+    "unskipped": ("v", "nothing skipped"),
+    "adaptive": ("o", "four samples near outlines"),
+    "four": ("s", "four samples everywhere"),
+    "one": ("^", "one sample a pixel"),
+}
 
 
 def frontier_chart(frontier: Frontier, kind: str) -> bytes:
@@ -23,6 +29,16 @@ def frontier_chart(frontier: Frontier, kind: str) -> bytes:
         frontier: figures.
         kind: "png" or "svg".
     """
+    figure = frontier_figure(frontier)
+    data = io.BytesIO()
+    about = {"Date": None} if kind == "svg" else {"Software": None}
+    figure.savefig(data, format=kind, dpi=100, metadata=about)
+    pyplot().close(figure)
+    return data.getvalue()
+
+
+def frontier_figure(frontier: Frontier) -> Any:
+    """The charts as a matplotlib figure."""
     plt = pyplot()
     figure, axes = plt.subplots(2, 1, figsize=(11, 13))
     _chart(axes[0], frontier, lambda p: None if p.flip is None else max(p.flip.mean, FLOOR), low_is_good=True)
@@ -42,18 +58,15 @@ def frontier_chart(frontier: Frontier, kind: str) -> bytes:
     caption = (
         f"Seed {frontier.seed}, {frontier.machine}, torch {frontier.torch}, {frontier.revision[:10]}. "
         "All ways drew each scene in turn. Error against the exact picture, four samples a pixel.\n"
-        "Filled: what `scenelang render` chooses from. Hollow: measured for comparison. "
-        "Circle: four samples near outlines; square: four everywhere; triangle: one."
+        f"Filled: what `scenelang render` chooses from. Hollow: measured for comparison. "
+        f"The line joins what nothing offered beats. w8 is the model {frontier.set}-w8, and so on."
     )
+    _legend(axes[1], frontier)
     figure.text(0.01, 0.004, caption, fontsize=7.5, color=INK)
     figure.tight_layout(rect=(0, 0.03, 1, 1))
     for axis in axes:
         place_labels(figure, axis)
-    data = io.BytesIO()
-    about = {"Date": None} if kind == "svg" else {"Software": None}
-    figure.savefig(data, format=kind, dpi=100, metadata=about)
-    plt.close(figure)
-    return data.getvalue()
+    return figure
 
 
 def _chart(
@@ -66,29 +79,29 @@ def _chart(
         axis.plot(
             point.ms.median,
             y,
-            marker="D" if point.precision == "int8" else MARKS[point.samples],
-            markersize=8,
+            marker=MARKS[mark_of(point)][0],
+            markersize=7.5,
             markerfacecolor=colour if point.offered else "white",
             markeredgecolor=colour,
             markeredgewidth=1.4,
             linestyle="none",
             zorder=3,
-            label=point.title,  # `place_labels` reads it
+            label=short_name(point, frontier.set),  # `place_labels` reads it
         )
     _front(axis, drawn, low_is_good)
     timed = [p for p in frontier.points if value(p) is None]
-    top = axis.get_ylim()[1]
     for point in timed:
         axis.axvline(point.ms.median, color=FAINT, linewidth=1, linestyle=":", zorder=1)
         axis.annotate(
             f"{point.name} (time only)",
-            (point.ms.median, top),
-            xytext=(-3, -6),
+            (point.ms.median, 0.03),
+            xycoords=("data", "axes fraction"),
+            xytext=(-3, 0),
             textcoords="offset points",
             rotation=90,
             fontsize=7,
             color=INK,
-            va="top",
+            va="bottom",
             ha="right",
         )
     times = [p.ms.median for p in frontier.points]
@@ -97,6 +110,44 @@ def _chart(
     axis.set_xlabel(_x_label(frontier), fontsize=9)
     axis.tick_params(labelsize=8)
     axis.grid(color=FAINT, linewidth=0.5, which="major")
+
+
+def mark_of(point: Point) -> str:
+    """Which of `MARKS` a point has."""
+    if point.precision == "int8":
+        return "int8"
+    if point.renderer == "framed" and not point.skip:
+        return "unskipped"
+    return point.samples
+
+
+def short_name(point: Point, base: str) -> str:
+    """A point's name without what its mark says and without its set's."""
+    if point.backend == "reference":
+        return point.name.replace("exact reference", "exact").replace(",", "")
+    name = point.name.partition(",")[0].removeprefix(f"{base}-") or base
+    if point.renderer == "streaming" and point.precision == "int8":
+        name += " int8"
+    return f"{name} ({point.side}² enlarged)" if point.side else name
+
+
+def _legend(axis: Any, frontier: Frontier) -> None:
+    """What colours and marks mean."""
+    from matplotlib.lines import Line2D
+
+    shown = {p.renderer for p in frontier.points}
+    used = {mark_of(p) for p in frontier.points if p.flip is not None and p.renderer == "framed"}
+    handles = [
+        Line2D([], [], color=colour, marker="o", linestyle="none", label=name)
+        for name, colour in COLOURS.items()
+        if name in shown
+    ]
+    handles += [
+        Line2D([], [], color=INK, marker=mark, linestyle="none", markerfacecolor="white", label=words)
+        for name, (mark, words) in MARKS.items()
+        if name in used | {"int8"}
+    ]
+    axis.legend(handles=handles, fontsize=8, frameon=False, loc="center right", ncols=1)
 
 
 def _x_label(frontier: Frontier) -> str:
@@ -115,4 +166,4 @@ def _front(axis: Any, drawn: Sequence[tuple[Point, float]], low_is_good: bool) -
     steps = sorted((p.ms.median, v) for (p, v), yes in zip(offered, kept, strict=True) if yes)
     if steps:
         xs, ys = zip(*steps, strict=True)
-        axis.plot(xs, ys, drawstyle="steps-post", color=INK, linewidth=1.3, zorder=2)
+        axis.plot(xs, ys, drawstyle="steps-post", color=INK, linewidth=1.3, zorder=2, label="_front")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any, Final
 
 from scenelang.evaluation.chart import INK
@@ -23,15 +24,23 @@ def place_labels(figure: Any, axis: Any) -> None:
         figure: laid out, so that positions are final.
         axis: of it.
     """
+    from matplotlib.patheffects import Normal, Stroke
+    from matplotlib.text import Text
+
     figure.canvas.draw()
     render = figure.canvas.get_renderer()
     window = axis.get_window_extent(render)
     marks = [line for line in axis.get_lines() if not line.get_label().startswith("_")]
     taken: list[Box] = []
+    corners = [xy for line in axis.get_lines() if line.get_label() == "_front" for xy in _corners(line)]
+    for (x0, y0), (x1, y1) in itertools.pairwise(axis.transData.transform(corners) if corners else []):
+        taken.append((min(x0, x1) - 2, min(y0, y1) - 2, max(x0, x1) + 2, max(y0, y1) + 2))
     for mark in marks:
         x, y = axis.transData.transform((mark.get_xdata()[0], mark.get_ydata()[0]))
         taken.append((x - 7, y - 7, x + 7, y + 7))
-    taken += [t.get_window_extent(render).extents for t in axis.texts]
+    for text in axis.texts:
+        text.update_positions(render)
+    taken += [Text.get_window_extent(t, render).extents for t in axis.texts]
     for mark in sorted(marks, key=lambda m: float(m.get_xdata()[0])):
         data = mark.get_xdata()[0], mark.get_ydata()[0]
         best: tuple[float, Any, Box] | None = None
@@ -50,7 +59,9 @@ def place_labels(figure: Any, axis: Any) -> None:
                 if abs(dx) + abs(dy) > 14
                 else None,
             )
-            box = tuple(label.get_window_extent(render).extents)
+            label.set_path_effects([Stroke(linewidth=2.5, foreground="white"), Normal()])
+            label.update_positions(render)
+            box = tuple(Text.get_window_extent(label, render).extents)  # without the line to the point
             outside = max(0.0, window.x0 - box[0]) + max(0.0, box[2] - window.x1)
             outside += max(0.0, window.y0 - box[1]) + max(0.0, box[3] - window.y1)
             cost = sum(_shared(box, other) for other in taken) + 50 * outside
@@ -64,6 +75,13 @@ def place_labels(figure: Any, axis: Any) -> None:
                 break
         if best is not None:
             taken.append(best[2])
+
+
+def _corners(line: Any) -> list[tuple[float, float]]:
+    """The corners of a staircase that is drawn with steps after its points."""
+    points = list(zip(line.get_xdata(), line.get_ydata(), strict=True))
+    steps = [((x1, y0), (x1, y1)) for (_, y0), (x1, y1) in itertools.pairwise(points)]
+    return [*points[:1], *itertools.chain.from_iterable(steps)]
 
 
 def _shared(a: Any, b: Any) -> float:

@@ -97,6 +97,7 @@ def measure_frontier(
         report: called with the stage, what is done and all.
     """
     keep_memory()
+    torch.set_num_threads(threads)
     manifest = load_manifest(base)
     ways = ways_of(base, threads)
     records = {way.name: Record() for way in ways}

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenelang.evaluation.frontier import Frontier, Point
+from scenelang.evaluation.frontier_chart import mark_of, short_name
 from scenelang.image import Image
 
 _PAGE: Final = Path(__file__).with_name("frontier_page.html")
@@ -61,9 +62,9 @@ def _facts(point: Point, frontier: Frontier, images: Sequence[Image]) -> dict[st
     ratio = frontier.streaming_ms / point.ms.median if frontier.streaming_ms else None
     return {
         "name": point.title,
+        "label": short_name(point, frontier.set),
+        "mark": mark_of(point),
         "renderer": point.renderer,
-        "precision": point.precision,
-        "samples": point.samples,
         "ms": point.ms.median,
         "p95": point.ms.p95,
         "ratio": ratio,

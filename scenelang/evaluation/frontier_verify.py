@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+import torch
+
 from scenelang.backend.neural import open_model
 from scenelang.evaluation.frontier import Frontier
 from scenelang.evaluation.frontier_choose import error_scale
@@ -74,6 +76,7 @@ def verify(
     """
     if seed == frontier.seed:
         raise ValueError(f"seed {seed} made the promises; verify with another")
+    torch.set_num_threads(1)
     model, manifest = open_model(base), load_manifest(base)
     points = {p.name: p for p in frontier.points if p.offered and p.flip is not None}
     ways = [w for w in ways_of(base, 1) if w.name in points and not w.side and w.backend == "neural"]
