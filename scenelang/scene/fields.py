@@ -1,4 +1,4 @@
-"""Types of the numbers and words in a Scene: what they mean, in which unit, and what is refused.
+"""What a Scene is made of: frozen nodes, numbers and words, in which unit, and what is refused.
 
 The descriptions and the `json_schema_extra` parts go into the JSON Schema, which says what it can of what
 the validators check.
@@ -6,9 +6,10 @@ the validators check.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 _NOT_0: dict[str, Any] = {"not": {"const": 0}}
 _NOT_000: dict[str, Any] = {"not": {"const": [0, 0, 0]}}
@@ -79,3 +80,35 @@ Affine = Annotated[
     tuple[Row, Row, Row, Row],
     Field(description="four rows; the last is 0, 0, 0, 1", json_schema_extra=_last_row),
 ]
+
+
+def _kind_is_required(schema: dict[str, Any]) -> None:
+    """In data the kind tells nodes apart, while Python's constructors know it."""
+    if "kind" in schema["properties"]:
+        schema["required"] = ["kind", *schema.get("required", ())]
+
+
+class Frozen(BaseModel):
+    """What all nodes of a Scene are."""
+
+    # Validators are built when first used: a scene evaluated from text needs none.
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        defer_build=True,
+        json_schema_extra=_kind_is_required,
+    )
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """What differs from the defaults: the code that makes it."""
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            if field.is_required() or value != field.default:
+                yield name, value
+
+    def __repr__(self) -> str:
+        try:
+            return super().__repr__()
+        except RecursionError:  # nested deeper than Python likes to recurse
+            return f"{type(self).__name__}(…)"

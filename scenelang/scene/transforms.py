@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from scenelang.scene.build import make
 from scenelang.scene.functions import angle, number
-from scenelang.scene.schema import (
+from scenelang.scene.modifiers import (
     Bend,
     Color,
     Displace,

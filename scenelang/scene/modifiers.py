@@ -1,0 +1,189 @@
+"""What is done to objects and to their materials: the transforms and texture operations of a `Scene`."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator
+
+from scenelang.scene.fields import (
+    Affine,
+    Axis,
+    Factor,
+    Finite,
+    Frozen,
+    Length,
+    Radians,
+    Rate,
+    Rgb,
+    Row,
+)
+
+
+def singular(rows: Sequence[Sequence[float]]) -> bool:
+    """Whether the 3 x 3 linear block of an affine has no inverse.
+
+    A determinant below 1e-14 of the product of the rows' lengths counts as 0: float64 cannot tell.
+    """
+    lengths = [math.hypot(*row[:3]) for row in rows[:3]]
+    if not all(lengths) or not all(map(math.isfinite, lengths)):
+        return True
+    unit = [[x / n for x in row[:3]] for row, n in zip(rows, lengths, strict=False)]
+    (a, b, c), (d, e, f), (g, h, i) = unit
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    return abs(determinant) < 1e-14
+
+
+class Translate(Frozen):
+    """A move; z is for 3D models."""
+
+    kind: Literal["translate"] = "translate"
+    x: Length
+    y: Length
+    z: Length = 0.0
+
+
+class Rotate(Frozen):
+    """A turn by ``angle`` radians, counter-clockwise, about ``axis`` (any length but 0)."""
+
+    kind: Literal["rotate"] = "rotate"
+    angle: Radians
+    axis: Axis = (0.0, 0.0, 1.0)
+
+    @classmethod
+    def degrees(cls, angle_deg: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Rotate:
+        """A turn by ``angle_deg`` degrees."""
+        return cls(angle=math.radians(angle_deg), axis=axis)
+
+    @field_validator("axis")
+    @classmethod
+    def _has_direction(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
+        if not any(axis):
+            raise ValueError("an axis of length 0")
+        return axis
+
+
+class Scale(Frozen):
+    """Factors along the axes; z is 1 in a 2D scene unless the scale is uniform."""
+
+    kind: Literal["scale"] = "scale"
+    x: Factor
+    y: Factor
+    z: Factor
+
+    @field_validator("x", "y", "z")
+    @classmethod
+    def _is_regular(cls, factor: float) -> float:
+        if factor == 0.0:
+            raise ValueError("a scale by 0")
+        return factor
+
+    @classmethod
+    def uniform(cls, s: float) -> Scale:
+        """``scale(s)``: the same factor along each axis."""
+        return cls(x=s, y=s, z=s)
+
+
+class Shear(Frozen):
+    """``xy``: x += k y, and so on."""
+
+    kind: Literal["shear"] = "shear"
+    axes: Literal["xy", "xz", "yx", "yz", "zx", "zy"]
+    k: Finite
+
+
+class Matrix(Frozen):
+    """A 4 x 4 affine, rows, for column vectors; the last row is 0 0 0 1."""
+
+    kind: Literal["matrix"] = "matrix"
+    rows: Affine
+
+    @field_validator("rows")
+    @classmethod
+    def _is_affine(cls, rows: tuple[Row, Row, Row, Row]) -> tuple[Row, Row, Row, Row]:
+        if rows[3] != (0.0, 0.0, 0.0, 1.0):
+            raise ValueError("the last row of a matrix is not 0, 0, 0, 1")
+        if singular(rows):
+            raise ValueError("a singular matrix")
+        return rows
+
+
+class Twirl(Frozen):
+    """A turn that grows with the distance from the origin."""
+
+    kind: Literal["twirl"] = "twirl"
+    k: Rate
+
+
+class Bend(Frozen):
+    """A turn that grows along x."""
+
+    kind: Literal["bend"] = "bend"
+    k: Rate
+
+
+class Twist(Frozen):
+    """A turn of (x, z) that grows along y; for 3D models."""
+
+    kind: Literal["twist"] = "twist"
+    k: Rate
+
+
+class Displace(Frozen):
+    """Adds ``amount`` sin(f x) sin(f y) sin(f z) to the distance, f being ``frequency``; for 3D models."""
+
+    kind: Literal["displace"] = "displace"
+    amount: Length
+    frequency: Annotated[Finite, Field(description="radians per world unit")]
+
+
+Transform = Annotated[
+    Translate | Rotate | Scale | Shear | Matrix | Twirl | Bend | Twist | Displace,
+    Field(discriminator="kind"),
+]
+Transforms = Annotated[tuple[Transform, ...], Field(description="in order, nearest the leaf first")]
+
+
+class Flip(Frozen):
+    """x to -x."""
+
+    kind: Literal["flip"] = "flip"
+
+
+class Color(Frozen):
+    """Multiplies by ``rgb``."""
+
+    kind: Literal["color"] = "color"
+    rgb: Rgb
+
+    @classmethod
+    def hex(cls, text: str) -> Color:
+        """A colour as text writes it: ``#d33`` or ``#dd3333``."""
+        if not re.fullmatch(r"#([0-9a-fA-F]{3}){1,2}", text):
+            raise ValueError(f"{text!r} is no colour such as '#d33' or '#dd3333'")
+        digits = text[1:] if len(text) == 7 else "".join(digit * 2 for digit in text[1:])
+        red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
+        return cls(rgb=(red, green, blue))
+
+
+class Grayscale(Frozen):
+    """Mixes with the luma."""
+
+    kind: Literal["grayscale"] = "grayscale"
+    amount: Annotated[Finite, Field(description="0 keeps the colour, 1 is grey")]
+
+
+class Hue(Frozen):
+    """An HSV hue shift by ``angle`` radians."""
+
+    kind: Literal["hue"] = "hue"
+    angle: Radians
+
+
+MaterialOp = Annotated[
+    Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue,
+    Field(discriminator="kind"),
+]
