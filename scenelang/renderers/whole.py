@@ -51,7 +51,7 @@ def draw_whole(
     if not len(vectors):
         return Drawing(from_samples(np.ones((height, width, 3), np.float32), None), 0, 0, 0)
     device = next(network.parameters()).device
-    v = torch.from_numpy(vectors)[None].to(device)
+    v = torch.from_numpy(vectors.copy())[None].to(device)
     t = torch.from_numpy(tokens.astype(np.int64))[None].to(device)
     if isinstance(network, Streaming):
         side = network.config.resolution
