@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 from scenelang.lsp import words
 from scenelang.lsp.context import Cursor
-from scenelang.lsp.names import Names, Symbol
+from scenelang.lsp.names import Names
 from scenelang.lsp.sight import sight_at
+from scenelang.lsp.symbols import Symbol
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax import nodes
 

@@ -9,8 +9,8 @@ from lsprotocol import types
 
 from scenelang.lsp import values, words
 from scenelang.lsp.check import Seen
-from scenelang.lsp.names import Symbol, Use
 from scenelang.lsp.signatures import describe_symbol
+from scenelang.lsp.symbols import Symbol, Use
 from scenelang.lsp.tree import path_to
 from scenelang.lsp.vocabulary import dimension_of, vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace

@@ -7,7 +7,7 @@ from typing import Final
 
 from lsprotocol import types
 
-from scenelang.lsp.names import Symbol, Use
+from scenelang.lsp.symbols import Symbol, Use
 from scenelang.lsp.workspace import Document, Workspace, uri_of
 from scenelang.scene.vocabulary import LANGUAGE
 from scenelang.syntax import nodes

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from scenelang.diagnostics.span import Span
-from scenelang.lsp.names import Kind, Names, Symbol
+from scenelang.lsp.names import Names
+from scenelang.lsp.symbols import Kind, Symbol
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Parsed
 

@@ -9,7 +9,7 @@ from lsprotocol import types
 
 from scenelang.lsp.callees import find_callee
 from scenelang.lsp.context import cursor_at
-from scenelang.lsp.names import Symbol
+from scenelang.lsp.symbols import Symbol
 from scenelang.lsp.text import width
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax import nodes

@@ -7,7 +7,7 @@ from typing import Final
 
 from lsprotocol import types
 
-from scenelang.lsp.names import Symbol, Use
+from scenelang.lsp.symbols import Symbol, Use
 from scenelang.lsp.text import width
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax.tables import tables

@@ -18,7 +18,8 @@ from pygls.uris import from_fs_path, to_fs_path
 from scenelang.diagnostics.diagnostic import Diagnostic, Fix, Label
 from scenelang.diagnostics.diagnostic import Edit as Change
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.lsp.names import Names, Symbol, Use
+from scenelang.lsp.names import Names
+from scenelang.lsp.symbols import Symbol, Use
 from scenelang.lsp.text import Encoding, Lines, applied
 from scenelang.scene.imports import Unreadable, read_source
 from scenelang.scene.session import MAX_BYTES
