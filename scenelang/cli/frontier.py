@@ -20,7 +20,7 @@ VERIFY_SEED = 4042
 @click.command("frontier")
 @click.argument("model")
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True)
-@click.option("--scenes", default=100, show_default=True, type=click.IntRange(1, 100_000))
+@click.option("--scenes", default=80, show_default=True, type=click.IntRange(1, 100_000))
 @click.option(
     "--seed",
     type=click.IntRange(0, 2**31 - 1),

@@ -65,11 +65,14 @@ def fit_cost(loads: Sequence[Load], ms: Sequence[float], skip: bool, *, fixed: b
         loads: of the frames.
         ms: what they took.
         skip: whether objects meet only the pixels in their reach.
-        fixed: the canvas is always the same, so that only objects count.
+        fixed: the canvas is always the same, so that only objects count. Where it may change but only one
+            was measured, everything is taken to grow with its pixels.
     """
     rows = np.array([load.row(skip) for load in loads]) / _UNITS
     if fixed:
         rows[:, 2:] = 0.0
+    elif len({load.pixels for load in loads}) == 1:
+        rows[:, :2] = 0.0
     if not skip:
         rows[:, 4] = 0.0
     times = np.asarray(ms, np.float64)

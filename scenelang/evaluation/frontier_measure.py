@@ -37,6 +37,8 @@ SHOWN = 4  # scenes whose pictures are kept
 CONVERGED = 8  # scenes compared with 64 samples a pixel
 SLOW_S = 20.0  # a way draws so long at most, but at least on `LEAST` scenes
 LEAST = 4
+COMPARED = 30  # scenes of ways that are measured for comparison and promise nothing
+TIMED = 8  # scenes of ways of which only the time is taken
 REPEATS = 2
 SIDES = (128, 512)  # further canvases that times are fitted on
 MANY = "many"  # set of more objects that times are fitted on
@@ -153,7 +155,8 @@ def _quota(way: Way, scene: Scene, scenes: int, threads: int) -> int:
     run = way.prepare(scene)
     run()
     ms, _ = _timed(run, threads)
-    return max(1, min(scenes, max(LEAST, int(1000 * SLOW_S / (REPEATS * ms)))))
+    most = TIMED if not way.drawn else scenes if way.offered else COMPARED
+    return max(1, min(scenes, most, max(LEAST, int(1000 * SLOW_S / (REPEATS * ms)))))
 
 
 def _one_scene(

@@ -92,6 +92,8 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
 
     def way(title: str, why_not: str | None = None, **options: Any) -> Way:
         words = [f"--{key} {value}" for key, value in options.items() if key != "skip"]
+        if manifest.renderer == "reading":
+            options["skip"] = False  # every sample reads every object
         line = " ".join(["scenelang render scene.nsg -o scene.png --model", name, *words])
         if side:
             line += f" --size {side}x{side}"

@@ -180,6 +180,15 @@ def test_a_fixed_canvas_costs_by_objects_alone() -> None:
     assert predicted_ms(cost, Load(100, 1 << 16, 0, 0), True) == pytest.approx(205, rel=0.01)
 
 
+def test_one_canvas_tells_nothing_of_a_constant() -> None:
+    """A way that was measured on one canvas alone is taken to grow with the pixels."""
+    loads = [Load(n, 1 << 16, 0.0, 0.0) for n in (1, 2, 3, 4, 2, 3)]
+    cost = fit_cost(loads, [100.0 + 50 * load.objects for load in loads], False)
+    large = predicted_ms(cost, Load(2, 1 << 18, 0.0, 0.0), False)
+    assert large == pytest.approx(4 * predicted_ms(cost, loads[1], False))
+    assert predicted_ms(cost, loads[1], False) == pytest.approx(200, rel=0.02)
+
+
 def square(x: float, size: float) -> Object:
     return Object(geometry="square", transforms=(Scale(x=size, y=size, z=1), Translate(x=x, y=0)))
 
