@@ -33,11 +33,12 @@ STRIP = 8  # scenes of a strip
 CHUNK = 8  # scenes drawn at once
 POINTS = 6  # of a curve over time
 SIDE = 32  # pixels along a side of the pictures: what `streaming` reaches on a processor in minutes
+SIZES_SIDE = 16  # of the thirteen trainings of the size study
 PARTS_SIDE = 128  # where only renderers that answer points are compared
 RATES: dict[RendererName, float] = {"framed": 3e-3, "streaming": 1e-3, "reading": 2e-3}
 RENDERERS: tuple[RendererName, ...] = ("framed", "reading", "streaming")
 LIFTINGS: tuple[LiftingName, ...] = ("exact", "learned")
-SIZES = (1, 2, 4, 8, 16, 32)
+SIZES = (1, 2, 4, 8, 16, 32, 64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,13 +105,14 @@ def compare(budget_s: float, seed: int) -> list[Run]:
 def table1(budget_s: float, seed: int) -> list[Run]:
     """Sizes 1 to 64 of the geometry vector and of the material vector, the other one 32 (Table 1)."""
     base = plain("streaming", "learned", budget_s, seed)
+    sizes = replace(base.student.streaming, resolution=SIZES_SIDE)
     runs = []
     for side in ("geometry", "material"):
         for d in SIZES:
             if side == "material" and d == 32:
                 continue  # the same run as the geometry's
-            student = replace(base.student, learned=LiftingConfig(**{side: d}))
-            runs.append(Run(f"{side} {d}", side, replace(base, student=student)))
+            student = replace(base.student, streaming=sizes, learned=LiftingConfig(**{side: d}))
+            runs.append(Run(f"{side} {d}", side, replace(base, student=student), side=SIZES_SIDE))
     return runs
 
 
