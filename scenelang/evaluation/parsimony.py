@@ -165,8 +165,10 @@ def parts_chart(parts: Mapping[str, Any], kind: str) -> bytes:
     )
     axes = [axes] if not sizes else list(axes)
     _bars(axes[0], parts)
+    shown = [run["psnr"]["mean"] for runs in (whole_runs(parts), *sizes.values()) for run in runs]
     for axis, (name, runs) in zip(axes[1:], sizes.items(), strict=True):
         _sizes(axis, name, runs, parts)
+        axis.set_ylim(min(shown) - 1, max(shown) + 1)
     data = figure_bytes(figure, kind)
     plt.close(figure)
     return data
@@ -217,5 +219,6 @@ def _sizes(axis: Any, name: str, runs: Sequence[Mapping[str, Any]], parts: Mappi
     axis.set_xticks([x for x, _ in points], [str(x) for x, _ in points])
     axis.minorticks_off()
     axis.set_title(name.replace("_", " "), fontsize=8.5, color=INK)
+    axis.set_ylabel("PSNR, dB", fontsize=8)
     axis.tick_params(labelsize=7)
     axis.grid(axis="y", color=FAINT, linewidth=0.5)
