@@ -13,12 +13,13 @@ _PLACES: Final = [
     for reach in (1.0, 1.8, 2.8, 4.0, 5.5, 7.5)
     for dx, dy in ((9, 0), (-9, 0), (7, 8), (7, -9), (-7, 8), (-7, -9), (0, 10), (0, -11))
 ]
+"""Points from the mark to the label's near side, the best first."""
 
 Box = tuple[float, float, float, float]
 
 
 def place_labels(figure: Any, axis: Any) -> None:
-    """Label every marker that has one, as matplotlib calls it, beside it.
+    """Write each mark's label, as matplotlib calls it, beside it.
 
     Args:
         figure: laid out, so that positions are final.
@@ -29,52 +30,57 @@ def place_labels(figure: Any, axis: Any) -> None:
 
     figure.canvas.draw()
     render = figure.canvas.get_renderer()
-    window = axis.get_window_extent(render)
+    dots = figure.dpi / 72  # of a point
+    window = axis.get_window_extent(render).extents
     marks = [line for line in axis.get_lines() if not line.get_label().startswith("_")]
     taken: list[Box] = []
     corners = [xy for line in axis.get_lines() if line.get_label() == "_front" for xy in _corners(line)]
     for (x0, y0), (x1, y1) in itertools.pairwise(axis.transData.transform(corners) if corners else []):
         taken.append((min(x0, x1) - 2, min(y0, y1) - 2, max(x0, x1) + 2, max(y0, y1) + 2))
-    for mark in marks:
-        x, y = axis.transData.transform((mark.get_xdata()[0], mark.get_ydata()[0]))
-        taken.append((x - 7, y - 7, x + 7, y + 7))
     for text in axis.texts:
         text.update_positions(render)
     taken += [Text.get_window_extent(t, render).extents for t in axis.texts]
-    for mark in sorted(marks, key=lambda m: float(m.get_xdata()[0])):
-        data = mark.get_xdata()[0], mark.get_ydata()[0]
-        best: tuple[float, Any, Box] | None = None
-        for dx, dy in _PLACES:
-            label = axis.annotate(
-                mark.get_label(),
-                data,
-                xytext=(dx, dy),
-                textcoords="offset points",
-                fontsize=SIZE,
-                color=INK,
-                ha="left" if dx > 0 else "right" if dx < 0 else "center",
-                va="center",
-                zorder=4,
-                arrowprops={"arrowstyle": "-", "color": "#8b98a3", "linewidth": 0.6, "shrinkB": 5}
-                if abs(dx) + abs(dy) > 14
-                else None,
-            )
-            label.set_path_effects([Stroke(linewidth=2.5, foreground="white"), Normal()])
-            label.update_positions(render)
-            box = tuple(Text.get_window_extent(label, render).extents)  # without the line to the point
-            outside = max(0.0, window.x0 - box[0]) + max(0.0, box[2] - window.x1)
-            outside += max(0.0, window.y0 - box[1]) + max(0.0, box[3] - window.y1)
-            cost = sum(_shared(box, other) for other in taken) + 50 * outside
-            if best is None or cost < best[0]:
-                if best is not None:
-                    best[1].remove()
-                best = cost, label, box
-            else:
-                label.remove()
-            if best[0] == 0:
-                break
-        if best is not None:
-            taken.append(best[2])
+    placed = []
+    for mark in marks:
+        x, y = axis.transData.transform((mark.get_xdata()[0], mark.get_ydata()[0]))
+        taken.append((x - 7, y - 7, x + 7, y + 7))
+        words = figure.text(0, 0, mark.get_label(), fontsize=SIZE)
+        size = words.get_window_extent(render)
+        words.remove()
+        placed.append((x, y, mark, size.width, size.height))
+    for x, y, mark, width, height in sorted(placed, key=lambda p: p[:2]):
+        boxes = [_box(x + dx * dots, y + dy * dots, dx, width, height) for dx, dy in _PLACES]
+        costs = [sum(_shared(box, t) for t in taken) + 50 * _outside(box, window) for box in boxes]
+        best = costs.index(min(costs))
+        dx, dy = _PLACES[best]
+        taken.append(boxes[best])
+        label = axis.annotate(
+            mark.get_label(),
+            (mark.get_xdata()[0], mark.get_ydata()[0]),
+            xytext=(dx, dy),
+            textcoords="offset points",
+            fontsize=SIZE,
+            color=INK,
+            ha="left" if dx > 0 else "right" if dx < 0 else "center",
+            va="center",
+            zorder=4,
+            arrowprops={"arrowstyle": "-", "color": "#8b98a3", "linewidth": 0.6, "shrinkB": 5}
+            if abs(dx) + abs(dy) > 14
+            else None,
+        )
+        label.set_path_effects([Stroke(linewidth=2.5, foreground="white"), Normal()])
+
+
+def _box(x: float, y: float, side: float, width: float, height: float) -> Box:
+    """Of words whose near side is at a place: their left one where ``side`` is positive."""
+    left = x if side > 0 else x - width if side < 0 else x - width / 2
+    return left, y - height / 2, left + width, y + height / 2
+
+
+def _outside(box: Box, window: Any) -> float:
+    """Pixels by which a box leaves a window."""
+    over = (window[0] - box[0], window[1] - box[1], box[2] - window[2], box[3] - window[3])
+    return float(sum(max(0.0, v) for v in over))
 
 
 def _corners(line: Any) -> list[tuple[float, float]]:

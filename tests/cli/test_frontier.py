@@ -11,7 +11,9 @@ import pytest
 from PIL import Image
 
 from scenelang.evaluation import frontier as frontier_file
+from scenelang.evaluation import frontier_verify
 from scenelang.evaluation.frontier import Cost, Errors, Frontier
+from scenelang.evaluation.frontier_verify import Case
 from tests.cli.conftest import Folder
 from tests.evaluation.test_frontier import frontier, point
 
@@ -172,8 +174,9 @@ def test_frontier_refuses(shipped: Folder, options: tuple[str, ...], words: str)
     assert words in result.stderr
 
 
-def test_verify_counts_kept_promises(shipped: Folder) -> None:
-    """The reference's promise of no error is kept; one of nearly none by the network is not."""
+def test_verify_counts_kept_promises(shipped: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A promise of little is kept in all scenes, one of nothing in none."""
+    monkeypatch.setattr(frontier_verify, "CASES", (Case("small", "", (64, 64), 1.0),))
     good = ladder()
     points = [p for p in good.points if p.name in ("shapes2d", "exact reference, 4 spp")]
     wide = replace(good, points=tuple(replace(p, flip=Errors(0.5, 0.5, 0.5, 0.5)) for p in points))
@@ -182,8 +185,8 @@ def test_verify_counts_kept_promises(shipped: Folder) -> None:
     assert result.exit_code == 0, result.output
     found = json.loads(Path("out/verified.json").read_text())
     assert found["held"] is True
-    assert found["cases"]["256 x 256"]["shapes2d"]["scenes"] == 2
-    assert found["cases"]["256 x 256"]["shapes2d"]["kept"] == 1.0
+    assert found["cases"]["small"]["shapes2d"]["scenes"] == 2
+    assert found["cases"]["small"]["shapes2d"]["kept"] == 1.0
     tight = replace(good, points=tuple(replace(p, flip=Errors(0, 0, 1e-9, 0)) for p in points))
     Path("tight.json").write_text(tight.to_json(), "utf-8")
     result = shipped.run("frontier", "shapes2d", "--verify", "--promises", "tight.json", "--scenes", "2")

@@ -129,8 +129,3 @@ def test_charts_label_every_point_that_has_an_error() -> None:
     pyplot().close(figure)
     png = frontier_chart(frontier(*POINTS[:5]), "png")
     assert PIL.Image.open(io.BytesIO(png)).size == (1100, 1300)
-
-
-def test_the_same_figures_give_the_same_chart() -> None:
-    made = frontier(*POINTS)
-    assert frontier_chart(made, "svg") == frontier_chart(made, "svg")
