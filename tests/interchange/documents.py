@@ -1,4 +1,4 @@
-"""glTF documents for tests, made by hand."""
+"""glTF documents for tests, made by hand, and what the importer makes of them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+import scenelang as nsg
+from scenelang.graph.affine import compose
+from scenelang.graph.steps import IDENTITY, Affine, Rows
+from scenelang.graph.transforms import step_of
+from scenelang.interchange.gltf import Imported, import_gltf
+from scenelang.interchange.gltf_file import parse_gltf
 
 Json = dict[str, Any]
 
@@ -35,3 +42,24 @@ def write(folder: Path, data: Json, name: str = "a.gltf") -> Path:
     path = folder / name
     path.write_text(json.dumps(data), "utf-8")
     return path
+
+
+def read(data: Json, **options: Any) -> Imported:
+    return import_gltf(parse_gltf(json.dumps(data).encode()), **options)
+
+
+def world(node: Any, dimension: int, outer: Rows = IDENTITY) -> list[tuple[str, np.ndarray]]:
+    """Geometry and world matrix of every object, in order, through the compiler's own steps."""
+    rows = IDENTITY
+    for transform in node.transforms:
+        step = step_of(transform, dimension)
+        assert isinstance(step, Affine), step
+        rows = compose(step.rows, rows)
+    rows = compose(outer, rows)
+    if isinstance(node, nsg.Object):
+        return [(node.geometry, np.array([*rows, 0, 0, 0, 1]).reshape(4, 4))]
+    return [found for child in node.children for found in world(child, dimension, rows)]
+
+
+def objects(scene: nsg.Scene, dimension: int = 2) -> list[tuple[str, np.ndarray]]:
+    return [found for node in scene.nodes for found in world(node, dimension)]
