@@ -24,6 +24,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from scenelang.renderers.streaming import SMALLEST
 from scenelang.training.checkpoint import load_tensors, save_tensors
 from scenelang.training.losses import leaf_loss, trace_loss
 from scenelang.training.pictures import (
@@ -68,6 +69,7 @@ class StudyConfig:
         seed: of parameters and scenes.
         data: distribution of the scenes.
         average: decay of the averaged weights that are evaluated.
+        warm: let each level of growing begin as the one below, enlarged; else as noise, as the paper does.
     """
 
     student: StudentConfig
@@ -82,6 +84,7 @@ class StudyConfig:
     seed: int = 1
     data: PictureConfig = field(default_factory=PictureConfig)
     average: float = 0.995
+    warm: bool = False
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
@@ -162,6 +165,7 @@ class Study:
         self.generator = torch.Generator(device).manual_seed(config.seed)
         self.progress = Progress(0, 0.0, math.nan)
         self._young = 0  # steps since the last level was blended in
+        self._level = SMALLEST  # of growing
         self.fixed: Scenes | None = None
         if config.fixed:
             self.fixed = random_scenes(config.fixed, config.data, torch.Generator(device).manual_seed(7))
@@ -212,6 +216,8 @@ class Study:
         r, blend = level_at(share, config.student.streaming.resolution, config.grow)
         if blend < 1.0:
             self._young = 0
+        if r > self._level and config.grow:
+            self._begin(r)
         target = pictures(scenes, r)
         found = self.student.image(scenes, r, blend)
         sigma = SIGMA[0] * (SIGMA[1] / SIGMA[0]) ** share
@@ -245,6 +251,15 @@ class Study:
         )
         return trace_loss(student.trace(scenes, x, y), batch, student.unasked)[0]
 
+    def _begin(self, resolution: int) -> None:
+        """Enter a level of growing."""
+        self._level = resolution
+        if not self.config.warm:
+            return
+        for student in (self.student, self.averaged):
+            assert isinstance(student, StreamingStudent)
+            student.renderer.enlarge(resolution)
+
     @torch.no_grad()
     def _average(self) -> None:
         # young averages forget faster, so that what a level starts from does not linger
@@ -270,6 +285,7 @@ class Study:
             "config": self.config.to_json(),
             "step": self.progress.step,
             "young": self._young,
+            "level": self._level,
             "seconds": self.progress.seconds,
         }
         tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
@@ -277,7 +293,8 @@ class Study:
 
     def _resume(self, path: Path, device: str) -> None:
         tensors, header = load_tensors(path, device)
-        if header["config"] != json.loads(json.dumps(self.config.to_json())):
+        known = {"warm": False, **header["config"]}  # of studies from before there was a choice
+        if known != json.loads(json.dumps(self.config.to_json())):
             raise ValueError(f"{path} was trained with another configuration")
 
         def under(prefix: str) -> dict[str, Tensor]:
@@ -293,4 +310,4 @@ class Study:
                 }
         self.generator.set_state(tensors["generator"].cpu())
         self.progress = Progress(header["step"], header["seconds"], math.nan)
-        self._young = header["young"]
+        self._young, self._level = header["young"], header.get("level", SMALLEST)

@@ -13,7 +13,7 @@ from scenelang.renderers.reading import ReadingConfig
 from scenelang.renderers.streaming import StreamingConfig
 from scenelang.training.encoders import LiftingConfig
 from scenelang.training.students import StudentConfig
-from scenelang.training.studies import Study, StudyConfig, level_at, rate_at
+from scenelang.training.studies import SIGMA, Study, StudyConfig, level_at, rate_at
 
 
 def config(renderer: str = "streaming", lifting: str = "learned", **changes: object) -> StudyConfig:
@@ -53,10 +53,12 @@ def test_a_few_scenes_are_learned(renderer: str, lifting: str) -> None:
     torch.manual_seed(0)
     study = Study(config(renderer, lifting, fixed=2, scenes=2, rate=5e-3, grow=False))
     # by steps, not by time; framed learns its leaves first only at shares of the budget that are not reached
-    losses = [p.loss for p in itertools.islice(study.run(), 60)]
+    losses = [p.loss for p in itertools.islice(study.run(), 200 if renderer == "streaming" else 60)]
     assert all(map(math.isfinite, losses))
-    first, last = sum(losses[:10]) / 10, sum(losses[-10:]) / 10
-    assert last < first - 0.05 * abs(first)
+    # a likelihood of the first deviation is no lower than its logarithm
+    least = math.log(SIGMA[0]) if renderer == "streaming" else 0.0
+    first, last = sum(losses[:10]) / 10 - least, sum(losses[-10:]) / 10 - least
+    assert last < 0.9 * first
 
 
 def test_it_resumes_where_it_was(tmp_path: Path) -> None:
