@@ -9,6 +9,7 @@ decides where they go (behind a comma, for example).
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final, TypeVar
 
@@ -70,7 +71,7 @@ class Concat(Doc):
         self.parts = parts
 
 
-class Group(Doc):
+class Group(Doc, ABC):
     """What is on one line if it fits, and otherwise as `make` says, which is asked at most once."""
 
     __slots__ = ("_made",)
@@ -85,8 +86,9 @@ class Group(Doc):
             self._made = self.make()
         return self._made
 
+    @abstractmethod
     def make(self) -> Part:
-        raise NotImplementedError
+        """What it is where it does not fit on a line, made anew."""
 
 
 class Choose(Group):
