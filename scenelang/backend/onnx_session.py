@@ -23,11 +23,16 @@ _IR: Final = 10
 _KINDS: Final = {"float32": 1, "uint8": 2}  # onnx.TensorProto
 
 
+def missing_package() -> str | None:
+    """The package that 8 bits need and that is not installed."""
+    return next((name for name in ("onnxruntime", "onnx") if importlib.util.find_spec(name) is None), None)
+
+
 def need_onnx() -> None:
     """Raises RenderError, with the command to run, where onnxruntime or onnx is not installed."""
-    for name in ("onnxruntime", "onnx"):
-        if importlib.util.find_spec(name) is None:
-            raise RenderError(f"precision int8 needs {name}, which is missing; pip install 'scenelang[int8]'")
+    name = missing_package()
+    if name is not None:
+        raise RenderError(f"precision int8 needs {name}, which is missing; pip install 'scenelang[int8]'")
 
 
 @dataclass(slots=True)

@@ -109,7 +109,7 @@ class Chooser:
         return Way(point.backend == "reference", point.precision, point.samples)
 
     def _chosen(self, frontier: Frontier, job: Job, program: Program) -> tuple[Choice, Program]:
-        """The best choice that can be compiled, and what it draws."""
+        """The best choice whose model draws the scene without further warnings, and its Program."""
         from scenelang.evaluation.frontier_choose import Wanted, choose
 
         refused: dict[str, str] = {}
@@ -118,9 +118,9 @@ class Chooser:
             choice = choose(found, Wanted(self.limits.ms, self.limits.flip), refused)
             point = choice.offer.point
             compiled = _compiled(job, program, point)
-            if compiled is not None:
+            if not isinstance(compiled, str):
                 return choice, compiled
-            refused[point.name] = "the scene has errors with this model"
+            refused |= {o.point.name: compiled for o in found if o.point.model == point.model}
             found = [offer for offer in found if offer.point.model != point.model]
 
     def _offers(
@@ -145,7 +145,10 @@ class Chooser:
                 manifest = load_manifest(point.model) if point.model is not None else None
                 why = refusal(point, manifest, scene, program.model if scene is None else None)
             if why is None and point.precision == "int8":
-                why = _no_onnx()
+                from scenelang.backend.onnx_session import missing_package
+
+                package = missing_package()
+                why = None if package is None else f"{package} is missing; pip install 'scenelang[int8]'"
             if why is None:
                 able.append(point)
             else:
@@ -161,19 +164,8 @@ class Chooser:
         return self._scale
 
 
-def _no_onnx() -> str | None:
-    from scenelang.backend.errors import RenderError
-    from scenelang.backend.onnx_session import need_onnx
-
-    try:
-        need_onnx()
-    except RenderError as error:
-        return str(error)
-    return None
-
-
-def _compiled(job: Job, program: Program, point: Point) -> Program | None:
-    """The job's Program for a point's model; None where it has errors there."""
+def _compiled(job: Job, program: Program, point: Point) -> Program | str:
+    """The Program for a point's model; the reason where it cannot draw the scene as promised."""
     if point.model in (None, program.model):
         return program
     from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
@@ -186,5 +178,7 @@ def _compiled(job: Job, program: Program, point: Point) -> Program | None:
     try:
         made = compile_scene(source.scene, spans=source.spans, diagnostics=found, model=point.model)
     except SceneError:
-        return None
-    return made
+        return found.errors[0].message
+    told = {d.code for d in job.diagnostics}
+    # a warning that the scene's own model does not give: this one is outside what it was trained on
+    return next((d.message for d in found.items if d.code not in told), made)

@@ -80,13 +80,14 @@ def command(
 
 
 def _measure(base: str, out: Path, scenes: int, seed: int, threads: int) -> None:
-    from scenelang.backend.onnx_session import need_onnx
+    from scenelang.backend.onnx_session import missing_package
     from scenelang.evaluation.frontier import NAME
     from scenelang.evaluation.frontier_measure import measure_frontier
     from scenelang.evaluation.frontier_page import frontier_page
     from scenelang.files import write_whole
 
-    need_onnx()
+    if (lacking := missing_package()) is not None:
+        click.echo(f"without int8: {lacking} is missing; pip install 'scenelang[int8]'", err=True)
     measured = measure_frontier(base, scenes, seed, threads, _report if sys.stderr.isatty() else None)
     frontier = measured.frontier
     write_whole(out / NAME, frontier.to_json().encode())

@@ -14,6 +14,7 @@ from scenelang.backend.neural import draw_program, open_model
 from scenelang.backend.onnx_calibrate import calibrate
 from scenelang.backend.onnx_draw import has_int8
 from scenelang.backend.onnx_framed import EightBitStream
+from scenelang.backend.onnx_session import missing_package
 from scenelang.backend.onnx_streaming import StreamingGraphs
 from scenelang.backend.render import Precision, Samples
 from scenelang.diagnostics.diagnostic import Diagnostics
@@ -69,7 +70,7 @@ class Way:
 
 
 def ways_of(base: str, threads: int) -> list[Way]:
-    """All ways to draw the scenes of a set.
+    """All ways to draw the scenes of a set; without onnxruntime those in 8 bits are left out.
 
     Args:
         base: the model named like the set.
@@ -82,7 +83,8 @@ def ways_of(base: str, threads: int) -> list[Way]:
     found: list[Way] = []
     for manifest in sorted(manifests, key=lambda m: (m.name != base, m.name)):
         found += _of_model(manifest, base, threads)
-    return [*found, *_references(load_manifest(base)), *_paper(base, threads)]
+    found += [*_references(load_manifest(base)), *_paper(base, threads)]
+    return [way for way in found if way.precision != "int8" or missing_package() is None]
 
 
 def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:

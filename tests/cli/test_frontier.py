@@ -14,6 +14,8 @@ from scenelang.evaluation import frontier as frontier_file
 from scenelang.evaluation import frontier_verify
 from scenelang.evaluation.frontier import Cost, Errors, Frontier
 from scenelang.evaluation.frontier_verify import Case
+from scenelang.models.manifest import available
+from scenelang.program import compile as compile_module
 from tests.cli.conftest import Folder
 from tests.evaluation.test_frontier import frontier, point
 
@@ -208,3 +210,29 @@ def test_costs_of_points_are_their_own(shipped: Folder) -> None:
     many = "for (i in 0..<30) { star { scale(0.1); translate(-0.9 + 0.06 * i, 0.3); } }\n"
     result = shipped.run("render", shipped.write("m.nsg", many), "-o", "m.png", "--max-flip", "1", "-v")
     assert "chosen by the frontier: shapes2d: 13 ms" in result.stderr
+
+
+def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled again for it; refused where it warns or errs and the scene's own model does not."""
+    other = "shapes2d-w8"
+    if other not in available():
+        pytest.skip("no second model ships")
+    points = [point(other, 5, 0.02, model=other), point("shapes2d", 16, 0.003)]
+    (shipped.path / "shipped.json").write_text(frontier(*points).to_json(), "utf-8")
+    text = said(shipped, "--max-flip", "0.05")
+    assert f"chosen by the frontier: {other}: 5.0 ms" in text
+    assert f"model {other} (chosen by the frontier)" in text
+    name = shipped.write("named.nsg", 'model "shapes2d"; square { scale(0.5); }\n')
+    assert other in shipped.run("render", name, "-o", "a.png", "--max-flip", "0.05", "-v").stderr
+    real = compile_module.compile_scene
+
+    def warns(scene: object, **options: object) -> object:
+        made = real(scene, **options)  # type: ignore[arg-type]
+        if options.get("model") == other:
+            options["diagnostics"].add("W0501", "4 objects, trained on 3", None)  # type: ignore[attr-defined]
+        return made
+
+    monkeypatch.setattr(compile_module, "compile_scene", warns)
+    text = said(shipped, "--max-flip", "0.05")
+    assert "chosen by the frontier: shapes2d: 16 ms" in text
+    assert f"not in question: {other}: 4 objects, trained on 3" in text
