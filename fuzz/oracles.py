@@ -11,8 +11,11 @@ from typing import Any
 from fuzz.target import Failure, hold
 from scenelang.diagnostics import render
 from scenelang.diagnostics.codes import CODES
-from scenelang.diagnostics.diagnostic import Diagnostic
+from scenelang.diagnostics.diagnostic import Diagnostic, SceneError
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.program.compile import compile_scene
+from scenelang.program.store import parse_program, program_bytes
+from scenelang.scene.schema import Scene
 from scenelang.syntax import nodes
 
 
@@ -59,6 +62,22 @@ def check_diagnostics(found: Sequence[Diagnostic], texts: Iterable[SourceFile] |
         for one, other in pairwise(ordered):
             hold(one.span.end <= other.span.start, "edits of a fix do not overlap", d)
     check_rendering(found)
+
+
+def check_compiling(scene: Scene) -> bytes | None:
+    """A Scene compiles to a Program that reads back from its bytes, or is refused with sound diagnostics.
+
+    Returns:
+        The Program's bytes.
+    """
+    try:
+        program = compile_scene(scene)
+    except SceneError as error:
+        check_diagnostics(error.diagnostics, None)
+        return None
+    written = program_bytes(program)
+    hold(program_bytes(parse_program(written)) == written, "Program to bytes and back")
+    return written
 
 
 def check_rendering(found: Sequence[Diagnostic]) -> None:

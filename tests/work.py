@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -40,16 +41,20 @@ def lines_run(function: Callable[[], object]) -> int:
     return count
 
 
-def ends(code: str) -> None:
+def ends(code: str, **environment: str) -> str:
     """Run Python code in a process of its own; fail where it fails or has to be killed.
 
     Its inputs are so large that what is linear takes seconds and what is quadratic hours, so that it does not
     matter how fast the machine is.
+
+    Returns:
+        What it prints.
     """
     try:
         done = subprocess.run(
             [sys.executable, "-c", code],
             cwd=ROOT,
+            env={**os.environ, **environment},
             capture_output=True,
             text=True,
             timeout=KILLED_S,
@@ -58,3 +63,4 @@ def ends(code: str) -> None:
     except subprocess.TimeoutExpired as error:
         raise AssertionError(f"killed after {KILLED_S} s; it had said: {error.stdout!r}") from None
     assert done.returncode == 0, done.stderr
+    return done.stdout

@@ -19,13 +19,13 @@ from random import Random
 from typing import Any, Final
 
 from fuzz import text
-from fuzz.oracles import check_diagnostics, same
+from fuzz.oracles import check_compiling, check_diagnostics, same
 from fuzz.target import Target, hold, sampled
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.render import render_json
 from scenelang.diagnostics.span import SourceFile
 from scenelang.program.compile import compile_scene
-from scenelang.program.store import parse_program, program_bytes
+from scenelang.program.store import program_bytes
 from scenelang.scene import evaluate as evaluating
 from scenelang.scene.schema import Scene
 from scenelang.scene.session import deep_stack
@@ -136,14 +136,9 @@ def _check_scene(scene: Scene) -> None:
         hold(Scene.from_json(scene.to_json()) == scene, "Scene to JSON and back")
         again, found = _evaluate(scene.to_nsg(), {}, 0)
         hold(again == scene, "Scene to text and back", [d.message for d in found][:3])
-    try:
-        program = compile_scene(scene)
-    except SceneError as error:
-        check_diagnostics(error.diagnostics, None)
-        return
-    written = program_bytes(program)
-    hold(written == program_bytes(compile_scene(scene)), "the same Scene gives the same Program")
-    hold(program_bytes(parse_program(written)) == written, "Program to bytes and back")
+    written = check_compiling(scene)
+    if written is not None:
+        hold(written == program_bytes(compile_scene(scene)), "the same Scene gives the same Program")
 
 
 def seeds() -> list[bytes]:

@@ -8,17 +8,16 @@ from random import Random
 from typing import Any
 
 from fuzz import text, trees
-from fuzz.oracles import check_diagnostics
+from fuzz.oracles import check_compiling, check_diagnostics
 from fuzz.target import Failure, Target, hold, sampled
 from scenelang.diagnostics.diagnostic import SceneError
 from scenelang.models.manifest import available, load_manifest
-from scenelang.program.compile import compile_scene
-from scenelang.program.store import parse_program, program_bytes
 from scenelang.scene.data import to_readable_json
 from scenelang.scene.load import loads
 from scenelang.scene.schema import Scene
 from scenelang.scene.session import deep_stack
 from scenelang.scene.to_python import to_python
+from scenelang.scene.vocabulary import MATERIAL_OPS, TRANSFORMS
 
 _PLAIN = (
     *(
@@ -55,13 +54,7 @@ def check(data: bytes) -> None:
         if sampled(data, 4):
             _check_python(scene)
     _check_text(scene)
-    try:
-        program = compile_scene(scene)
-    except SceneError as error:
-        check_diagnostics(error.diagnostics, None)
-        return
-    held = program_bytes(program)
-    hold(program_bytes(parse_program(held)) == held, "Program to bytes and back")
+    check_compiling(scene)
 
 
 def _check_text(scene: Scene) -> None:
@@ -238,15 +231,8 @@ def dictionary() -> list[bytes]:
         "smooth",
         "subtract",
         "intersect",
-        "translate",
-        "rotate",
-        "scale",
-        "shear",
-        "matrix",
-        "twirl",
-        "bend",
-        "twist",
-        "displace",
+        *TRANSFORMS,
+        *MATERIAL_OPS,
         "x",
         "y",
         "z",
@@ -257,17 +243,13 @@ def dictionary() -> list[bytes]:
         "rows",
         "amount",
         "frequency",
-        "flip",
-        "color",
         "rgb",
-        "grayscale",
-        "hue",
         "seconds",
         "fps",
         "loop",
     ]
     return [
-        *(f'"{word}"'.encode() for word in words),
+        *(f'"{word}"'.encode() for word in dict.fromkeys(words)),
         b"null",
         b"true",
         b"1e308",

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import subprocess
-import sys
 from pathlib import Path
+
+from tests.work import ends
 
 ROOT = Path(__file__).parents[2]
 
@@ -23,17 +22,6 @@ def outcomes(count: int) -> str:
 
 def test_other_hash_seeds_give_the_same() -> None:
     code = "from tests.fuzz.test_hash_seeds import outcomes; print(outcomes(30))"
-    told = []
-    for seed in ("0", "1"):
-        environment = {**os.environ, "PYTHONHASHSEED": seed}
-        done = subprocess.run(
-            [sys.executable, "-c", code],
-            cwd=ROOT,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        told.append(done.stdout.split())
+    told = [ends(code, PYTHONHASHSEED=seed).split() for seed in ("0", "1")]
     assert len(told[0]) == 60
     assert told[0] == told[1]

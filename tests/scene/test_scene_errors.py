@@ -12,6 +12,7 @@ from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.codes.names import CODES as NAMES
 from scenelang.diagnostics.codes.types import CODES as TYPES
 from scenelang.diagnostics.suggest import nearest
+from tests.syntax.reading import apply
 
 CASES = [case.partition("\n")[::2] for case in (HERE / "errors.nsgs").read_text("utf-8").split("=== ")[1:]]
 MALFORMED = sorted((HERE / "malformed").glob("*.nsg"))
@@ -59,9 +60,7 @@ def apply_fix(text: str) -> str:
     """The text with the fix of its only diagnostic applied."""
     fix = run_text(text).only().fix
     assert fix is not None
-    for edit in sorted(fix.edits, key=lambda e: -e.span.start):
-        text = text[: edit.span.start] + edit.replacement + text[edit.span.end :]
-    return text
+    return apply(text, fix)
 
 
 @pytest.mark.parametrize(

@@ -10,17 +10,16 @@ from scenelang.diagnostics.suggest import did_you_mean, ranked
 from scenelang.scene import elsewhere
 from scenelang.scene.functions import FUNCTIONS
 from scenelang.scene.vocabulary import LANGUAGE
+from tests.syntax.reading import apply
 
 SPAN = Span(SourceFile("x", "x"), 0, 1)
 
 
-def apply(text: str, outcome: Outcome) -> str:
+def mended(text: str, outcome: Outcome) -> str:
     """The text with the fix of its only diagnostic made."""
     fix = outcome.only().fix
     assert fix is not None
-    for edit in sorted(fix.edits, key=lambda e: -e.span.start):
-        text = text[: edit.span.start] + edit.replacement + text[edit.span.end :]
-    return text
+    return apply(text, fix)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +75,7 @@ def test_one_fix_mends(bad: str, good: str | None) -> None:
     if good is None:
         assert outcome.only().fix is None
         return
-    assert apply(bad, outcome) == good
+    assert mended(bad, outcome) == good
     run_text(good).good()
 
 
