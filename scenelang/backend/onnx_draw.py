@@ -76,6 +76,6 @@ def open_int8(model: Model, threads: int) -> StreamingGraphs:
     need_onnx()
     key = model.digest, threads
     if key not in _opened:
-        ranges = load_ranges(ranges_path(name), model.network.cpu(), model.digest)
+        ranges = load_ranges(ranges_path(name), model.network, model.digest)
         _opened[key] = StreamingGraphs(model.network, ranges, threads)
     return _opened[key]

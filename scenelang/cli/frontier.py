@@ -69,6 +69,10 @@ def command(
     base = load_manifest(model).set
     if base not in known:
         raise click.UsageError(f"no model is named like the set '{base}'")
+    from scenelang.evaluation.sets import SETS
+
+    if base not in SETS:
+        raise click.UsageError(f"no scenes of the set '{base}' can be made; there are {', '.join(SETS)}")
     need_metrics()
     out.mkdir(parents=True, exist_ok=True)
     if calibrate:
