@@ -7,6 +7,7 @@ interrupted experiment goes on where it stopped and a run that two experiments s
 
 from __future__ import annotations
 
+import json
 import math
 import platform
 from collections.abc import Callable, Sequence
@@ -19,6 +20,7 @@ import torch
 from torch import Tensor
 
 from scenelang.evaluation.metrics import MOST_DB, measure
+from scenelang.files import write_whole
 from scenelang.image import Image
 from scenelang.renderers.streaming import StreamingConfig
 from scenelang.training.ablations import ablation_runs
@@ -226,8 +228,19 @@ def run_experiment(
         "threads": torch.get_num_threads(),
         "device": settings.device,
         "budget_s": budget_s,
+        "white": white(max(run.side for run in runs), settings),
         "runs": results,
     }
+
+
+def white(side: int, settings: Settings) -> dict[str, Any]:
+    """Figures of pictures with nothing on them, which a renderer has to beat to have learned anything."""
+    generator = torch.Generator(settings.device).manual_seed(UNSEEN)
+    scenes = random_scenes(settings.scenes, PictureConfig(), generator)
+    exact = torch.cat(
+        [pictures(scenes.pick(rows), side) for rows in torch.split(torch.arange(len(scenes.leaf)), CHUNK)]
+    )
+    return _figures(torch.ones_like(exact).cpu(), exact.cpu())
 
 
 def run_one(
@@ -239,7 +252,9 @@ def run_one(
         config, settings.folder / "runs" / run.folder, settings.device, _perceptual(config, settings)
     )
     few = _scenes(run, study, 24, settings)
-    curve: list[tuple[float, float]] = []
+    # kept beside the checkpoint, for runs that are measured again
+    kept = settings.folder / "runs" / run.folder / "curve.json"
+    curve: list[list[float]] = json.loads(kept.read_text("utf-8")) if kept.exists() else []
     finite = True
     due = config.seconds / POINTS
     for progress in study.run():
@@ -251,7 +266,9 @@ def run_one(
             if config.student.renderer == "streaming":
                 r, blend = level_at(progress.seconds / config.seconds, r, config.grow)
             shown, exact = draw(study.averaged, few, r, blend)
-            curve.append((round(progress.seconds, 1), round(_psnr(shown, exact), 2)))
+            curve.append([round(progress.seconds, 1), round(_psnr(shown, exact), 2)])
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(kept, json.dumps(curve).encode())
             if report is not None:
                 report(run, study, curve[-1][1])
     finite = finite and all(bool(p.isfinite().all()) for p in study.averaged.parameters())

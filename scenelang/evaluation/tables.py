@@ -41,12 +41,15 @@ def _effort(run: Result) -> list[str]:
     return [f"{run['seconds']:.0f} s", f"{run['steps']:,}", f"{run['parameters']:,}"]
 
 
+NOTHING = "*a white picture*"
 EFFORT = ("processor time", "steps", "parameters")
 
 
 def plain(found: Result) -> str:
     """A line a run: overfit, losses, table 3, seeds, parts."""
     rows = [[run["name"], run["group"], *_effort(run), *figures(run)] for run in found["runs"]]
+    if "white" in found and not any(run["config"]["fixed"] for run in found["runs"]):
+        rows.append([NOTHING, "", "–", "–", "–", *figures(found["white"])])
     return markdown(("what", "", *EFFORT, *HEAD), rows)
 
 
@@ -66,6 +69,9 @@ def compare(found: Result) -> str:
             cells += [f"{mark}{value:.2f}{mark}", f"{at[group]['flip']['mean']:.3f}"]
         slope = at[groups[-1]]["psnr"]["mean"] - at[groups[0]]["psnr"]["mean"]
         rows.append([*cells, f"{slope:+.2f}"])
+    if "white" in found:
+        blank = [f"{found['white']['psnr']['mean']:.2f}", f"{found['white']['flip']['mean']:.3f}"]
+        rows.append([NOTHING, "0", *blank * len(groups), "0"])
     head = ["renderer + lifting", "parameters"]
     for group in groups:
         head += [f"{group}: PSNR, dB", "FLIP"]
@@ -83,6 +89,8 @@ def table1(found: Result) -> str:
             run = by_name.get(f"{side} {d}") or by_name.get(f"geometry {d}" if d == 32 else "")
             if run is not None:
                 rows.append([str(d), *figures(run), *theirs(line)])
+        if "white" in found:
+            rows.append([NOTHING, *figures(found["white"]), *theirs(None)])
         parts.append(markdown((f"{side} numbers", *HEAD, *PAPER_HEAD), rows))
     return "\n\n".join(parts)
 
@@ -93,6 +101,8 @@ def _beside(published: Mapping[str, paper.Figures]) -> Any:
             [run["name"], *_effort(run), *figures(run), *theirs(published.get(run["name"]))]
             for run in found["runs"]
         ]
+        if "white" in found:
+            rows.append([NOTHING, "–", "–", "–", *figures(found["white"]), *theirs(None)])
         return markdown(("", *EFFORT, *HEAD, *PAPER_HEAD), rows)
 
     return table
