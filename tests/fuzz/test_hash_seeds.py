@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from pathlib import Path
 
 from tests.work import ends
-
-ROOT = Path(__file__).parents[2]
 
 
 def outcomes(count: int) -> str:
