@@ -121,18 +121,15 @@ def _table(frontier: Frontier) -> str:
     lines.append(
         f"* on the front. {between(frontier.points)} points lie between the fastest and the nearest."
     )
-    if frontier.streaming_ms:
-        default = next((p for p in frontier.points if p.name == frontier.set), None)
-        if default is not None:
-            ratio = frontier.streaming_ms / default.ms.median
-            lines.append(
-                f"A frame of {default.name} is {ratio:.1f} times as fast as the paper's streaming one."
-            )
+    default = next((p for p in frontier.points if p.name == frontier.set), None)
+    if default is not None and default.ratio_to_streaming:
+        ratio = f"{default.ratio_to_streaming:.1f} times as fast as the paper's streaming one"
+        lines.append(f"A frame of {default.name} is {ratio}.")
     by_name = {p.name: p for p in frontier.points}
     for name, p in by_name.items():
         plain = by_name.get(name.removesuffix(", int8"))
         if p.precision == "int8" and plain is not None and plain is not p:
-            speed = plain.ms.median / p.ms.median
+            speed = p.ratio_to_streaming / plain.ratio_to_streaming if plain.ratio_to_streaming else 0.0
             line = f"int8: {plain.title} {speed:.2f} times as fast"
             if p.psnr is not None and plain.psnr is not None:
                 line += f", {p.psnr.mean - plain.psnr.mean:+.2f} dB"

@@ -115,12 +115,12 @@ def measure_frontier(
         if report is not None:
             report("scenes", index + 1, scenes)
     _other_loads(base, [way for way in ways if way.offered], records, seed, threads, report)
-    points = [_point(way, records[way.name]) for way in ways]
+    paper = next((records[w.name] for w in ways if w.name.startswith("the paper's")), None)
+    points = [_point(way, records[way.name], paper) for way in ways]
     offered = [p for p in points if p.offered and p.flip is not None and not p.side]
     kept = front([(p.ms.median, p.flip.mean) for p in offered if p.flip is not None])
     on_front = {p.name for p, yes in zip(offered, kept, strict=True) if yes}
     points = [_with_front(p, p.name in on_front) for p in points]
-    paper = next((p for p in points if p.name.startswith("the paper's") and p.precision == "float32"), None)
     frontier = Frontier(
         set=manifest.set,
         seed=seed,
@@ -132,7 +132,7 @@ def measure_frontier(
         revision=revision(),
         torch=torch.__version__.split("+")[0],
         yardstick_ms=(stick + yardstick()) / 2,
-        streaming_ms=paper.ms.median if paper is not None else 0.0,
+        streaming_ms=statistics.median(paper.all_ms) if paper is not None else 0.0,
         converged={n: float(np.mean(r.converged)) for n, r in records.items() if r.converged},
         points=tuple(sorted(points, key=lambda p: p.ms.median)),
     )
@@ -262,7 +262,7 @@ def promised(values: Sequence[float]) -> float:
     return 1.5 * ordered[-1]
 
 
-def _point(way: Way, record: Record) -> Point:
+def _point(way: Way, record: Record, paper: Record | None) -> Point:
     errors = quality = None
     if record.flip:
         errors = Errors(
@@ -289,6 +289,7 @@ def _point(way: Way, record: Record) -> Point:
         why_not=way.why_not,
         scenes=len(record.ms),
         ms=Times(statistics.median(record.all_ms), float(np.percentile(record.all_ms, 95))),
+        ratio_to_streaming=_ratio(paper, record),
         flip=errors,
         psnr=quality,
         cost=cost,
@@ -297,6 +298,14 @@ def _point(way: Way, record: Record) -> Point:
         on_front=False,
         command=way.command,
     )
+
+
+def _ratio(paper: Record | None, record: Record) -> float:
+    """How many times as long the paper's frames took, on the scenes that both drew."""
+    if paper is None:
+        return 0.0
+    both = min(len(paper.ms), len(record.ms))
+    return sum(paper.ms[:both]) / sum(record.ms[:both])
 
 
 def _with_front(point: Point, on_front: bool) -> Point:

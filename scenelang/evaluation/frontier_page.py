@@ -31,7 +31,7 @@ def frontier_page(frontier: Frontier, pictures: Mapping[str, Sequence[Image]], e
         pictures: of the same scenes, of each point, by its name.
         exact: the exact ones.
     """
-    points = [_facts(p, frontier, pictures.get(p.name, ())) for p in frontier.points]
+    points = [_facts(p, frontier.set, pictures.get(p.name, ())) for p in frontier.points]
     width, height = frontier.canvas
     cores = "one core" if frontier.threads == 1 else f"{frontier.threads} cores"
     data = {
@@ -50,7 +50,7 @@ def frontier_page(frontier: Frontier, pictures: Mapping[str, Sequence[Image]], e
     for name, text in (
         ("SET", html.escape(frontier.set)),
         ("ABOUT", html.escape(about)),
-        ("ROWS", "\n".join(_row(i, p, frontier) for i, p in enumerate(frontier.points))),
+        ("ROWS", "\n".join(map(_row, range(len(points)), frontier.points))),
         # last, as it may hold anything; `<` cannot end the element it stands in
         ("DATA", json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")),
     ):
@@ -58,16 +58,15 @@ def frontier_page(frontier: Frontier, pictures: Mapping[str, Sequence[Image]], e
     return page
 
 
-def _facts(point: Point, frontier: Frontier, images: Sequence[Image]) -> dict[str, Any]:
-    ratio = frontier.streaming_ms / point.ms.median if frontier.streaming_ms else None
+def _facts(point: Point, base: str, images: Sequence[Image]) -> dict[str, Any]:
     return {
         "name": point.title,
-        "label": short_name(point, frontier.set),
+        "label": short_name(point, base),
         "mark": mark_of(point),
         "renderer": point.renderer,
         "ms": point.ms.median,
         "p95": point.ms.p95,
-        "ratio": ratio,
+        "ratio": point.ratio_to_streaming,
         "flip": point.flip
         and {"mean": point.flip.mean, "bound": point.flip.bound, "worst": point.flip.worst},
         "psnr": point.psnr and {"mean": point.psnr.mean, "worst": point.psnr.worst},
@@ -96,10 +95,10 @@ def picture_uri(image: Image) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(data.getvalue()).decode('ascii')}"
 
 
-def _row(index: int, point: Point, frontier: Frontier) -> str:
+def _row(index: int, point: Point) -> str:
     """A row of the table; the first cell holds the button that shows the point."""
     flip, psnr = point.flip, point.psnr
-    ratio = f"{frontier.streaming_ms / point.ms.median:.3g}×" if frontier.streaming_ms else ""
+    ratio = f"{point.ratio_to_streaming:.3g}×" if point.ratio_to_streaming else ""
     cells = [
         f"{point.ms.median:.3g}",
         ratio,

@@ -6,18 +6,24 @@ import base64
 import io
 import json
 import re
+import subprocess
+import sys
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import PIL.Image
 import pytest
 
 from scenelang.evaluation.chart import pyplot
+from scenelang.evaluation.frontier import between, frontier_path, load_frontier
 from scenelang.evaluation.frontier_chart import frontier_chart, frontier_figure, short_name
 from scenelang.evaluation.frontier_page import frontier_page, picture_uri
 from scenelang.image import Image, from_samples
+from scenelang.models.manifest import available
+from tests.evaluation.test_frontier import frontier, point
 
-from .test_frontier import frontier, point
+ROOT = Path(__file__).parents[2]
 
 NOISE = from_samples(np.random.default_rng(1).random((128, 128, 3)).astype(np.float32), None)
 FLAT = from_samples(np.full((128, 128, 3), 0.5, np.float32), None)
@@ -129,3 +135,19 @@ def test_charts_label_every_point_that_has_an_error() -> None:
     pyplot().close(figure)
     png = frontier_chart(frontier(*POINTS[:5]), "png")
     assert PIL.Image.open(io.BytesIO(png)).size == (1100, 1300)
+
+
+@pytest.mark.skipif(not frontier_path("shapes2d").exists(), reason="no frontier is shipped")
+def test_the_documentation_tells_the_shipped_frontier() -> None:
+    """And the frontier is of the weights that ship, and its promises were kept."""
+    command = [sys.executable, ROOT / "docs/make_frontier.py", "--check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    shipped = load_frontier("shapes2d")
+    assert shipped is not None
+    assert {p.model for p in shipped.points if p.model is not None} <= set(available())
+    assert between(shipped.points) >= 8
+    found = json.loads((ROOT / "docs/results/frontier-verified.json").read_text("utf-8"))
+    assert found["held"] is True
+    assert all(row["kept"] >= 0.95 for rows in found["cases"].values() for row in rows.values())
+    assert found["seed"] != found["frontier_seed"] == shipped.seed
