@@ -11,7 +11,6 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-
     from scenelang.animation.targets import Target
     from scenelang.backend.render import Precision, Samples
     from scenelang.cli.animation import Wanted
