@@ -12,8 +12,8 @@ from types import FrameType
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-KILLED_S = 60
-"""A process that takes longer is killed; none of those here needs a tenth of it."""
+KILLED_S = 120
+"""A process that takes longer is killed; none of those here needs a twentieth of it."""
 
 
 def lines_run(function: Callable[[], object]) -> int:

@@ -18,7 +18,7 @@ from PIL import Image
 from scenelang.watching.changes import folders, settle, stamps
 from tests.cli.conftest import Folder
 
-LONG_S = 60  # on a busy machine
+LONG_S = 120  # on a busy machine
 HEAD = "canvas(16, 16); background(#000);\n"
 
 

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-SOON_S = 60
-"""No command here needs a tenth of it on an idle machine."""
+SOON_S = 300
+"""No command here needs a twentieth of it on an idle machine."""
 READY = "import sys, scenelang.cli.start as s; print('ready', flush=True); s.main()"
 
 
