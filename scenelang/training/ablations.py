@@ -183,7 +183,10 @@ class NoSharpening(FramedStudent):
 
 
 class NoFrame(FramedStudent):
-    """The decoder meets points of the world, and all 32 numbers of the geometry vector choose its weights."""
+    """The decoder meets points of the world, and all 32 numbers of the geometry vector choose its weights.
+
+    Numbers that choose weights can do all that numbers beside the point can, as biases are weights too.
+    """
 
     def __init__(self, config: StudentConfig) -> None:
         super().__init__(replace(config, framed=replace(config.framed, code=exact.D_G)))
