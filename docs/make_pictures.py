@@ -34,6 +34,8 @@ import scenelang as nsg
 from scenelang.evaluation.chart import stability_chart
 from scenelang.evaluation.experiment_charts import experiment_chart
 from scenelang.evaluation.experiment_charts import strips as experiment_strips
+from scenelang.evaluation.frontier import Frontier, frontier_path
+from scenelang.evaluation.frontier_chart import frontier_chart
 from scenelang.evaluation.parsimony import parts_chart
 from scenelang.evaluation.run import Case, worst_sheet
 from scenelang.models.load import load_model
@@ -240,6 +242,11 @@ def parts() -> bytes:
     return _few_colours(parts_chart(json.loads(PARTS.read_text("utf-8")), "png"))
 
 
+def frontier() -> bytes:
+    """The shipped frontier's charts."""
+    return _few_colours(frontier_chart(Frontier.from_json(frontier_path("shapes2d").read_bytes()), "png"))
+
+
 def plan() -> dict[str, Callable[[], bytes]]:
     """What `docs/pictures` holds, and how each file of it is made."""
     made: dict[str, Callable[[], bytes]] = {}
@@ -263,6 +270,8 @@ def plan() -> dict[str, Callable[[], bytes]]:
     made["stability.png"] = stability
     if PARTS.exists():
         made["parts.png"] = parts
+    if frontier_path("shapes2d").exists():
+        made["frontier.png"] = frontier
     made |= experiments()
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
     return made

@@ -1,0 +1,193 @@
+"""Write the tables of docs/frontier.md from the shipped frontier and its verification.
+
+python docs/make_frontier.py            writes the page's tables
+python docs/make_frontier.py --check    fails where they are out of date
+python docs/make_frontier.py --measure  measures first: ranges for int8, the frontier, the verification
+
+Measuring takes about ten minutes of one idle core. It ships scenelang/models/shapes2d/frontier.json and
+the int8 ranges of the set's models, and draws docs/pictures/frontier.png and docs/frontier-chart.html.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from scenelang.evaluation.frontier import Frontier, Point, between, frontier_path
+
+HERE = Path(__file__).parent
+PAGE = HERE / "frontier.md"
+VERIFIED = HERE / "results" / "frontier-verified.json"
+MODELS = HERE.parent / "scenelang" / "models"
+BASE = "shapes2d"
+
+
+def measure(scenes: int) -> None:
+    """Calibrate, measure, ship, verify."""
+    command = [sys.executable, "-m", "scenelang", "frontier", BASE]
+    if any(MODELS.glob(f"{BASE}*streaming*/manifest.json")):
+        subprocess.run([*command, "--calibrate", "-o", str(MODELS)], check=True)
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        subprocess.run([*command, "-o", folder, "--scenes", str(scenes)], check=True)
+        shutil.copyfile(out / "frontier.json", frontier_path(BASE))
+        draw = [sys.executable, str(HERE / "make_pictures.py"), "--only", "frontier.png"]
+        subprocess.run(draw, check=True)
+        shutil.copyfile(out / "frontier.html", HERE / "frontier-chart.html")
+        done = subprocess.run([*command, "--verify", "-o", folder, "--scenes", str(scenes)], check=False)
+        shutil.copyfile(out / "verified.json", VERIFIED)
+    if done.returncode:
+        print("not every promise is kept: see the page", file=sys.stderr)
+
+
+def chart_text(frontier: Frontier) -> str:
+    """The chart, and where the page with the pictures is."""
+    return (
+        "![milliseconds against FLIP and against PSNR](pictures/frontier.png)\n\n"
+        "[The interactive chart](frontier-chart.html) shows what each point draws, its figures, and the command "
+        "that draws with it.\nIt is one file that needs no network.\n\n"
+        f"{frontier.scenes} scenes; filled points are chosen from, hollow ones measured for comparison."
+    )
+
+
+def points_text(frontier: Frontier) -> str:
+    """What every way to draw takes and how far it is off."""
+    lines = [
+        "| way to draw | ms | × the paper's speed | FLIP | promised | PSNR, dB | scenes | |",
+        "|---|--:|--:|--:|--:|--:|--:|---|",
+    ]
+    for p in frontier.points:
+        ratio = f"{p.ratio_to_streaming:.3g}" if p.ratio_to_streaming else ""
+        errors = ["", "", ""]
+        if p.flip is not None and p.psnr is not None:
+            errors = [f"{p.flip.mean:.4f}", f"{p.flip.bound:.4f}", f"{p.psnr.mean:.2f}"]
+        note = "**on the front**" if p.on_front else p.why_not or ""
+        cells = [p.title, f"{p.ms.median:.3g}", ratio, *errors, str(p.scenes), note]
+        lines.append(f"| {' | '.join(cells)} |")
+    f = frontier
+    cores = "one core" if f.threads == 1 else f"{f.threads} cores"
+    clock = " of processor time" if f.clock == "processor" else ""
+    about = (
+        f"{f.scenes} scenes of `{f.set}` at {f.canvas[0]}², seed {f.seed}; milliseconds{clock}, median of "
+        f"warm frames on {cores} of {f.machine}; torch {f.torch}, revision `{f.revision[:9]}`. "
+        f"{between(f.points)} ways lie between the fastest and the nearest."
+    )
+    return "\n".join(lines) + "\n\n" + about
+
+
+def pairs_text(frontier: Frontier) -> str:
+    """What 8 bits gain and cost, each against the same way in float32."""
+    by_name = {p.name: p for p in frontier.points}
+    lines = [
+        "| way to draw | float32, ms | int8, ms | times as fast | PSNR, dB |",
+        "|---|--:|--:|--:|--:|",
+    ]
+    for name, eight in by_name.items():
+        plain = by_name.get(name.removesuffix(", int8"))
+        if plain is None or plain is eight:
+            continue
+        change = "not trained"
+        if plain.psnr is not None and eight.psnr is not None:
+            change = f"{eight.psnr.mean - plain.psnr.mean:+.2f}"
+        ratio = eight.ratio_to_streaming / plain.ratio_to_streaming  # on the same scenes
+        lines.append(
+            f"| {plain.title} | {plain.ms.median:.3g} | {eight.ms.median:.3g} | **{ratio:.2f}** | {change} |"
+        )
+    return "\n".join(lines)
+
+
+def paper_text(frontier: Frontier) -> str:
+    """The default's frame against the paper's."""
+    default = _named(frontier, BASE)
+    if default is None or not default.ratio_to_streaming:
+        return "*Not measured.*"
+    ratio = default.ratio_to_streaming
+    return (
+        f"A frame of `{BASE}` takes {default.ms.median:.3g} ms, one of the paper's streaming renderer "
+        f"{frontier.streaming_ms:,.0f} ms: **{ratio:.0f} times** as long, in the same run on the same scenes."
+    )
+
+
+def converged_text(frontier: Frontier) -> str:
+    """Errors against 64 samples a pixel."""
+    lines = ["| way to draw | FLIP against 4 spp, the definition | FLIP against 64 spp |", "|---|--:|--:|"]
+    wanted = ["exact reference, 1 spp", "exact reference, 4 spp", "exact reference, 16 spp", BASE]
+    for name in (*wanted, f"{BASE}, one sample"):
+        point = _named(frontier, name)
+        if point is not None and point.flip is not None and name in frontier.converged:
+            lines.append(f"| {name} | {point.flip.mean:.4f} | {frontier.converged[name]:.4f} |")
+    return "\n".join(lines)
+
+
+def _named(frontier: Frontier, name: str) -> Point | None:
+    return next((p for p in frontier.points if p.name == name), None)
+
+
+def verified_text(found: dict[str, Any] | None) -> str:
+    """In how many unseen scenes promises were kept."""
+    if found is None:
+        return "*Not verified yet.*"
+    cases = list(found["cases"])
+    lines = [f"| way to draw | {' | '.join(cases)} |", "|---|" + "--:|" * len(cases)]
+    for name in found["cases"][cases[0]]:
+        cells = []
+        for case in cases:
+            row = found["cases"][case].get(name)
+            cells.append("" if row is None else f"{100 * row['kept']:.1f} % of {row['scenes']}")
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    verdict = "is kept" if found["held"] else "is **not** kept everywhere"
+    about = (
+        f"Seed {found['seed']} (the promises are of seed {found['frontier_seed']}), revision "
+        f"`{found['revision'][:9]}`. The promise of at least 95 % {verdict}."
+    )
+    return "\n".join(lines) + "\n\n" + about
+
+
+def page() -> str:
+    """The page as it should be."""
+    path = frontier_path(BASE)
+    frontier = Frontier.from_json(path.read_bytes()) if path.exists() else None
+    found = json.loads(VERIFIED.read_text("utf-8")) if VERIFIED.exists() else None
+    parts = {"verified": verified_text(found)}
+    for name, told in (
+        ("chart", chart_text),
+        ("points", points_text),
+        ("pairs", pairs_text),
+        ("paper", paper_text),
+        ("converged", converged_text),
+    ):
+        parts[name] = told(frontier) if frontier is not None else "*Not measured yet.*"
+    text = PAGE.read_text("utf-8")
+    for name, words in parts.items():
+        pattern = re.compile(rf"(<!-- begin {name} -->\n\n).*?(\n\n<!-- end {name} -->)", re.DOTALL)
+        text, count = pattern.subn(lambda m, words=words: m[1] + words + m[2], text)  # type: ignore[misc]
+        assert count == 1, name
+    return text
+
+
+def main() -> None:
+    """See the module's description."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--measure", action="store_true")
+    parser.add_argument("--scenes", type=int, default=80)
+    asked = parser.parse_args()
+    if asked.measure:
+        measure(asked.scenes)
+    text = page()
+    if asked.check:
+        if text != PAGE.read_text("utf-8"):
+            raise SystemExit("docs/frontier.md is out of date: python docs/make_frontier.py")
+        return
+    PAGE.write_text(text, "utf-8")
+
+
+if __name__ == "__main__":
+    main()
