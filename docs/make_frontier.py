@@ -51,8 +51,8 @@ def chart_text(frontier: Frontier) -> str:
     """The chart, and where the page with the pictures is."""
     return (
         "![milliseconds against FLIP and against PSNR](pictures/frontier.png)\n\n"
-        "[The interactive chart](frontier-chart.html) shows what each point draws, its figures, and the command "
-        "that draws with it.\nIt is one file that needs no network.\n\n"
+        "[The interactive chart](frontier-chart.html) shows what each point draws, its figures and the "
+        "command that draws with it.\nIt is one file that needs no network.\n\n"
         f"{frontier.scenes} scenes; filled points are chosen from, hollow ones measured for comparison."
     )
 
