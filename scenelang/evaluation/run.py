@@ -57,8 +57,14 @@ def coverage(scene: Scene, manifest: Manifest) -> float:
 
 
 def scenes_of(model: Model, name: str, seed: int) -> Callable[[int], Scene]:
-    """The scenes of a set by index, as `scenes` makes them for a model."""
-    return scenes(name, seed, lambda scene: coverage(scene, model.manifest))
+    """The scenes of a set by index, as `scenes` makes them for a model, on a canvas that it draws."""
+    made = scenes(name, seed, lambda scene: coverage(scene, model.manifest))
+    return lambda index: sized(made(index), model.manifest)
+
+
+def sized(scene: Scene, manifest: Manifest) -> Scene:
+    """The scene on a canvas that a model draws."""
+    return scene.model_copy(update={"canvas": manifest.sizes[0]}) if manifest.sizes else scene
 
 
 def draw_scene(model: Model, scene: Scene, threads: int = 1) -> tuple[Program, Image]:

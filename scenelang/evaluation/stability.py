@@ -22,7 +22,7 @@ from scenelang.backend.neural import draw_program as paint
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.evaluation.metrics import flip, psnr
 from scenelang.evaluation.probes import PROBES, Probe, animated, apart, rng_of, union_of
-from scenelang.evaluation.run import coverage, spread
+from scenelang.evaluation.run import coverage, sized, spread
 from scenelang.graph.lower import lower
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.graph.transforms import step_of
@@ -154,17 +154,11 @@ def _drawn(model: Model, scene: Scene, folded: bool) -> Image:
     return draw_program(model, program if folded else unfolded(scene, program, model))
 
 
-def _sized(scene: Scene, model: Model) -> Scene:
-    """The scene on a canvas that the model draws."""
-    sizes = model.manifest.sizes
-    return scene.model_copy(update={"canvas": sizes[0]}) if sizes else scene
-
-
 def scene_of(probe: Probe, value: float, index: int, seed: int, model: Model) -> Scene:
     """The scene of a probe at a value; drawn again while it covers too little of the canvas."""
     scale = 1.0
     for attempt in range(200):
-        scene = _sized(probe.make(rng_of(seed, index, attempt), value), model)
+        scene = sized(probe.make(rng_of(seed, index, attempt), value), model.manifest)
         if coverage(scene, model.manifest) >= LEAST_COVER * scale:
             return scene
         scale *= 0.97  # thin and tiny objects never cover that much
@@ -209,8 +203,8 @@ def order_of_disjoint(model: Model, scenes: int, seed: int) -> dict[str, float]:
     for index in range(scenes):
         rng = rng_of(seed, index)
         nodes = apart(rng)
-        first = _sized(union_of(nodes), model)
-        second = _sized(union_of([nodes[i] for i in rng.permutation(len(nodes))]), model)
+        first = sized(union_of(nodes), model.manifest)
+        second = sized(union_of([nodes[i] for i in rng.permutation(len(nodes))]), model.manifest)
         a, b = _drawn(model, first, True), _drawn(model, second, True)
         most = max(most, float(np.abs(np.asarray(a) - np.asarray(b)).max()))
         values.append(psnr(a, exact_picture(first, model)[0]))
@@ -224,7 +218,7 @@ def flicker(model: Model, scenes: int, seed: int) -> dict[str, float]:
     """
     ratios = []
     for index in range(scenes):
-        frames = [_sized(f, model) for f in animated(rng_of(seed, index), FRAMES)]
+        frames = [sized(f, model.manifest) for f in animated(rng_of(seed, index), FRAMES)]
         ours = [np.asarray(_drawn(model, f, True), np.float64) for f in frames]
         exact_ones = [exact_picture(f, model)[0] for f in frames]
         extra = real = 0.0

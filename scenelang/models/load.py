@@ -90,7 +90,7 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
         tensors = load(data)
         if not isinstance(network, Framed):
             tensors = {
-                name.removeprefix(RENDERER): tensor
+                name.removeprefix(RENDERER): tensor.float() if tensor.dtype == torch.float16 else tensor
                 for name, tensor in tensors.items()
                 if name.startswith(RENDERER)
             }

@@ -167,7 +167,12 @@ def codes_of(manifest: Manifest, data: bytes) -> Codes:
 
 
 def _rows(names: tuple[str, ...], table: Any) -> dict[str, tuple[float, ...]]:
-    if table is None or table.dtype != "float32" or table.ndim != 2 or len(table) != len(names):
+    if (
+        table is None
+        or table.dtype not in ("float32", "float16")
+        or table.ndim != 2
+        or len(table) != len(names)
+    ):
         found = "no codes" if table is None else f"codes {table.dtype} {list(table.shape)}"
         raise ModelError(f"{found}, where {len(names)} rows of float32 are needed")
     rows: list[list[float]] = table.tolist()

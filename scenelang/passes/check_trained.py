@@ -13,7 +13,14 @@ from scenelang.graph.walk import leaves
 from scenelang.models.manifest import Manifest
 from scenelang.passes.context import Context
 
-_CODES = {"objects": "W0501", "twirl": "W0502", "bend": "W0503", "scale": "W0504"}
+_CODES = {
+    "objects": "W0501",
+    "twirl": "W0502",
+    "bend": "W0503",
+    "scale": "W0504",
+    "smooth": "W0505",
+    "thin": "W0506",
+}
 _TOLERANCE = 1e-9
 
 
@@ -31,7 +38,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     """Warn once for each quantity outside its trained or measured range, at the object furthest out.
 
     Deformations are measured in the normal form, per unit length of the space they act in; the scale of an
-    object is each of the two stretches of its affine maps.
+    object is each of the two stretches of its affine maps, and how thin it is their ratio.
 
     Before: STREAM. After: unchanged.
     """
@@ -48,6 +55,14 @@ def check_trained(graph: Graph, context: Context) -> Graph:
                 subject = f"a `{quantity}` of {found.value:.3g} on {name}"
             others = f", as {found.count - 1:,} more are" if found.count > 1 else ""
             _warn(context, quantity, f"{subject} is outside the measured range {{}}{others}", found.leaf)
+    if (found := worst.get("thin")) is not None:
+        fact = f"`{found.leaf.geometry}`, {found.value:.3g} times as long as wide,"
+        others = f", as {found.count - 1:,} more are" if found.count > 1 else ""
+        _warn(context, "thin", f"{fact} is outside the measured range {{}}{others}", found.leaf)
+    smooth = [link.node for link in graph.root.links if link.op == "smooth"]
+    if "smooth" in manifest.trained and len(smooth) > manifest.trained["smooth"][1]:
+        last = next((node for node in reversed(smooth) if isinstance(node, Leaf)), None)
+        _warn(context, "smooth", f"{len(smooth):,} smooth unions are outside the measured range {{}}", last)
     limits = manifest.trained.get("objects")
     if limits is not None and count > limits[1]:
         last = next((link.node for link in reversed(graph.root.links) if isinstance(link.node, Leaf)), None)
@@ -67,6 +82,8 @@ def _noted(leaf: Leaf, dimension: int) -> list[tuple[str, float]]:
 def _measures(leaf: Leaf, dimension: int) -> list[tuple[str, float]]:
     smallest, largest = affine.stretches(composed(leaf.moves), dimension)
     found = [("scale", smallest), ("scale", largest)]
+    if smallest > 0:
+        found.append(("thin", largest / smallest))
     for move in leaf.moves:
         if isinstance(move.step, Warp):
             if move.step.twirl:

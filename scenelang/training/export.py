@@ -20,6 +20,8 @@ LIFTING, RENDERER = "lifting.", "renderer."
 def export(study: Study, file: StudentFile, path: Path, device: str = "cpu") -> None:
     """Write the averaged weights of a study: the lifting's and the renderer's, without the levels of growing.
 
+    They are stored in half precision, which is far finer than what such a training leaves undecided.
+
     Args:
         study: trained.
         file: the configuration it was made of.
@@ -37,7 +39,7 @@ def export(study: Study, file: StudentFile, path: Path, device: str = "cpu") -> 
     for name, tensor in student.state_dict().items():
         grown = isinstance(student, StreamingStudent) and name.startswith(f"{RENDERER}stages.")
         if not grown or name.startswith(last):
-            kept[name] = tensor.detach().float().cpu().contiguous()
+            kept[name] = tensor.detach().half().cpu().contiguous()
     header: dict[str, Any] = {
         "format": 1,
         "model": file.model,

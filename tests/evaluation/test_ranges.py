@@ -16,10 +16,10 @@ def probe(healthy: float, **psnr: float) -> dict[str, Any]:
 
 
 def test_a_range_ends_where_the_error_begins_to_show() -> None:
-    found = {"probes": {"objects": probe(4, v1=50, v4=50, v16=45.1, v32=44.9, v64=50)}}
+    found = {"probes": {"objects": probe(4, v1=50, v4=50, v16=40.1, v32=39.9, v64=50)}}
     ranges, lines = measured_ranges(found)
     assert ranges == {"objects": [1, 16]}
-    assert lines == {"objects": "32: 44.9 dB (worst 43.9), 64: 50.0 dB (worst 49.0)"}
+    assert lines == {"objects": "32: 39.9 dB (worst 38.9), 64: 50.0 dB (worst 49.0)"}
 
 
 def test_a_model_of_larger_error_is_compared_with_itself() -> None:
@@ -32,10 +32,10 @@ def test_a_model_of_larger_error_is_compared_with_itself() -> None:
 def test_both_ends_have_units_of_their_own() -> None:
     found = {
         "probes": {
-            "size": probe(1, v0_1=40, v0_5=50, v1=50, v2=50, v4=30),
+            "size": probe(1, v0_1=39, v0_5=50, v1=50, v2=50, v4=30),
             "warp": probe(1, v0_5=50, v1=50, v2=50),
         }
     }
     ranges, lines = measured_ranges(found)
     assert ranges == {"scale": [0.1, 1.1], "twirl": [-1.6, 1.6], "bend": [-1.6, 1.6]}
-    assert lines == {"scale": "0.02: 40.0 dB (worst 39.0), 2.2: 30.0 dB (worst 29.0)"}
+    assert lines == {"scale": "0.02: 39.0 dB (worst 38.0), 2.2: 30.0 dB (worst 29.0)"}

@@ -9,8 +9,12 @@ CODES: dict[str, str] = {
     "E0506": "an object has more deformations than the model holds",
     "E0507": "the canvas is larger than the model draws",
     "E0508": "no model fits the scene",
+    "E0509": "the model does not draw canvases of this size",
+    "E0510": "the model draws over white alone",
     "W0501": "more objects than the model was measured with",
     "W0502": "a twirl outside the measured range",
     "W0503": "a bend outside the measured range",
     "W0504": "an object outside the measured range of scales",
+    "W0505": "more smooth unions than the model was measured with",
+    "W0506": "an object thinner than the model was measured with",
 }
