@@ -59,8 +59,9 @@ MOVING_BYTES = 220_000
 PALETTE = 256
 NEAR = 2.5  # a palette that changes values by more than this on average (of 255) is not used
 _SCENE = re.compile(
-    r"^```nsg(?: title=[^\n]*)?\n(.*?)^```\n\n!\[[^\]]*\]\(pictures/([\w/-]+\.(?:png|webp))\)",
-    re.MULTILINE | re.DOTALL,
+    r"^```nsg(?: title=[^\n]*)?\n((?:(?!```)[^\n]*\n)*)```\n\n"
+    r"!\[[^\]]*\]\(pictures/([\w/-]+\.(?:png|webp))\)",
+    re.MULTILINE,
 )
 _SHOWN = re.compile(r"^// Shown( \w+)?: (.*)$", re.MULTILINE)
 
