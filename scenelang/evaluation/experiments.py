@@ -262,7 +262,7 @@ def run_one(
         if not finite:
             break
         if progress.seconds >= due * (len(curve) + 1) and progress.seconds < config.seconds:
-            r, blend = SIDE, 1.0
+            r, blend = min(run.side, SIDE), 1.0
             if config.student.renderer == "streaming":
                 r, blend = level_at(progress.seconds / config.seconds, r, config.grow)
             shown, exact = draw(study.averaged, few, r, blend)

@@ -12,7 +12,7 @@ from PIL import Image
 
 from scenelang.cli.main import cli
 from scenelang.evaluation import paper
-from scenelang.evaluation.experiments import EXPERIMENTS, SIDE, Settings, run_experiment
+from scenelang.evaluation.experiments import EXPERIMENTS, SIDE, SIZES_SIDE, Settings, run_experiment, run_one
 from scenelang.evaluation.tables import table_of
 
 
@@ -55,6 +55,14 @@ def test_an_experiment_is_trained_measured_and_drawn(tmp_path: Path) -> None:
     assert drawn.exit_code == 0, drawn.output
     for suffix in (".md", ".png", ".svg", "-strips.png"):
         assert (tmp_path / f"table2{suffix}").stat().st_size > 100
+
+
+def test_every_size_of_a_vector_is_drawn_at_its_own_resolution(tmp_path: Path) -> None:
+    """The size study has another resolution than the rest, on the way as at the end."""
+    (run,) = [run for run in EXPERIMENTS["table1"](0.3, 1) if run.name == "geometry 2"]
+    found = run_one(run, Settings(tmp_path, 8))
+    assert found["resolution"] == SIZES_SIDE
+    assert found["curve"]
 
 
 def result(name: str, group: str, psnr: float, **more: Any) -> dict[str, Any]:
