@@ -75,7 +75,7 @@ def fit_cost(loads: Sequence[Load], ms: Sequence[float], skip: bool, *, fixed: b
         rows[:, :2] = 0.0
     if not skip:
         rows[:, 4] = 0.0
-    times = np.asarray(ms, np.float64)
+    times = np.maximum(np.asarray(ms, np.float64), 1e-6)  # a clock may stand still
     found = _at_least_zero(rows / times[:, None], np.ones(len(times)))
     guess = np.maximum(rows @ found, 1e-9)
     spread = max(1.0, float(np.percentile(times / guess, 95)))
