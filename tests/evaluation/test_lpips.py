@@ -43,6 +43,7 @@ def convolve(x: np.ndarray, w: np.ndarray, b: np.ndarray, stride: int) -> np.nda
 
 def test_it_is_the_weighted_distance_of_unit_features(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(LAYERS, "alexnet", SMALL)
+    monkeypatch.setattr(lpips, "SMALLEST", 9)
     w = weights()
     a, b = torch.rand(2, 3, 9, 9, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
     found = Lpips("alexnet", w).double()(a[None], b[None])
@@ -64,6 +65,15 @@ def test_it_is_the_weighted_distance_of_unit_features(monkeypatch: pytest.Monkey
         gap = (features[0][i] - features[1][i]) ** 2
         expected += float((gap * w[f"head.{i}"].numpy()[:, None, None]).sum(0).mean())
     assert float(found) == pytest.approx(expected, rel=1e-9)
+
+
+def test_small_pictures_are_enlarged_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As pixels twice as large, not as other pictures."""
+    monkeypatch.setitem(LAYERS, "alexnet", SMALL)
+    distance = Lpips("alexnet", weights()).double()
+    a, b = torch.rand(2, 1, 3, 16, 16, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
+    larger = [x.repeat_interleave(2, 2).repeat_interleave(2, 3) for x in (a, b)]
+    torch.testing.assert_close(distance(a, b), distance(*larger))
 
 
 def test_the_trunks_are_the_published_ones() -> None:
