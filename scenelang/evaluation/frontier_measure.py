@@ -44,6 +44,7 @@ SIDES = (128, 512)  # further canvases that times are fitted on
 MANY = "many"  # set of more objects that times are fitted on
 FITTED = 6  # scenes of each of these
 PROMISED = 0.975
+MARGIN = 1.25  # of 40 scenes without it, one scene in ten of another seed was worse than promised
 
 Report = Callable[[str, int, int], None]
 
@@ -268,7 +269,7 @@ def _point(way: Way, record: Record, paper: Record | None) -> Point:
         errors = Errors(
             float(np.mean(record.flip)),
             float(np.percentile(record.flip, 95)),
-            promised(record.flip),
+            MARGIN * promised(record.flip),
             max(record.flip),
         )
         quality = Quality(float(np.mean(record.psnr)), float(np.percentile(record.psnr, 5)), min(record.psnr))
