@@ -21,6 +21,13 @@ _CODES = {
     "smooth": "W0505",
     "thin": "W0506",
 }
+_SUBJECTS = {
+    "twirl": "a `twirl` of {value} on {name}",
+    "bend": "a `bend` of {value} on {name}",
+    "scale": "a scale of {value} of {name}",
+    "thin": "{name}, {value} times as long as wide,",
+}
+"""What is said of an object, in the order of the warnings."""
 _TOLERANCE = 1e-9
 
 
@@ -47,18 +54,11 @@ def check_trained(graph: Graph, context: Context) -> Graph:
         count += 1
         for quantity, value in _noted(leaf, graph.dimension):
             _note(worst, quantity, value, leaf, manifest)
-    for quantity in ("twirl", "bend", "scale"):
+    for quantity, subject in _SUBJECTS.items():
         if (found := worst.get(quantity)) is not None:
-            name = f"`{found.leaf.geometry}`"
-            subject = f"a scale of {found.value:.3g} of {name}"
-            if quantity != "scale":
-                subject = f"a `{quantity}` of {found.value:.3g} on {name}"
+            said = subject.format(name=f"`{found.leaf.geometry}`", value=f"{found.value:.3g}")
             others = f", as {found.count - 1:,} more are" if found.count > 1 else ""
-            _warn(context, quantity, f"{subject} is outside the measured range {{}}{others}", found.leaf)
-    if (found := worst.get("thin")) is not None:
-        fact = f"`{found.leaf.geometry}`, {found.value:.3g} times as long as wide,"
-        others = f", as {found.count - 1:,} more are" if found.count > 1 else ""
-        _warn(context, "thin", f"{fact} is outside the measured range {{}}{others}", found.leaf)
+            _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", found.leaf)
     smooth = [link.node for link in graph.root.links if link.op == "smooth"]
     if "smooth" in manifest.trained and len(smooth) > manifest.trained["smooth"][1]:
         last = next((node for node in reversed(smooth) if isinstance(node, Leaf)), None)
