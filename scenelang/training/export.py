@@ -8,13 +8,12 @@ from typing import Any
 
 import torch
 
+from scenelang.models.load import RENDERER
 from scenelang.training.checkpoint import save_tensors
 from scenelang.training.config import StudentFile
 from scenelang.training.loop import revision
 from scenelang.training.students import StreamingStudent
 from scenelang.training.studies import Study
-
-LIFTING, RENDERER = "lifting.", "renderer."
 
 
 def export(study: Study, file: StudentFile, path: Path, device: str = "cpu") -> None:
