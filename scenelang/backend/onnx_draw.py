@@ -14,9 +14,10 @@ from scenelang.backend.onnx_streaming import StreamingGraphs
 from scenelang.image import from_samples
 from scenelang.models.load import Model
 from scenelang.models.manifest import ROOT
-from scenelang.program.program import Program, ProgramError
+from scenelang.program.program import Program
 from scenelang.renderers.draw import Drawing
 from scenelang.renderers.streaming import Streaming
+from scenelang.renderers.whole import need_side, need_white
 
 RANGES: Final = "int8.safetensors"
 
@@ -44,12 +45,9 @@ def draw_int8(program: Program, model: Model, threads: int) -> Drawing:
         ProgramError: the canvas or background is one that the model does not draw.
     """
     graphs = open_int8(model, threads)
-    if program.background is None or min(program.background) < 1.0:
-        raise ProgramError("this model draws on white only")
+    need_white(program.background)
     side = graphs.resolution
-    if program.canvas != (side, side):
-        width, height = program.canvas
-        raise ProgramError(f"this model draws {side} x {side} pixels, not {width} x {height}")
+    need_side(program.canvas, side)
     if not len(program):
         return Drawing(from_samples(np.ones((side, side, 3), np.float32), None), 0, 0, 0)
     picture = graphs.draw(program.vectors, program.tokens)

@@ -22,6 +22,19 @@ from scenelang.renderers.streaming import Streaming
 TILE = 1 << 13  # samples that `reading` answers at a time
 
 
+def need_white(background: tuple[float, float, float] | None) -> None:
+    """Raise ProgramError for a background that networks without coverage do not paint over."""
+    if background is None or min(background) < 1.0:
+        raise ProgramError("this model draws on white only")
+
+
+def need_side(canvas: tuple[int, int], side: int) -> None:
+    """Raise ProgramError for a canvas of another size than a network draws."""
+    if canvas != (side, side):
+        width, height = canvas
+        raise ProgramError(f"this model draws {side} x {side} pixels, not {width} x {height}")
+
+
 @torch.no_grad()
 def draw_whole(
     network: Streaming | Reading,
@@ -45,8 +58,7 @@ def draw_whole(
     Raises:
         ProgramError: the canvas or the background is one that the network was not trained for.
     """
-    if background is None or min(background) < 1.0:
-        raise ProgramError("this model draws on white only")
+    need_white(background)
     width, height = canvas
     if not len(vectors):
         return Drawing(from_samples(np.ones((height, width, 3), np.float32), None), 0, 0, 0)
@@ -55,8 +67,7 @@ def draw_whole(
     t = torch.from_numpy(tokens.astype(np.int64))[None].to(device)
     if isinstance(network, Streaming):
         side = network.config.resolution
-        if canvas != (side, side):
-            raise ProgramError(f"this model draws {side} x {side} pixels, not {width} x {height}")
+        need_side(canvas, side)
         found = network(v, t)[0].permute(1, 2, 0)
         pairs = len(vectors) * side * side
     else:
