@@ -37,7 +37,7 @@ SCENES = {
 def flop_per_pair(network: Framed) -> int:
     """Floating-point operations of the network's products for one sample that meets one object."""
     decoder: int = sum(2 * w.shape[1] * w.shape[2] for w in network.decoder_w)
-    cell: int = sum(2 * w.shape[1] * w.shape[2] for w in (network.cell_w1, network.cell_w2))
+    cell: int = 2 * network.cell_lines[0].numel()
     return decoder + cell
 
 

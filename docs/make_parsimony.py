@@ -35,7 +35,8 @@ PARTS = {
     "no distance scale": "the factor that turns leaf units into world units",
     "no frame": "leaf coordinates; the decoder meets the world's, and the geometry vector picks its weights",
     "token as input": "a set of weights for each token; the token is a further input",
-    "no sharpened inputs": "signs of distance and state at three slopes, beside the numbers themselves",
+    "hidden layer": "nothing; the gates get 16 rectified linear units more, as those of the first cell had",
+    "never forced": "steps that start from the exact state, with which streams are learned at first",
     "pictures alone": "the asking for distances; colour and coverage alone train it",
 }
 WORDS = {"pays": "it pays", "no difference": "no difference", "costs": "better without"}

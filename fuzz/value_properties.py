@@ -116,7 +116,7 @@ def networks_of_any_size_load_as_they_were_saved(data: st.DataObject) -> None:
 
     sizes = {
         name: data.draw(st.integers(1, 6), name)
-        for name in ("features", "state", "decoder_width", "cell_width")
+        for name in ("features", "state", "decoder_width", "paint_lines")
     }
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(data.draw(st.integers(0, 1000)))

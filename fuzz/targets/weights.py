@@ -125,7 +125,7 @@ def _small() -> bytes:
     """A network of the smallest sizes, so that most of a file is header."""
     from scenelang.renderers.framed import Framed, FramedConfig
 
-    config = FramedConfig(decoder_width=2, cell_width=1)
+    config = FramedConfig(decoder_width=2)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(1)
         network = Framed(config, 4, 1)

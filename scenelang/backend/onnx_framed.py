@@ -19,7 +19,6 @@ from torch import Tensor
 
 from scenelang.backend.onnx_session import Nodes
 from scenelang.renderers.framed import RADIUS
-from scenelang.renderers.frames import FAR
 from scenelang.renderers.stream import Stream, _Row
 
 Floats = npt.NDArray[np.float32]
@@ -34,17 +33,12 @@ class EightBitStream(Stream):
         super().__init__(*arguments, **options)
         self._decoders: dict[int, Any] = {}
 
-    def _decode(self, qx: Tensor, qy: Tensor, radius: Tensor, row: _Row) -> Tensor:
+    def _layers(self, x: Tensor, row: _Row) -> Tensor:
         decoder = self._decoders.get(id(row.layers))
         if decoder is None:
             decoder = _decoder([v.numpy() for layer in row.layers for v in layer])
             self._decoders[id(row.layers)] = decoder
-        x = torch.stack([qx, qy], 1)  # (m, 2)
-        x *= (RADIUS / radius.clamp_min(RADIUS))[:, None]
-        found = torch.from_numpy(decoder.run(None, {"points": x.numpy()})[0]).T
-        found += (radius - RADIUS).clamp_min_(0.0) * self.far
-        found.mul_(row.frame.scale)
-        return found.clamp_(-FAR, FAR) if row.frame.wild else found
+        return torch.from_numpy(decoder.run(None, {"points": x.numpy()})[0])
 
 
 _known: dict[bytes, Any] = {}
@@ -63,7 +57,7 @@ def _decoder(arrays: list[Floats]) -> Any:
 def _session(arrays: list[Floats]) -> Any:
     """Points (m, 2) to features (m, F)."""
     w1, w2, w3 = arrays[::2]
-    b1, b2, b3 = (a[:, 0] for a in arrays[1::2])
+    b1, b2, b3 = arrays[1::2]
     rng = np.random.default_rng(1)
     angle, far = rng.uniform(0, 2 * np.pi, _POINTS), RADIUS * np.sqrt(rng.uniform(0, 1, _POINTS))
     points = np.stack([far * np.cos(angle), far * np.sin(angle)]).astype(np.float32)

@@ -28,7 +28,7 @@ from scenelang.training.encoders import LiftingConfig
 from scenelang.training.loop import revision
 from scenelang.training.pictures import PictureConfig, Scenes, pictures, random_scenes
 from scenelang.training.students import LiftingName, RendererName, StreamingStudent, Student, StudentConfig
-from scenelang.training.studies import Study, StudyConfig, level_at
+from scenelang.training.studies import RATES, Study, StudyConfig, level_at
 
 UNSEEN = 2021  # seed of the scenes that are measured; trainings use small ones
 STRIP = 8  # scenes of a strip
@@ -37,7 +37,6 @@ POINTS = 6  # of a curve over time
 SIDE = 32  # pixels along a side of the pictures: what `streaming` reaches on a processor in minutes
 SIZES_SIDE = 16  # of the thirteen trainings of the size study
 PARTS_SIDE = 128  # where only renderers that answer points are compared
-RATES: dict[RendererName, float] = {"framed": 3e-3, "streaming": 1e-3, "reading": 2e-3}
 RENDERERS: tuple[RendererName, ...] = ("framed", "reading", "streaming")
 LIFTINGS: tuple[LiftingName, ...] = ("exact", "learned")
 SIZES = (1, 2, 4, 8, 16, 32, 64)
@@ -78,7 +77,7 @@ def plain(renderer: RendererName, lifting: LiftingName, seconds: float, seed: in
     scenes = 8 if renderer == "streaming" else 16  # a picture of a scene takes long
     rate = RATES[renderer]
     if (renderer, lifting) == ("framed", "learned"):
-        rate /= 3  # faster, its frames collapse and it draws the mean colour
+        rate /= 10  # faster, its frames collapse and it draws the mean colour
     warm = renderer == "streaming"  # a level that begins as noise costs more than minutes can pay
     return StudyConfig(student, seconds=seconds, rate=rate, scenes=scenes, seed=seed, warm=warm)
 

@@ -110,7 +110,8 @@ def _framed(config: dict[str, Any], manifest: Manifest, size: int) -> Framed:
         raise ModelError("a network size is out of range")
     known = FramedConfig(**sizes)
     decoder = (known.code + 1) * known.decoder_width * (known.decoder_width + known.features)
-    cell = (known.features + known.state) * known.cell_width + known.features * known.state
+    rows = known.state + known.paint_lines
+    cell = (known.features + known.state) * rows + known.features * known.state
     if 4 * max(decoder, cell) > size:
         raise ModelError("a network larger than its file")
     return Framed(known, len(manifest.geometries), len(manifest.materials))

@@ -1,7 +1,7 @@
 """The framed renderer's network: an LSTM per sample that meets each object in the object's own frame.
 
 Letters: B streams, N objects, P points, C = `code`, F = `features`, S = `state`, G = `decoder_width`,
-K = `cell_width`. Distances are in world units, leaf coordinates in leaf units.
+L = `paint_lines`. Distances are in world units, leaf coordinates in leaf units.
 
 For a point and an object the frame gives the point's leaf coordinates exactly (`frames.py`). Two learned
 parts then draw:
@@ -10,9 +10,9 @@ parts then draw:
    the object's code, so that shapes live in codes: swap two codes and the shapes swap. It has rectified
    linear units, which represent straight edges exactly, and its output is multiplied by the object's
    distance scale.
-2. The cell is an LSTM (Hochreiter and Schmidhuber 1997) whose gates are clamped lines and whose weights
-   are chosen by the boolean token. A part of it is a register that carries the colour under one gate of
-   its own, so that colour is kept, not re-learned.
+2. The cell is an LSTM (Hochreiter and Schmidhuber 1997) whose gates are clamped lines in what it is shown
+   and what it remembers, chosen by the boolean token. A part of it is a register that carries the colour
+   under one gate of its own, so that colour is kept, not re-learned.
 
 No pixel looks at another and nothing here knows a leaf, an operator or a resolution.
 """
@@ -28,7 +28,6 @@ import torch
 from torch import Tensor, nn
 
 TOKENS = 4
-SHARPEN = (16.0, 256.0, 4096.0)  # per world unit: slopes at which signs are shown to the cell
 EMPTY = 1.0  # world units: the margin before the first object, out of reach of every blend
 RADIUS = 2.0  # leaf units: the decoder sees points in this disc, farther ones at its rim
 
@@ -43,7 +42,7 @@ class FramedConfig:
         features: distance-like features F of an object at a point.
         state: entries S of the LSTM state.
         decoder_width: hidden units of the decoder's two layers.
-        cell_width: hidden units in front of the gates.
+        paint_lines: lines L of which the highest opens the register's gate.
     """
 
     code: int = 4
@@ -51,39 +50,10 @@ class FramedConfig:
     features: int = 1
     state: int = 1
     decoder_width: int = 32
-    cell_width: int = 16
+    paint_lines: int = 2
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
-
-
-class _Clamp(torch.autograd.Function):
-    """clamp(x, 0, 1) whose gradient outside the interval is let through by a tenth, inward only."""
-
-    @staticmethod
-    def forward(ctx: Any, x: Tensor) -> Tensor:
-        ctx.save_for_backward(x)
-        return x.clamp(0.0, 1.0)
-
-    @staticmethod
-    def backward(ctx: Any, grad: Tensor) -> Tensor:
-        x: Tensor = ctx.saved_tensors[0]
-        inside = (x >= 0) & (x <= 1)
-        inward = ((x < 0) & (grad < 0)) | ((x > 1) & (grad > 0))
-        return grad * (inside.to(grad.dtype) + 0.1 * inward.to(grad.dtype))
-
-
-def gate(x: Tensor) -> Tensor:
-    """A saturating gate: clamp(x, 0, 1), trainable from outside the interval."""
-    if torch.is_grad_enabled() and x.requires_grad:
-        clamped: Tensor = _Clamp.apply(x)  # type: ignore[no-untyped-call]
-        return clamped
-    return x.clamp(0.0, 1.0)
-
-
-def sharpen(x: Tensor) -> Tensor:
-    """x and its sign at several sharpnesses side by side: (…, n) -> (…, n (1 + len(SHARPEN)))."""
-    return torch.cat([x, *((x * s).clamp(-1.0, 1.0) for s in SHARPEN)], -1)
 
 
 class Framed(nn.Module):
@@ -116,12 +86,11 @@ class Framed(nn.Module):
         self.far = nn.Parameter(torch.ones(c.features))  # growth of the features beyond the rim
         self.edge_slope = nn.Parameter(torch.tensor(math.log(50.0)))
 
-        inputs = (c.features + c.state) * (1 + len(SHARPEN))
-        self.cell_w1 = nn.Parameter(torch.randn(TOKENS, inputs, c.cell_width) * math.sqrt(2 / inputs))
-        self.cell_b1 = nn.Parameter(torch.randn(TOKENS, c.cell_width) * 0.1)
-        self.cell_w2 = nn.Parameter(torch.randn(TOKENS, c.cell_width, c.state + 1) / math.sqrt(c.cell_width))
-        self.cell_skip = nn.Parameter(torch.zeros(TOKENS, c.features + c.state, c.state + 1))
-        self.cell_b2 = nn.Parameter(torch.full((TOKENS, c.state + 1), 0.5))
+        rows = c.state + c.paint_lines
+        self.cell_lines = nn.Parameter(torch.randn(TOKENS, c.features + c.state, rows) * 0.3)
+        # a logarithm: the gate of a union is a thousand times as steep as what it starts from
+        self.cell_gain = nn.Parameter(torch.zeros(TOKENS, rows))
+        self.cell_bias = nn.Parameter(torch.full((TOKENS, rows), 0.5))
         self.candidate = nn.Parameter(torch.rand(TOKENS, c.features, c.state) - 0.5)
         self.bump = nn.Parameter(torch.zeros(TOKENS, c.state))
         self.read_slope = nn.Parameter(torch.tensor(math.log(20.0)))
@@ -143,9 +112,13 @@ class Framed(nn.Module):
         ]
 
     def cell_weights(self) -> tuple[Tensor, ...]:
-        """Parameters of the cell, each with tokens in front."""
-        candidate = self.candidate.clamp(-1.0, 1.0)
-        return self.cell_w1, self.cell_b1, self.cell_w2, self.cell_skip, self.cell_b2, candidate, self.bump
+        """Parameters of the cell, each with tokens in front: lines, biases, candidate, bump.
+
+        The steeper a gate, the lower its bump, so that what a blend adds shrinks as it narrows.
+        """
+        gain = self.cell_gain.exp()
+        bump = self.bump / gain[:, : self.config.state]
+        return self.cell_lines * gain[:, None], self.cell_bias, self.candidate.clamp(-1.0, 1.0), bump
 
     def object_albedo(self, material_code: Tensor) -> Tensor:
         """Albedo (M, 3) of material codes (M, material_code)."""
@@ -187,19 +160,44 @@ class Framed(nn.Module):
             state: (B, P, S).
             colour: the register (B, P, 3).
             object_colour: (B, 1, 3).
-            weights: w1 (B, F + S, K), b1 (B, K), w2 (B, K, 3 S + 1), b2 (B, 3 S + 1).
+            weights: lines (B, F + S, S + L), biases (B, S + L), candidate (B, F, S), bump (B, S).
         """
-        w1, b1, w2, skip, b2, candidate, bump = weights
-        seen = sharpen(torch.cat([features, state], -1))
-        hidden = torch.relu(torch.baddbmm(b1[:, None], seen, w1))  # (B, P, K)
-        lines = torch.baddbmm(b2[:, None], seen[..., : skip.shape[1]], skip)
-        gates = gate(torch.baddbmm(lines, hidden, w2))  # (B, P, S + 1)
-        take, paint = gates[..., :-1], gates[..., -1:]
-        new = torch.bmm(features, candidate)  # (B, P, S)
-        state = state + take * (new - state) - bump[:, None] * take * (1 - take)
+        lines, bias, candidate, bump = weights
+        levels = torch.baddbmm(bias[:, None], torch.cat([features, state], -1), lines)  # (B, P, S + L)
+        return self.update(levels, features @ candidate, bump, state, colour, object_colour)
+
+    def update(
+        self,
+        levels: Tensor,
+        candidate: Tensor,
+        bump: Tensor,
+        state: Tensor,
+        colour: Tensor,
+        object_colour: Tensor,
+    ) -> tuple[Tensor, Tensor]:
+        """State and register behind the gates.
+
+        Args:
+            levels: of the gates before they are clamped (B, P, S + L).
+            candidate: what the state becomes where its gate is open (B, P, S).
+            bump: by how much a half-open gate lowers the state, times four (B, S), or (B, P, S).
+            state, colour, object_colour: as `step` takes them.
+        """
+        take = levels[..., : self.config.state].clamp(0.0, 1.0)
+        paint = levels[..., self.config.state :].amax(-1, keepdim=True).clamp(0.0, 1.0)
+        bump = bump[:, None] if bump.dim() < take.dim() else bump
+        state = state + take * (candidate - state) - bump * take * (1 - take)
         return state, colour + paint * (object_colour - colour)
 
-    def trace(self, q: Tensor, scale: Tensor, code: Tensor, colours: Tensor, tokens: Tensor) -> Trace:
+    def trace(
+        self,
+        q: Tensor,
+        scale: Tensor,
+        code: Tensor,
+        colours: Tensor,
+        tokens: Tensor,
+        given: tuple[Tensor, Tensor] | None = None,
+    ) -> Trace:
         """Run streams for training, keeping what the image of every prefix shows.
 
         Args:
@@ -208,6 +206,8 @@ class Framed(nn.Module):
             code: (B, N, C).
             colours: (B, N, 3).
             tokens: (B, N), int64.
+            given: exact distance (B, N, P) and colour (B, N, P, 3) after every object, from which each
+                step then starts in place of its own answers (teacher forcing, Williams and Zipser 1989).
         """
         b, n, p, _ = q.shape
         layers = self.decoder_weights(code.reshape(b * n, -1))
@@ -219,6 +219,9 @@ class Framed(nn.Module):
         margins, shown = [], []
         for i in range(n):
             t = tokens[:, i]
+            if given is not None and i > 0:
+                state = torch.cat([given[0][:, i - 1, :, None], state[..., 1:]], -1)
+                colour = given[1][:, i - 1]
             state, colour = self.step(
                 features[:, i], state, colour, colours[:, i, None], tuple(w[t] for w in weights)
             )

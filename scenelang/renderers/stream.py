@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import linear
 
 from scenelang.lifting import exact
-from scenelang.renderers.framed import EMPTY, RADIUS, SHARPEN, Framed
+from scenelang.renderers.framed import EMPTY, RADIUS, Framed
 from scenelang.renderers.frames import BLEND_REACH, FAR, ObjectFrame, local_points, read_frame
 
 UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
@@ -25,7 +26,7 @@ SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """One object, ready to draw: weights (out, in) and biases (out, 1)."""
+    """One object, ready to draw: weights (out, in) and biases (out,)."""
 
     frame: ObjectFrame
     token: int
@@ -37,11 +38,8 @@ class _Row:
 
 @dataclass(frozen=True, slots=True)
 class _Cell:
-    w1: Tensor
-    b1: Tensor
-    w2: Tensor
-    lines: Tensor
-    b2: Tensor
+    lines: Tensor  # (S + L, F + S)
+    bias: Tensor
     candidate: Tensor
     bump: Tensor
 
@@ -125,20 +123,11 @@ class Stream:
         self.skip = skip
         self.device = network.codes.device
         self.cells = [
-            _Cell(
-                w1.T.contiguous(),
-                b1[:, None],
-                w2.T.contiguous(),
-                lines.T.contiguous(),
-                b2[:, None],
-                c.T.contiguous(),
-                bump[:, None],
-            )
-            for w1, b1, w2, lines, b2, c, bump in zip(*network.cell_weights(), strict=True)
+            _Cell(lines.T.contiguous(), bias[:, None], c.T.contiguous(), bump[:, None])
+            for lines, bias, c, bump in zip(*network.cell_weights(), strict=True)
         ]
         self.slope = float(network.read_slope.exp()) / 4
         self.unit = float(self.cells[UNION].candidate[0].norm())  # growth of the margin per world unit
-        self.sharpen = [float(s) for s in SHARPEN]
         self.far = network.far[:, None]
         self.vectors = vectors
         self.codes = np.unique(vectors[:, exact.CODE], axis=0)  # of the leaves in use
@@ -154,7 +143,7 @@ class Stream:
         g, m = vectors[:, : exact.D_G], vectors[:, exact.D_G :]
         codes, index = np.unique(g[:, exact.CODE], axis=0, return_inverse=True)
         made = self.network.decoder_weights(torch.from_numpy(codes).to(self.device))
-        shapes = [tuple((w[i].T.contiguous(), b[i][:, None]) for w, b in made) for i in range(len(codes))]
+        shapes = [tuple((w[i].T.contiguous(), b[i]) for w, b in made) for i in range(len(codes))]
         codes_m = torch.from_numpy(m[:, exact.MATERIAL_CODE].copy()).to(self.device)
         albedo = torch.cat([self.network.object_albedo(codes_m), torch.ones_like(codes_m[:, :1])], 1)
         matrix = torch.from_numpy(m[:, exact.COLOUR].reshape(-1, 3, 4).copy()).to(self.device)
@@ -244,29 +233,25 @@ class Stream:
 
     def _decode(self, qx: Tensor, qy: Tensor, radius: Tensor, row: _Row) -> Tensor:
         """Features (F, m) of leaf coordinates (m,)."""
-        x = torch.stack([qx, qy])
-        x *= RADIUS / radius.clamp_min(RADIUS)
-        for i, (w, b) in enumerate(row.layers):
-            x = torch.addmm(b, w, x)
-            if i < 2:
-                x.relu_()
+        x = torch.stack([qx, qy], 1)  # rows of points suit layers this narrow
+        x *= (RADIUS / radius.clamp_min(RADIUS))[:, None]
+        x = self._layers(x, row).T
         x += (radius - RADIUS).clamp_min_(0.0) * self.far
         x.mul_(row.frame.scale)
         return x.clamp_(-FAR, FAR) if row.frame.wild else x
+
+    def _layers(self, x: Tensor, row: _Row) -> Tensor:
+        """The decoder's layers on points (m, 2), to (m, F)."""
+        for w, b in row.layers[:-1]:
+            x = linear(x, w, b).relu_()
+        return linear(x, *row.layers[-1])
 
     def _step(self, old: Tensor, row: _Row, s: int) -> tuple[Tensor, Tensor]:
         """The cell (`Framed.step`) on [features, state, colour] (F + S + 3, m)."""
         cell = self.cells[row.token]
         n = old.shape[0] - 3
-        seen = torch.empty((n * (1 + len(self.sharpen)), old.shape[1]), device=old.device)
-        seen[:n] = old[:n]
-        for i, slope in enumerate(self.sharpen, 1):
-            torch.mul(old[:n], slope, out=seen[i * n : (i + 1) * n])
-        seen[n:].clamp_(-1.0, 1.0)
-        hidden = torch.addmm(cell.b1, cell.w1, seen).relu_()
-        lines = torch.addmm(cell.b2, cell.lines, old[:n])
-        gates = lines.addmm_(cell.w2, hidden).clamp_(0.0, 1.0)
-        take, paint = gates[:s], gates[s:]
+        gates = torch.addmm(cell.bias, cell.lines, old[:n])
+        take, paint = gates[:s].clamp_(0.0, 1.0), gates[s:].amax(0, keepdim=True).clamp_(0.0, 1.0)
         state, colour = old[n - s : n], old[n:]
         gap = (cell.candidate @ old[: n - s]).sub_(state)
         new = torch.addcmul(state, take, gap).sub_((take * (1 - take)).mul_(cell.bump))

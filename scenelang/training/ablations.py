@@ -4,7 +4,8 @@ Each network here derives from the shipped one and has one thing taken away. Non
 shipped renderer knows nothing of them. `ablation_runs` lists the study: the same data, budget, rate and
 seed for all.
 
-Letters: B streams, N objects, P points, F features, S state, K cell width, as in `renderers/framed.py`.
+Letters: B streams, N objects, P points, F features, S state, L lines of the paint gate, as in
+`renderers/framed.py`.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ import torch
 from torch import Tensor, nn
 
 from scenelang.lifting import exact
-from scenelang.renderers.framed import TOKENS, Framed, FramedConfig, Trace, gate, sharpen
+from scenelang.renderers.framed import TOKENS, Framed, FramedConfig, Trace
 from scenelang.training.pictures import Scenes
 from scenelang.training.scenes import GEOMETRIES
 from scenelang.training.students import FramedStudent, StudentConfig
-from scenelang.training.studies import StudyConfig
+from scenelang.training.studies import RATES, StudyConfig
 
-RATE = 3e-3
+HIDDEN = 16  # units of the hidden layer that the cell had
 MEMORY = 8  # entries of the state that may learn to hold a colour where no register does
 SEEDS = 3  # of the whole renderer: differences below their spread mean nothing
 
@@ -31,24 +32,11 @@ SIZES: Mapping[str, tuple[int, ...]] = {
     "decoder_width": (8, 16, 32, 64),
     "code": (1, 2, 4, 8),
     "state": (1, 4),
-    "cell_width": (4, 8, 16),
+    "paint_lines": (1, 2, 4),
 }
 """Values of each field of `FramedConfig` that are tried, the shipped one among them."""
 
-LABELS = {"decoder_width": "decoder", "code": "code size", "state": "state", "cell_width": "cell"}
-
-
-def _lines(seen: Tensor, plain: Tensor, *weights: Tensor) -> Tensor:
-    """Outputs of the cell's two layers before any gate, as in `Framed.step`.
-
-    Args:
-        seen: what the hidden layer sees (B, P, inputs).
-        plain: what goes to the outputs by lines alone (B, P, F + S).
-        weights: w1, b1, w2, skip, b2 of each stream's token, B in front.
-    """
-    w1, b1, w2, skip, b2 = weights
-    hidden = torch.relu(torch.baddbmm(b1[:, None], seen, w1))  # (B, P, K)
-    return torch.baddbmm(torch.baddbmm(b2[:, None], plain, skip), hidden, w2)
+LABELS = {"decoder_width": "decoder", "code": "code size", "state": "state", "paint_lines": "paint lines"}
 
 
 class WithoutRegister(Framed):
@@ -72,11 +60,10 @@ class WithoutRegister(Framed):
         object_colour: Tensor,
         weights: tuple[Tensor, ...],
     ) -> tuple[Tensor, Tensor]:
-        *layers, candidate, bump, from_colour = weights
-        plain = torch.cat([features, state], -1)
-        take = gate(_lines(sharpen(plain), plain, *layers))[..., :-1]  # (B, P, S); the last gate is unused
-        new = torch.bmm(features, candidate) + torch.bmm(object_colour, from_colour)
-        state = state + take * (new - state) - bump[:, None] * take * (1 - take)
+        lines, bias, candidate, bump, from_colour = weights
+        levels = torch.baddbmm(bias[:, None], torch.cat([features, state], -1), lines)
+        new = features @ candidate + object_colour @ from_colour
+        state, _ = self.update(levels, new, bump, state, colour, object_colour)  # its gate is unused
         return state, state @ self.readout + self.readout_b
 
 
@@ -86,8 +73,16 @@ class WithoutScale(Framed):
     def decode(self, q: Tensor, scale: Tensor, layers: list[tuple[Tensor, Tensor]]) -> Tensor:
         return super().decode(q, torch.ones_like(scale), layers)
 
-    def trace(self, q: Tensor, scale: Tensor, code: Tensor, colours: Tensor, tokens: Tensor) -> Trace:
-        found = super().trace(q, scale, code, colours, tokens)
+    def trace(
+        self,
+        q: Tensor,
+        scale: Tensor,
+        code: Tensor,
+        colours: Tensor,
+        tokens: Tensor,
+        given: tuple[Tensor, Tensor] | None = None,
+    ) -> Trace:
+        found = super().trace(q, scale, code, colours, tokens, given)
         found.distance = found.distance * scale[..., None]  # the loss asks for world units
         return found
 
@@ -96,25 +91,24 @@ class TokenAsInput(Framed):
     """The cell has one set of weights for all tokens, and the token's one-hot vector as a further input.
 
     As an input a one-hot vector is a bias for each token. What the token chose elsewhere, the candidate and
-    the bump, are outputs of the same two layers.
+    the bump, are outputs of the same lines.
     """
 
     def __init__(self, config: FramedConfig, geometries: int, materials: int) -> None:
         super().__init__(config, geometries, materials)
-        f, s, k = config.features, config.state, config.cell_width
-        outputs = (s + 1) + s + s  # gates, candidate, bump
+        f, s, gates = config.features, config.state, config.state + config.paint_lines
         del self.candidate, self.bump
-        skip = torch.zeros(1, f + s, outputs)
-        skip[:, :f, s + 1 : 2 * s + 1] = torch.rand(1, f, s) - 0.5
-        bias = torch.zeros(TOKENS, outputs)
-        bias[:, : s + 1] = 0.5
-        self.cell_w1 = nn.Parameter(self.cell_w1[:1].detach().clone())
-        self.cell_w2 = nn.Parameter(torch.randn(1, k, outputs) / math.sqrt(k))
-        self.cell_skip, self.cell_b2 = nn.Parameter(skip), nn.Parameter(bias)
+        lines = torch.zeros(1, f + s, gates + s + s)  # gates, candidate, bump
+        lines[..., :gates] = self.cell_lines[:1].detach()
+        lines[:, :f, gates : gates + s] = torch.rand(1, f, s) - 0.5
+        bias = torch.zeros(TOKENS, gates + s + s)
+        bias[:, :gates] = 0.5
+        self.cell_lines, self.cell_bias = nn.Parameter(lines), nn.Parameter(bias)
+        self.cell_gain = nn.Parameter(torch.zeros(1, gates + s + s))
 
     def cell_weights(self) -> tuple[Tensor, ...]:
-        w1, w2, skip = (w.expand(TOKENS, -1, -1) for w in (self.cell_w1, self.cell_w2, self.cell_skip))
-        return w1, self.cell_b1, w2, skip, self.cell_b2
+        lines = self.cell_lines * self.cell_gain.exp()[:, None]
+        return lines.expand(TOKENS, -1, -1), self.cell_bias
 
     def step(
         self,
@@ -124,22 +118,26 @@ class TokenAsInput(Framed):
         object_colour: Tensor,
         weights: tuple[Tensor, ...],
     ) -> tuple[Tensor, Tensor]:
-        plain = torch.cat([features, state], -1)
+        lines, bias = weights
+        outputs = torch.baddbmm(bias[:, None], torch.cat([features, state], -1), lines)
         s = self.config.state
-        outputs = _lines(sharpen(plain), plain, *weights)  # (B, P, 3 S + 1)
-        gates, new, bump = gate(outputs[..., : s + 1]), outputs[..., s + 1 : 2 * s + 1], outputs[..., -s:]
-        take, paint = gates[..., :-1], gates[..., -1:]
-        state = state + take * (new - state) - bump * take * (1 - take)
-        return state, colour + paint * (object_colour - colour)
+        return self.update(
+            outputs[..., : -2 * s], outputs[..., -2 * s : -s], outputs[..., -s:], state, colour, object_colour
+        )
 
 
-class WithoutSharpening(Framed):
-    """The cell's hidden layer sees features and state as they are, not their signs at several sharpnesses."""
+class WithHiddenLayer(Framed):
+    """The gates also see a hidden layer of rectified linear units, as those of the first cell did."""
 
     def __init__(self, config: FramedConfig, geometries: int, materials: int) -> None:
         super().__init__(config, geometries, materials)
-        inputs = config.features + config.state
-        self.cell_w1 = nn.Parameter(torch.randn(TOKENS, inputs, config.cell_width) * math.sqrt(2 / inputs))
+        inputs, rows = config.features + config.state, config.state + config.paint_lines
+        self.cell_w1 = nn.Parameter(torch.randn(TOKENS, inputs, HIDDEN) * math.sqrt(2 / inputs))
+        self.cell_b1 = nn.Parameter(torch.randn(TOKENS, HIDDEN) * 0.1)
+        self.cell_w2 = nn.Parameter(torch.randn(TOKENS, HIDDEN, rows) / math.sqrt(HIDDEN))
+
+    def cell_weights(self) -> tuple[Tensor, ...]:
+        return (*super().cell_weights(), self.cell_w1, self.cell_b1, self.cell_w2)
 
     def step(
         self,
@@ -149,13 +147,11 @@ class WithoutSharpening(Framed):
         object_colour: Tensor,
         weights: tuple[Tensor, ...],
     ) -> tuple[Tensor, Tensor]:
-        *layers, candidate, bump = weights
+        lines, bias, candidate, bump, w1, b1, w2 = weights
         plain = torch.cat([features, state], -1)
-        gates = gate(_lines(plain, plain, *layers))
-        take, paint = gates[..., :-1], gates[..., -1:]
-        new = torch.bmm(features, candidate)
-        state = state + take * (new - state) - bump[:, None] * take * (1 - take)
-        return state, colour + paint * (object_colour - colour)
+        hidden = torch.relu(torch.baddbmm(b1[:, None], plain, w1))  # (B, P, HIDDEN)
+        levels = torch.baddbmm(torch.baddbmm(bias[:, None], plain, lines), hidden, w2)
+        return self.update(levels, features @ candidate, bump, state, colour, object_colour)
 
 
 class NoRegister(FramedStudent):
@@ -176,10 +172,16 @@ class SharedCell(FramedStudent):
     network = TokenAsInput
 
 
-class NoSharpening(FramedStudent):
-    """See `WithoutSharpening`."""
+class HiddenLayer(FramedStudent):
+    """See `WithHiddenLayer`."""
 
-    network = WithoutSharpening
+    network = WithHiddenLayer
+
+
+class NeverForced(FramedStudent):
+    """Every step of a stream starts from what the one before answered, from the first batch on."""
+
+    forced = False
 
 
 class NoFrame(FramedStudent):
@@ -205,6 +207,7 @@ class PicturesAlone(FramedStudent):
     """Nothing asks for distances: the loss is of colour and coverage, which pictures show."""
 
     unasked = frozenset({"shape", "depth"})
+    forced = False  # distances are what it would be given
 
 
 class OtherCodes(FramedStudent):
@@ -228,7 +231,8 @@ VARIANTS: Mapping[str, type[FramedStudent]] = {
     "no distance scale": NoScale,
     "no frame": NoFrame,
     "token as input": SharedCell,
-    "no sharpened inputs": NoSharpening,
+    "hidden layer": HiddenLayer,
+    "never forced": NeverForced,
     "pictures alone": PicturesAlone,
     "code": OtherCodes,
 }
@@ -243,7 +247,7 @@ def ablation_runs(budget_s: float, seed: int) -> list[tuple[str, str, StudyConfi
         budget_s: processor seconds of each.
         seed: of parameters and scenes; the whole renderer is trained with the two after it as well.
     """
-    whole = StudyConfig(StudentConfig("framed", "exact"), seconds=budget_s, rate=RATE, seed=seed)
+    whole = StudyConfig(StudentConfig("framed", "exact"), seconds=budget_s, rate=RATES["framed"], seed=seed)
     runs = [("framed", "whole", replace(whole, seed=seed + i)) for i in range(SEEDS)]
     runs += [
         (name, "parts", replace(whole, student=replace(whole.student, variant=name)))

@@ -26,9 +26,10 @@ class Phase:
         iterations: optimiser steps.
         objects: most objects of a stream; 0 trains on the leaves alone, without frames or cell.
         streams: streams B of a batch; for leaves alone the factor on the number of points of each.
-        decoder_rate: the decoder's learning rate as a share of the cell's.
+        decoder_rate: the decoder's learning rate as a share of the cell's; 0 leaves it as it is.
         rate: the phase's highest learning rate as a share of the whole training's.
         smooth: share of streams of unions and smooth unions only, in place of the scenes' own.
+        forced: start every step from the exact state instead of the network's own.
     """
 
     iterations: int
@@ -37,6 +38,7 @@ class Phase:
     decoder_rate: float = 1.0
     rate: float = 1.0
     smooth: float | None = None
+    forced: bool = False
 
 
 @checked(frozen=True, config={"extra": "forbid"})

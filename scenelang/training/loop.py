@@ -63,8 +63,7 @@ def train(
     checkpoint = folder / "checkpoint.safetensors"
     if checkpoint.exists():
         tensors, header = load_tensors(checkpoint, device)
-        known = {"cell": None, **header["config"]}  # checkpoints from before there was one
-        if known != json.loads(json.dumps(config.to_json())):
+        if header["config"] != json.loads(json.dumps(config.to_json())):
             raise ValueError(f"{checkpoint} was trained with another configuration")
         unpack_training(tensors, network, optimiser, scenes)
         done, spent_s = header["iteration"], header["seconds"]
@@ -80,10 +79,12 @@ def train(
         share = config.rate * phase.rate * _schedule(into, phase.iterations)
         optimiser.param_groups[0]["lr"] = share
         optimiser.param_groups[1]["lr"] = share * phase.decoder_rate
+        for parameter in decoder:
+            parameter.requires_grad_(phase.decoder_rate > 0)
         if phase.objects:
             drawn = config.scenes if phase.smooth is None else replace(config.scenes, smooth=phase.smooth)
             batch = random_batch(phase.streams, phase.objects, drawn, scenes)
-            loss, parts = image_loss(network, batch)
+            loss, parts = image_loss(network, batch, forced=phase.forced)
         else:
             loss, parts = leaf_loss(network, leaf_batch(phase.streams * config.scenes.points, scenes))
         optimiser.zero_grad()

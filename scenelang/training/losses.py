@@ -18,19 +18,25 @@ SHARP = 0.02  # distances are asked for relative to themselves plus this
 FAR_LEAF, FAR_WORLD = 2.0, 0.4  # leaf and world units: farther outside, a distance makes no difference
 
 
-def image_loss(network: Framed, batch: Batch) -> tuple[Tensor, dict[str, float]]:
+def image_loss(network: Framed, batch: Batch, *, forced: bool = False) -> tuple[Tensor, dict[str, float]]:
     """Loss of a batch of streams at points.
 
     Coverage by cross-entropy and distance by relative absolute error, of each object alone and of each
     prefix; colour where the prefix covers the point by squared and absolute error. Padding counts for
     nothing.
 
+    Args:
+        network: answers.
+        batch: what is asked.
+        forced: let every step start from the exact state before it.
+
     Returns:
         The loss, and its parts as numbers by name.
     """
     material = network.material_codes[torch.zeros_like(batch.leaf).flatten()]
     colours = batch.rgb * network.object_albedo(material).view(*batch.leaf.shape, 3)
-    trace = network.trace(batch.q, batch.scale, network.codes[batch.leaf], colours, batch.tokens)
+    given = (batch.depth, batch.colour) if forced else None
+    trace = network.trace(batch.q, batch.scale, network.codes[batch.leaf], colours, batch.tokens, given)
     return trace_loss(trace, batch)
 
 

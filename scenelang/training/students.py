@@ -147,6 +147,7 @@ class FramedStudent(PointStudent):
 
     network: ClassVar[type[Framed]] = Framed
     unasked: ClassVar[frozenset[str]] = frozenset()  # terms of the loss that are left out
+    forced: ClassVar[bool] = True  # whether its streams begin with the exact state before every object
 
     def __init__(self, config: StudentConfig) -> None:
         super().__init__(config)
@@ -181,8 +182,10 @@ class FramedStudent(PointStudent):
         q, scale = read_points(g, x, y)
         return q, scale, g[..., exact.CODE]
 
-    def trace(self, scenes: Scenes, x: Tensor, y: Tensor) -> Trace:
-        """What the network answers along the streams at world points (B, P)."""
+    def trace(
+        self, scenes: Scenes, x: Tensor, y: Tensor, given: tuple[Tensor, Tensor] | None = None
+    ) -> Trace:
+        """What the network answers along the streams at world points (B, P); see `Framed.trace`."""
         vectors = self.lifting.lift(scenes)
         g, m = vectors[..., : exact.D_G], vectors[..., exact.D_G :]
         q, scale, code = self.read(g, scenes, x, y)
@@ -191,7 +194,7 @@ class FramedStudent(PointStudent):
         albedo = self.renderer.object_albedo(material).view(b, n, 3)
         mix = m[..., exact.COLOUR].reshape(b, n, 3, 4)
         colours = (mix[..., :3] @ albedo[..., None])[..., 0] + mix[..., 3]
-        return self.renderer.trace(q, scale, code, colours, scenes.tokens)
+        return self.renderer.trace(q, scale, code, colours, scenes.tokens, given)
 
     def points(self, scenes: Scenes, x: Tensor, y: Tensor) -> Tensor:
         trace = self.trace(scenes, x, y)

@@ -5,7 +5,7 @@ Gaussian negative log likelihood whose standard deviation is annealed, plus a pe
 given; it may grow, resolution by resolution (Table 3 of the paper's supplement; Karras et al. 2018).
 `reading` answers random points of many scenes, by squared and absolute error against one exact sample each.
 `framed` is asked for coverage, distance and colour at points (`losses.py`); where its frames are exact it
-learns the leaves alone first.
+learns the leaves alone first, then every step by itself, then whole streams.
 
 Time is the process's processor time, which other work on the machine changes little.
 """
@@ -40,6 +40,7 @@ from scenelang.training.scenes import Batch, SceneConfig, leaf_batch, points_of
 from scenelang.training.students import (
     FramedStudent,
     PointStudent,
+    RendererName,
     StreamingStudent,
     Student,
     StudentConfig,
@@ -47,6 +48,9 @@ from scenelang.training.students import (
 )
 
 LEAVES_ALONE = 0.4  # share of the budget in which exact frames train on the leaves alone
+RATES: dict[RendererName, float] = {"framed": 1e-2, "streaming": 1e-3, "reading": 2e-3}
+"""Learning rate that each renderer trains best at, of those tried."""
+FORCED = 0.7  # share of the budget up to which framed streams start every step from the exact state
 WARM_UP = 0.02  # share of the budget
 SIGMA = (0.3, 0.1)  # standard deviation of the likelihood, first and last; annealed geometrically
 
@@ -249,7 +253,8 @@ class Study:
             depth=torch.stack([depth for depth, _ in steps], 1),
             colour=torch.stack([colour.expand(*depth.shape, 3) for depth, colour in steps], 1),
         )
-        return trace_loss(student.trace(scenes, x, y), batch, student.unasked)[0]
+        given = (batch.depth, batch.colour) if student.forced and share < FORCED else None
+        return trace_loss(student.trace(scenes, x, y, given), batch, student.unasked)[0]
 
     def _begin(self, resolution: int) -> None:
         """Enter a level of growing."""

@@ -88,7 +88,7 @@ def test_a_small_difference_is_none_however_close_seeds_are() -> None:
 
 def test_sizes_are_grouped_by_what_differs() -> None:
     groups = size_groups(measured({}))
-    assert set(groups) == {"decoder_width", "code", "state", "cell_width"}
+    assert set(groups) == {"decoder_width", "code", "state", "paint_lines"}
     for group, runs in groups.items():
         values = [size_of(run, group) for run in runs]
         assert getattr(FramedConfig(), group) not in values

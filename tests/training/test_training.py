@@ -25,7 +25,7 @@ def tiny_config(iterations: int = 6) -> TrainConfig:
         seed=3,
         rate=0.01,
         phases=(Phase(iterations, 0, 1), Phase(iterations, 3, 4, 0.1)),
-        network=FramedConfig(decoder_width=8, cell_width=8),
+        network=FramedConfig(decoder_width=8),
         scenes=SceneConfig(points=16),
     )
 
@@ -112,7 +112,7 @@ def test_a_decoder_gets_the_cell_of_a_model(tmp_path: Path) -> None:
     same = {
         name for name in found if found[name].shape == donor[name].shape and found[name].equal(donor[name])
     }
-    assert {"cell_w1", "cell_b2", "albedo", "material_codes", "read_slope"} <= same
+    assert {"cell_lines", "cell_bias", "albedo", "material_codes", "read_slope"} <= same
     assert not same & {"codes", "far"}
     assert found["decoder_w.1"].shape == (5, 8, 8)
 
