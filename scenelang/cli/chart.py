@@ -27,7 +27,7 @@ def command(folder: Path, out: Path | None) -> None:
         from scenelang.evaluation.experiment_charts import experiment_chart, strips
     except ImportError:
         raise click.UsageError("charts need matplotlib; pip install 'scenelang[charts]'") from None
-    from scenelang.evaluation.experiments import EXPERIMENTS
+    from scenelang.evaluation.experiment_runs import EXPERIMENTS
     from scenelang.evaluation.tables import table_of
     from scenelang.files import write_whole
 

@@ -12,7 +12,7 @@ from scenelang.cli import options
 from scenelang.cli.eval import need_metrics
 
 if TYPE_CHECKING:
-    from scenelang.evaluation.experiments import Run
+    from scenelang.evaluation.experiment_runs import Run
     from scenelang.training.studies import Study
 
 
@@ -56,7 +56,8 @@ def command(
     import torch
 
     from scenelang.backend.neural import choose_device, keep_memory
-    from scenelang.evaluation.experiments import EXPERIMENTS, Settings, run_experiment
+    from scenelang.evaluation.experiment_runs import EXPERIMENTS
+    from scenelang.evaluation.experiments import Settings, run_experiment
     from scenelang.evaluation.lpips import LpipsError
     from scenelang.files import write_whole
 

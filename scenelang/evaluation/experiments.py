@@ -1,8 +1,8 @@
 """Trainings at equal budgets, measured on the same unseen scenes: one experiment, one JSON file.
 
-An experiment is a list of runs. Each trains a student (`scenelang.training.studies`) for a stated budget of
-processor time and draws the same scenes, whose seeds no training uses. Runs keep checkpoints, so that an
-interrupted experiment goes on where it stopped and a run that two experiments share is trained once.
+Each run of an experiment (`experiment_runs`) trains for a stated budget of processor time and draws the
+same scenes, whose seeds no training uses. Runs keep checkpoints, so that an interrupted experiment goes on
+where it stopped and a run that two experiments share is trained once.
 """
 
 from __future__ import annotations
@@ -10,175 +10,33 @@ from __future__ import annotations
 import json
 import math
 import platform
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from scenelang.evaluation.experiment_runs import EXPERIMENTS, SIDE, Run
 from scenelang.evaluation.metrics import MOST_DB, measure
 from scenelang.files import write_whole
 from scenelang.image import Image
-from scenelang.renderers.streaming import StreamingConfig
-from scenelang.training.ablations import ablation_runs
-from scenelang.training.encoders import LiftingConfig
 from scenelang.training.loop import revision
 from scenelang.training.pictures import PictureConfig, Scenes, pictures, random_scenes
-from scenelang.training.students import LiftingName, RendererName, StreamingStudent, Student, StudentConfig
-from scenelang.training.studies import RATES, Study, StudyConfig, level_at
+from scenelang.training.students import StreamingStudent, Student
+from scenelang.training.studies import Study, StudyConfig, level_at
+
+if TYPE_CHECKING:
+    from scenelang.evaluation.lpips import Lpips
 
 UNSEEN = 2021  # seed of the scenes that are measured; trainings use small ones
 STRIP = 8  # scenes of a strip
+FEW = 24  # scenes of a curve over time
 CHUNK = 8  # scenes drawn at once
 POINTS = 6  # of a curve over time
-SIDE = 32  # pixels along a side of the pictures: what `streaming` reaches on a processor in minutes
-SIZES_SIDE = 16  # of the thirteen trainings of the size study
-PARTS_SIDE = 128  # where only renderers that answer points are compared
-RENDERERS: tuple[RendererName, ...] = ("framed", "reading", "streaming")
-LIFTINGS: tuple[LiftingName, ...] = ("exact", "learned")
-SIZES = (1, 2, 4, 8, 16, 32, 64)
-
-
-@dataclass(frozen=True, slots=True)
-class Run:
-    """One training and what it is called.
-
-    Args:
-        name: in tables.
-        group: runs that are compared with one another.
-        study: what is trained.
-        seen: measure on the fixed scenes it was trained on.
-        side: pixels along a side of the pictures that are measured.
-    """
-
-    name: str
-    group: str
-    study: StudyConfig
-    seen: bool = False
-    side: int = SIDE
-
-    @property
-    def folder(self) -> str:
-        """Where its checkpoint lies, the same for the same run of another experiment."""
-        study = self.study
-        parts = [self.name, f"{study.seconds:g}s", f"seed{study.seed}"]
-        if study.fixed:
-            parts.append(f"{study.fixed}scenes")
-        return "-".join(parts).replace("+", "-").replace(" ", "-")
-
-
-def plain(renderer: RendererName, lifting: LiftingName, seconds: float, seed: int = 1) -> StudyConfig:
-    """The usual training of a renderer and a lifting; `streaming` has an eighth of the paper's filters."""
-    streaming = StreamingConfig(resolution=SIDE, width=1 / 8)
-    student = StudentConfig(renderer=renderer, lifting=lifting, streaming=streaming)
-    scenes = 8 if renderer == "streaming" else 16  # a picture of a scene takes long
-    rate = RATES[renderer]
-    if (renderer, lifting) == ("framed", "learned"):
-        rate /= 10  # faster, its frames collapse and it draws the mean colour
-    warm = renderer == "streaming"  # a level that begins as noise costs more than minutes can pay
-    return StudyConfig(student, seconds=seconds, rate=rate, scenes=scenes, seed=seed, warm=warm)
-
-
-def overfit(budget_s: float, seed: int) -> list[Run]:
-    """Each renderer on 16 scenes it sees again and again: does it work at all?"""
-    runs = []
-    for renderer in RENDERERS:
-        for lifting in LIFTINGS:
-            if lifting == "exact" and renderer != "framed":
-                continue
-            study = replace(plain(renderer, lifting, budget_s, seed), fixed=16, average=0.98)
-            runs.append(Run(f"{renderer}+{lifting}", "16 scenes", study, seen=True))
-    return runs
-
-
-def compare(budget_s: float, seed: int) -> list[Run]:
-    """Every renderer with every lifting at a third of the budget and at all of it."""
-    return [
-        Run(f"{renderer}+{lifting}", f"{seconds:g} s", plain(renderer, lifting, seconds, seed))
-        for seconds in (budget_s / 3, budget_s)
-        for renderer in RENDERERS
-        for lifting in LIFTINGS
-    ]
-
-
-def table1(budget_s: float, seed: int) -> list[Run]:
-    """Sizes 1 to 64 of the geometry vector and of the material vector, the other one 32 (Table 1)."""
-    base = plain("streaming", "learned", budget_s, seed)
-    sizes = replace(base.student.streaming, resolution=SIZES_SIDE)
-    runs = []
-    for side in ("geometry", "material"):
-        for d in SIZES:
-            if side == "material" and d == 32:
-                continue  # the same run as the geometry's
-            student = replace(base.student, streaming=sizes, learned=LiftingConfig(**{side: d}))
-            runs.append(Run(f"{side} {d}", side, replace(base, student=student), side=SIZES_SIDE))
-    return runs
-
-
-def table2(budget_s: float, seed: int) -> list[Run]:
-    """Deformed shapes: the paper's method, and ours (Table 2, left)."""
-    return [
-        Run(f"{r}+{lifting}", f"{budget_s:g} s", plain(r, lifting, budget_s, seed)) for r, lifting in _PAIRS
-    ]
-
-
-_PAIRS: tuple[tuple[RendererName, LiftingName], ...] = (("streaming", "learned"), ("framed", "exact"))
-
-
-def table3(budget_s: float, seed: int) -> list[Run]:
-    """Growing resolution by resolution against training at the last one at once (Table 3)."""
-    grown = plain("streaming", "learned", budget_s, seed)
-    return [
-        Run("streaming+learned", "grown, each level from the one below", grown),
-        Run("streaming+learned cold", "grown, each level from noise", replace(grown, warm=False)),
-        Run("streaming+learned direct", "direct", replace(grown, grow=False)),
-    ]
-
-
-def table4(budget_s: float, seed: int) -> list[Run]:
-    """The paper's two renderers (Table 4)."""
-    renderers: tuple[RendererName, ...] = ("streaming", "reading")
-    return [Run(f"{r}+learned", f"{budget_s:g} s", plain(r, "learned", budget_s, seed)) for r in renderers]
-
-
-def losses(budget_s: float, seed: int) -> list[Run]:
-    """The likelihood alone, and with half of a perceptual loss beside it, as the paper trains."""
-    alone = plain("streaming", "learned", budget_s, seed)
-    return [
-        Run("streaming+learned", "likelihood", alone),
-        Run("streaming+learned perceptual", "perceptual", replace(alone, perceptual=0.5)),
-    ]
-
-
-def seeds(budget_s: float, seed: int) -> list[Run]:
-    """Three seeds of each renderer: spread and divergence."""
-    pairs: tuple[tuple[RendererName, LiftingName], ...] = (*_PAIRS, ("reading", "learned"))
-    return [
-        Run(f"{r}+{lifting}", f"seed {s}", plain(r, lifting, budget_s, s))
-        for r, lifting in pairs
-        for s in range(seed, seed + 3)
-    ]
-
-
-def parts(budget_s: float, seed: int) -> list[Run]:
-    """`framed` without one of its parts at a time, and at other sizes: what each of them buys."""
-    return [Run(*run, side=PARTS_SIDE) for run in ablation_runs(budget_s, seed)]
-
-
-EXPERIMENTS: dict[str, Callable[[float, int], list[Run]]] = {
-    "overfit": overfit,
-    "compare": compare,
-    "table1": table1,
-    "table2": table2,
-    "table3": table3,
-    "table4": table4,
-    "losses": losses,
-    "seeds": seeds,
-    "parts": parts,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,12 +92,8 @@ def run_experiment(
 
 def white(side: int, settings: Settings) -> dict[str, Any]:
     """Figures of pictures with nothing on them, which a renderer has to beat to have learned anything."""
-    generator = torch.Generator(settings.device).manual_seed(UNSEEN)
-    scenes = random_scenes(settings.scenes, PictureConfig(), generator)
-    exact = torch.cat(
-        [pictures(scenes.pick(rows), side) for rows in torch.split(torch.arange(len(scenes.leaf)), CHUNK)]
-    )
-    return _figures(torch.ones_like(exact).cpu(), exact.cpu())
+    _, exact = unseen(settings.scenes, side, settings.device)
+    return _figures(torch.ones_like(exact), exact)
 
 
 def run_one(
@@ -250,7 +104,6 @@ def run_one(
     study = Study(
         config, settings.folder / "runs" / run.folder, settings.device, _perceptual(config, settings)
     )
-    few = _scenes(run, study, 24, settings)
     # kept beside the checkpoint, for runs that are measured again
     kept = settings.folder / "runs" / run.folder / "curve.json"
     curve: list[list[float]] = json.loads(kept.read_text("utf-8")) if kept.exists() else []
@@ -264,15 +117,16 @@ def run_one(
             r, blend = min(run.side, SIDE), 1.0
             if config.student.renderer == "streaming":
                 r, blend = level_at(progress.seconds / config.seconds, r, config.grow)
-            shown, exact = draw(study.averaged, few, r, blend)
-            curve.append([round(progress.seconds, 1), round(_psnr(shown, exact), 2)])
+            few, exact = _measured(run, study, FEW, r, settings)
+            found = _psnr(draw(study.averaged, few, r, blend), exact)
+            curve.append([round(progress.seconds, 1), round(found, 2)])
             kept.parent.mkdir(parents=True, exist_ok=True)
             write_whole(kept, json.dumps(curve).encode())
             if report is not None:
                 report(run, study, curve[-1][1])
     finite = finite and all(bool(p.isfinite().all()) for p in study.averaged.parameters())
-    scenes = _scenes(run, study, settings.scenes, settings)
-    shown, exact = draw(study.averaged, scenes, run.side)
+    scenes, exact = _measured(run, study, settings.scenes, run.side, settings)
+    shown = draw(study.averaged, scenes, run.side)
     figures = _figures(shown, exact)
     if report is not None:
         report(run, study, figures["psnr"]["mean"])
@@ -300,17 +154,32 @@ def _perceptual(config: StudyConfig, settings: Settings) -> Callable[[Tensor, Te
     return load_lpips("alexnet").to(settings.device)
 
 
-def _scenes(run: Run, study: Study, count: int, settings: Settings) -> Scenes:
-    if run.seen:
-        assert study.fixed is not None
-        return study.fixed
-    generator = torch.Generator(settings.device).manual_seed(UNSEEN)
-    return random_scenes(count, PictureConfig(), generator)
+def _measured(run: Run, study: Study, count: int, r: int, settings: Settings) -> tuple[Scenes, Tensor]:
+    """The scenes that a run is measured on, and their exact pictures (B, 3, R, R)."""
+    if not run.seen:
+        return unseen(count, r, settings.device)
+    assert study.fixed is not None
+    return study.fixed, _exact(study.fixed, r)
+
+
+@lru_cache(maxsize=4)
+def unseen(count: int, r: int, device: str) -> tuple[Scenes, Tensor]:
+    """Scenes whose seed no training uses, and their exact pictures (B, 3, R, R)."""
+    scenes = random_scenes(count, PictureConfig(), torch.Generator(device).manual_seed(UNSEEN))
+    return scenes, _exact(scenes, r)
+
+
+def _chunks(scenes: Scenes) -> Iterator[Scenes]:
+    return map(scenes.pick, torch.split(torch.arange(len(scenes.leaf)), CHUNK))
+
+
+def _exact(scenes: Scenes, r: int) -> Tensor:
+    return torch.cat([pictures(some, r) for some in _chunks(scenes)]).cpu()
 
 
 @torch.no_grad()
-def draw(student: Student, scenes: Scenes, r: int, blend: float = 1.0) -> tuple[Tensor, Tensor]:
-    """A student's pictures and the exact ones (B, 3, R, R).
+def draw(student: Student, scenes: Scenes, r: int, blend: float = 1.0) -> Tensor:
+    """A student's pictures (B, 3, R, R).
 
     Args:
         student: what draws.
@@ -318,16 +187,11 @@ def draw(student: Student, scenes: Scenes, r: int, blend: float = 1.0) -> tuple[
         r: pixels R along a side.
         blend: share of the newest level, of a student that grows.
     """
-    shown, exact = [], []
-    for rows in torch.split(torch.arange(len(scenes.leaf)), CHUNK):
-        some = scenes.pick(rows)
-        if isinstance(student, StreamingStudent):
-            image = student.image(some, r, blend)
-        else:
-            image = student.image(some, r)
-        shown.append(image.clamp(0.0, 1.0))
-        exact.append(pictures(some, r))
-    return torch.cat(shown).cpu(), torch.cat(exact).cpu()
+    if isinstance(student, StreamingStudent):
+        images = [student.image(some, r, blend) for some in _chunks(scenes)]
+    else:
+        images = [student.image(some, r) for some in _chunks(scenes)]
+    return torch.cat(images).clamp(0.0, 1.0).cpu()
 
 
 def _psnr(shown: Tensor, exact: Tensor) -> float:
@@ -357,10 +221,10 @@ def _figures(shown: Tensor, exact: Tensor) -> dict[str, Any]:
 
 def _lpips(shown: Tensor, exact: Tensor) -> dict[str, float] | None:
     """LPIPS of VGG16 features, mean; None where its weights are not installed."""
-    from scenelang.evaluation.lpips import LpipsError, load_lpips
+    from scenelang.evaluation.lpips import LpipsError
 
     try:
-        distance = load_lpips("vgg16")
+        distance = _vgg()
     except LpipsError:
         return None
     with torch.no_grad():
@@ -369,6 +233,13 @@ def _lpips(shown: Tensor, exact: Tensor) -> dict[str, float] | None:
             for a, b in zip(torch.split(shown, CHUNK), torch.split(exact, CHUNK), strict=True)
         ]
     return {"mean": round(sum(found) / len(shown), 4)}
+
+
+@lru_cache(maxsize=1)
+def _vgg() -> Lpips:
+    from scenelang.evaluation.lpips import load_lpips
+
+    return load_lpips("vgg16")
 
 
 def _strips(run: Run, shown: Tensor, exact: Tensor, folder: Path) -> str:

@@ -12,7 +12,8 @@ from PIL import Image
 
 from scenelang.cli.main import cli
 from scenelang.evaluation import paper
-from scenelang.evaluation.experiments import EXPERIMENTS, SIDE, SIZES_SIDE, Settings, run_experiment, run_one
+from scenelang.evaluation.experiment_runs import EXPERIMENTS, SIDE, SIZES_SIDE
+from scenelang.evaluation.experiments import Settings, run_experiment, run_one
 from scenelang.evaluation.tables import table_of
 
 
