@@ -7,8 +7,12 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from scenelang.models.load import Model
 
 DEFAULT_SEED = 2021
 
@@ -50,18 +54,11 @@ def command(
     need_metrics()
     import torch
 
-    from scenelang.backend.errors import RenderError
     from scenelang.backend.neural import keep_memory
     from scenelang.evaluation.run import evaluate_set, worst_sheet
     from scenelang.files import write_whole
-    from scenelang.models.load import ModelError, load_model
 
-    try:
-        loaded = load_model(model, path=weights)
-    except KeyError:
-        raise click.UsageError(f"no model '{model}'") from None
-    except ModelError as error:
-        raise RenderError(str(error)) from None
+    loaded = model_to_measure(model, weights)
     keep_memory()
     torch.set_num_threads(threads)
     out.mkdir(parents=True, exist_ok=True)
@@ -88,6 +85,19 @@ def need_metrics() -> None:
     for name in ("flip_evaluator", "pytorch_msssim"):
         if importlib.util.find_spec(name) is None:
             raise click.UsageError(f"{name} is missing; pip install 'scenelang[eval]'")
+
+
+def model_to_measure(name: str, weights: Path | None) -> Model:
+    """A shipped model, or one with other weights; what cannot be loaded ends the command."""
+    from scenelang.backend.errors import RenderError
+    from scenelang.models.load import ModelError, load_model
+
+    try:
+        return load_model(name, path=weights)
+    except KeyError:
+        raise click.UsageError(f"no model '{name}'") from None
+    except ModelError as error:
+        raise RenderError(str(error)) from None
 
 
 def _progress(name: str) -> Callable[[int, int], None]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from scenelang.cli.eval import DEFAULT_SEED, need_metrics
+from scenelang.cli.eval import DEFAULT_SEED, model_to_measure, need_metrics
 
 
 @click.command("stability")
@@ -33,22 +33,15 @@ def command(
     need_metrics()
     import torch
 
-    from scenelang.backend.errors import RenderError
     from scenelang.evaluation.probes import PROBES
     from scenelang.evaluation.stability import INVARIANTS, run_stability
     from scenelang.files import write_whole
-    from scenelang.models.load import ModelError, load_model
 
     known = [*PROBES, *INVARIANTS]
     unknown = [name for name in only if name not in known]
     if unknown:
         raise click.UsageError(f"no probe '{unknown[0]}'; the probes are {', '.join(known)}")
-    try:
-        loaded = load_model(model, path=weights)
-    except KeyError:
-        raise click.UsageError(f"no model '{model}'") from None
-    except ModelError as error:
-        raise RenderError(str(error)) from None
+    loaded = model_to_measure(model, weights)
     torch.set_num_threads(1)
     found = run_stability(loaded, scenes, seed, only, _report if sys.stderr.isatty() else None)
     out.mkdir(parents=True, exist_ok=True)

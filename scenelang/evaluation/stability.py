@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.backend.neural import draw_program as paint
+from scenelang.backend.neural import draw_program
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.evaluation.metrics import flip, psnr
 from scenelang.evaluation.probes import PROBES, Probe, animated, apart, rng_of, union_of
@@ -139,10 +139,10 @@ def unfolded(scene: Scene, program: Program, model: Model) -> Program:
     return dataclasses.replace(program, vectors=vectors)
 
 
-def draw_program(model: Model, program: Program, **options: Any) -> Image:
+def picture_of(model: Model, program: Program, **options: Any) -> Image:
     """A Program's picture; options are those of `renderers.draw.draw`."""
     if not isinstance(model.network, Framed):
-        return paint(program, model, threads=1).image
+        return draw_program(program, model, threads=1).image
     return draw(
         model.network, program.vectors, program.tokens, program.canvas, program.background, **options
     ).image
@@ -151,7 +151,7 @@ def draw_program(model: Model, program: Program, **options: Any) -> Image:
 def _drawn(model: Model, scene: Scene, folded: bool) -> Image:
     without = () if folded else OPTIONAL
     program = compile_scene(scene, model=model.manifest.name, codes=model.codes(), without=without)
-    return draw_program(model, program if folded else unfolded(scene, program, model))
+    return picture_of(model, program if folded else unfolded(scene, program, model))
 
 
 def scene_of(probe: Probe, value: float, index: int, seed: int, model: Model) -> Scene:
@@ -240,13 +240,13 @@ def arithmetic(model: Model, scenes: int, seed: int) -> dict[str, float]:
     for index in range(scenes):
         scene = scene_of(probe, 4, index, seed, model)
         program = compile_scene(scene, model=model.manifest.name, codes=model.codes())
-        base = np.asarray(draw_program(model, program))
+        base = np.asarray(picture_of(model, program))
         for name, options in (
             ("tiles", {"tile": 1999}),
             ("threads", {"threads": 2, "tile": 1 << 13}),
             ("skipping", {"skip": False}),
         ):
-            other = np.asarray(draw_program(model, program, **options))
+            other = np.asarray(picture_of(model, program, **options))
             most[name] = max(most[name], float(np.abs(other - base).max()))
     return {k: round(v, 7) for k, v in most.items()}
 

@@ -14,9 +14,9 @@ from scenelang.evaluation.probes import PROBES, animated, apart, rng_of, union_o
 from scenelang.evaluation.stability import (
     OPTIONAL,
     compare,
-    draw_program,
     exact_picture,
     order_of_disjoint,
+    picture_of,
     run_stability,
     scene_of,
     unfolded,
@@ -111,7 +111,7 @@ def test_recorded_bounds_hold(model: Model) -> None:
             program = compile_scene(scene, model="shapes2d", without=OPTIONAL)
             if not PROBES[name].folded:
                 program = unfolded(scene, program, model)
-            found = compare(draw_program(model, program), exact_picture(scene, model))
+            found = compare(picture_of(model, program), exact_picture(scene, model))
             assert found.psnr >= row["psnr"]["worst"] - 0.5, (name, row["value"])
     invariants = recorded["invariants"]
     assert invariants["order_of_disjoint"]["largest_difference"] < 1 / 255
