@@ -163,7 +163,7 @@ PROBES: dict[str, Probe] = {
         3,
         _operators,
     ),
-    "blends": Probe("smooth unions in a row", "smooth unions", (1, 2, 4, 8, 16, 32), 4, _blends),
+    "blends": Probe("smooth unions in a row", "smooth unions", (1, 2, 4, 8, 16, 32, 64), 4, _blends),
     "affine": Probe(
         "affine maps of each object, each lifted by itself",
         "affine maps",
