@@ -213,7 +213,7 @@ def worst_cases(name: str, count: int) -> bytes:
 
 def stability() -> bytes:
     """Charts of the stability suite, from what `scenelang stability` wrote: of every model measured."""
-    paths = sorted((DOCS / "results").glob("stability*.json"))
+    paths = sorted((DOCS / "results").glob("stability*.json"), key=lambda path: len(path.name))
     reports = [json.loads(path.read_text("utf-8")) for path in paths]
     return _few_colours(stability_chart(reports, "png"))
 

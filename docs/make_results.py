@@ -78,7 +78,7 @@ def experiment(name: str) -> Callable[[], str]:
 def stability() -> str:
     """Mean and worst PSNR at the healthy value and at both ends of every probe, of every model measured."""
     rows = []
-    for path in sorted((HERE / "results").glob("stability*.json")):
+    for path in sorted((HERE / "results").glob("stability*.json"), key=lambda path: len(path.name)):
         found = json.loads(path.read_text())
         for probe in found["probes"].values():
             healthy = next(row for row in probe["rows"] if row["value"] == probe["healthy"])

@@ -26,12 +26,12 @@ def stability_chart(results: Sequence[Mapping[str, Any]], kind: str) -> bytes:
     figure, axes = plt.subplots(lines, COLUMNS, figsize=(4.2 * COLUMNS, 2.7 * lines), squeeze=False)
     lowest = min(row["psnr"]["worst"] for r in results for p in r["probes"].values() for row in p["rows"])
     for axis, name in zip(axes.flat, names, strict=False):
-        _probe(axis, [r["probes"][name] for r in results if name in r["probes"]])
+        _probe(axis, [{**r["probes"][name], "model": r["model"]} for r in results if name in r["probes"]])
         axis.set_ylim(min(40.0, lowest - 1), MOST_DB + 1)
     for axis in axes.flat[len(names) :]:
         axis.set_axis_off()
     if len(results) > 1:
-        axes.flat[0].legend([r["model"] for r in results], fontsize=7, frameon=False)
+        axes.flat[0].legend(fontsize=7, frameon=False)
     data = figure_bytes(figure, kind)
     plt.close(figure)
     return data
@@ -42,7 +42,7 @@ def _probe(axis: Any, curves: Sequence[Mapping[str, Any]]) -> None:
     for i, curve in enumerate(curves):
         x = [row["value"] for row in curve["rows"]]
         mean, p5, worst = ([row["psnr"][k] for row in curve["rows"]] for k in ("mean", "p5", "worst"))
-        (line,) = axis.plot(x, mean, marker="o", markersize=3, linewidth=1.5)
+        (line,) = axis.plot(x, mean, marker="o", markersize=3, linewidth=1.5, label=curve["model"])
         if i == 0:
             axis.fill_between(x, p5, mean, color=line.get_color(), alpha=0.15, linewidth=0)
             axis.plot(x, worst, ".", color=WARN, markersize=4)
