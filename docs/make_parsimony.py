@@ -60,19 +60,23 @@ def parts_text(parts: Record | None) -> str:
     if parts is None:
         return "*Not measured yet.*"
     mean, spread = whole_psnr(parts)
+    blends, apart = whole_psnr(parts, blends=True)
     whole = whole_runs(parts)[0]
     seeds = len(whole_runs(parts))
-    rows = [["nothing", *_figures(whole), "", ""]]
+    rows = [["nothing", *_figures(whole), "", f"{whole['blends']:.1f}", "", ""]]
     for run in parts["runs"]:
         if run["group"] == "parts":
             found = verdict(run, parts)
             taken = f"**{run['name']}**: {PARTS[run['name']]}"
-            rows.append([taken, *_figures(run), f"{found.change:+.1f}", WORDS[found.word]])
-    head = ("taken away", "parameters", "steps", "PSNR, dB", "5th percentile", "change", "the part")
+            changes = f"{found.change:+.1f}", f"{run['blends']:.1f}", f"{found.blends:+.1f}"
+            rows.append([taken, *_figures(run), *changes, WORDS[found.word]])
+    figures = "parameters", "steps", "PSNR, dB", "5th percentile", "change", "blends, dB", "change"
+    head = ("taken away", *figures, "the part")
     about = (
         f"{parts['budget_s']:.0f} s of processor time each, seed {parts['seed']}, {whole['scenes']} unseen "
         f"scenes at {whole['resolution']}², revision `{parts['revision'][:9]}`, {parts['machine']}. "
-        f"The whole renderer with {seeds} seeds: {mean:.1f} dB, {spread:.1f} dB apart."
+        f"The whole renderer with {seeds} seeds: {mean:.1f} dB, {spread:.1f} dB apart; scenes of smooth "
+        f"unions alone {blends:.1f} dB, {apart:.1f} dB apart. Changes are from these means."
     )
     chart = "![PSNR without each part, and by each size](pictures/parts.png)"
     return "\n\n".join([markdown(head, rows), about, chart])

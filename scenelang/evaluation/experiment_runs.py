@@ -32,6 +32,7 @@ class Run:
         study: what is trained.
         seen: measure on the fixed scenes it was trained on.
         side: pixels along a side of the pictures that are measured.
+        blends: measure scenes of smooth unions alone as well.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Run:
     study: StudyConfig
     seen: bool = False
     side: int = SIDE
+    blends: bool = False
 
     @property
     def folder(self) -> str:
@@ -145,7 +147,7 @@ def seeds(budget_s: float, seed: int) -> list[Run]:
 
 def parts(budget_s: float, seed: int) -> list[Run]:
     """`framed` without one of its parts at a time, and at other sizes: what each of them buys."""
-    return [Run(*run, side=PARTS_SIDE) for run in ablation_runs(budget_s, seed)]
+    return [Run(*run, side=PARTS_SIDE, blends=True) for run in ablation_runs(budget_s, seed)]
 
 
 EXPERIMENTS: dict[str, Callable[[float, int], list[Run]]] = {

@@ -24,6 +24,7 @@ from scenelang.evaluation.experiment_runs import EXPERIMENTS, SIDE, Run
 from scenelang.evaluation.metrics import MOST_DB, measure
 from scenelang.files import write_whole
 from scenelang.image import Image
+from scenelang.renderers.stream import SMOOTH
 from scenelang.training.loop import revision
 from scenelang.training.pictures import PictureConfig, Scenes, pictures, random_scenes
 from scenelang.training.students import StreamingStudent, Student
@@ -128,6 +129,9 @@ def run_one(
     scenes, exact = _measured(run, study, settings.scenes, run.side, settings)
     shown = draw(study.averaged, scenes, run.side)
     figures = _figures(shown, exact)
+    if run.blends:
+        blended, truth = unseen(settings.scenes, run.side, settings.device, blends=True)
+        figures["blends"] = round(_psnr(draw(study.averaged, blended, run.side), truth), 4)
     if report is not None:
         report(run, study, figures["psnr"]["mean"])
     return {
@@ -163,9 +167,18 @@ def _measured(run: Run, study: Study, count: int, r: int, settings: Settings) ->
 
 
 @lru_cache(maxsize=4)
-def unseen(count: int, r: int, device: str) -> tuple[Scenes, Tensor]:
-    """Scenes whose seed no training uses, and their exact pictures (B, 3, R, R)."""
+def unseen(count: int, r: int, device: str, blends: bool = False) -> tuple[Scenes, Tensor]:
+    """Scenes whose seed no training uses, and their exact pictures (B, 3, R, R).
+
+    Args:
+        count: scenes B.
+        r: pixels R along a side.
+        device: that makes them.
+        blends: join all objects of a scene by smooth unions.
+    """
     scenes = random_scenes(count, PictureConfig(), torch.Generator(device).manual_seed(UNSEEN))
+    if blends:
+        scenes.tokens[:, 1:] = SMOOTH
     return scenes, _exact(scenes, r)
 
 

@@ -119,10 +119,12 @@ class Verdict:
 
     Args:
         change: mean PSNR in dB less the whole renderer's; below 0 where the part buys something.
-        word: ``pays``, ``no difference`` or ``costs``: the change against the spread over seeds.
+        blends: the same of scenes of smooth unions alone.
+        word: ``pays``, ``no difference`` or ``costs``: the changes against the spread over seeds.
     """
 
     change: float
+    blends: float
     word: str
 
 
@@ -131,24 +133,36 @@ def whole_runs(parts: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [run for run in parts["runs"] if run["group"] == "whole"]
 
 
-def whole_psnr(parts: Mapping[str, Any]) -> tuple[float, float]:
+def whole_psnr(parts: Mapping[str, Any], *, blends: bool = False) -> tuple[float, float]:
     """Mean PSNR of the whole renderer over its seeds, and its spread: largest less smallest."""
-    values = [run["psnr"]["mean"] for run in whole_runs(parts)]
+    values = [_psnr(run, blends) for run in whole_runs(parts)]
     return sum(values) / len(values), max(values) - min(values)
 
 
+def _psnr(run: Mapping[str, Any], blends: bool) -> float:
+    value: float = run["blends"] if blends else run["psnr"]["mean"]
+    return value
+
+
 def verdict(run: Mapping[str, Any], parts: Mapping[str, Any]) -> Verdict:
-    """Judge a run without a part, which pays if pictures are worse without it by more than seeds are apart.
+    """Judge a run without a part.
+
+    The part pays if pictures of either kind are worse without it by more than seeds are apart, and costs if
+    one kind is better by as much and none is worse.
 
     Args:
         run: of `parts`.
         parts: what ``scenelang experiment parts`` wrote.
     """
-    mean, spread = whole_psnr(parts)
-    change = run["psnr"]["mean"] - mean
-    least = max(spread, LEAST_DB)
-    word = "pays" if change < -least else "costs" if change > least else "no difference"
-    return Verdict(change, word)
+    changes, signs = [], set()
+    for blends in (False, True):
+        mean, spread = whole_psnr(parts, blends=blends)
+        change = _psnr(run, blends) - mean
+        changes.append(change)
+        if abs(change) > max(spread, LEAST_DB):
+            signs.add(change < 0)
+    word = "pays" if True in signs else "costs" if signs else "no difference"
+    return Verdict(changes[0], changes[1], word)
 
 
 def parts_chart(parts: Mapping[str, Any], kind: str) -> bytes:

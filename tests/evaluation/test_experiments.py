@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 from click.testing import CliRunner
 from PIL import Image
 
 from scenelang.cli.main import cli
 from scenelang.evaluation import paper
 from scenelang.evaluation.experiment_runs import EXPERIMENTS, SIDE, SIZES_SIDE
-from scenelang.evaluation.experiments import Settings, run_experiment, run_one
+from scenelang.evaluation.experiments import Settings, run_experiment, run_one, unseen
 from scenelang.evaluation.tables import table_of
 
 
@@ -56,6 +58,17 @@ def test_an_experiment_is_trained_measured_and_drawn(tmp_path: Path) -> None:
     assert drawn.exit_code == 0, drawn.output
     for suffix in (".md", ".png", ".svg", "-strips.png"):
         assert (tmp_path / f"table2{suffix}").stat().st_size > 100
+
+
+def test_parts_are_also_measured_where_all_is_blended(tmp_path: Path) -> None:
+    """The same scenes, joined by smooth unions alone; no other experiment draws them."""
+    plain, blended = (unseen(12, 16, "cpu", blends)[0] for blends in (False, True))
+    assert (blended.tokens == torch.tensor([0, 1, 1, 1])).all()
+    assert torch.equal(plain.affine, blended.affine)
+    assert not torch.equal(plain.tokens, blended.tokens)
+    run = dataclasses.replace(EXPERIMENTS["parts"](0.1, 1)[0], side=16)
+    assert 0 < run_one(run, Settings(tmp_path, 8))["blends"] <= 50
+    assert not any(run.blends for name in EXPERIMENTS if name != "parts" for run in EXPERIMENTS[name](1.0, 1))
 
 
 def test_every_size_of_a_vector_is_drawn_at_its_own_resolution(tmp_path: Path) -> None:

@@ -60,6 +60,7 @@ def measured(psnr: dict[str, float]) -> dict[str, Any]:
                 "resolution": 128,
                 "scenes": 64,
                 "psnr": {"mean": mean, "p5": mean - 8, "worst": mean - 9},
+                "blends": mean - 3,
             }
         )
     return {"seed": 1, "revision": "0123456789", "machine": "x86_64", "budget_s": 60.0, "runs": runs}
@@ -84,6 +85,23 @@ def test_a_small_difference_is_none_however_close_seeds_are() -> None:
             run["psnr"]["mean"] = 40.0
     run = next(run for run in parts["runs"] if run["name"] == "no register")
     assert verdict(run, parts).word == "no difference"
+
+
+@pytest.mark.parametrize(("change", "word"), [(-5.0, "pays"), (5.0, "costs"), (0.0, "no difference")])
+def test_a_part_may_pay_in_blends_alone(change: float, word: str) -> None:
+    parts = measured({"framed": 40, "no distance scale": 39.6})
+    run = next(run for run in parts["runs"] if run["name"] == "no distance scale")
+    run["blends"] = whole_psnr(parts, blends=True)[0] + change
+    found = verdict(run, parts)
+    assert found.blends == pytest.approx(change)
+    assert found.word == word
+
+
+def test_what_is_worse_in_one_kind_pays_whatever_the_other() -> None:
+    parts = measured({"framed": 40, "hidden layer": 45.0})
+    run = next(run for run in parts["runs"] if run["name"] == "hidden layer")
+    run["blends"] = 20.0
+    assert verdict(run, parts).word == "pays"
 
 
 def test_sizes_are_grouped_by_what_differs() -> None:
@@ -114,7 +132,7 @@ def test_tables_of_parts_and_sizes() -> None:
     rows = [line for line in text.splitlines() if line.startswith("| ")]
     assert len(rows) == 2 + len(SCRIPT.PARTS)  # the head, the whole renderer, each part
     (row,) = (line for line in rows if "no register" in line)
-    assert row.endswith("| 31.2 | 23.2 | -8.4 | it pays |")  # 31.25 less 39.6, the mean over seeds
+    assert row.endswith("| 31.2 | 23.2 | -8.4 | 28.2 | -8.4 | it pays |")  # 31.25 less 39.6, the mean over seeds
     assert "39.6 dB, 0.8 dB apart" in text
     sizes = SCRIPT.sizes_text(parts)
     shown = [line.split(" | ")[0] for line in sizes.splitlines() if "decoder" in line]
