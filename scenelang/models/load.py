@@ -106,6 +106,8 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
 
 def _framed(config: dict[str, Any], manifest: Manifest, size: int) -> Framed:
     sizes = config["network"]
+    if "cell_width" in sizes:
+        raise ModelError("weights of an earlier framed renderer, whose cell was another; train them again")
     if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes.values()):
         raise ModelError("a network size is out of range")
     known = FramedConfig(**sizes)

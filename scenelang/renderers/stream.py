@@ -243,7 +243,8 @@ class Stream:
         else:
             near &= touched.index_select(0, index)
         kept = _where(near)
-        return tuple(v.index_select(0, kept) for v in (index, qx, qy, radius))  # type: ignore[return-value]
+        index, qx, qy = index.index_select(0, kept), qx.index_select(0, kept), qy.index_select(0, kept)
+        return index, qx, qy, radius.index_select(0, kept)
 
     def _decode(self, qx: Tensor, qy: Tensor, radius: Tensor, row: _Row) -> Tensor:
         """Features (F, m) of leaf coordinates (m,)."""

@@ -104,6 +104,7 @@ OF_THE_NETWORK = {
     "a network of a huge cell": network(features=1024, state=1024),
     "a network of true size": network(state=True),
     "a network with a size unknown": network(depth=3),
+    "a network of an earlier version": network(cell_width=16),
 }
 
 
@@ -118,6 +119,11 @@ def test_networks(name: str) -> None:
     with pytest.raises(ModelError) as caught:
         load_network({**HARM, **OF_THE_NETWORK}[name], SHAPES)
     assert str(caught.value)
+
+
+def test_weights_of_an_earlier_version_are_called_that() -> None:
+    with pytest.raises(ModelError, match="earlier framed renderer"):
+        load_network(network(cell_width=16), SHAPES)
 
 
 def test_the_shipped_weights_are_none_of_these() -> None:
