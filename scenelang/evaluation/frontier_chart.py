@@ -10,7 +10,7 @@ from scenelang.evaluation.chart import FAINT, INK, pyplot
 from scenelang.evaluation.frontier import Frontier, Point, front
 from scenelang.evaluation.frontier_chart_labels import place_labels
 
-FLOOR: Final = 2e-4
+FLOOR: Final = 5e-5
 """FLIP below which points lie on the chart's lower edge; 0 has no place on a logarithmic axis."""
 COLOURS: Final = {"framed": "#1f77b4", "streaming": "#c8452f", "reading": "#7b5ea7", "reference": "#2f8f5b"}
 MARKS: Final = {
