@@ -8,6 +8,7 @@ errors, averaged over channels, over the number of such pixels.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import platform
 import time
@@ -214,10 +215,13 @@ def order_of_disjoint(model: Model, scenes: int, seed: int) -> dict[str, float]:
 def flicker(model: Model, scenes: int, seed: int) -> dict[str, float]:
     """Change from frame to frame that the exact animation does not have, over the change that it has.
 
-    Both are root mean squares over pixels; 0 is none, 1 as much again as the picture moves.
+    Both are root mean squares over pixels; 0 is none, 1 as much again as the picture moves. Animations in
+    which nothing moves do not count, and where none does more are drawn.
     """
-    ratios = []
-    for index in range(scenes):
+    ratios: list[float] = []
+    for index in itertools.count():
+        if index >= scenes and ratios:
+            break
         frames = [sized(f, model.manifest) for f in animated(rng_of(seed, index), FRAMES)]
         ours = [np.asarray(_drawn(model, f, True), np.float64) for f in frames]
         exact_ones = [exact_picture(f, model)[0] for f in frames]

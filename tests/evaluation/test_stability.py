@@ -11,10 +11,12 @@ import torch
 
 from scenelang.evaluation.metrics import MOST_DB
 from scenelang.evaluation.probes import PROBES, animated, apart, rng_of, union_of
+from scenelang.evaluation.run import sized
 from scenelang.evaluation.stability import (
     OPTIONAL,
     compare,
     exact_picture,
+    flicker,
     order_of_disjoint,
     picture_of,
     run_stability,
@@ -126,3 +128,11 @@ def test_the_whole_suite_runs(model: Model) -> None:
     for probe in found["probes"].values():
         for row in probe["rows"]:
             assert 20 < row["psnr"]["worst"] <= MOST_DB
+
+
+def test_flicker_of_one_scene_looks_on_until_something_moves(model: Model) -> None:
+    """All frames of this seed's first animation are white."""
+    for frame in animated(rng_of(2021, 0), 3):
+        assert (exact_picture(sized(frame, model.manifest), model)[0] == 1).all()
+    found = flicker(model, 1, 2021)
+    assert 0 < found["mean"] == found["worst"] < 0.2
