@@ -1,6 +1,6 @@
 """Measure everything that docs/results.md reports, from scratch, at any budget.
 
-python benchmarks/everything.py -o out                 about four minutes: a budget for seeing that it runs
+python benchmarks/everything.py -o out                 about ten minutes: a budget for seeing that it runs
 python benchmarks/everything.py -o out --budget 6      the paper's methods six processor minutes each
 
 Trains every design of `scenelang experiment`, draws the charts, evaluates the shipped models, runs the
