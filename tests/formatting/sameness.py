@@ -16,16 +16,26 @@ def tree_of(text: str) -> object:
     return without_spans(tree)
 
 
-def without_spans(value: Any) -> object:
-    if dataclasses.is_dataclass(value):
-        fields = ((f.name, getattr(value, f.name)) for f in dataclasses.fields(value))
-        return (
-            type(value).__name__,
-            *((k, without_spans(v)) for k, v in fields if not isinstance(v, Span)),
-        )
-    if isinstance(value, tuple):
-        return tuple(map(without_spans, value))
-    return value
+def without_spans(value: Any) -> list[object]:
+    """A tree as the list of its nodes from the root down, each with the number or names of what it holds.
+
+    A list, because deep trees would take all of Python's frames to walk and to compare.
+    """
+    found: list[object] = []
+    left = [value]
+    while left:
+        value = left.pop()
+        if dataclasses.is_dataclass(value):
+            fields = [(f.name, getattr(value, f.name)) for f in dataclasses.fields(value)]
+            kept = [(name, held) for name, held in fields if not isinstance(held, Span)]
+            found.append((type(value).__name__, *(name for name, _ in kept)))
+            left += [held for _, held in reversed(kept)]
+        elif isinstance(value, tuple):
+            found.append(("tuple", len(value)))
+            left += reversed(value)
+        else:
+            found.append(value)
+    return found
 
 
 def comments(text: str) -> list[str]:
