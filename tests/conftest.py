@@ -7,7 +7,10 @@ import signal
 from hypothesis import HealthCheck, settings
 
 # Seconds decide no test, as they hang on the machine: neither those of an example nor those of drawing it.
-settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# The same cases every time: new ones are what fuzz/ looks for, by the hour.
+settings.register_profile(
+    "untimed", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.load_profile("untimed")
 
 # A test run that was started in the background ignores interrupts, and so would the processes that tests
