@@ -33,7 +33,7 @@ from scenelang.formatting.trivia import Notes, texts_of
 from scenelang.syntax.tokens import Tokens
 
 _PATH = re.compile(r"\w+(\.\w+)*")
-_NUMBER = re.compile(r"\.?[0-9][\w.+-]*")
+_NUMBER_LAST = re.compile(r"(?:^|\s)\.?[0-9][\w.+-]*$")  # comments may stand before it
 _SURE_DIGITS = 300
 """A number of so many signs without an exponent is finite."""
 _LONGEST_OPERATOR = 2
@@ -263,7 +263,7 @@ class ExpressionLayout:
 
     def member(self, value: Part, dot: int, name: Part) -> Part:
         # A dot right behind a number may be taken for its decimal point.
-        space = " " if _NUMBER.fullmatch(flat_of(value) or "") else ""
+        space = " " if _NUMBER_LAST.search(flat_of(value) or "") else ""
         return self._glued(value, space, self.word(dot), name)
 
     def method(self, value: Part, dot: int, name: Part, args: Part) -> Part:

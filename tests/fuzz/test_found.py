@@ -220,3 +220,15 @@ def test_files_whose_names_are_no_text(name: str, uri: str) -> None:
     log = json.loads(render_sarif(list(found)))
     place = log["runs"][0]["results"][0]["locations"][0]["physicalLocation"]
     assert place["artifactLocation"]["uri"] == uri
+
+
+@pytest.mark.parametrize("number", ["0", "1.5", "2e3", ".5"])
+@pytest.mark.parametrize("before", ["", "/* */ ", "0 ? b : /* 7 */ ", "// x\n"])
+@pytest.mark.parametrize("between", ["", "// line\n", "/* c */ "])
+def test_a_dot_behind_a_number_behind_a_comment_is_no_decimal_point(
+    number: str, before: str, between: str
+) -> None:
+    """The formatter looked for a number alone, and stopped at its own check of the result."""
+    done = format_text(f"let a = {before}{number} . {between}a;")
+    assert f"{number} ." in done
+    assert format_text(done) == done
