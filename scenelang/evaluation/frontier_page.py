@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenelang.evaluation.frontier import Frontier, Point
-from scenelang.evaluation.frontier_chart import mark_of, short_name
+from scenelang.evaluation.frontier_chart import FLOOR, mark_of, short_name
 from scenelang.image import Image
 
 _PAGE: Final = Path(__file__).with_name("frontier_page.html")
@@ -39,6 +39,7 @@ def frontier_page(frontier: Frontier, pictures: Mapping[str, Sequence[Image]], e
         "exact": [picture_uri(image) for image in exact],
         "streaming_ms": frontier.streaming_ms,
         "canvas": [width, height],
+        "floor": FLOOR,
     }
     about = (
         f"{frontier.scenes} scenes of the set {frontier.set} (seed {frontier.seed}), {width} × {height} "
