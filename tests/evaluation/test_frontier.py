@@ -30,12 +30,11 @@ from scenelang.evaluation.frontier_choose import (
     offers,
     refusal,
 )
-from scenelang.evaluation.frontier_cost import Load, fit_cost, load_of, predicted_ms, yardstick
+from scenelang.evaluation.frontier_cost import Load
 from scenelang.evaluation.frontier_measure import enlarged, promised
 from scenelang.image import from_samples
 from scenelang.models.manifest import load_manifest
-from scenelang.program.compile import compile_scene
-from scenelang.scene.schema import Object, Scale, Scene, Translate, Twist
+from scenelang.scene.schema import Object, Scale, Scene, Twist
 
 
 def point(name: str, ms: float, flip: float | None, **more: object) -> Point:
@@ -132,83 +131,15 @@ def test_promises_are_kept_by_new_values_of_the_same_kind() -> None:
     assert np.mean(kept) >= 0.972
 
 
+def test_a_stated_speed_of_the_machine_is_taken() -> None:
+    assert machine_scale(frontier(), 2.5) == 2.5
+
+
 def test_smaller_canvases_and_more_objects_promise_less() -> None:
     assert error_scale((256, 256), 1) == error_scale((1024, 300), 4) == 1.0
     assert error_scale((128, 512), 4) == 2.0
     assert error_scale((256, 256), 16) == 4.0
     assert error_scale((64, 64), 8) == 8.0
-
-
-# ---------------------------------------------------------------- cost
-
-
-def test_cost_is_found_again() -> None:
-    rng = np.random.default_rng(3)
-    true = Cost(2.0, 30.0, 40.0, 90.0, 0.5, 1.0)
-    loads = [
-        Load(int(n), int(p), float(m), float(o))
-        for n, p, m, o in zip(
-            rng.integers(1, 60, 50),
-            rng.integers(1 << 12, 1 << 20, 50),
-            rng.uniform(0, 2e6, 50),
-            rng.uniform(0, 9e3, 50),
-            strict=True,
-        )
-    ]
-    found = fit_cost(loads, [predicted_ms(true, load, True) for load in loads], True)
-    for load in loads:
-        assert predicted_ms(found, load, True) == pytest.approx(predicted_ms(true, load, True), rel=1e-4)
-    assert found.spread == pytest.approx(1.0, abs=1e-4)
-
-
-def test_no_coefficient_is_negative_and_the_spread_covers() -> None:
-    rng = np.random.default_rng(4)
-    loads = [Load(int(n), 65536, float(n) * 9000, float(n) * 100) for n in rng.integers(1, 9, 80)]
-    ms = [10 - 0.5 * load.objects + rng.uniform(0, 4) for load in loads]  # faster with more objects
-    cost = fit_cost(loads, ms, True)
-    terms = (cost.frame, cost.thousand_objects, cost.megapixel, cost.megameeting, cost.outline)
-    assert min(terms) >= 0
-    under = [
-        t <= predicted_ms(cost, load, True) * cost.spread * 1.0001 for load, t in zip(loads, ms, strict=True)
-    ]
-    assert np.mean(under) >= 0.95
-
-
-def test_a_fixed_canvas_costs_by_objects_alone() -> None:
-    loads = [Load(n, 1 << 16, 1e5, 500.0) for n in range(1, 9)]
-    cost = fit_cost(loads, [5.0 + 2 * n for n in range(1, 9)], True, fixed=True)
-    assert cost.megapixel == cost.megameeting == cost.outline == 0
-    assert predicted_ms(cost, Load(100, 1 << 16, 0, 0), True) == pytest.approx(205, rel=0.01)
-
-
-def test_one_canvas_tells_nothing_of_a_constant() -> None:
-    """A way that was measured on one canvas alone is taken to grow with the pixels."""
-    loads = [Load(n, 1 << 16, 0.0, 0.0) for n in (1, 2, 3, 4, 2, 3)]
-    cost = fit_cost(loads, [100.0 + 50 * load.objects for load in loads], False)
-    large = predicted_ms(cost, Load(2, 1 << 18, 0.0, 0.0), False)
-    assert large == pytest.approx(4 * predicted_ms(cost, loads[1], False))
-    assert predicted_ms(cost, loads[1], False) == pytest.approx(200, rel=0.02)
-
-
-def square(x: float, size: float) -> Object:
-    return Object(geometry="square", transforms=(Scale(x=size, y=size, z=1), Translate(x=x, y=0)))
-
-
-def test_the_load_of_a_scene_is_its_bounds_within_the_canvas() -> None:
-    program = compile_scene(Scene(canvas=(200, 100), nodes=(square(0, 0.1), square(2, 0.5))))
-    load = load_of(program)
-    assert (load.objects, load.pixels) == (2, 20_000)
-    boxes = program.bounds * 50  # half of the shorter side
-    inside = [
-        (min(b[2], 100) - max(b[0], -100)) * (min(b[3], 50) - max(b[1], -50)) for b in boxes.astype(float)
-    ]
-    assert load.meetings == pytest.approx(sum(inside), rel=1e-6)
-    assert load.meetings < 2 * 20_000
-
-
-def test_the_yardstick_is_a_time() -> None:
-    assert yardstick() > 0
-    assert machine_scale(frontier(), 2.5) == 2.5
 
 
 # ---------------------------------------------------------------- choosing
@@ -309,7 +240,7 @@ def test_the_choice_tells_why_and_what_was_next() -> None:
 def test_points_that_cannot_draw_a_scene_are_refused() -> None:
     manifest = load_manifest("shapes2d")
     fixed = replace(manifest, sizes=((64, 64),), white=True)
-    scene = Scene(nodes=(square(0, 0.5),))
+    scene = Scene(nodes=(Object(geometry="square", transforms=(Scale(x=0.5, y=0.5, z=1),)),))
     one = point("a", 1, 0.1)
     assert refusal(one, manifest, scene, None) is None
     assert refusal(one, fixed, scene, None) == "draws 64 x 64 pixels only"

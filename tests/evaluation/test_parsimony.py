@@ -132,9 +132,8 @@ def test_tables_of_parts_and_sizes() -> None:
     rows = [line for line in text.splitlines() if line.startswith("| ")]
     assert len(rows) == 2 + len(SCRIPT.PARTS)  # the head, the whole renderer, each part
     (row,) = (line for line in rows if "no register" in line)
-    assert row.endswith(
-        "| 31.2 | 23.2 | -8.4 | 28.2 | -8.4 | it pays |"
-    )  # 31.25 less 39.6, the mean over seeds
+    # 31.25 less 39.6, the mean over seeds
+    assert row.endswith("| 31.2 | 23.2 | -8.4 | 28.2 | -8.4 | it pays |")
     assert "39.6 dB, 0.8 dB apart" in text
     sizes = SCRIPT.sizes_text(parts)
     shown = [line.split(" | ")[0] for line in sizes.splitlines() if "decoder" in line]
