@@ -2,10 +2,10 @@
 
 python docs/make_frontier.py            writes the page's tables
 python docs/make_frontier.py --check    fails where they are out of date
-python docs/make_frontier.py --measure  measures first: ranges for int8, the frontier, the verification
+python docs/make_frontier.py --measure  measures first: the frontier, the verification
 
-Measuring takes about ten minutes of one idle core. It ships scenelang/models/shapes2d/frontier.json and
-the int8 ranges of the set's models, and draws docs/pictures/frontier.png and docs/frontier-chart.html.
+Measuring takes about ten minutes of one idle core. It ships scenelang/models/shapes2d/frontier.json, and
+draws docs/pictures/frontier.png and docs/frontier-chart.html.
 """
 
 from __future__ import annotations
@@ -25,15 +25,12 @@ from scenelang.evaluation.frontier import Frontier, Point, between, frontier_pat
 HERE = Path(__file__).parent
 PAGE = HERE / "frontier.md"
 VERIFIED = HERE / "results" / "frontier-verified.json"
-MODELS = HERE.parent / "scenelang" / "models"
 BASE = "shapes2d"
 
 
 def measure(scenes: int) -> None:
-    """Calibrate, measure, ship, verify."""
+    """Measure, ship, verify."""
     command = [sys.executable, "-m", "scenelang", "frontier", BASE]
-    if any(MODELS.glob(f"{BASE}*streaming*/manifest.json")):
-        subprocess.run([*command, "--calibrate", "-o", str(MODELS)], check=True)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         subprocess.run([*command, "-o", folder, "--scenes", str(scenes)], check=True)
@@ -82,27 +79,6 @@ def points_text(frontier: Frontier) -> str:
         f"{between(f.points)} ways lie between the fastest and the nearest."
     )
     return "\n".join(lines) + "\n\n" + about
-
-
-def pairs_text(frontier: Frontier) -> str:
-    """What 8 bits gain and cost, each against the same way in float32."""
-    by_name = {p.name: p for p in frontier.points}
-    lines = [
-        "| way to draw | float32, ms | int8, ms | times as fast | PSNR, dB |",
-        "|---|--:|--:|--:|--:|",
-    ]
-    for name, eight in by_name.items():
-        plain = by_name.get(name.removesuffix(", int8"))
-        if plain is None or plain is eight:
-            continue
-        change = "not trained"
-        if plain.psnr is not None and eight.psnr is not None:
-            change = f"{eight.psnr.mean - plain.psnr.mean:+.2f}"
-        ratio = eight.ratio_to_streaming / plain.ratio_to_streaming  # on the same scenes
-        lines.append(
-            f"| {plain.title} | {plain.ms.median:.3g} | {eight.ms.median:.3g} | **{ratio:.2f}** | {change} |"
-        )
-    return "\n".join(lines)
 
 
 def paper_text(frontier: Frontier) -> str:
@@ -161,7 +137,6 @@ def page() -> str:
     for name, told in (
         ("chart", chart_text),
         ("points", points_text),
-        ("pairs", pairs_text),
         ("paper", paper_text),
         ("converged", converged_text),
     ):

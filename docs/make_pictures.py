@@ -220,7 +220,7 @@ def stability() -> bytes:
 
 def _few_colours(chart: bytes) -> bytes:
     with pillow.open(io.BytesIO(chart)) as picture:
-        return png(picture.convert("RGB").quantize(64))
+        return png(picture.convert("RGB").quantize(64, pillow.Quantize.MAXCOVERAGE))  # keeps rare colours
 
 
 def experiments() -> dict[str, Callable[[], bytes]]:

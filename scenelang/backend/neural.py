@@ -18,7 +18,7 @@ from functools import lru_cache
 import torch
 
 from scenelang.backend.errors import RenderError
-from scenelang.backend.render import Precision, Samples
+from scenelang.backend.render import Samples
 from scenelang.models.load import Model, ModelError, load_model, place_of
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing, draw
@@ -119,7 +119,6 @@ def draw_program(
     threads: int | None = None,
     split: int | None = None,
     kept: Kept | None = None,
-    precision: Precision = "float32",
     samples: Samples = "adaptive",
     skip: bool = True,
     progress: Callable[[float], None] | None = None,
@@ -134,7 +133,6 @@ def draw_program(
         threads: tiles drawn at the same time; by default one for each usable core.
         split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
-        precision: ``"int8"`` draws in 8 bits on the CPU, with models that have such a form.
         samples: of a pixel, with the framed renderer: four near outlines, four everywhere, or one.
         skip: leave out points that an object cannot reach; without it no pixel measured differed by 0.001.
         progress: called with the share done, in [0, 1], from any thread.
@@ -158,10 +156,6 @@ def draw_program(
         threads, split = 1, 1  # the device is busy with one tile
     with _drawing, _one_torch_thread():
         try:
-            if precision == "int8":
-                from scenelang.backend.onnx_draw import draw_int8  # onnxruntime is an extra
-
-                return draw_int8(program, model, threads)
             if not isinstance(model.network, Framed):
                 torch.set_num_threads(threads)
                 return draw_whole(

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 Backend = Literal["neural", "reference"]
 Device = Literal["auto", "cpu", "cuda"]
-Precision = Literal["float32", "int8"]
 Samples = Literal["adaptive", "four", "one"]
 
 
@@ -24,7 +23,6 @@ def render(
     backend: Backend = "neural",
     device: Device = "auto",
     threads: int | None = None,
-    precision: Precision = "float32",
     samples: Samples = "adaptive",
     progress: Callable[[float], None] | None = None,
 ) -> Image:
@@ -39,7 +37,6 @@ def render(
             definition, which knows no boolean rule and none of a model's limits.
         device: where the network runs; ``"auto"`` is CUDA where there is any.
         threads: tiles drawn at the same time; by default as many as there are usable cores.
-        precision: ``"int8"`` draws in 8 bits on the CPU, with models that have such a form.
         samples: of a pixel: ``"four"`` as the language defines, ``"one"``, which is faster and has hard
             edges, or ``"adaptive"``, four near outlines and one elsewhere, which looks the same as four.
         progress: called with the share done, in [0, 1], from any thread.
@@ -53,8 +50,6 @@ def render(
             compiled for, it does not draw in this way, or the reference was given a Program.
         ValueError: an argument is none of the above.
     """
-    if precision not in get_args(Precision):
-        raise ValueError(f"unknown precision {precision!r}; there are 'float32' and 'int8'")
     if samples not in get_args(Samples):
         raise ValueError(f"unknown samples {samples!r}; there are 'adaptive', 'four' and 'one'")
     if threads is not None and threads < 1:
@@ -62,8 +57,8 @@ def render(
     if backend == "reference":
         from scenelang.backend.exact import draw_exact
 
-        if precision != "float32" or samples != "adaptive":
-            raise RenderError("the reference has neither a precision nor a choice of samples")
+        if samples != "adaptive":
+            raise RenderError("the reference always takes four samples a pixel")
         if not isinstance(program_or_scene, Scene):
             raise RenderError("the reference draws scenes; a program keeps only what the network needs")
         return draw_exact(program_or_scene)
@@ -80,7 +75,5 @@ def render(
         program = program_or_scene
     from scenelang.backend.neural import choose_device, draw_program, open_model
 
-    model = open_model(program.model, "cpu" if precision == "int8" else choose_device(device))
-    return draw_program(
-        program, model, threads=threads, precision=precision, samples=samples, progress=progress
-    ).image
+    model = open_model(program.model, choose_device(device))
+    return draw_program(program, model, threads=threads, samples=samples, progress=progress).image

@@ -12,7 +12,7 @@ from scenelang.cli.jobs import Job, program_notes
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from scenelang.backend.render import Precision, Samples
+    from scenelang.backend.render import Samples
     from scenelang.evaluation.frontier import Frontier, Point
     from scenelang.evaluation.frontier_choose import Choice, Offer
     from scenelang.program.program import Program
@@ -43,7 +43,7 @@ def check_options(ctx: click.Context, limits: Limits, device: str) -> None:
     from click.core import ParameterSource
 
     asked = "--max-ms" if limits.ms is not None else "--max-flip"
-    for name in ("backend", "precision", "samples"):
+    for name in ("backend", "samples"):
         if limits and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             raise click.UsageError(f"{asked} chooses the {name} itself; leave out --{name}.")
     if limits and device == "cuda":
@@ -56,11 +56,10 @@ class Way:
 
     Args:
         exact: by the reference.
-        precision, samples: of the network.
+        samples: of the network.
     """
 
     exact: bool
-    precision: Precision
     samples: Samples
 
 
@@ -106,7 +105,7 @@ class Chooser:
         scale = f"this machine takes {self._machine(frontier):.2f} times as long as the one that was measured"
         refused = [f"not in question: {name}: {why}" for name, why in choice.refused.items()]
         job.notes = [*choice.notes, f"times are for one thread; {scale}", *refused, *notes]
-        return Way(point.backend == "reference", point.precision, point.samples)
+        return Way(point.backend == "reference", point.samples)
 
     def _chosen(self, frontier: Frontier, job: Job, program: Program) -> tuple[Choice, Program]:
         """The best choice whose model draws the scene without further warnings, and its Program."""
@@ -144,11 +143,6 @@ class Chooser:
             else:
                 manifest = load_manifest(point.model) if point.model is not None else None
                 why = refusal(point, manifest, scene, program.model if scene is None else None)
-            if why is None and point.precision == "int8":
-                from scenelang.backend.onnx_session import missing_package
-
-                package = missing_package()
-                why = None if package is None else f"{package} is missing; pip install 'scenelang[int8]'"
             if why is None:
                 able.append(point)
             else:

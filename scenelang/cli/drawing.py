@@ -11,7 +11,7 @@ from scenelang.cli.inputs import Request
 from scenelang.cli.jobs import Job
 
 if TYPE_CHECKING:
-    from scenelang.backend.render import Precision, Samples
+    from scenelang.backend.render import Samples
     from scenelang.cli.choosing import Limits
     from scenelang.image import Image
 
@@ -56,16 +56,16 @@ def chosen(
         assert way is not None
         if way.exact:
             return exact(request, clock)(job, progress)
-        return neural(clock, "cpu", threads, way.precision, way.samples)(job, progress)
+        return neural(clock, "cpu", threads, way.samples)(job, progress)
 
     return draw, [(job, path) for job, path in ready if ways[id(job)] is not None], code
 
 
-def neural(clock: Clock, device: str, threads: int | None, precision: Precision, samples: Samples) -> Draw:
+def neural(clock: Clock, device: str, threads: int | None, samples: Samples) -> Draw:
     """Draw with trained networks."""
     with clock("load torch"):
         from scenelang.backend.neural import choose_device, draw_program, open_model
-    place = "cpu" if precision == "int8" else choose_device(device)
+    place = choose_device(device)
 
     def draw(job: Job, progress: Callable[[float], None]) -> Image:
         assert job.program is not None
@@ -76,7 +76,6 @@ def neural(clock: Clock, device: str, threads: int | None, precision: Precision,
                 job.program,
                 model,
                 threads=threads,
-                precision=precision,
                 samples=samples,
                 progress=progress,
             )

@@ -34,7 +34,6 @@ VERIFY_SEED = 4042
     metavar="FILE",
     help="Verify this frontier.json instead of the shipped one.",
 )
-@click.option("--calibrate", is_flag=True, help="Find the ranges that models need to be drawn in int8.")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -45,22 +44,18 @@ def command(
     threads: int,
     verify: bool,
     promises: Path | None,
-    calibrate: bool,
 ) -> None:
     """Measure time and error of every way to draw the scenes of MODEL's set, side by side, in one run.
 
-    That is all shipped models of the set in float32 and int8, with and without skipping and with other
-    samplings, the exact reference, and the time of the paper's streaming renderer at full size. Writes
-    frontier.json, frontier.png, frontier.svg and frontier.html, which needs no other file, into OUT.
+    That is all shipped models of the set, with and without skipping and with other samplings, the exact
+    reference, and the time of the paper's streaming renderer at full size. Writes frontier.json,
+    frontier.png, frontier.svg and frontier.html, which needs no other file, into OUT.
 
     With --verify draws other scenes and counts in how many the promised errors of the shipped frontier are
-    kept, writes verified.json, and exits with 1 if that is under 95 %. With --calibrate writes
-    NAME/int8.safetensors for each model that int8 is for.
+    kept, writes verified.json, and exits with 1 if that is under 95 %.
     """
     from scenelang.models.manifest import available, load_manifest
 
-    if verify and calibrate:
-        raise click.UsageError("--verify and --calibrate are two things.")
     if promises is not None and not verify:
         raise click.UsageError("--promises goes with --verify.")
     known = available()
@@ -75,23 +70,18 @@ def command(
         raise click.UsageError(f"no scenes of the set '{base}' can be made; there are {', '.join(SETS)}")
     need_metrics()
     out.mkdir(parents=True, exist_ok=True)
-    if calibrate:
-        _calibrate(base, out)
-    elif verify:
+    if verify:
         ctx.exit(0 if _verify(base, out, scenes, seed, promises) else 1)
     else:
         _measure(base, out, scenes, DEFAULT_SEED if seed is None else seed, threads)
 
 
 def _measure(base: str, out: Path, scenes: int, seed: int, threads: int) -> None:
-    from scenelang.backend.onnx_session import missing_package
     from scenelang.evaluation.frontier import NAME
     from scenelang.evaluation.frontier_measure import measure_frontier
     from scenelang.evaluation.frontier_page import frontier_page
     from scenelang.files import write_whole
 
-    if (lacking := missing_package()) is not None:
-        click.echo(f"without int8: {lacking} is missing; pip install 'scenelang[int8]'", err=True)
     measured = measure_frontier(base, scenes, seed, threads, _report if sys.stderr.isatty() else None)
     frontier = measured.frontier
     write_whole(out / NAME, frontier.to_json().encode())
@@ -125,15 +115,6 @@ def _table(frontier: Frontier) -> str:
     if default is not None and default.ratio_to_streaming:
         ratio = f"{default.ratio_to_streaming:.1f} times as fast as the paper's streaming one"
         lines.append(f"A frame of {default.name} is {ratio}.")
-    by_name = {p.name: p for p in frontier.points}
-    for name, p in by_name.items():
-        plain = by_name.get(name.removesuffix(", int8"))
-        if p.precision == "int8" and plain is not None and plain is not p:
-            speed = p.ratio_to_streaming / plain.ratio_to_streaming if plain.ratio_to_streaming else 0.0
-            line = f"int8: {plain.title} {speed:.2f} times as fast"
-            if p.psnr is not None and plain.psnr is not None:
-                line += f", {p.psnr.mean - plain.psnr.mean:+.2f} dB"
-            lines.append(line)
     return "\n".join(lines)
 
 
@@ -168,20 +149,6 @@ def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path 
     least = f"every promise is kept in at least {100 * KEPT:.0f} % of the scenes"
     click.echo(least if found["held"] else f"not {least}")
     return bool(found["held"])
-
-
-def _calibrate(base: str, out: Path) -> None:
-    from scenelang.backend.onnx_session import need_onnx
-    from scenelang.evaluation.frontier_calibrate import SCENES, SEED, calibrate_model
-    from scenelang.models.manifest import available, load_manifest
-
-    need_onnx()
-    models = [m for m in map(load_manifest, available()) if m.set == base and m.renderer == "streaming"]
-    if not models:
-        raise click.UsageError(f"no model of the set '{base}' has a renderer that int8 is for: streaming")
-    for manifest in models:
-        path = calibrate_model(manifest.name, out)
-        click.echo(f"{path}: ranges of {SCENES} scenes (seed {SEED})")
 
 
 def _report(name: str, done: int, count: int) -> None:

@@ -12,7 +12,7 @@ from scenelang.cli import options
 
 if TYPE_CHECKING:
     from scenelang.animation.targets import Target
-    from scenelang.backend.render import Precision, Samples
+    from scenelang.backend.render import Samples
     from scenelang.cli.animation import Wanted
     from scenelang.cli.choosing import Limits
     from scenelang.cli.clock import Clock
@@ -54,13 +54,6 @@ if TYPE_CHECKING:
 @options.model
 @options.backend
 @click.option(
-    "--precision",
-    type=click.Choice(["float32", "int8"]),
-    default="float32",
-    show_default=True,
-    help="Draw in 8 bits, with models that have such a form.",
-)
-@click.option(
     "--samples",
     type=click.Choice(["adaptive", "four", "one"]),
     default="adaptive",
@@ -99,7 +92,6 @@ def command(
     dither: bool,
     model: str | None,
     backend: options.Backend,
-    precision: Precision,
     samples: Samples,
     max_ms: float | None,
     max_flip: float | None,
@@ -124,8 +116,8 @@ def command(
       FOLDER/                       FOLDER/STEM-0000.png and so on
     A run that was interrupted goes on where it stopped.
 
-    With --max-ms or --max-flip each scene is drawn by what `scenelang frontier` measured to suffice, model,
-    precision and samples; -v says which, why, and what was next.
+    With --max-ms or --max-flip each scene is drawn by what `scenelang frontier` measured to suffice, model
+    and samples; -v says which, why, and what was next.
     """
     from scenelang.cli.animation import Wanted, wanted_target
     from scenelang.cli.choosing import Limits, check_options
@@ -149,7 +141,7 @@ def command(
     if len(files) == 1 and frame is None and not files[0].endswith(PROGRAM):
         target = wanted_target(files[0], out, wanted)
         if target is not None:
-            _only_stills(limits, precision, samples)
+            _only_stills(limits, samples)
             painting = _Painting(backend, device, threads, strict, verbose)
             code, source = _animate(files[0], out, target, request, wanted, painting)
             if source is None:
@@ -164,10 +156,10 @@ def command(
     if limits:
         draw, ready, code = chosen(limits, request, clock, threads, ready, code)
     elif backend == "reference":
-        _only_network(precision, samples)
+        _only_network(samples)
         draw = exact(request, clock)
     else:
-        draw = neural(clock, device, threads, precision, samples)
+        draw = neural(clock, device, threads, samples)
     with Bar("drawing", len(ready)) as bar:
         for index, (job, path) in enumerate(ready):
             image = draw(job, partial(bar.part, index))
@@ -296,16 +288,16 @@ def _prepared(
     return jobs, max(code, int(any(job.failed(strict) for job in read)))
 
 
-def _only_stills(limits: Limits, precision: str, samples: str) -> None:
+def _only_stills(limits: Limits, samples: str) -> None:
     """Refuse for animations what chooses or changes how one picture is drawn."""
-    if limits or precision != "float32" or samples != "adaptive":
-        what = "--max-ms and --max-flip" if limits else "--precision and --samples"
-        raise click.UsageError(f"{what} are for single pictures; --frame draws one of an animation.")
+    if limits or samples != "adaptive":
+        what = "--max-ms and --max-flip are" if limits else "--samples is"
+        raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")
 
 
-def _only_network(precision: str, samples: str) -> None:
-    if precision != "float32" or samples != "adaptive":
-        raise click.UsageError("--precision and --samples are for the network, not for the reference.")
+def _only_network(samples: str) -> None:
+    if samples != "adaptive":
+        raise click.UsageError("--samples is for the network, not for the reference.")
 
 
 def _save(image: Image, path: Path) -> None:

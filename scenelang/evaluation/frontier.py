@@ -1,6 +1,6 @@
 """Speed against error: what was measured of each way to draw, which of them are worth having, and the file.
 
-A *point* is a way to draw: a model with its precision and sampling, or the exact reference. The *front* are
+A *point* is a way to draw: a model with its sampling, or the exact reference. The *front* are
 the points that no other one beats: nothing faster has less error.
 """
 
@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
-from scenelang.backend.render import Precision, Samples
+from scenelang.backend.render import Samples
 from scenelang.files import read_json, read_regular
 from scenelang.models.manifest import ROOT, available, load_manifest
 
@@ -85,7 +85,7 @@ class Point:
         backend: ``"neural"`` or ``"reference"``.
         model: name of the model; None for the reference and for what has no trained weights.
         renderer: of the network, or ``"reference"``.
-        precision, samples, skip: how it draws.
+        samples, skip: how it draws.
         spp: samples a pixel of the reference.
         side: pixels along a side that it draws, enlarged for the comparison; 0 where it draws any canvas.
         offered: whether `scenelang render` chooses it.
@@ -104,7 +104,6 @@ class Point:
     backend: Literal["neural", "reference"]
     model: str | None
     renderer: str
-    precision: Precision
     samples: Samples
     skip: bool
     spp: int
@@ -167,6 +166,8 @@ class Frontier:
     def from_json(data: bytes) -> Frontier:
         """Read a file as if a stranger had written it.
 
+        Points in 8 bits, which files of before have, are left out: nothing draws so any more.
+
         Raises:
             ValueError: it is none, or holds what it cannot.
         """
@@ -176,7 +177,7 @@ class Frontier:
         points = found.get("points")
         if not isinstance(points, list) or not all(isinstance(p, dict) for p in points):
             raise ValueError("a frontier without points")
-        made = tuple(map(_point, points))
+        made = tuple(_point(p) for p in points if p.pop("precision", "float32") == "float32")
         canvas = found.get("canvas")
         if not isinstance(canvas, list) or len(canvas) != 2:
             raise ValueError("a frontier without a canvas")
@@ -216,7 +217,6 @@ def _fits(kind: str, value: Any) -> bool:
         return type(value).__name__ == kind and (kind != "int" or value >= 0)
     known = {
         "Samples": get_args(Samples),
-        "Precision": get_args(Precision),
         "Literal['neural', 'reference']": ("neural", "reference"),
     }
     choices = known.get(kind.replace('"', "'"))

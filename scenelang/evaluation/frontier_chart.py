@@ -14,7 +14,6 @@ FLOOR: Final = 5e-5
 """FLIP below which points lie on the chart's lower edge; 0 has no place on a logarithmic axis."""
 COLOURS: Final = {"framed": "#1f77b4", "streaming": "#c8452f", "reading": "#7b5ea7", "reference": "#2f8f5b"}
 MARKS: Final = {
-    "int8": ("D", "int8"),
     "unskipped": ("v", "nothing skipped"),
     "adaptive": ("o", "four samples near outlines"),
     "four": ("s", "four samples everywhere"),
@@ -114,8 +113,6 @@ def _chart(
 
 def mark_of(point: Point) -> str:
     """Which of `MARKS` a point has."""
-    if point.precision == "int8":
-        return "int8"
     if point.renderer == "framed" and not point.skip:
         return "unskipped"
     return point.samples
@@ -126,8 +123,6 @@ def short_name(point: Point, base: str) -> str:
     if point.backend == "reference":
         return point.name.replace("exact reference", "exact").replace(",", "")
     name = point.name.partition(",")[0].removeprefix(f"{base}-") or base
-    if point.renderer == "streaming" and point.precision == "int8":
-        name += " int8"
     return f"{name} ({point.side}² enlarged)" if point.side else name
 
 
@@ -145,7 +140,7 @@ def _legend(axis: Any, frontier: Frontier) -> None:
     handles += [
         Line2D([], [], color=INK, marker=mark, linestyle="none", markerfacecolor="white", label=words)
         for name, (mark, words) in MARKS.items()
-        if name in used | {"int8"}
+        if name in used
     ]
     axis.legend(handles=handles, fontsize=8, frameon=False, loc="center right", ncols=1)
 

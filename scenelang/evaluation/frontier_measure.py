@@ -18,7 +18,6 @@ import PIL.Image
 import torch
 
 from scenelang.backend.neural import keep_memory, open_model
-from scenelang.backend.onnx_session import has_vnni
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.evaluation.frontier import Cost, Errors, Frontier, Point, Quality, Times, front
 from scenelang.evaluation.frontier_cost import Load, fit_cost, load_of, yardstick
@@ -281,7 +280,6 @@ def _point(way: Way, record: Record, paper: Record | None) -> Point:
         backend=way.backend,
         model=way.model,
         renderer=way.renderer,
-        precision=way.precision,
         samples=way.samples,
         skip=way.skip,
         spp=way.spp,
@@ -314,7 +312,7 @@ def _with_front(point: Point, on_front: bool) -> Point:
 
 
 def machine() -> str:
-    """The processor, and whether it multiplies 8-bit numbers in one instruction."""
+    """The processor."""
     name = platform.processor() or platform.machine()
     try:
         with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
@@ -323,4 +321,4 @@ def machine() -> str:
             )
     except OSError:
         pass
-    return f"{name}, {platform.machine()}" + (", VNNI" if has_vnni() else "")
+    return f"{name}, {platform.machine()}"

@@ -11,12 +11,7 @@ import numpy as np
 import torch
 
 from scenelang.backend.neural import draw_program, open_model
-from scenelang.backend.onnx_calibrate import calibrate
-from scenelang.backend.onnx_draw import has_int8
-from scenelang.backend.onnx_framed import EightBitStream
-from scenelang.backend.onnx_session import missing_package
-from scenelang.backend.onnx_streaming import StreamingGraphs
-from scenelang.backend.render import Precision, Samples
+from scenelang.backend.render import Samples
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.image import Image, from_samples
@@ -25,7 +20,6 @@ from scenelang.models.weights import read_facts
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
 from scenelang.reference.image import reference_image
-from scenelang.renderers.draw import draw
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 from scenelang.scene.schema import Scene
 
@@ -53,7 +47,6 @@ class Way:
     backend: Literal["neural", "reference"] = "neural"
     model: str | None = None
     renderer: str = "reference"
-    precision: Precision = "float32"
     samples: Samples = "adaptive"
     skip: bool = True
     spp: int = 0
@@ -70,7 +63,7 @@ class Way:
 
 
 def ways_of(base: str, threads: int) -> list[Way]:
-    """All ways to draw the scenes of a set; without onnxruntime those in 8 bits are left out.
+    """All ways to draw the scenes of a set.
 
     Args:
         base: the model named like the set.
@@ -84,7 +77,7 @@ def ways_of(base: str, threads: int) -> list[Way]:
     for manifest in sorted(manifests, key=lambda m: (m.name != base, m.name)):
         found += _of_model(manifest, base, threads)
     found += [*_references(load_manifest(base)), *_paper(base, threads)]
-    return [way for way in found if way.precision != "int8" or missing_package() is None]
+    return found
 
 
 def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
@@ -117,18 +110,6 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
         yield way(f"{name}, four samples", samples="four")
         yield way(f"{name}, one sample", samples="one")
         yield way(f"{name}, nothing skipped", "the same picture, later", skip=False)
-        yield Way(
-            f"{name}, int8",
-            _framed_int8(name, threads),
-            model=name,
-            renderer="framed",
-            precision="int8",
-            why_not="loses far more than 1 dB and gains no time",
-            parameters=facts.parameters,
-            bytes=facts.bytes,
-        )
-    if has_int8(name):
-        yield way(f"{name}, int8", precision="int8")
 
 
 def _neural(name: str, side: int, threads: int, **options: Any) -> Prepare:
@@ -140,26 +121,6 @@ def _neural(name: str, side: int, threads: int, **options: Any) -> Prepare:
 
         def run() -> Image:
             return draw_program(program, model, threads=threads, **options).image
-
-        return run
-
-    return prepare
-
-
-def _framed_int8(name: str, threads: int) -> Prepare:
-    def prepare(scene: Scene) -> Draw:
-        p, network = compile_scene(scene, model=name), open_model(name).framed
-
-        def run() -> Image:
-            return draw(
-                network,
-                p.vectors,
-                p.tokens,
-                p.canvas,
-                p.background,
-                threads=threads,
-                make_stream=EightBitStream,
-            ).image
 
         return run
 
@@ -194,17 +155,14 @@ def _exact(manifest: Manifest, per_side: int) -> Prepare:
 def _paper(base: str, threads: int) -> Iterator[Way]:
     """The paper's streaming renderer at the full size, untrained: what a frame of it takes."""
     for width, title in ((1.0, "the paper's streaming"), (1 / 8, "streaming, 1/8 of the filters")):
-        for precision in ("float32", "int8"):
-            tail = ", int8" if precision == "int8" else ""
-            yield Way(
-                f"{title}, {FULL}²{tail}",
-                _untrained(base, width, precision, threads),
-                renderer="streaming",
-                precision="int8" if precision == "int8" else "float32",
-                why_not="random weights, to take its time",
-                drawn=False,
-                parameters=sum(p.numel() for p in _random(width).parameters()),
-            )
+        yield Way(
+            f"{title}, {FULL}²",
+            _untrained(base, width, threads),
+            renderer="streaming",
+            why_not="random weights, to take its time",
+            drawn=False,
+            parameters=sum(p.numel() for p in _random(width).parameters()),
+        )
 
 
 @lru_cache(maxsize=4)
@@ -216,24 +174,15 @@ def _random(width: float) -> Streaming:
     return made
 
 
-@lru_cache(maxsize=4)
-def _random_int8(width: float, threads: int) -> StreamingGraphs:
-    rng = np.random.default_rng(1)
-    stream = rng.normal(size=(1, 64)).astype(np.float32), np.zeros(1, np.int8)
-    return StreamingGraphs(_random(width), calibrate(_random(width), [stream]), threads)
-
-
-def _untrained(base: str, width: float, precision: str, threads: int) -> Prepare:
+def _untrained(base: str, width: float, threads: int) -> Prepare:
     def prepare(scene: Scene) -> Draw:
         program = compile_scene(scene, model=base)
-        return lambda: from_samples(_streamed(program, width, precision, threads), None)
+        return lambda: from_samples(_streamed(program, width, threads), None)
 
     return prepare
 
 
-def _streamed(program: Program, width: float, precision: str, threads: int) -> np.ndarray:
-    if precision == "int8":
-        return _random_int8(width, threads).draw(program.vectors, program.tokens)
+def _streamed(program: Program, width: float, threads: int) -> np.ndarray:
     before = torch.get_num_threads()
     torch.set_num_threads(threads)
     try:

@@ -57,7 +57,6 @@ def draw(
     skip: bool = True,
     adaptive: bool = True,
     refine: bool = True,
-    make_stream: Callable[..., Stream] = Stream,
     tile: int = TILE,
     progress: Callable[[float], None] | None = None,
 ) -> Drawing:
@@ -75,7 +74,6 @@ def draw(
         skip: leave out points that an object cannot reach.
         adaptive: sample once where no outline is near, instead of four times everywhere.
         refine: sample four times near outlines; without it pixels are hard-edged and faster.
-        make_stream: `Stream`, or one that computes it another way.
         tile: pixels at a time, at least one row.
         progress: called with the share done, from any thread.
 
@@ -85,7 +83,7 @@ def draw(
     """
     width, height = canvas
     frames = kept.frames if kept is not None else None
-    stream = make_stream(network, vectors, tokens, skip=skip, frames=frames)
+    stream = Stream(network, vectors, tokens, skip=skip, frames=frames)
     rows = max(1, min(tile // width, -(-height // (split or threads))))
     tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     out = np.empty((height, width, 4), np.float32)

@@ -28,7 +28,7 @@ def ladder() -> Frontier:
         point("shapes2d", 16, 0.003),
         point("shapes2d, four samples", 30, 0.0029, samples="four"),
         point("gone", 1, 0.001, model="gone"),
-        point("shapes2d, int8", 2, 0.02, precision="int8", offered=False, why_not="no use", cost=None),
+        point("shapes2d, idle", 2, 0.02, offered=False, why_not="no use", cost=None),
         replace(exact, flip=Errors(0.0, 0.0, 0.0, 0.0)),
     )
 
@@ -69,7 +69,7 @@ def test_the_choice_is_told(shipped: Folder, options: tuple[str, ...], name: str
     assert f"chosen by the frontier: {name}" in text
     assert "runner-up: " in text
     assert "not in question: gone: not installed" in text or "--model" in options
-    assert "int8" not in text
+    assert "idle" not in text
 
 
 def test_what_is_chosen_is_what_is_drawn(shipped: Folder) -> None:
@@ -121,13 +121,11 @@ def test_compiled_programs_take_their_own_model(shipped: Folder) -> None:
     ("options", "words"),
     [
         (("--max-ms", "9", "--backend", "neural"), "--max-ms chooses the backend itself"),
-        (("--max-flip", "0.1", "--precision", "int8"), "--max-flip chooses the precision itself"),
         (("--max-ms", "9", "--samples", "one"), "--max-ms chooses the samples itself"),
         (("--max-ms", "9", "--device", "cuda"), "--max-ms knows processors only"),
         (("--max-ms", "0"), "0.0 is not in the range"),
         (("--max-flip", "2"), "2.0 is not in the range"),
-        (("--backend", "reference", "--samples", "one"), "are for the network, not for the reference"),
-        (("--precision", "int8"), "model `shapes2d` has no int8 form"),
+        (("--backend", "reference", "--samples", "one"), "is for the network, not for the reference"),
     ],
 )
 def test_what_does_not_go_together(shipped: Folder, options: tuple[str, ...], words: str) -> None:
@@ -141,7 +139,7 @@ def test_animations_are_not_chosen_for(shipped: Folder) -> None:
     for options in (("--max-ms", "20"), ("--samples", "one")):
         result = shipped.run("render", name, "-o", "a.gif", *options)
         assert result.exit_code == 2
-        assert "are for single pictures; --frame draws one" in result.stderr
+        assert "for single pictures; --frame draws one" in result.stderr
     assert shipped.run("render", name, "-o", "a.png", "--frame", "1", "--max-ms", "20").exit_code == 0
 
 
@@ -164,7 +162,6 @@ def test_a_missing_or_damaged_frontier(shipped: Folder) -> None:
     ("options", "words"),
     [
         (("nothing",), "no model 'nothing'; there is "),
-        (("shapes2d", "--verify", "--calibrate"), "two things"),
         (("shapes2d", "--promises", "shipped.json"), "--promises goes with --verify"),
         (("shapes2d", "--verify", "--seed", "1"), "seed 1 made the promises"),
         (("shapes2d", "--scenes", "0"), "0 is not in the range"),

@@ -43,7 +43,6 @@ def point(name: str, ms: float, flip: float | None, **more: object) -> Point:
         backend="neural",
         model="shapes2d",
         renderer="framed",
-        precision="float32",
         samples="adaptive",
         skip=True,
         spp=0,
@@ -269,6 +268,14 @@ def test_the_file_comes_back() -> None:
     assert again.to_json() == text
     assert [p.name for p in again.points] == [p.name for p in made.points]
     assert again.points[-1].flip is None
+
+
+def test_points_in_8_bits_of_older_files_are_left_out() -> None:
+    old = json.loads(frontier(*LADDER).to_json())
+    for index, told in enumerate(old["points"]):
+        told["precision"] = "int8" if index == 1 else "float32"
+    read = Frontier.from_json(json.dumps(old).encode())
+    assert [p.name for p in read.points] == ["fast", "slow", "bad"]
 
 
 def damaged() -> list[tuple[str, object]]:
