@@ -42,6 +42,14 @@ Report = Callable[[int, int, float, dict[str, float]], None]
 @click.option(
     "--every", type=click.IntRange(1), default=500, show_default=True, help="Steps between reports."
 )
+@click.option(
+    "--save-every",
+    type=click.FloatRange(0),
+    default=60.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Most time between checkpoints; the first comes after the first step.",
+)
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -51,6 +59,7 @@ def command(
     device: str,
     threads: int | None,
     every: int,
+    save_every: float,
 ) -> None:
     """Train, or go on where the checkpoint in FOLDER was saved.
 
@@ -71,18 +80,21 @@ def command(
     keep_memory()
     torch.set_num_threads(threads or 1)
     place = choose_device(device)
+    budget_s = math.inf if budget is None else 60 * budget
     if isinstance(wanted, StudentFile):
         try:
-            _student(wanted, out, math.inf if budget is None else 60 * budget, place, every)
+            _student(wanted, out, budget_s, place, every, save_every)
         except ValueError as error:
             raise click.UsageError(str(error)) from None
         ctx.exit(0)
-    click.echo(f"training {wanted.model}: {wanted.iterations:,} steps on {place}, into {out}", err=True)
     last: dict[str, float] = {}
     try:
         with _reporter() as report:
 
             def note(done: int, total: int, seconds: float, parts: dict[str, float]) -> None:
+                if not parts:
+                    _begin(wanted.model, f"step {done:,} of {total:,}", done, place, out)
+                    return
                 last.clear()
                 last.update(parts)
                 report(done, total, seconds, parts)
@@ -90,9 +102,10 @@ def command(
             finished = train(
                 wanted,
                 out,
-                budget_s=math.inf if budget is None else 60 * budget,
+                budget_s=budget_s,
                 device=place,
                 report=note,
+                save_every_s=save_every,
                 report_every=every,
             )
     except ValueError as error:
@@ -113,15 +126,20 @@ def command(
     ctx.exit(0)
 
 
-def _student(file: StudentFile, out: Path, budget_s: float, device: str, every: int) -> None:
+def _begin(model: str, reached: str, done: int, device: str, out: Path) -> None:
+    """Say whether a training starts or goes on."""
+    what = "going on with" if done else "starting"
+    click.echo(f"{what} the training of {model} at {reached}, on {device}, in {out}", err=True)
+
+
+def _student(
+    file: StudentFile, out: Path, budget_s: float, device: str, every: int, save_every: float
+) -> None:
     """Train a student, or go on with it."""
     from scenelang.training.export import export
     from scenelang.training.studies import Study
 
     config = file.study
-    click.echo(
-        f"training {file.model}: {config.seconds:g} s of processor time on {device}, into {out}", err=True
-    )
     perceptual = None
     if config.perceptual:
         from scenelang.evaluation.lpips import LpipsError, load_lpips
@@ -131,8 +149,10 @@ def _student(file: StudentFile, out: Path, budget_s: float, device: str, every: 
         except LpipsError as error:
             raise ValueError(str(error)) from None
     study = Study(config, out, device, perceptual)
+    reached = f"{study.progress.seconds:.0f} of {config.seconds:g} s of processor time"
+    _begin(file.model, reached, study.progress.step, device, out)
     total = 0.0
-    for progress in study.run(budget_s):
+    for progress in study.run(budget_s, save_every):
         total += progress.loss
         if progress.step % every == 0:
             mean, total = total / every, 0.0

@@ -13,6 +13,7 @@ from typing import Any
 
 import torch
 
+from scenelang.files import read_regular, write_whole
 from scenelang.models.load import load_model
 from scenelang.renderers.framed import Framed
 from scenelang.training.checkpoint import load_tensors, pack_training, save_tensors, unpack_training
@@ -21,6 +22,7 @@ from scenelang.training.losses import image_loss, leaf_loss
 from scenelang.training.scenes import GEOMETRIES, leaf_batch, random_batch
 
 WARM_UP = 200
+_MOST_LOG = 1 << 26  # bytes
 Report = Callable[[int, int, float, dict[str, float]], None]
 
 
@@ -38,11 +40,14 @@ def train(
 
     Args:
         config: what to train; must equal the checkpoint's.
-        folder: gets ``checkpoint.safetensors``, ``log.jsonl`` and, at the end, ``weights.safetensors``.
+        folder: gets ``checkpoint.safetensors``, ``log.jsonl`` and, at the end, ``weights.safetensors``. What
+            the log tells of steps after the checkpoint, which are done again, is cut off.
         budget_s: stop after so many seconds of this call, with a checkpoint.
         device: torch device; scenes are made there.
-        report: called with iteration, iterations, seconds spent and mean loss parts.
-        save_every_s: seconds between checkpoints.
+        report: called with iteration, iterations, seconds spent and mean loss parts, of which there are none
+            at the start.
+        save_every_s: most seconds between checkpoints. The first comes after the first step, and each
+            later one at most when the time since the start has doubled.
         report_every: iterations between reports.
 
     Returns:
@@ -60,20 +65,23 @@ def train(
     )
     scenes = torch.Generator(device).manual_seed(config.seed)
     done, spent_s = 0, 0.0
+    sums: dict[str, float] = {}
     checkpoint = folder / "checkpoint.safetensors"
     if checkpoint.exists():
         tensors, header = load_tensors(checkpoint, device)
         if header["config"] != json.loads(json.dumps(config.to_json())):
             raise ValueError(f"{checkpoint} was trained with another configuration")
         unpack_training(tensors, network, optimiser, scenes)
-        done, spent_s = header["iteration"], header["seconds"]
+        done, spent_s, sums = header["iteration"], header["seconds"], header.get("sums", {})
+    _cut(folder / "log.jsonl", done)
+    if report:
+        report(done, config.iterations, spent_s, {})
 
-    def save(name: str, tensors: dict[str, torch.Tensor]) -> None:
+    def save(name: str, tensors: dict[str, torch.Tensor], **more: Any) -> None:
         seconds = spent_s + time.perf_counter() - started
-        save_tensors(folder / name, tensors, _header(config, done, seconds, device))
+        save_tensors(folder / name, tensors, _header(config, done, seconds, device) | more)
 
     started = saved = time.perf_counter()
-    sums: dict[str, float] = {}
     while done < config.iterations:
         phase, into = _phase_at(config, done)
         share = config.rate * phase.rate * _schedule(into, phase.iterations)
@@ -101,8 +109,9 @@ def train(
                 report(done, config.iterations, spent_s + now - started, sums)
             sums = {}
         out_of_time = now - started > budget_s
-        if now - saved > save_every_s or out_of_time or done == config.iterations:
-            save("checkpoint.safetensors", pack_training(network, optimiser, scenes))
+        due = now - saved > min(save_every_s, saved - started)
+        if due or out_of_time or done == config.iterations:
+            save("checkpoint.safetensors", pack_training(network, optimiser, scenes), sums=sums)
             saved = now
         if out_of_time:
             break
@@ -112,6 +121,20 @@ def train(
         take_cell(network, config.cell)
     save("weights.safetensors", dict(network.state_dict()))
     return True
+
+
+def _cut(log: Path, done: int) -> None:
+    """Leave of a log what it tells of the first ``done`` iterations."""
+    lines = read_regular(log, _MOST_LOG).splitlines(keepends=True) if log.exists() else []
+    kept = []
+    for line in lines:
+        try:
+            if json.loads(line)["iteration"] > done:
+                break
+        except (ValueError, TypeError, KeyError):  # half a line of a run that was killed
+            break
+        kept.append(line)
+    write_whole(log, b"".join(kept))
 
 
 def take_cell(network: Framed, model: str) -> None:

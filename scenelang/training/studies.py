@@ -144,7 +144,7 @@ class Study:
 
     Args:
         config: what to train.
-        folder: gets ``checkpoint.safetensors`` and ``log.jsonl``; None keeps nothing.
+        folder: gets ``checkpoint.safetensors``; None keeps nothing.
         device: torch device.
         perceptual: distance of two batches of pictures (B, 3, R, R) in [0, 1], for `config.perceptual`.
     """
@@ -177,7 +177,10 @@ class Study:
             self._resume(folder / "checkpoint.safetensors", device)
 
     def run(self, seconds: float = math.inf, save_every_s: float = 60.0) -> Iterator[Progress]:
-        """Train until the budget is spent, or so many more seconds of it; yields after every step."""
+        """Train until the budget is spent, or so many more seconds of it; yields after every step.
+
+        Checkpoints are ``save_every_s`` apart at most; early ones come when the time of this run has doubled.
+        """
         used = unsaved = 0.0
         while self.progress.seconds < self.config.seconds:
             started = time.process_time()  # of the step alone: whoever iterates may evaluate between
@@ -194,7 +197,7 @@ class Study:
             self.progress = Progress(self.progress.step + 1, self.progress.seconds + spent, loss.item())
             used, unsaved = used + spent, unsaved + spent
             yield self.progress
-            if unsaved > save_every_s or used > seconds:
+            if unsaved > min(save_every_s, used - unsaved) or used > seconds:
                 self.save()
                 unsaved = 0.0
             if used > seconds:

@@ -74,11 +74,13 @@ def test_train(folder: Folder) -> None:
     arguments = ("train", tiny_config(folder), "-o", "run", "--device", "cpu", "--every", "2")
     result = folder.run(*arguments)
     assert result.exit_code == 0
+    assert result.stderr.startswith("starting the training of shapes2d at step 0 of 6, on cpu, in run\n")
     assert "2 of 6 steps" in result.stderr
     assert result.stdout.startswith("done, mean loss ")
     weights = Path("run/weights.safetensors").read_bytes()
     again = folder.run(*arguments)
     assert again.exit_code == 0
+    assert again.stderr == "going on with the training of shapes2d at step 6 of 6, on cpu, in run\n"
     assert Path("run/weights.safetensors").stat().st_size == len(weights)
 
 

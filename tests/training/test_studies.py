@@ -75,6 +75,12 @@ def test_it_resumes_where_it_was(tmp_path: Path) -> None:
     assert rest == pytest.approx(whole[5:], rel=1e-3)
 
 
+def test_a_killed_study_leaves_a_checkpoint(tmp_path: Path) -> None:
+    """Long before the interval ends."""
+    list(itertools.islice(Study(config(), tmp_path).run(), 4))
+    assert 0 < Study(config(), tmp_path).progress.step <= 4
+
+
 def test_another_configuration_is_refused(tmp_path: Path) -> None:
     study = Study(config(), tmp_path)
     next(study.run())

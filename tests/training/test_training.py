@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -69,6 +71,45 @@ def test_a_training_that_was_stopped_goes_on_as_if_it_had_not(tmp_path: Path) ->
         assert torch.equal(tensor, parts[name]), name
 
 
+class Killed(BaseException):
+    """Raised where a process would be killed."""
+
+
+def told(folder: Path) -> list[dict[str, float]]:
+    """The log, without its times."""
+    lines = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
+    return [{key: value for key, value in line.items() if key != "seconds"} for line in lines]
+
+
+@pytest.mark.parametrize("at", [2, 9])
+def test_a_killed_training_leaves_a_checkpoint_and_one_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int
+) -> None:
+    """Killed long before the interval ends; the log is that of a training that was not."""
+    config = replace(tiny_config(), phases=(Phase(12, 3, 4),))
+    train(config, tmp_path / "whole", report_every=2)
+    calls = 0
+
+    def killed(*arguments: Any) -> Batch:
+        nonlocal calls
+        calls += 1
+        if calls > at:
+            raise Killed
+        return random_batch(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("scenelang.training.loop.random_batch", killed)
+        patch.setattr("time.perf_counter", lambda: float(calls))
+        with pytest.raises(Killed):
+            train(config, tmp_path / "parts", report_every=2)
+    with (tmp_path / "parts" / "log.jsonl").open("a") as log:
+        log.write('{"iterat')
+    reached: list[int] = []
+    train(config, tmp_path / "parts", report_every=2, report=lambda i, *_: reached.append(i))
+    assert at / 2 <= reached[0] <= at
+    assert told(tmp_path / "parts") == told(tmp_path / "whole")
+
+
 def test_a_checkpoint_of_another_configuration_is_refused(tmp_path: Path) -> None:
     train(tiny_config(), tmp_path, budget_s=0.0)
     with pytest.raises(ValueError, match="another configuration"):
@@ -97,7 +138,7 @@ def test_training_learns(tmp_path: Path) -> None:
         scenes=SceneConfig(points=64),
     )
     losses: list[float] = []
-    train(config, tmp_path, report=lambda i, n, s, parts: losses.append(parts["alone"]), report_every=25)
+    train(config, tmp_path, report=lambda i, n, s, parts: losses.extend(parts.values()), report_every=25)
     assert losses[-1] < losses[0] * 2 / 3
 
 
