@@ -3,7 +3,7 @@
 python benchmarks/everything.py -o out                 about ten minutes: a budget for seeing that it runs
 python benchmarks/everything.py -o out --budget 6      the paper's methods six processor minutes each
 
-Trains every design of `scenelang experiment`, draws the charts, evaluates the shipped models, runs the
+Trains every design of `scenelang lab experiment`, draws the charts, evaluates the shipped models, runs the
 stability suite, and measures the frontier. Everything is written under the folder; what was trained before is
 not trained again.
 """
@@ -28,6 +28,7 @@ def commands(out: Path, budget: float, scenes: int) -> list[list[str]]:
     few = max(1, scenes // 20)
     return [
         [
+            "lab",
             "experiment",
             "all",
             "-o",
@@ -37,10 +38,10 @@ def commands(out: Path, budget: float, scenes: int) -> list[list[str]]:
             "--scenes",
             f"{max(8, scenes)}",
         ],
-        ["chart", f"{out}/experiments"],
-        ["eval", "shapes2d", "--all-sets", "--scenes", f"{max(2, scenes // 5)}", "-o", f"{out}/eval"],
-        ["stability", "shapes2d", "--scenes", f"{few}", "-o", f"{out}/stability"],
-        ["frontier", "shapes2d", "--scenes", f"{max(2, scenes // 5)}", "-o", f"{out}/frontier"],
+        ["lab", "chart", f"{out}/experiments"],
+        ["lab", "eval", "shapes2d", "--all-sets", "--scenes", f"{max(2, scenes // 5)}", "-o", f"{out}/eval"],
+        ["lab", "stability", "shapes2d", "--scenes", f"{few}", "-o", f"{out}/stability"],
+        ["lab", "frontier", "shapes2d", "--scenes", f"{max(2, scenes // 5)}", "-o", f"{out}/frontier"],
     ]
 
 

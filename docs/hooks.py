@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
-from scenelang.cli.main import COMMANDS, cli
+from scenelang.cli.main import Commands, cli
 
 ROOT = Path(__file__).parents[1]
 CODE_PAGES = "scenelang/diagnostics/pages"
@@ -66,12 +67,19 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def commands_page() -> str:
     """Every command with the text of its ``--help``."""
     parts = ["# Commands\n\nWhat `scenelang COMMAND --help` says.\n"]
-    for name, summary in COMMANDS.items():
-        command = cli.get_command(click.Context(cli), name)
-        assert command is not None, name
-        context = click.Context(command, info_name=f"scenelang {name}", terminal_width=100)
-        parts.append(f"## {name}\n\n{summary}\n\n```text\n{command.get_help(context)}\n```\n")
+    parts += _told(cli, "scenelang")
     return "\n".join(parts)
+
+
+def _told(group: Commands, path: str) -> Iterator[str]:
+    for name, summary in group.table.items():
+        command = group.get_command(click.Context(group), name)
+        assert command is not None, name
+        context = click.Context(command, info_name=f"{path} {name}", terminal_width=100)
+        title = f"{path} {name}".removeprefix("scenelang ")
+        yield f"## {title}\n\n{summary}\n\n```text\n{command.get_help(context)}\n```\n"
+        if isinstance(command, Commands):
+            yield from _told(command, f"{path} {name}")
 
 
 def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:

@@ -20,7 +20,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from scenelang.evaluation.frontier import Frontier, Point, between, frontier_path
+from scenelang.measure.frontier import Frontier, Point, between, frontier_path
 
 HERE = Path(__file__).parent
 PAGE = HERE / "frontier.md"
@@ -30,7 +30,7 @@ BASE = "shapes2d"
 
 def measure(scenes: int) -> None:
     """Measure, ship, verify."""
-    command = [sys.executable, "-m", "scenelang", "frontier", BASE]
+    command = [sys.executable, "-m", "scenelang", "lab", "frontier", BASE]
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         subprocess.run([*command, "-o", folder, "--scenes", str(scenes)], check=True)

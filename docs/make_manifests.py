@@ -3,9 +3,9 @@
 python docs/make_manifests.py            writes scenelang/models/*/manifest.json
 python docs/make_manifests.py --check    fails where one is out of date
 
-Ranges and what lies beyond them come from docs/results/stability.json (`scenelang stability`), errors on
-each set from docs/results/*.json and docs/results/NAME/*.json (`scenelang eval`). Models that the suite was
-not run on keep the ranges that they were trained in.
+Ranges and what lies beyond them come from docs/results/stability.json (`scenelang lab stability`), errors
+on each set from docs/results/*.json and docs/results/NAME/*.json (`scenelang lab eval`). Models that the
+suite was not run on keep the ranges that they were trained in.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from scenelang.evaluation.metrics import MOST_DB
-from scenelang.evaluation.ranges import measured_ranges
-from scenelang.evaluation.sets import SETS
+from scenelang.lab.stability.ranges import measured_ranges
+from scenelang.measure.metrics import MOST_DB
+from scenelang.measure.sets import SETS
 from scenelang.models.manifest import ROOT, Manifest, available
 
 RESULTS = Path(__file__).parent / "results"

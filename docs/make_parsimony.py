@@ -3,8 +3,9 @@
 python docs/make_parsimony.py
 python docs/make_parsimony.py --measure
 
-`plans.json` is measured here with --measure; `experiments/parts.json` is what `scenelang experiment parts`
-writes, and `passes.json` what `python -m tests.passes.prove` writes. docs/make_pictures.py draws the chart.
+`plans.json` is measured here with --measure; `experiments/parts.json` is what
+`scenelang lab experiment parts` writes, and `passes.json` what `python -m tests.passes.prove` writes.
+docs/make_pictures.py draws the chart.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scenelang.evaluation.parsimony import (
+from scenelang.files import write_whole
+from scenelang.lab.parsimony import (
     WAYS,
     measure_examples,
     size_groups,
@@ -25,7 +27,6 @@ from scenelang.evaluation.parsimony import (
     whole_psnr,
     whole_runs,
 )
-from scenelang.files import write_whole
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results"

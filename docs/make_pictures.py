@@ -31,13 +31,13 @@ from PIL import Image as pillow
 from PIL import ImageDraw, ImageFont
 
 import scenelang as nsg
-from scenelang.evaluation.chart import stability_chart
-from scenelang.evaluation.experiment_charts import experiment_chart
-from scenelang.evaluation.experiment_charts import strips as experiment_strips
-from scenelang.evaluation.frontier import Frontier, frontier_path
-from scenelang.evaluation.frontier_chart import frontier_chart
-from scenelang.evaluation.parsimony import parts_chart
-from scenelang.evaluation.run import Case, worst_sheet
+from scenelang.lab.charts import stability_chart
+from scenelang.lab.evaluate import Case, worst_sheet
+from scenelang.lab.experiments.charts import experiment_chart
+from scenelang.lab.experiments.charts import strips as experiment_strips
+from scenelang.lab.frontier.chart import frontier_chart
+from scenelang.lab.parsimony import parts_chart
+from scenelang.measure.frontier import Frontier, frontier_path
 from scenelang.models.load import load_model
 
 DOCS = Path(__file__).parent
@@ -212,7 +212,7 @@ def worst_cases(name: str, count: int) -> bytes:
 
 
 def stability() -> bytes:
-    """Charts of the stability suite, from what `scenelang stability` wrote: of every model measured."""
+    """Charts of the stability suite, from what `scenelang lab stability` wrote: of every model measured."""
     paths = sorted((DOCS / "results").glob("stability*.json"), key=lambda path: len(path.name))
     reports = [json.loads(path.read_text("utf-8")) for path in paths]
     return _few_colours(stability_chart(reports, "png"))
@@ -224,7 +224,7 @@ def _few_colours(chart: bytes) -> bytes:
 
 
 def experiments() -> dict[str, Callable[[], bytes]]:
-    """Charts of experiments, and strips of what their runs draw, from what `scenelang experiment` wrote."""
+    """Charts of experiments, and strips of what their runs draw, from what `lab experiment` wrote."""
     made: dict[str, Callable[[], bytes]] = {}
     folder = DOCS / "results" / "experiments"
     for path in sorted(folder.glob("*.json")):
@@ -239,7 +239,7 @@ def experiments() -> dict[str, Callable[[], bytes]]:
 
 
 def parts() -> bytes:
-    """What each part of the renderer buys, from what `scenelang experiment parts` wrote."""
+    """What each part of the renderer buys, from what `scenelang lab experiment parts` wrote."""
     return _few_colours(parts_chart(json.loads(PARTS.read_text("utf-8")), "png"))
 
 

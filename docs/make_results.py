@@ -3,8 +3,8 @@
 python docs/make_results.py            writes the page
 python docs/make_results.py --check    fails where it is out of date
 
-What `scenelang eval` measured lies in docs/results/, what `scenelang experiment` did in
-docs/results/experiments/; charts and strips of the latter are drawn by `scenelang chart`.
+What `scenelang lab eval` measured lies in docs/results/, what `scenelang lab experiment` did in
+docs/results/experiments/; charts and strips of the latter are drawn by `scenelang lab chart`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from scenelang.evaluation.tables import markdown, table_of
+from scenelang.lab.experiments.tables import markdown, table_of
 
 HERE = Path(__file__).parent
 WHAT = {
@@ -66,9 +66,9 @@ def experiment(name: str) -> Callable[[], str]:
         found = json.loads(path.read_text())
         scenes, side = found["runs"][0]["scenes"], found["runs"][0]["resolution"]
         said = (
-            f"`scenelang experiment {name} --budget {found['budget_s'] / 60:g}`: {scenes} scenes at {side}², "
-            f"seed {found['seed']}, {found['device']}, {found['threads']} thread, torch {found['torch']}, "
-            f"revision `{found['revision'][:8]}`"
+            f"`scenelang lab experiment {name} --budget {found['budget_s'] / 60:g}`: "
+            f"{scenes} scenes at {side}², seed {found['seed']}, {found['device']}, "
+            f"{found['threads']} thread, torch {found['torch']}, revision `{found['revision'][:8]}`"
         )
         return f"{table_of(found)}\n\n{said}"
 

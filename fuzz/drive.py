@@ -14,7 +14,7 @@ from random import Random
 
 OWN_SHARE = 0.7
 """Share of mutations that know the structure; the others are libFuzzer's."""
-LEFT_OUT = ("scenelang.training", "scenelang.evaluation", "scenelang.cli", "scenelang.__main__")
+LEFT_OUT = ("scenelang.training", "scenelang.measure", "scenelang.lab", "scenelang.cli", "scenelang.__main__")
 
 
 def main(name: str, folder: Path, seed: int, options: list[str]) -> None:

@@ -37,8 +37,9 @@ ORDER = (
     "scenelang.backend",
     "scenelang.animation",
     "scenelang.watching",
-    "scenelang.evaluation",
+    "scenelang.measure",
     "scenelang.cli",
+    "scenelang.lab",
 )
 # The reference defines the training images; what is measured against it may not draw with it.
 APART = (("scenelang.renderers", "scenelang.reference"), ("scenelang.reference", "scenelang.renderers"))
@@ -52,8 +53,9 @@ MAY_BE_HEAVY = (
     "scenelang.backend",
     "scenelang.animation",
     "scenelang.watching",
-    "scenelang.evaluation",
+    "scenelang.measure",
     "scenelang.cli",
+    "scenelang.lab",
 )
 
 
@@ -106,6 +108,17 @@ def test_reference_and_renderers_stay_apart() -> None:
         if inside(module, source)
         for target, line in imports(path)
         if inside(target, forbidden)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_nothing_outside_imports_the_laboratory() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line} imports {target}"
+        for module, path in MODULES.items()
+        if not inside(module, "scenelang.lab")
+        for target, line in imports(path)
+        if inside(target, "scenelang.lab")
     ]
     assert not wrong, "\n".join(wrong)
 

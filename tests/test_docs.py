@@ -103,9 +103,9 @@ def commands() -> list[tuple[str, str]]:
 
 
 @cache
-def help_of(subcommand: str) -> str:
+def help_of(*subcommand: str) -> str:
     code = "from scenelang.cli.main import main; main()"
-    arguments = [sys.executable, "-c", code, subcommand, "--help"]
+    arguments = [sys.executable, "-c", code, *subcommand, "--help"]
     shown = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert shown.returncode == 0, shown.stderr
     return shown.stdout
@@ -124,7 +124,7 @@ def test_commands_name_what_exists(place: str, command: str) -> None:
         place
     )
     if program == "scenelang":
-        options = help_of(words[1])
+        options = help_of(*words[1 : 3 if words[1] == "lab" else 2])
         for word in words[2:]:
             if re.match(r"-{1,2}[A-Za-z]", word):
                 name = word.partition("=")[0]

@@ -25,7 +25,7 @@ PAGES = ("index", "tutorial", "cookbook", "embedding", "language", "formatting",
 SLOW = ("animation",)
 _BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```\n(?:\n```text\n(.*?)^```$)?", re.MULTILINE | re.DOTALL)
 VENV = ".venv/bin/"
-_LONG = {"watch", "train", "eval", "lsp"}  # commands that do not end, or not soon
+_LONG = {"watch", "train", "lab", "lsp"}  # commands that do not end, or not soon
 _OTHERS = {"python3", "python", "pip", "git", "mkdocs"}  # parsed by test_docs.py, not run here
 
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from scenelang.backend.render import Samples
-    from scenelang.evaluation.frontier import Frontier, Point
-    from scenelang.evaluation.frontier_choose import Choice, Offer
+    from scenelang.measure.choose import Choice, Offer
+    from scenelang.measure.frontier import Frontier, Point
     from scenelang.program.program import Program
 
 
@@ -81,8 +81,8 @@ class Chooser:
         Args:
             job: compiled, without errors.
         """
-        from scenelang.evaluation.frontier import load_frontier
-        from scenelang.evaluation.frontier_choose import NothingFits
+        from scenelang.measure.choose import NothingFits
+        from scenelang.measure.frontier import load_frontier
 
         program = job.program
         assert program is not None
@@ -109,7 +109,7 @@ class Chooser:
 
     def _chosen(self, frontier: Frontier, job: Job, program: Program) -> tuple[Choice, Program]:
         """The best choice whose model draws the scene without further warnings, and its Program."""
-        from scenelang.evaluation.frontier_choose import Wanted, choose
+        from scenelang.measure.choose import Wanted, choose
 
         refused: dict[str, str] = {}
         found = list(self._offers(frontier, job, program, refused))
@@ -125,8 +125,8 @@ class Chooser:
     def _offers(
         self, frontier: Frontier, job: Job, program: Program, refused: dict[str, str]
     ) -> Iterator[Offer]:
-        from scenelang.evaluation.frontier_choose import offers, refusal
-        from scenelang.evaluation.frontier_cost import load_of
+        from scenelang.measure.choose import offers, refusal
+        from scenelang.measure.cost import load_of
         from scenelang.models.manifest import available, load_manifest
 
         scene = job.source.scene if job.source is not None else None
@@ -151,8 +151,8 @@ class Chooser:
 
     def _machine(self, frontier: Frontier) -> float:
         if self._scale is None:
-            from scenelang.evaluation.frontier_choose import machine_scale
-            from scenelang.evaluation.frontier_cost import yardstick
+            from scenelang.measure.choose import machine_scale
+            from scenelang.measure.cost import yardstick
 
             self._scale = machine_scale(frontier, yardstick())
         return self._scale

@@ -10,10 +10,7 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from scenelang.cli.inputs import Request
-    from scenelang.image import Image
 
 
 @click.command("compare")
@@ -36,8 +33,8 @@ def command(
     Prints PSNR (at most 50 dB), SSIM and FLIP. Transparent pictures are compared over white.
     """
     from scenelang.cli.clock import Clock
-    from scenelang.cli.eval import need_metrics
     from scenelang.cli.inputs import read_input, unused_defines
+    from scenelang.cli.needs import need_metrics
     from scenelang.cli.say import say_diagnostics
     from scenelang.diagnostics.diagnostic import SceneError
 
@@ -49,8 +46,8 @@ def command(
         ctx.exit(1)
     from scenelang.backend.exact import draw_exact
     from scenelang.backend.neural import choose_device, draw_program, open_model
-    from scenelang.evaluation.metrics import measure
-    from scenelang.evaluation.sheet import side_by_side
+    from scenelang.measure.metrics import measure, over_white
+    from scenelang.measure.sheet import side_by_side
     from scenelang.program.compile import compile_scene
 
     try:
@@ -62,20 +59,11 @@ def command(
         ctx.exit(1)
     say_diagnostics(found.diagnostics)
     opened = open_model(program.model, choose_device(device))
-    picture = _over_white(draw_program(program, opened, threads=threads).image)
-    exact = _over_white(draw_exact(found.scene, spans=found.spans, model=request.model))
+    picture = over_white(draw_program(program, opened, threads=threads).image)
+    exact = over_white(draw_exact(found.scene, spans=found.spans, model=request.model))
     figures = measure(picture, exact)
     text = f"PSNR {figures['psnr']:.2f} dB  SSIM {figures['ssim']:.4f}  FLIP {figures['flip']:.4f}"
     stem = "stdin" if scene == "-" else Path(scene).stem
     target = out if out is not None else Path(f"{stem}-compare.png")
     side_by_side(picture, exact, text).save(target)
     click.echo(f"{text}  {target}")
-
-
-def _over_white(image: Image) -> np.ndarray:
-    """Colours (H, W, 3) of a picture that may have alpha."""
-    if image.shape[2] == 3:
-        return image
-    alpha = image[..., 3:]
-    over: np.ndarray = image[..., :3] * alpha + (1 - alpha)
-    return over

@@ -42,7 +42,7 @@ def command(
     if made.program is None or made.source.scene is None or made.diagnostics.errors:
         ctx.exit(1)
     from scenelang.backend.neural import choose_device, open_model, usable_cores
-    from scenelang.evaluation.plan import choice, drawing_cost, stages, token_counts
+    from scenelang.measure.plan import choice, drawing_cost, stages, token_counts
 
     scene, program = made.source.scene, made.program
     opened = open_model(program.model, choose_device(device))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import io
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from keyword import iskeyword
 from typing import Any, Final
@@ -15,31 +15,29 @@ import click
 from scenelang.backend.errors import RenderError
 from scenelang.files import NotWritten
 
-# Command -> what `--help` says. Each lies in `scenelang/cli/<command>.py` as `command`, imported when called;
+# Command -> what `--help` says. Each lies in a file of its name as `command`, imported when it is called;
 # a keyword's file ends in an underscore, and a dash is one.
 COMMANDS: Final = {
     "render": "Draw scenes or compiled programs.",
-    "check": "Report what is wrong with scenes.",
-    "fmt": "Lay scenes out in the one canonical way.",
-    "compile": "Compile a scene to a program.",
-    "compare": "Draw a scene beside its exact picture.",
-    "models": "List models, or tell about one.",
-    "eval": "Measure a model on unseen scenes.",
-    "frontier": "Measure speed against error of every way to draw.",
-    "stability": "Measure a model far beyond its training.",
-    "train": "Train a model's weights.",
-    "experiment": "Train several designs alike and compare them.",
-    "chart": "Draw tables and charts of experiments.",
     "watch": "Draw a scene again whenever it is saved.",
-    "lsp": "Serve editors over the Language Server Protocol.",
+    "check": "Report what is wrong with scenes.",
     "explain": "Say what a diagnostic's code means.",
+    "fmt": "Lay scenes out in the one canonical way.",
+    "lsp": "Serve editors over the Language Server Protocol.",
     "convert": "Write a scene as text, JSON or Python.",
     "import": "Make a scene of a glTF file's nodes.",
+    "schema": "Print the JSON Schema of scenes.",
+    "compile": "Compile a scene to a program.",
+    "compare": "Draw a scene beside its exact picture.",
+    "explain-plan": "Say what drawing a scene takes.",
     "dump": "Show what a scene is after each stage.",
     "graph": "Draw the graph of a scene.",
-    "explain-plan": "Say what drawing a scene takes.",
-    "schema": "Print the JSON Schema of scenes.",
+    "models": "List models, or tell about one.",
+    "train": "Train a model's weights.",
+    "lab": "Measure models and compare designs: the laboratory.",
 }
+ELSEWHERE: Final = {"lab": "scenelang.lab.commands"}  # nothing else here knows of the laboratory
+MOVED: Final = {name: f"lab {name}" for name in ("eval", "frontier", "stability", "experiment", "chart")}
 INTERRUPTED: Final = 130  # as shells report it
 
 
@@ -49,32 +47,59 @@ class Trouble(click.ClickException):
     exit_code = 2
 
 
-class _Commands(click.Group):
+class Commands(click.Group):
+    """Commands that are imported when they are called.
+
+    Args:
+        package: that their files lie in.
+        table: command -> what `--help` says.
+        elsewhere: modules of commands that do not lie there.
+        moved: what commands of before are called now.
+    """
+
+    def __init__(
+        self,
+        *,
+        package: str,
+        table: Mapping[str, str],
+        elsewhere: Mapping[str, str] | None = None,
+        moved: Mapping[str, str] | None = None,
+        **options: Any,
+    ) -> None:
+        super().__init__(**options)
+        self.package, self.table = package, table
+        self.elsewhere, self.moved = elsewhere or {}, moved or {}
+
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
+        return list(self.table)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
+        if cmd_name not in self.table:
             return None
-        module = f"scenelang.cli.{cmd_name.replace('-', '_')}{'_' if iskeyword(cmd_name) else ''}"
+        file = f"{cmd_name.replace('-', '_')}{'_' if iskeyword(cmd_name) else ''}"
+        module = self.elsewhere.get(cmd_name, f"{self.package}.{file}")
         command: click.Command = importlib.import_module(module).command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl(list(self.table.items()))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+        if args and args[0] not in self.table and not args[0].startswith("-"):
             from difflib import get_close_matches
 
-            near = get_close_matches(args[0], COMMANDS, 1)
+            if args[0] in self.moved:
+                ctx.fail(f"'{args[0]}' is now '{ctx.command_path} {self.moved[args[0]]}'.")
+            near = get_close_matches(args[0], self.table, 1)
             advice = f" Did you mean '{near[0]}'?" if near else ""
             ctx.fail(f"No such command '{args[0]}'.{advice}")
         return super().resolve_command(ctx, args)
 
+
+class _Commands(Commands):
     def make_context(
         self,
         info_name: str | None,
@@ -122,7 +147,12 @@ def describe(error: OSError) -> str:
 
 
 @click.group(
-    cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+    cls=_Commands,
+    package="scenelang.cli",
+    table=COMMANDS,
+    elsewhere=ELSEWHERE,
+    moved=MOVED,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(package_name="scenelang", message="%(prog)s %(version)s")
 def cli() -> None:

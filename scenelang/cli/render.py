@@ -116,8 +116,8 @@ def command(
       FOLDER/                       FOLDER/STEM-0000.png and so on
     A run that was interrupted goes on where it stopped.
 
-    With --max-ms or --max-flip each scene is drawn by what `scenelang frontier` measured to suffice, model
-    and samples; -v says which, why, and what was next.
+    With --max-ms or --max-flip each scene is drawn by what was measured to suffice, model and samples; -v
+    says which, why, and what was next.
     """
     from scenelang.cli.animation import Wanted, wanted_target
     from scenelang.cli.choosing import Limits, check_options

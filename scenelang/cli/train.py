@@ -16,41 +16,48 @@ from scenelang.cli import options
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-    from scenelang.training.config import StudentFile
-
 Report = Callable[[int, int, float, dict[str, float]], None]
 
 
+def training(made: Callable[..., None]) -> Callable[..., None]:
+    """The arguments and options of commands that train."""
+    for option in (
+        click.pass_context,
+        click.option(
+            "--save-every",
+            type=click.FloatRange(0),
+            default=60.0,
+            show_default=True,
+            metavar="SECONDS",
+            help="Most time between checkpoints; the first comes after the first step.",
+        ),
+        click.option(
+            "--every", type=click.IntRange(1), default=500, show_default=True, help="Steps between reports."
+        ),
+        options.threads,
+        options.device,
+        click.option(
+            "--budget",
+            type=click.FloatRange(0, min_open=True),
+            metavar="MINUTES",
+            help="Stop after this time, with a checkpoint.",
+        ),
+        click.option(
+            "-o",
+            "--out",
+            required=True,
+            type=click.Path(file_okay=False, path_type=Path),
+            metavar="FOLDER",
+            help="Gets the checkpoint, the log and at the end the weights.",
+        ),
+        click.argument("config"),
+    ):
+        made = option(made)
+    return made
+
+
 @click.command("train")
-@click.argument("config")
-@click.option(
-    "-o",
-    "--out",
-    required=True,
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="FOLDER",
-    help="Gets the checkpoint, the log and at the end the weights.",
-)
-@click.option(
-    "--budget",
-    type=click.FloatRange(0, min_open=True),
-    metavar="MINUTES",
-    help="Stop after this time, with a checkpoint.",
-)
-@options.device
-@options.threads
-@click.option(
-    "--every", type=click.IntRange(1), default=500, show_default=True, help="Steps between reports."
-)
-@click.option(
-    "--save-every",
-    type=click.FloatRange(0),
-    default=60.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="Most time between checkpoints; the first comes after the first step.",
-)
-@click.pass_context
+@training
 def command(
     ctx: click.Context,
     config: str,
@@ -70,30 +77,25 @@ def command(
     from pydantic import ValidationError
 
     from scenelang.backend.neural import choose_device, keep_memory
-    from scenelang.training.config import StudentFile, read_config
+    from scenelang.training.config import config_data, is_study, read_config
     from scenelang.training.loop import train
 
+    if is_study(config_data(config)):
+        raise click.UsageError(f"'{config}' configures a study; scenelang lab train trains it.")
     try:
         wanted = read_config(config)
     except ValidationError as error:
-        raise click.UsageError(f"bad configuration '{config}': {_first(error)}") from None
+        raise click.UsageError(f"bad configuration '{config}': {first_mistake(error)}") from None
     keep_memory()
     torch.set_num_threads(threads or 1)
     place = choose_device(device)
-    budget_s = math.inf if budget is None else 60 * budget
-    if isinstance(wanted, StudentFile):
-        try:
-            _student(wanted, out, budget_s, place, every, save_every)
-        except ValueError as error:
-            raise click.UsageError(str(error)) from None
-        ctx.exit(0)
     last: dict[str, float] = {}
     try:
         with _reporter() as report:
 
             def note(done: int, total: int, seconds: float, parts: dict[str, float]) -> None:
                 if not parts:
-                    _begin(wanted.model, f"step {done:,} of {total:,}", done, place, out)
+                    begin(wanted.model, f"step {done:,} of {total:,}", done, place, out)
                     return
                 last.clear()
                 last.update(parts)
@@ -102,7 +104,7 @@ def command(
             finished = train(
                 wanted,
                 out,
-                budget_s=budget_s,
+                budget_s=math.inf if budget is None else 60 * budget,
                 device=place,
                 report=note,
                 save_every_s=save_every,
@@ -115,7 +117,7 @@ def command(
         raise
     reached = f", mean loss {_losses(last)}" if last else ""
     if finished:
-        from scenelang.evaluation.record import record_measured
+        from scenelang.measure.record import record_measured
 
         weights = out / "weights.safetensors"
         figures = record_measured(weights, wanted.cell or wanted.model)
@@ -126,46 +128,10 @@ def command(
     ctx.exit(0)
 
 
-def _begin(model: str, reached: str, done: int, device: str, out: Path) -> None:
+def begin(model: str, reached: str, done: int, device: str, out: Path) -> None:
     """Say whether a training starts or goes on."""
     what = "going on with" if done else "starting"
     click.echo(f"{what} the training of {model} at {reached}, on {device}, in {out}", err=True)
-
-
-def _student(
-    file: StudentFile, out: Path, budget_s: float, device: str, every: int, save_every: float
-) -> None:
-    """Train a student, or go on with it."""
-    from scenelang.training.export import export
-    from scenelang.training.studies import Study
-
-    config = file.study
-    perceptual = None
-    if config.perceptual:
-        from scenelang.evaluation.lpips import LpipsError, load_lpips
-
-        try:
-            perceptual = load_lpips("alexnet").to(device)
-        except LpipsError as error:
-            raise ValueError(str(error)) from None
-    study = Study(config, out, device, perceptual)
-    reached = f"{study.progress.seconds:.0f} of {config.seconds:g} s of processor time"
-    _begin(file.model, reached, study.progress.step, device, out)
-    total = 0.0
-    for progress in study.run(budget_s, save_every):
-        total += progress.loss
-        if progress.step % every == 0:
-            mean, total = total / every, 0.0
-            click.echo(
-                f"{progress.step:,} steps, {progress.seconds:.0f} of {config.seconds:g} s, "
-                f"mean loss {mean:.4g}",
-                err=True,
-            )
-    if study.progress.seconds < config.seconds:
-        click.echo(f"out of time: the same command goes on from the checkpoint in {out}")
-        return
-    export(study, file, out / "weights.safetensors", device)
-    click.echo(f"done: {out / 'weights.safetensors'}")
 
 
 @contextmanager
@@ -191,7 +157,7 @@ def _losses(parts: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.4g}" for name, value in parts.items())
 
 
-def _first(error: ValidationError) -> str:
+def first_mistake(error: ValidationError) -> str:
     """The first mistake that was found, in a line."""
     mistake = error.errors(include_url=False)[0]
     where = ".".join(str(part) for part in mistake["loc"])

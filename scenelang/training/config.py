@@ -12,7 +12,6 @@ from pydantic.dataclasses import dataclass as checked
 from scenelang.files import read_regular
 from scenelang.renderers.framed import FramedConfig
 from scenelang.training.scenes import SceneConfig
-from scenelang.training.studies import StudyConfig
 
 CONFIGS = Path(__file__).parent / "configs"
 _MOST_BYTES = 1 << 20
@@ -72,29 +71,28 @@ class TrainConfig:
         return asdict(self)
 
 
-@checked(frozen=True, config={"extra": "forbid"})
-class StudentFile:
-    """A model of another renderer or lifting, trained by a study.
+def config_data(name: str) -> bytes:
+    """The text of a configuration, by path or by the name of a shipped one.
 
-    Args:
-        model: name of the model that the weights are for.
-        study: what is trained.
+    Raises:
+        OSError: there is no such file, or it cannot be read.
     """
+    path = Path(name)
+    if not path.suffix and (CONFIGS / f"{name}.json").exists():
+        path = CONFIGS / f"{name}.json"
+    return read_regular(path, _MOST_BYTES)
 
-    model: str
-    study: StudyConfig
+
+def is_study(data: bytes) -> bool:
+    """Whether a configuration is one of a study, which the laboratory trains."""
+    return b'"study"' in data
 
 
-def read_config(name: str) -> TrainConfig | StudentFile:
+def read_config(name: str) -> TrainConfig:
     """Read a configuration by path or by the name of a shipped one.
 
     Raises:
         OSError: there is no such file, or it cannot be read.
         pydantic.ValidationError: a key is unknown or a value has the wrong type.
     """
-    path = Path(name)
-    if not path.suffix and (CONFIGS / f"{name}.json").exists():
-        path = CONFIGS / f"{name}.json"
-    data = read_regular(path, _MOST_BYTES)
-    kind = StudentFile if b'"study"' in data else TrainConfig
-    return TypeAdapter[TrainConfig | StudentFile](kind).validate_json(data)
+    return TypeAdapter[TrainConfig](TrainConfig).validate_json(config_data(name))

@@ -11,7 +11,7 @@ import pytest
 import scenelang
 from scenelang.backend.errors import RenderError
 from scenelang.backend.neural import draw_program, open_model
-from scenelang.evaluation.metrics import psnr
+from scenelang.measure.metrics import psnr
 from scenelang.models.load import Model
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene

@@ -54,6 +54,36 @@ def test_explain(folder: Folder) -> None:
     assert folder.run("explain", "E9999").exit_code == 2
 
 
+@pytest.mark.parametrize("name", ["eval", "frontier", "stability", "experiment", "chart"])
+def test_old_names_answer_with_the_new_ones(folder: Folder, name: str) -> None:
+    result = folder.run(name, "shapes2d")
+    assert result.exit_code == 2
+    assert f"'{name}' is now 'scenelang lab {name}'." in result.stderr
+    assert folder.run("lab", name, "--help").exit_code == 0
+    assert name not in folder.run("--help").stdout
+
+
+def test_studies_are_trained_in_the_laboratory(folder: Folder) -> None:
+    result = folder.run("train", "shapes2d-streaming", "-o", "run")
+    assert result.exit_code == 2
+    assert "scenelang lab train trains it" in result.stderr
+    from scenelang.training.config import CONFIGS
+
+    config = json.loads((CONFIGS / "shapes2d-reading.json").read_text())
+    config["study"] |= {"scenes": 1, "points": 4}
+    arguments = (
+        "lab",
+        "train",
+        folder.write("tiny.json", json.dumps(config)),
+        "-o",
+        "run",
+        "--device",
+        "cpu",
+    )
+    result = folder.run(*arguments, "--budget", "1e-9")
+    assert result.stdout.startswith("out of time"), result.output
+
+
 def tiny_config(folder: Folder, **changes: object) -> str:
     from scenelang.training.config import CONFIGS
 
@@ -66,7 +96,7 @@ def tiny_config(folder: Folder, **changes: object) -> str:
 @pytest.fixture
 def one_scene(monkeypatch: pytest.MonkeyPatch) -> None:
     """What was trained is measured on one scene of each set, not on many."""
-    monkeypatch.setattr("scenelang.evaluation.record.SCENES", 1)
+    monkeypatch.setattr("scenelang.measure.record.SCENES", 1)
 
 
 @pytest.mark.usefixtures("one_scene")

@@ -29,7 +29,7 @@ COMMANDS = [
     ("graph", "{}.nsg", "-o", "out.mmd"),
     ("import", "{}.glb", "-o", "out.nsg"),
     ("train", "{}.json", "-o", "out"),
-    ("eval", "shapes2d", "--weights", "{}.safetensors", "-o", "out"),
+    ("lab", "eval", "shapes2d", "--weights", "{}.safetensors", "-o", "out"),
 ]
 SUFFIXES = ("nsg", "json", "safetensors", "glb")
 

@@ -137,7 +137,9 @@ def test_the_shipped_weights_are_none_of_these() -> None:
 )
 def test_commands_say_so(folder: Folder, name: str) -> None:
     Path("bad.safetensors").write_bytes(HARM[name])
-    result = folder.run("eval", "shapes2d", "--scenes", "1", "--weights", "bad.safetensors", "-o", "out")
+    result = folder.run(
+        "lab", "eval", "shapes2d", "--scenes", "1", "--weights", "bad.safetensors", "-o", "out"
+    )
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1
     assert result.stderr.startswith("Error: ")

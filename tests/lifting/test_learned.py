@@ -8,8 +8,8 @@ import torch
 
 from scenelang.graph import affine
 from scenelang.graph.steps import Affine, Warp
+from scenelang.lab.designs.encoders import Encoders, LiftingConfig
 from scenelang.lifting.learned import GEOMETRY_INPUTS, lift_geometry, lift_material, read_lifting
-from scenelang.training.encoders import Encoders, LiftingConfig
 
 
 def encoders(geometry: int = 8, material: int = 4) -> Encoders:

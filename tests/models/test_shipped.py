@@ -7,7 +7,7 @@ import pytest
 
 import scenelang as nsg
 from scenelang.backend.neural import draw_program, open_model
-from scenelang.evaluation.run import draw_scene, reference_of, scenes_of
+from scenelang.measure.scenes import draw_scene, reference_of, scenes_of
 from scenelang.models.manifest import available, load_manifest
 from scenelang.program.compile import compile_scene
 

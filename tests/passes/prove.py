@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.evaluation.plan import count
 from scenelang.files import write_whole
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph, Leaf
 from scenelang.graph.steps import Step
+from scenelang.measure.plan import count
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
 from scenelang.passes.context import Context

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.evaluation.sets import SETS, random_scene
 from scenelang.graph.lower import lower
+from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.manifest import load_manifest
 from scenelang.reference.distance import SECTORS, leaf_distance
 from scenelang.reference.image import reference_image

@@ -1,0 +1,1 @@
+"""The laboratory: what measures, compares and trains for comparison. Nothing outside imports it."""

@@ -1,0 +1,86 @@
+"""Charts of measurements, drawn from their JSON by matplotlib as PNG or SVG."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from scenelang.measure.metrics import MOST_DB
+
+INK, FAINT, LINE, WARN = "#22303c", "#c9d1d8", "#1f77b4", "#c8452f"
+COLUMNS = 3
+
+
+def stability_chart(results: Sequence[Mapping[str, Any]], kind: str) -> bytes:
+    """PSNR of every probe: the mean as a line, from the 5th percentile up shaded, the worst as dots.
+
+    Args:
+        results: of `run_stability`, one a model; the first is drawn in full.
+        kind: "png" or "svg".
+    """
+    plt = pyplot()
+    first = results[0]
+    names = list(first["probes"])
+    lines = (len(names) + COLUMNS - 1) // COLUMNS
+    figure, axes = plt.subplots(lines, COLUMNS, figsize=(4.2 * COLUMNS, 2.7 * lines), squeeze=False)
+    lowest = min(row["psnr"]["worst"] for r in results for p in r["probes"].values() for row in p["rows"])
+    for axis, name in zip(axes.flat, names, strict=False):
+        _probe(axis, [{**r["probes"][name], "model": r["model"]} for r in results if name in r["probes"]])
+        axis.set_ylim(min(40.0, lowest - 1), MOST_DB + 1)
+    for axis in axes.flat[len(names) :]:
+        axis.set_axis_off()
+    if len(results) > 1:
+        axes.flat[0].legend(fontsize=7, frameon=False)
+    data = figure_bytes(figure, kind)
+    plt.close(figure)
+    return data
+
+
+def _probe(axis: Any, curves: Sequence[Mapping[str, Any]]) -> None:
+    first = curves[0]
+    for i, curve in enumerate(curves):
+        x = [row["value"] for row in curve["rows"]]
+        mean, p5, worst = ([row["psnr"][k] for row in curve["rows"]] for k in ("mean", "p5", "worst"))
+        (line,) = axis.plot(x, mean, marker="o", markersize=3, linewidth=1.5, label=curve["model"])
+        if i == 0:
+            axis.fill_between(x, p5, mean, color=line.get_color(), alpha=0.15, linewidth=0)
+            axis.plot(x, worst, ".", color=WARN, markersize=4)
+    values = [row["value"] for row in first["rows"]]
+    if min(values) > 0 and max(values) / min(values) > 8:
+        axis.set_xscale("log", base=2)
+    axis.set_xticks(values, [f"{v:g}" for v in values])
+    axis.minorticks_off()
+    axis.axvline(first["healthy"], color=FAINT, linewidth=5, zorder=0)
+    axis.set_title(first["title"], fontsize=8.5, color=INK)
+    axis.set_xlabel(first["quantity"], fontsize=8)
+    axis.set_ylabel("PSNR, dB", fontsize=8)
+    axis.tick_params(labelsize=7)
+    axis.grid(axis="y", color=FAINT, linewidth=0.5)
+
+
+def pyplot() -> Any:
+    """matplotlib's pyplot, drawing to files alone; the same data give the same bytes."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    import matplotlib.pyplot as plt
+
+    plt.rcParams.update(
+        {
+            "font.family": "DejaVu Sans",
+            "svg.hashsalt": "scenelang",
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "axes.edgecolor": FAINT,
+        }
+    )
+    return plt
+
+
+def figure_bytes(figure: Any, kind: str) -> bytes:
+    data = io.BytesIO()
+    figure.tight_layout()
+    about = {"Date": None} if kind == "svg" else {"Software": None}
+    figure.savefig(data, format=kind, dpi=80, metadata=about)
+    return data.getvalue()

@@ -1,0 +1,23 @@
+"""``scenelang lab COMMAND``: what measures models, compares them and trains for comparison."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import click
+
+from scenelang.cli.main import Commands
+
+TABLE: Final = {
+    "eval": "Measure a model on unseen scenes.",
+    "stability": "Measure a model far beyond its training.",
+    "frontier": "Measure speed against error of every way to draw.",
+    "experiment": "Train several designs alike and compare them.",
+    "chart": "Draw tables and charts of experiments.",
+    "train": "Train the weights of another renderer or lifting.",
+}
+
+
+@click.group("lab", cls=Commands, package="scenelang.lab.commands", table=TABLE)
+def command() -> None:
+    """Measure models and compare designs: what the figures in the documentation come from."""

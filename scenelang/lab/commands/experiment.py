@@ -1,0 +1,95 @@
+"""``scenelang lab experiment``: trainings at equal budgets, measured on the same unseen scenes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scenelang.cli import options
+from scenelang.cli.needs import need_metrics
+
+if TYPE_CHECKING:
+    from scenelang.lab.designs.studies import Study
+    from scenelang.lab.experiments.runs import Run
+
+
+@click.command("experiment")
+@click.argument("names", metavar="NAME...", nargs=-1, required=True)
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="Gets NAME.json, strips of pictures, and checkpoints to go on from.",
+)
+@click.option(
+    "--budget",
+    required=True,
+    type=click.FloatRange(0, min_open=True),
+    metavar="MINUTES",
+    help="Processor time of each training.",
+)
+@click.option(
+    "--scenes", default=200, show_default=True, type=click.IntRange(8, 10_000), help="Unseen ones, measured."
+)
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(0, 2000))
+@options.device
+@options.threads
+def command(
+    names: tuple[str, ...],
+    out: Path,
+    budget: float,
+    scenes: int,
+    seed: int,
+    device: str,
+    threads: int | None,
+) -> None:
+    """Train several renderers and liftings for the same time each and measure them alike.
+
+    NAME is one or more of overfit, compare, table1, table2, table3, table4, losses, seeds, parts, or all.
+    """
+    need_metrics()
+    import torch
+
+    from scenelang.backend.neural import choose_device, keep_memory
+    from scenelang.files import write_whole
+    from scenelang.lab.experiments.experiment import Settings, run_experiment
+    from scenelang.lab.experiments.lpips import LpipsError
+    from scenelang.lab.experiments.runs import EXPERIMENTS
+
+    wanted = list(EXPERIMENTS) if "all" in names else list(dict.fromkeys(names))
+    unknown = [name for name in wanted if name not in EXPERIMENTS]
+    if unknown:
+        raise click.UsageError(f"no experiment '{unknown[0]}'; they are {', '.join(EXPERIMENTS)}, all")
+    keep_memory()
+    torch.set_num_threads(threads or 1)
+    settings = Settings(out, scenes, choose_device(device))
+    for name in wanted:
+        try:
+            found = run_experiment(name, 60 * budget, seed, settings, _report)
+        except ValueError as error:
+            raise click.UsageError(f"{error}; choose another folder or the same budget") from None
+        except LpipsError as error:
+            if names == (name,):
+                raise click.UsageError(str(error)) from None
+            click.echo(f"{name} left out: {error}", err=True)
+            continue
+        out.mkdir(parents=True, exist_ok=True)
+        write_whole(out / f"{name}.json", (json.dumps(found, indent=1) + "\n").encode())
+        for run in found["runs"]:
+            click.echo(
+                f"{name}: {run['name']}, {run['group']}: PSNR {run['psnr']['mean']:.2f} dB, "
+                f"worst {run['psnr']['worst']:.2f}, FLIP {run['flip']['mean']:.4f}, {run['steps']:,} steps"
+            )
+
+
+def _report(run: Run, study: Study, psnr: float) -> None:
+    click.echo(
+        f"{run.name}, {run.group}: {study.progress.seconds:.0f} of {study.config.seconds:g} s, "
+        f"{study.progress.step:,} steps, PSNR {psnr:.2f} dB",
+        err=True,
+    )

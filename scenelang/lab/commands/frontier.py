@@ -1,0 +1,157 @@
+"""``scenelang lab frontier``: speed against error of every way to draw a set's scenes."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scenelang.cli.needs import need_metrics
+from scenelang.lab.commands.eval import DEFAULT_SEED
+
+if TYPE_CHECKING:
+    from scenelang.measure.frontier import Frontier
+
+VERIFY_SEED = 4042
+
+
+@click.command("frontier")
+@click.argument("model")
+@click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True)
+@click.option("--scenes", default=80, show_default=True, type=click.IntRange(1, 100_000))
+@click.option(
+    "--seed",
+    type=click.IntRange(0, 2**31 - 1),
+    help=f"Of the scenes.  [default: {DEFAULT_SEED}; {VERIFY_SEED} to verify]",
+)
+@click.option("--threads", default=1, show_default=True, type=click.IntRange(1, 256))
+@click.option("--verify", is_flag=True, help="Check that promised errors hold on other scenes.")
+@click.option(
+    "--promises",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="FILE",
+    help="Verify this frontier.json instead of the shipped one.",
+)
+@click.pass_context
+def command(
+    ctx: click.Context,
+    model: str,
+    out: Path,
+    scenes: int,
+    seed: int | None,
+    threads: int,
+    verify: bool,
+    promises: Path | None,
+) -> None:
+    """Measure time and error of every way to draw the scenes of MODEL's set, side by side, in one run.
+
+    That is all shipped models of the set, with and without skipping and with other samplings, the exact
+    reference, and the time of the paper's streaming renderer at full size. Writes frontier.json,
+    frontier.png, frontier.svg and frontier.html, which needs no other file, into OUT.
+
+    With --verify draws other scenes and counts in how many the promised errors of the shipped frontier are
+    kept, writes verified.json, and exits with 1 if that is under 95 %.
+    """
+    from scenelang.models.manifest import available, load_manifest
+
+    if promises is not None and not verify:
+        raise click.UsageError("--promises goes with --verify.")
+    known = available()
+    if model not in known:
+        raise click.UsageError(f"no model '{model}'; there is {', '.join(known)}")
+    base = load_manifest(model).set
+    if base not in known:
+        raise click.UsageError(f"no model is named like the set '{base}'")
+    from scenelang.measure.sets import SETS
+
+    if base not in SETS:
+        raise click.UsageError(f"no scenes of the set '{base}' can be made; there are {', '.join(SETS)}")
+    need_metrics()
+    out.mkdir(parents=True, exist_ok=True)
+    if verify:
+        ctx.exit(0 if _verify(base, out, scenes, seed, promises) else 1)
+    else:
+        _measure(base, out, scenes, DEFAULT_SEED if seed is None else seed, threads)
+
+
+def _measure(base: str, out: Path, scenes: int, seed: int, threads: int) -> None:
+    from scenelang.files import write_whole
+    from scenelang.lab.frontier.measure import measure_frontier
+    from scenelang.lab.frontier.page import frontier_page
+    from scenelang.measure.frontier import NAME
+
+    measured = measure_frontier(base, scenes, seed, threads, _report if sys.stderr.isatty() else None)
+    frontier = measured.frontier
+    write_whole(out / NAME, frontier.to_json().encode())
+    page = frontier_page(frontier, measured.pictures, measured.exact)
+    write_whole(out / "frontier.html", page.encode())
+    try:
+        from scenelang.lab.frontier.chart import frontier_chart
+
+        for kind in ("png", "svg"):
+            write_whole(out / f"frontier.{kind}", frontier_chart(frontier, kind))
+    except ImportError:
+        click.echo("no chart: matplotlib is missing; pip install 'scenelang[charts]'", err=True)
+    click.echo(_table(frontier))
+
+
+def _table(frontier: Frontier) -> str:
+    """All points, the fastest first."""
+    from scenelang.measure.frontier import between
+
+    lines = [f"{'':2}{'way to draw':44}{'ms':>9}{'p95':>9}{'FLIP':>9}{'promise':>9}{'PSNR':>7}{'scenes':>8}"]
+    for p in frontier.points:
+        errors = " " * 25
+        if p.flip is not None and p.psnr is not None:
+            errors = f"{p.flip.mean:9.5f}{p.flip.bound:9.5f}{p.psnr.mean:7.2f}"
+        mark = "* " if p.on_front else "  "
+        lines.append(f"{mark}{p.title:44}{p.ms.median:9.2f}{p.ms.p95:9.2f}{errors}{p.scenes:8}")
+    lines.append(
+        f"* on the front. {between(frontier.points)} points lie between the fastest and the nearest."
+    )
+    default = next((p for p in frontier.points if p.name == frontier.set), None)
+    if default is not None and default.ratio_to_streaming:
+        ratio = f"{default.ratio_to_streaming:.1f} times as fast as the paper's streaming one"
+        lines.append(f"A frame of {default.name} is {ratio}.")
+    return "\n".join(lines)
+
+
+def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path | None) -> bool:
+    from scenelang.files import read_regular, write_whole
+    from scenelang.lab.frontier.verify import KEPT, verify
+    from scenelang.measure.frontier import MOST_BYTES, Frontier, frontier_path
+
+    path = promises or frontier_path(base)
+    try:
+        frontier = Frontier.from_json(read_regular(path, MOST_BYTES))
+    except FileNotFoundError:
+        raise click.UsageError(f"'{base}' ships no frontier; measure one and give --promises") from None
+    except ValueError as error:
+        raise click.UsageError(f"'{path}' is no frontier: {error}") from None
+    try:
+        found = verify(
+            frontier,
+            base,
+            scenes,
+            VERIFY_SEED if seed is None else seed,
+            _report if sys.stderr.isatty() else None,
+        )
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    write_whole(out / "verified.json", (json.dumps(found, indent=1) + "\n").encode())
+    for case, rows in found["cases"].items():
+        click.echo(case)
+        for name, row in rows.items():
+            kept = f"{100 * row['kept']:5.1f} % of {row['scenes']}"
+            click.echo(f"  {name:40} kept in {kept}, at worst {row['worst']:.2f} of the promise")
+    least = f"every promise is kept in at least {100 * KEPT:.0f} % of the scenes"
+    click.echo(least if found["held"] else f"not {least}")
+    return bool(found["held"])
+
+
+def _report(name: str, done: int, count: int) -> None:
+    end = "\n" if done == count else ""
+    click.echo(f"\r{name}: {done}/{count}{end}", nl=False, err=True)

@@ -1,0 +1,54 @@
+"""From a finished study to weights that a model draws with."""
+
+from __future__ import annotations
+
+import platform
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from scenelang.lab.designs.config import StudentFile
+from scenelang.lab.designs.students import StreamingStudent
+from scenelang.lab.designs.studies import Study
+from scenelang.models.load import RENDERER
+from scenelang.training.checkpoint import save_tensors
+from scenelang.training.loop import revision
+
+
+def export(study: Study, file: StudentFile, path: Path, device: str = "cpu") -> None:
+    """Write the averaged weights of a study: the lifting's and the renderer's, without the levels of growing.
+
+    They are stored in half precision, which is far finer than what such a training leaves undecided.
+
+    Args:
+        study: trained.
+        file: the configuration it was made of.
+        path: of the weights.
+        device: that it was trained on.
+
+    Raises:
+        ValueError: the student is a framed one, whose weights `scenelang.training.loop` writes.
+    """
+    student = study.averaged
+    kept: dict[str, torch.Tensor] = {}
+    last = f"{RENDERER}stages.{study.config.student.streaming.resolution}."
+    if study.config.student.renderer == "framed":
+        raise ValueError("framed models are trained by a configuration with phases")
+    for name, tensor in student.state_dict().items():
+        grown = isinstance(student, StreamingStudent) and name.startswith(f"{RENDERER}stages.")
+        if not grown or name.startswith(last):
+            kept[name] = tensor.detach().half().cpu().contiguous()
+    header: dict[str, Any] = {
+        "format": 1,
+        "model": file.model,
+        "config": study.config.to_json(),
+        "iteration": study.progress.step,
+        "seconds": round(study.progress.seconds, 1),
+        "device": device,
+        "machine": platform.machine(),
+        "threads": torch.get_num_threads(),
+        "torch": torch.__version__.split("+")[0],
+        "revision": revision(),
+    }
+    save_tensors(path, kept, header)

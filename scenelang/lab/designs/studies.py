@@ -1,0 +1,321 @@
+"""Training any student on pictures for a stated budget of processor time.
+
+Each renderer is trained the way it asks for. `streaming` sees whole exact pictures and the paper's loss: a
+Gaussian negative log likelihood whose standard deviation is annealed, plus a perceptual loss where one is
+given; it may grow, resolution by resolution (Table 3 of the paper's supplement; Karras et al. 2018).
+`reading` answers random points of many scenes, by squared and absolute error against one exact sample each.
+`framed` is asked for coverage, distance and colour at points (`losses.py`); where its frames are exact it
+learns the leaves alone first, then every step by itself, then whole streams.
+
+Time is the process's processor time, which other work on the machine changes little.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from scenelang.lab.designs.pictures import (
+    PictureConfig,
+    Scenes,
+    pictures,
+    random_scenes,
+    shown,
+    stretch,
+    trace_exactly,
+)
+from scenelang.lab.designs.students import (
+    FramedStudent,
+    PointStudent,
+    RendererName,
+    StreamingStudent,
+    Student,
+    StudentConfig,
+    make_student,
+)
+from scenelang.renderers.streaming import SMALLEST
+from scenelang.training.checkpoint import load_tensors, save_tensors
+from scenelang.training.losses import leaf_loss, trace_loss
+from scenelang.training.scenes import Batch, SceneConfig, leaf_batch, points_of
+
+LEAVES_ALONE = 0.4  # share of the budget in which exact frames train on the leaves alone
+RATES: dict[RendererName, float] = {"framed": 1e-2, "streaming": 1e-3, "reading": 2e-3}
+"""Learning rate that each renderer trains best at, of those tried."""
+FORCED = 0.7  # share of the budget up to which framed streams start every step from the exact state
+WARM_UP = 0.02  # share of the budget
+SIGMA = (0.3, 0.1)  # standard deviation of the likelihood, first and last; annealed geometrically
+
+
+@dataclass(frozen=True, slots=True)
+class StudyConfig:
+    """Everything that decides what a study yields, besides the code and the machine.
+
+    Args:
+        student: lifting, renderer, sizes.
+        seconds: budget of processor time.
+        rate: learning rate; falls to √0.1 of it after `drop` of the budget, as in the paper, then to a
+            hundredth by a cosine over the last tenth.
+        drop: share of the budget.
+        scenes: scenes B of a batch.
+        points: points P of a scene, for renderers that answer points.
+        grow: train at 4 x 4 first and double; else at the last resolution alone.
+        perceptual: weight of the perceptual loss.
+        fixed: train on this many fixed scenes; 0 draws new ones for every batch.
+        seed: of parameters and scenes.
+        data: distribution of the scenes.
+        average: decay of the averaged weights that are evaluated.
+        warm: let each level of growing begin as the one below, enlarged; else as noise, as the paper does.
+    """
+
+    student: StudentConfig
+    seconds: float
+    rate: float = 1e-3
+    drop: float = 0.43
+    scenes: int = 16
+    points: int = 64
+    grow: bool = True
+    perceptual: float = 0.0
+    fixed: int = 0
+    seed: int = 1
+    data: PictureConfig = field(default_factory=PictureConfig)
+    average: float = 0.995
+    warm: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+@dataclass(slots=True)
+class Progress:
+    """Where a study is.
+
+    Args:
+        step: optimiser steps done.
+        seconds: processor time spent.
+        loss: of the last batch.
+    """
+
+    step: int
+    seconds: float
+    loss: float
+
+
+def rate_at(share: float, config: StudyConfig) -> float:
+    """Learning rate at a share of the budget."""
+    rate = config.rate * min(1.0, share / WARM_UP + 0.02)
+    if share > config.drop:
+        rate *= math.sqrt(0.1)
+    if share > 0.9:
+        rate *= 0.1 + 0.9 * 0.5 * (1 + math.cos(math.pi * (share - 0.9) / 0.1))
+    return rate
+
+
+def level_at(share: float, final: int, grow: bool) -> tuple[int, float]:
+    """Resolution and blend at a share of the budget.
+
+    Half of the budget is the last resolution's, a quarter the one's before, and so on down to 4 x 4. As in
+    the paper a new level is blended in over as long as it then trains alone.
+    """
+    if not grow or final == 4:
+        return final, 1.0
+    levels = int(math.log2(final)) - 1  # 4, 8, …, final
+    weights = [2.0**i for i in range(levels)]
+    start = 0.0
+    for i, weight in enumerate(weights):
+        width = weight / sum(weights)
+        if share < start + width or i == levels - 1:
+            into = (share - start) / width
+            return 4 * 2**i, 1.0 if i == 0 else min(1.0, 2 * into)
+        start += width
+    raise AssertionError
+
+
+class Study:
+    """A training that can be stopped and taken up again.
+
+    Args:
+        config: what to train.
+        folder: gets ``checkpoint.safetensors``; None keeps nothing.
+        device: torch device.
+        perceptual: distance of two batches of pictures (B, 3, R, R) in [0, 1], for `config.perceptual`.
+    """
+
+    def __init__(
+        self,
+        config: StudyConfig,
+        folder: Path | None = None,
+        device: str = "cpu",
+        perceptual: Callable[[Tensor, Tensor], Tensor] | None = None,
+    ) -> None:
+        if config.perceptual and perceptual is None:
+            raise ValueError("a perceptual loss is asked for and none is given")
+        torch.manual_seed(config.seed)
+        self.config, self.folder, self.perceptual = config, folder, perceptual
+        self.student: Student = make_student(config.student, grown=config.grow).to(device)
+        if isinstance(self.student, StreamingStudent):
+            self.student.renderer.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.averaged = copy.deepcopy(self.student).requires_grad_(False)
+        self.parameters = [p for p in self.student.parameters() if p.requires_grad]
+        self.optimiser = torch.optim.Adam(self.parameters, lr=config.rate, betas=(0.9, 0.99))
+        self.generator = torch.Generator(device).manual_seed(config.seed)
+        self.progress = Progress(0, 0.0, math.nan)
+        self._young = 0  # steps since the last level was blended in
+        self._level = SMALLEST  # of growing
+        self.fixed: Scenes | None = None
+        if config.fixed:
+            self.fixed = random_scenes(config.fixed, config.data, torch.Generator(device).manual_seed(7))
+        if folder is not None and (folder / "checkpoint.safetensors").exists():
+            self._resume(folder / "checkpoint.safetensors", device)
+
+    def run(self, seconds: float = math.inf, save_every_s: float = 60.0) -> Iterator[Progress]:
+        """Train until the budget is spent, or so many more seconds of it; yields after every step.
+
+        Checkpoints are ``save_every_s`` apart at most; early ones come when the time of this run has doubled.
+        """
+        used = unsaved = 0.0
+        while self.progress.seconds < self.config.seconds:
+            started = time.process_time()  # of the step alone: whoever iterates may evaluate between
+            share = self.progress.seconds / self.config.seconds
+            for group in self.optimiser.param_groups:
+                group["lr"] = rate_at(share, self.config)
+            loss = self._loss(share)
+            self.optimiser.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            torch.nn.utils.clip_grad_norm_(self.parameters, 1.0)
+            self.optimiser.step()
+            self._average()
+            spent = time.process_time() - started
+            self.progress = Progress(self.progress.step + 1, self.progress.seconds + spent, loss.item())
+            used, unsaved = used + spent, unsaved + spent
+            yield self.progress
+            if unsaved > min(save_every_s, used - unsaved) or used > seconds:
+                self.save()
+                unsaved = 0.0
+            if used > seconds:
+                return
+        self.save()
+
+    def _loss(self, share: float) -> Tensor:
+        config = self.config
+        if self.fixed is not None:
+            rows = torch.randperm(config.fixed, generator=self.generator)[: config.scenes]
+            scenes = self.fixed.pick(rows)
+        else:
+            scenes = random_scenes(config.scenes, config.data, self.generator)
+        if isinstance(self.student, FramedStudent):
+            return self._framed_loss(self.student, scenes, share)
+        if isinstance(self.student, PointStudent):
+            size = (2, len(scenes.leaf), config.points)
+            x, y = torch.rand(size, generator=self.generator, device=scenes.leaf.device) * 2 - 1
+            gap = self.student.points(scenes, x, y) - shown(scenes, x, y)
+            loss: Tensor = gap.square().mean() + 0.1 * gap.abs().mean()
+            return loss
+        assert isinstance(self.student, StreamingStudent)
+        r, blend = level_at(share, config.student.streaming.resolution, config.grow)
+        if blend < 1.0:
+            self._young = 0
+        if r > self._level and config.grow:
+            self._begin(r)
+        target = pictures(scenes, r)
+        found = self.student.image(scenes, r, blend)
+        sigma = SIGMA[0] * (SIGMA[1] / SIGMA[0]) ** share
+        loss = (found - target).square().mean() / (2 * sigma**2) + math.log(sigma)
+        if self.perceptual is not None and config.perceptual:
+            loss = loss + config.perceptual * self.perceptual(found, target)
+        return loss
+
+    def _framed_loss(self, student: FramedStudent, scenes: Scenes, share: float) -> Tensor:
+        p = self.config.points
+        if share < LEAVES_ALONE and student.leaves_first:
+            leaves = leaf_batch(4 * p, self.generator)
+            return leaf_loss(student.renderer, leaves, student.leaf_codes, student.unasked)[0]
+        maps, singular = scenes.affine[..., :2, [0, 1, 3]], stretch(scenes)
+        near = SceneConfig(points=p, extent=1.0)
+        points = points_of(
+            maps, scenes.leaf, scenes.count, scenes.twirl, scenes.bend, singular, near, self.generator
+        )
+        x, y = points[:, :p].unbind(-1)
+        distance, steps = trace_exactly(scenes, x, y)
+        batch = Batch(
+            q=points,  # not looked at: the student finds leaf coordinates by itself
+            scale=singular,
+            leaf=scenes.leaf,
+            rgb=scenes.rgb,
+            tokens=scenes.tokens,
+            count=scenes.count,
+            distance=distance,
+            depth=torch.stack([depth for depth, _ in steps], 1),
+            colour=torch.stack([colour.expand(*depth.shape, 3) for depth, colour in steps], 1),
+        )
+        given = (batch.depth, batch.colour) if student.forced and share < FORCED else None
+        return trace_loss(student.trace(scenes, x, y, given), batch, student.unasked)[0]
+
+    def _begin(self, resolution: int) -> None:
+        """Enter a level of growing."""
+        self._level = resolution
+        if not self.config.warm:
+            return
+        for student in (self.student, self.averaged):
+            assert isinstance(student, StreamingStudent)
+            student.renderer.enlarge(resolution)
+
+    @torch.no_grad()
+    def _average(self) -> None:
+        # young averages forget faster, so that what a level starts from does not linger
+        decay = min(self.config.average, (1 + self._young) / (10 + self._young))
+        self._young += 1
+        for kept, new in zip(self.averaged.parameters(), self.student.parameters(), strict=True):
+            kept.lerp_(new, 1 - decay)
+
+    def save(self) -> None:
+        """Write the checkpoint."""
+        if self.folder is None:
+            return
+        self.folder.mkdir(parents=True, exist_ok=True)
+        tensors = {f"student.{k}": v for k, v in self.student.state_dict().items()}
+        tensors |= {f"averaged.{k}": v for k, v in self.averaged.state_dict().items()}
+        names = {id(p): k for k, p in self.student.named_parameters()}
+        for parameter, state in self.optimiser.state.items():
+            for key, value in state.items():
+                tensors[f"optimiser.{names[id(parameter)]}.{key}"] = torch.as_tensor(value)
+        tensors["generator"] = self.generator.get_state()
+        header = {
+            "format": 1,
+            "config": self.config.to_json(),
+            "step": self.progress.step,
+            "young": self._young,
+            "level": self._level,
+            "seconds": self.progress.seconds,
+        }
+        tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
+        save_tensors(self.folder / "checkpoint.safetensors", tensors, header)
+
+    def _resume(self, path: Path, device: str) -> None:
+        tensors, header = load_tensors(path, device)
+        known = {"warm": False, **header["config"]}  # of studies from before there was a choice
+        if known != json.loads(json.dumps(self.config.to_json())):
+            raise ValueError(f"{path} was trained with another configuration")
+
+        def under(prefix: str) -> dict[str, Tensor]:
+            return {k.removeprefix(prefix): v for k, v in tensors.items() if k.startswith(prefix)}
+
+        self.student.load_state_dict(under("student."))
+        self.averaged.load_state_dict(under("averaged."))
+        for name, parameter in self.student.named_parameters():
+            state = under(f"optimiser.{name}.")
+            if state:
+                self.optimiser.state[parameter] = {
+                    k: v.cpu() if k == "step" else v.clone() for k, v in state.items()
+                }
+        self.generator.set_state(tensors["generator"].cpu())
+        self.progress = Progress(header["step"], header["seconds"], math.nan)
+        self._young, self._level = header["young"], header.get("level", SMALLEST)

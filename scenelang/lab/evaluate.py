@@ -1,0 +1,116 @@
+"""Evaluate a model on seeded unseen scenes against the exact reference."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.image import Image
+from scenelang.measure.metrics import MOST_DB, measure
+from scenelang.measure.scenes import draw_scene, reference_of, scenes_of, spread
+from scenelang.measure.sheet import contact_sheet, side_by_side
+from scenelang.models.load import Model
+from scenelang.program.program import TOKENS
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One scene's figures.
+
+    Args:
+        index: in its set.
+        last: the word that joins the last object of the stream.
+        objects: rows of the Program.
+        figures: psnr (dB), ssim, flip.
+    """
+
+    index: int
+    last: str
+    objects: int
+    figures: dict[str, float]
+
+
+def _worst(cases: list[Case], count: int = 12) -> list[Case]:
+    return sorted(cases, key=lambda c: c.figures["psnr"])[:count]
+
+
+def worst_sheet(model: Model, name: str, seed: int, cases: list[Case], count: int = 12) -> Image:
+    """A contact sheet of the cases of a set with the lowest PSNR: network, reference, FLIP map."""
+    scene_at = scenes_of(model, name, seed)
+    rows = []
+    for case in _worst(cases, count):
+        scene = scene_at(case.index)
+        label = f"#{case.index} {case.last} {case.figures['psnr']:.1f} dB FLIP {case.figures['flip']:.4f}"
+        rows.append(side_by_side(draw_scene(model, scene)[1], reference_of(scene, model.manifest), label))
+    return contact_sheet(rows)
+
+
+def evaluate_set(
+    model: Model,
+    name: str,
+    count: int,
+    seed: int,
+    *,
+    threads: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[dict[str, Any], list[Case]]:
+    """Draw a set and compare.
+
+    Args:
+        model: what draws.
+        name: the set.
+        count: scenes.
+        seed: of the scenes.
+        threads: for drawing.
+        progress: called with scenes done and all.
+
+    Returns:
+        A summary for JSON, and every case.
+    """
+    scene_at = scenes_of(model, name, seed)
+    started = time.perf_counter()
+    cases = []
+    for index in range(count):
+        scene = scene_at(index)
+        program, picture = draw_scene(model, scene, threads)
+        figures = measure(picture, reference_of(scene, model.manifest))
+        cases.append(Case(index, _last_word(program.tokens), len(program), figures))
+        if progress is not None:
+            progress(index + 1, count)
+    summary = {
+        "set": name,
+        "scenes": count,
+        "seed": seed,
+        "psnr_cap_db": MOST_DB,
+        "weights": model.digest,
+        "machine": f"{platform.machine()}, {threads} thread(s)",
+        "seconds": round(time.perf_counter() - started, 1),
+        **summarise(cases),
+        "worst_cases": [{"index": c.index, "last": c.last, **c.figures} for c in _worst(cases)],
+        "by_last_token": {
+            word: summarise([c for c in cases if c.last == word])
+            for word in (*TOKENS, "all_union")
+            if any(c.last == word for c in cases)
+        },
+    }
+    return summary, cases
+
+
+def _last_word(tokens: npt.NDArray[np.int8]) -> str:
+    if not tokens.any():
+        return "all_union"
+    return next(word for word, value in TOKENS.items() if value == tokens[-1])
+
+
+def summarise(cases: list[Case]) -> dict[str, Any]:
+    """Mean, 5th percentile from the bad end, and worst of each figure."""
+    out: dict[str, Any] = {"count": len(cases)}
+    for figure, bad_end in (("psnr", 5), ("ssim", 5), ("flip", 95)):
+        out[figure] = spread([c.figures[figure] for c in cases], bad_end)
+    return out

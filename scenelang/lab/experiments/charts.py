@@ -1,0 +1,167 @@
+"""Charts and strips of pictures out of the JSON files of experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image as pillow
+from PIL import ImageDraw
+
+from scenelang.image import Image
+from scenelang.lab.charts import FAINT, INK, figure_bytes, pyplot
+from scenelang.lab.experiments import paper
+
+Result = Mapping[str, Any]
+LABEL, LINE, ENLARGED = 170, 4, 2  # pixels; how much larger strips are shown
+THEIRS = "#8a97a3"
+
+
+def experiment_chart(found: Result, kind: str) -> bytes:
+    """The chart of an experiment.
+
+    Args:
+        found: of `scenelang.lab.experiments.experiment.run_experiment`.
+        kind: "png" or "svg".
+    """
+    plt = pyplot()
+    draw = _DRAWN.get(found["experiment"], _bars)
+    figure = draw(plt, found)
+    data = figure_bytes(figure, kind)
+    plt.close(figure)
+    return data
+
+
+def _compare(plt: Any, found: Result) -> Any:
+    """PSNR over the budget; a line for each renderer and lifting."""
+    figure, axis = plt.subplots(figsize=(6.4, 4.0))
+    names = list(dict.fromkeys(run["name"] for run in found["runs"]))
+    for name in names:
+        runs = [run for run in found["runs"] if run["name"] == name]
+        x = [run["config"]["seconds"] for run in runs]
+        renderer, lifting = name.split("+")
+        axis.plot(
+            x,
+            [run["psnr"]["mean"] for run in runs],
+            marker="o",
+            linestyle="-" if lifting == "exact" else "--",
+            color={"framed": "#1f77b4", "reading": "#2f9e63", "streaming": "#c8452f"}[renderer],
+            label=name,
+        )
+    axis.set_xscale("log")
+    ticks = sorted({run["config"]["seconds"] for run in found["runs"]})
+    axis.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    axis.minorticks_off()
+    axis.set_xlabel("processor seconds of training")
+    return _finish(figure, axis, f"unseen scenes at {found['runs'][0]['resolution']}²")
+
+
+def _table1(plt: Any, found: Result) -> Any:
+    """PSNR over the size of either vector, ours and the paper's."""
+    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.6), sharey=True)
+    sides = (("geometry", paper.GEOMETRY_SIZES), ("material", paper.MATERIAL_SIZES))
+    for axis, (side, published) in zip(axes, sides, strict=True):
+        runs = {run["name"]: run for run in found["runs"]}
+        if side == "material" and "geometry 32" in runs:
+            runs["material 32"] = runs["geometry 32"]
+        sizes = [d for d in published if f"{side} {d}" in runs]
+        axis.plot(
+            sizes, [runs[f"{side} {d}"]["psnr"]["mean"] for d in sizes], marker="o", label="ours, 2D shapes"
+        )
+        axis.plot(
+            list(published),
+            [line.psnr for line in published.values()],
+            "o--",
+            color=THEIRS,
+            label="the paper's",
+        )
+        axis.set_xscale("log", base=2)
+        axis.set_xticks(list(published), [str(d) for d in published])
+        axis.minorticks_off()
+        axis.set_xlabel(f"numbers of a {side} vector")
+        _finish(figure, axis, "")
+    return figure
+
+
+def _seeds(plt: Any, found: Result) -> Any:
+    """Each seed a dot."""
+    figure, axis = plt.subplots(figsize=(6.4, 3.2))
+    names = list(dict.fromkeys(run["name"] for run in found["runs"]))
+    for at, name in enumerate(names):
+        values = [run["psnr"]["mean"] for run in found["runs"] if run["name"] == name]
+        axis.plot([at] * len(values), values, "o", color=INK)
+    axis.set_xticks(range(len(names)), names)
+    axis.set_xlim(-0.5, len(names) - 0.5)
+    return _finish(figure, axis, "", legend=False)
+
+
+def _bars(plt: Any, found: Result) -> Any:
+    """A bar a run, the worst scene as a dot."""
+    runs = found["runs"]
+    figure, axis = plt.subplots(figsize=(7.0, 0.8 + 0.34 * len(runs)))
+    y = range(len(runs))
+    axis.barh(y, [run["psnr"]["mean"] for run in runs], color="#9fc4e0")
+    axis.plot([run["psnr"]["worst"] for run in runs], y, ".", color="#c8452f")
+    groups = {run["group"] for run in runs}
+    labels = [run["name"] if len(groups) == 1 else f"{run['name']}, {run['group']}" for run in runs]
+    axis.set_yticks(y, labels, fontsize=8)
+    axis.invert_yaxis()
+    axis.set_xlabel("PSNR, dB (bar: mean, dot: worst scene)")
+    axis.grid(axis="x", color=FAINT, linewidth=0.5)
+    return figure
+
+
+def _finish(figure: Any, axis: Any, title: str, legend: bool = True) -> Any:
+    axis.set_ylabel("PSNR, dB")
+    axis.grid(axis="y", color=FAINT, linewidth=0.5)
+    if title:
+        axis.set_title(title, fontsize=9, color=INK)
+    if legend:
+        axis.legend(fontsize=7.5, frameon=False)
+    return figure
+
+
+_DRAWN = {"compare": _compare, "table1": _table1, "seeds": _seeds}
+
+
+def strips(found: Result, folder: Path) -> Image:
+    """The same scenes drawn by every run of an experiment, a row each, the exact ones on top.
+
+    Args:
+        found: of `run_experiment`.
+        folder: where its strips lie.
+
+    Raises:
+        OSError: a strip is missing.
+    """
+    rows: list[tuple[str, Path]] = []
+    exact = ""
+    for run in found["runs"]:
+        seen = "-seen" if run["config"]["fixed"] else ""
+        truth = f"exact-{run['resolution']}px{seen}.png"
+        if truth != exact:
+            rows.append(("exact", folder / truth))
+            exact = truth
+        groups = {other["group"] for other in found["runs"]}
+        label = run["name"] if len(groups) == 1 else f"{run['name']}, {run['group']}"
+        rows.append((f"{label}\n{run['psnr']['mean']:.1f} dB", folder / run["strip"]))
+    return _sheet(rows)
+
+
+def _sheet(rows: Sequence[tuple[str, Path]]) -> Image:
+    pictures = []
+    for label, path in rows:
+        with pillow.open(path) as file:
+            size = file.width * ENLARGED, file.height * ENLARGED
+            pictures.append((label, file.convert("RGB").resize(size, pillow.Resampling.NEAREST)))
+    width = LABEL + max(picture.width for _, picture in pictures)
+    height = sum(picture.height + LINE for _, picture in pictures)
+    sheet = pillow.new("RGB", (width, height), "white")
+    pen, top = ImageDraw.Draw(sheet), 0
+    for label, picture in pictures:
+        pen.text((4, top + 4), label, fill="black")
+        sheet.paste(picture, (LABEL, top))
+        top += picture.height + LINE
+    return (np.asarray(sheet, np.float32) / 255).view(Image)

@@ -1,0 +1,267 @@
+"""Trainings at equal budgets, measured on the same unseen scenes: one experiment, one JSON file.
+
+Each run of an experiment (`experiment_runs`) trains for a stated budget of processor time and draws the
+same scenes, whose seeds no training uses. Runs keep checkpoints, so that an interrupted experiment goes on
+where it stopped and a run that two experiments share is trained once.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from scenelang.files import write_whole
+from scenelang.image import Image
+from scenelang.lab.designs.pictures import PictureConfig, Scenes, pictures, random_scenes
+from scenelang.lab.designs.students import StreamingStudent, Student
+from scenelang.lab.designs.studies import Study, StudyConfig, level_at
+from scenelang.lab.experiments.runs import EXPERIMENTS, SIDE, Run
+from scenelang.measure.metrics import MOST_DB, measure
+from scenelang.renderers.stream import SMOOTH
+from scenelang.training.loop import revision
+
+if TYPE_CHECKING:
+    from scenelang.lab.experiments.lpips import Lpips
+
+UNSEEN = 2021  # seed of the scenes that are measured; trainings use small ones
+STRIP = 8  # scenes of a strip
+FEW = 24  # scenes of a curve over time
+CHUNK = 8  # scenes drawn at once
+POINTS = 6  # of a curve over time
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How an experiment is run and measured.
+
+    Args:
+        folder: gets the JSON file, the strips and the runs' checkpoints.
+        scenes: unseen scenes that are measured.
+        device: torch device.
+    """
+
+    folder: Path
+    scenes: int = 200
+    device: str = "cpu"
+
+
+def run_experiment(
+    name: str,
+    budget_s: float,
+    seed: int,
+    settings: Settings,
+    report: Callable[[Run, Study, float], None] | None = None,
+) -> dict[str, Any]:
+    """Train and measure all runs of an experiment.
+
+    Args:
+        name: of `EXPERIMENTS`.
+        budget_s: processor seconds of a training.
+        seed: of parameters and training scenes.
+        settings: where and how.
+        report: called with a run, its study and the PSNR so far, a few times a run.
+
+    Returns:
+        What is written to ``FOLDER/NAME.json``.
+    """
+    runs = EXPERIMENTS[name](budget_s, seed)
+    results = [run_one(run, settings, report) for run in runs]
+    return {
+        "experiment": name,
+        "set": "shapes2d",
+        "seed": seed,
+        "revision": revision(),
+        "machine": platform.machine(),
+        "torch": torch.__version__.split("+")[0],
+        "threads": torch.get_num_threads(),
+        "device": settings.device,
+        "budget_s": budget_s,
+        "white": white(max(run.side for run in runs), settings),
+        "runs": results,
+    }
+
+
+def white(side: int, settings: Settings) -> dict[str, Any]:
+    """Figures of pictures with nothing on them, which a renderer has to beat to have learned anything."""
+    _, exact = unseen(settings.scenes, side, settings.device)
+    return _figures(torch.ones_like(exact), exact)
+
+
+def run_one(
+    run: Run, settings: Settings, report: Callable[[Run, Study, float], None] | None = None
+) -> dict[str, Any]:
+    """Train one run, or what is left of it, and measure it."""
+    config = run.study
+    study = Study(
+        config, settings.folder / "runs" / run.folder, settings.device, _perceptual(config, settings)
+    )
+    # kept beside the checkpoint, for runs that are measured again
+    kept = settings.folder / "runs" / run.folder / "curve.json"
+    curve: list[list[float]] = json.loads(kept.read_text("utf-8")) if kept.exists() else []
+    finite = True
+    due = config.seconds / POINTS
+    for progress in study.run():
+        finite = finite and math.isfinite(progress.loss)
+        if not finite:
+            break
+        if progress.seconds >= due * (len(curve) + 1) and progress.seconds < config.seconds:
+            r, blend = min(run.side, SIDE), 1.0
+            if config.student.renderer == "streaming":
+                r, blend = level_at(progress.seconds / config.seconds, r, config.grow)
+            few, exact = _measured(run, study, FEW, r, settings)
+            found = _psnr(draw(study.averaged, few, r, blend), exact)
+            curve.append([round(progress.seconds, 1), round(found, 2)])
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(kept, json.dumps(curve).encode())
+            if report is not None:
+                report(run, study, curve[-1][1])
+    finite = finite and all(bool(p.isfinite().all()) for p in study.averaged.parameters())
+    scenes, exact = _measured(run, study, settings.scenes, run.side, settings)
+    shown = draw(study.averaged, scenes, run.side)
+    figures = _figures(shown, exact)
+    if run.blends:
+        blended, truth = unseen(settings.scenes, run.side, settings.device, blends=True)
+        figures["blends"] = round(_psnr(draw(study.averaged, blended, run.side), truth), 4)
+    if report is not None:
+        report(run, study, figures["psnr"]["mean"])
+    return {
+        "name": run.name,
+        "group": run.group,
+        "config": config.to_json(),
+        "seconds": round(study.progress.seconds, 1),
+        "steps": study.progress.step,
+        "parameters": sum(p.numel() for p in study.averaged.parameters()),
+        "finite": finite,
+        "resolution": run.side,
+        "scenes": len(scenes.leaf),
+        **figures,
+        "curve": curve,
+        "strip": _strips(run, shown, exact, settings.folder),
+    }
+
+
+def _perceptual(config: StudyConfig, settings: Settings) -> Callable[[Tensor, Tensor], Tensor] | None:
+    if not config.perceptual:
+        return None
+    from scenelang.lab.experiments.lpips import load_lpips
+
+    return load_lpips("alexnet").to(settings.device)
+
+
+def _measured(run: Run, study: Study, count: int, r: int, settings: Settings) -> tuple[Scenes, Tensor]:
+    """The scenes that a run is measured on, and their exact pictures (B, 3, R, R)."""
+    if not run.seen:
+        return unseen(count, r, settings.device)
+    assert study.fixed is not None
+    return study.fixed, _exact(study.fixed, r)
+
+
+@lru_cache(maxsize=4)
+def unseen(count: int, r: int, device: str, blends: bool = False) -> tuple[Scenes, Tensor]:
+    """Scenes whose seed no training uses, and their exact pictures (B, 3, R, R).
+
+    Args:
+        count: scenes B.
+        r: pixels R along a side.
+        device: that makes them.
+        blends: join all objects of a scene by smooth unions.
+    """
+    scenes = random_scenes(count, PictureConfig(), torch.Generator(device).manual_seed(UNSEEN))
+    if blends:
+        scenes.tokens[:, 1:] = SMOOTH
+    return scenes, _exact(scenes, r)
+
+
+def _chunks(scenes: Scenes) -> Iterator[Scenes]:
+    return map(scenes.pick, torch.split(torch.arange(len(scenes.leaf)), CHUNK))
+
+
+def _exact(scenes: Scenes, r: int) -> Tensor:
+    return torch.cat([pictures(some, r) for some in _chunks(scenes)]).cpu()
+
+
+@torch.no_grad()
+def draw(student: Student, scenes: Scenes, r: int, blend: float = 1.0) -> Tensor:
+    """A student's pictures (B, 3, R, R).
+
+    Args:
+        student: what draws.
+        scenes: what is drawn.
+        r: pixels R along a side.
+        blend: share of the newest level, of a student that grows.
+    """
+    if isinstance(student, StreamingStudent):
+        images = [student.image(some, r, blend) for some in _chunks(scenes)]
+    else:
+        images = [student.image(some, r) for some in _chunks(scenes)]
+    return torch.cat(images).clamp(0.0, 1.0).cpu()
+
+
+def _psnr(shown: Tensor, exact: Tensor) -> float:
+    errors = (shown - exact).square().mean((1, 2, 3)).clamp_min(10 ** (-MOST_DB / 10))
+    return float((-10 * errors.log10()).mean())
+
+
+def _figures(shown: Tensor, exact: Tensor) -> dict[str, Any]:
+    """Mean, worst and the tail towards it, of each metric over the scenes."""
+    cases = []
+    for one, other in zip(shown, exact, strict=True):
+        # a network that came to nothing draws what is not a number; its picture is grey
+        a, b = (v.nan_to_num(0.5).permute(1, 2, 0).numpy() for v in (one, other))
+        cases.append(measure(a, b))
+    out: dict[str, Any] = {}
+    for metric in ("psnr", "ssim", "flip"):
+        values = np.array([case[metric] for case in cases])
+        tail, worst = (95, values.max()) if metric == "flip" else (5, values.min())
+        out[metric] = {
+            "mean": round(float(values.mean()), 4),
+            f"p{tail}": round(float(np.percentile(values, tail)), 4),
+            "worst": round(float(worst), 4),
+        }
+    out["lpips"] = _lpips(shown, exact)
+    return out
+
+
+def _lpips(shown: Tensor, exact: Tensor) -> dict[str, float] | None:
+    """LPIPS of VGG16 features, mean; None where its weights are not installed."""
+    from scenelang.lab.experiments.lpips import LpipsError
+
+    try:
+        distance = _vgg()
+    except LpipsError:
+        return None
+    with torch.no_grad():
+        found = [
+            float(distance(a.nan_to_num(0.5), b)) * len(a)
+            for a, b in zip(torch.split(shown, CHUNK), torch.split(exact, CHUNK), strict=True)
+        ]
+    return {"mean": round(sum(found) / len(shown), 4)}
+
+
+@lru_cache(maxsize=1)
+def _vgg() -> Lpips:
+    from scenelang.lab.experiments.lpips import load_lpips
+
+    return load_lpips("vgg16")
+
+
+def _strips(run: Run, shown: Tensor, exact: Tensor, folder: Path) -> str:
+    """Write the first scenes in a row, and the exact ones beside it; returns the file's name."""
+    name = f"{run.folder}.png"
+    truth = f"exact-{run.side}px{'-seen' if run.seen else ''}.png"
+    for file, images in ((name, shown), (truth, exact)):
+        row: Sequence[Tensor] = [image.nan_to_num(0.5).permute(1, 2, 0) for image in images[:STRIP]]
+        picture = np.ascontiguousarray(torch.cat(list(row), 1).numpy(), np.float32)
+        folder.mkdir(parents=True, exist_ok=True)
+        picture.view(Image).save(folder / file)
+    return name

@@ -1,0 +1,163 @@
+"""What each experiment trains: lists of runs, for a budget of processor time and a seed.
+
+An experiment is a list of runs, each of which trains a student (`scenelang.lab.designs.studies`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from scenelang.lab.designs.ablations import ablation_runs
+from scenelang.lab.designs.encoders import LiftingConfig
+from scenelang.lab.designs.students import LiftingName, RendererName, StudentConfig
+from scenelang.lab.designs.studies import RATES, StudyConfig
+from scenelang.renderers.streaming import StreamingConfig
+
+SIDE = 32  # pixels along a side of the pictures: what `streaming` reaches on a processor in minutes
+SIZES_SIDE = 16  # of the thirteen trainings of the size study
+PARTS_SIDE = 128  # where only renderers that answer points are compared
+RENDERERS: tuple[RendererName, ...] = ("framed", "reading", "streaming")
+LIFTINGS: tuple[LiftingName, ...] = ("exact", "learned")
+SIZES = (1, 2, 4, 8, 16, 32, 64)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One training and what it is called.
+
+    Args:
+        name: in tables.
+        group: runs that are compared with one another.
+        study: what is trained.
+        seen: measure on the fixed scenes it was trained on.
+        side: pixels along a side of the pictures that are measured.
+        blends: measure scenes of smooth unions alone as well.
+    """
+
+    name: str
+    group: str
+    study: StudyConfig
+    seen: bool = False
+    side: int = SIDE
+    blends: bool = False
+
+    @property
+    def folder(self) -> str:
+        """Where its checkpoint lies, the same for the same run of another experiment."""
+        study = self.study
+        parts = [self.name, f"{study.seconds:g}s", f"seed{study.seed}"]
+        if study.fixed:
+            parts.append(f"{study.fixed}scenes")
+        return "-".join(parts).replace("+", "-").replace(" ", "-")
+
+
+def plain(renderer: RendererName, lifting: LiftingName, seconds: float, seed: int = 1) -> StudyConfig:
+    """The usual training of a renderer and a lifting; `streaming` has an eighth of the paper's filters."""
+    streaming = StreamingConfig(resolution=SIDE, width=1 / 8)
+    student = StudentConfig(renderer=renderer, lifting=lifting, streaming=streaming)
+    scenes = 8 if renderer == "streaming" else 16  # a picture of a scene takes long
+    rate = RATES[renderer]
+    if (renderer, lifting) == ("framed", "learned"):
+        rate /= 10  # faster, its frames collapse and it draws the mean colour
+    warm = renderer == "streaming"  # a level that begins as noise costs more than minutes can pay
+    return StudyConfig(student, seconds=seconds, rate=rate, scenes=scenes, seed=seed, warm=warm)
+
+
+def overfit(budget_s: float, seed: int) -> list[Run]:
+    """Each renderer on 16 scenes it sees again and again: does it work at all?"""
+    runs = []
+    for renderer in RENDERERS:
+        for lifting in LIFTINGS:
+            if lifting == "exact" and renderer != "framed":
+                continue
+            study = replace(plain(renderer, lifting, budget_s, seed), fixed=16, average=0.98)
+            runs.append(Run(f"{renderer}+{lifting}", "16 scenes", study, seen=True))
+    return runs
+
+
+def compare(budget_s: float, seed: int) -> list[Run]:
+    """Every renderer with every lifting at a third of the budget and at all of it."""
+    return [
+        Run(f"{renderer}+{lifting}", f"{seconds:g} s", plain(renderer, lifting, seconds, seed))
+        for seconds in (budget_s / 3, budget_s)
+        for renderer in RENDERERS
+        for lifting in LIFTINGS
+    ]
+
+
+def table1(budget_s: float, seed: int) -> list[Run]:
+    """Sizes 1 to 64 of the geometry vector and of the material vector, the other one 32 (Table 1)."""
+    base = plain("streaming", "learned", budget_s, seed)
+    sizes = replace(base.student.streaming, resolution=SIZES_SIDE)
+    runs = []
+    for side in ("geometry", "material"):
+        for d in SIZES:
+            if side == "material" and d == 32:
+                continue  # the same run as the geometry's
+            student = replace(base.student, streaming=sizes, learned=LiftingConfig(**{side: d}))
+            runs.append(Run(f"{side} {d}", side, replace(base, student=student), side=SIZES_SIDE))
+    return runs
+
+
+def table2(budget_s: float, seed: int) -> list[Run]:
+    """Deformed shapes: the paper's method, and ours (Table 2, left)."""
+    return [
+        Run(f"{r}+{lifting}", f"{budget_s:g} s", plain(r, lifting, budget_s, seed)) for r, lifting in _PAIRS
+    ]
+
+
+_PAIRS: tuple[tuple[RendererName, LiftingName], ...] = (("streaming", "learned"), ("framed", "exact"))
+
+
+def table3(budget_s: float, seed: int) -> list[Run]:
+    """Growing resolution by resolution against training at the last one at once (Table 3)."""
+    grown = plain("streaming", "learned", budget_s, seed)
+    return [
+        Run("streaming+learned", "grown, each level from the one below", grown),
+        Run("streaming+learned cold", "grown, each level from noise", replace(grown, warm=False)),
+        Run("streaming+learned direct", "direct", replace(grown, grow=False)),
+    ]
+
+
+def table4(budget_s: float, seed: int) -> list[Run]:
+    """The paper's two renderers (Table 4)."""
+    renderers: tuple[RendererName, ...] = ("streaming", "reading")
+    return [Run(f"{r}+learned", f"{budget_s:g} s", plain(r, "learned", budget_s, seed)) for r in renderers]
+
+
+def losses(budget_s: float, seed: int) -> list[Run]:
+    """The likelihood alone, and with half of a perceptual loss beside it, as the paper trains."""
+    alone = plain("streaming", "learned", budget_s, seed)
+    return [
+        Run("streaming+learned", "likelihood", alone),
+        Run("streaming+learned perceptual", "perceptual", replace(alone, perceptual=0.5)),
+    ]
+
+
+def seeds(budget_s: float, seed: int) -> list[Run]:
+    """Three seeds of each renderer: spread and divergence."""
+    pairs: tuple[tuple[RendererName, LiftingName], ...] = (*_PAIRS, ("reading", "learned"))
+    return [
+        Run(f"{r}+{lifting}", f"seed {s}", plain(r, lifting, budget_s, s))
+        for r, lifting in pairs
+        for s in range(seed, seed + 3)
+    ]
+
+
+def parts(budget_s: float, seed: int) -> list[Run]:
+    """`framed` without one of its parts at a time, and at other sizes: what each of them buys."""
+    return [Run(*run, side=PARTS_SIDE, blends=True) for run in ablation_runs(budget_s, seed)]
+
+
+EXPERIMENTS: dict[str, Callable[[float, int], list[Run]]] = {
+    "overfit": overfit,
+    "compare": compare,
+    "table1": table1,
+    "table2": table2,
+    "table3": table3,
+    "table4": table4,
+    "losses": losses,
+    "seeds": seeds,
+    "parts": parts,
+}

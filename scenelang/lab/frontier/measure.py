@@ -1,0 +1,325 @@
+"""One run that takes the time and the error of every way to draw, side by side.
+
+Each scene is drawn by all ways in turn, beginning with another one each time, so that a machine that slows
+down slows all of them. Ways that take long draw fewer scenes; the file says how many.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import PIL.Image
+import torch
+
+from scenelang.backend.neural import keep_memory, open_model
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import lower
+from scenelang.image import Image, from_samples
+from scenelang.lab.frontier.fit import fit_cost
+from scenelang.lab.frontier.ways import Draw, Way, ways_of
+from scenelang.measure.cost import Load, load_of, yardstick
+from scenelang.measure.frontier import Cost, Errors, Frontier, Point, Quality, Times, front
+from scenelang.measure.metrics import flip, psnr
+from scenelang.measure.scenes import reference_of, scenes_of
+from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.program.compile import compile_scene
+from scenelang.reference.image import reference_image
+from scenelang.scene.schema import Scene
+from scenelang.training.loop import revision
+
+SHOWN = 4  # scenes whose pictures are kept
+CONVERGED = 8  # scenes compared with 64 samples a pixel
+SLOW_S = 20.0  # a way draws so long at most, but at least on `LEAST` scenes
+LEAST = 4
+COMPARED = 30  # scenes of ways that are measured for comparison and promise nothing
+TIMED = 8  # scenes of ways of which only the time is taken
+REPEATS = 2
+SIDES = (128, 512)  # further canvases that times are fitted on
+MANY = "many"  # set of more objects that times are fitted on
+FITTED = 6  # scenes of each of these
+PROMISED = 0.975
+MARGIN = 1.25  # of 40 scenes without it, one scene in ten of another seed was worse than promised
+
+Report = Callable[[str, int, int], None]
+
+
+@dataclass(slots=True)
+class Record:
+    """What was measured of a way.
+
+    Args:
+        ms: of each scene, the least of the repeats.
+        all_ms: of every frame.
+        flip, psnr: of each scene.
+        loads, fitted: of the frames that its cost is fitted to, and their milliseconds.
+        pictures: of the first scenes.
+        converged: FLIP against 64 samples a pixel.
+    """
+
+    ms: list[float] = field(default_factory=list)
+    all_ms: list[float] = field(default_factory=list)
+    flip: list[float] = field(default_factory=list)
+    psnr: list[float] = field(default_factory=list)
+    loads: list[Load] = field(default_factory=list)
+    fitted: list[float] = field(default_factory=list)
+    pictures: list[Image] = field(default_factory=list)
+    converged: list[float] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Measured:
+    """A frontier and the pictures that belong to it.
+
+    Args:
+        frontier: figures.
+        pictures: of each point, by name, of the first scenes.
+        exact: the exact ones.
+    """
+
+    frontier: Frontier
+    pictures: dict[str, list[Image]]
+    exact: list[Image]
+
+
+def measure_frontier(
+    base: str, scenes: int, seed: int, threads: int, report: Report | None = None
+) -> Measured:
+    """Measure all ways to draw the scenes of a set.
+
+    Args:
+        base: the model named like the set.
+        scenes: how many; of 256 x 256 pixels.
+        seed: of the scenes.
+        threads: cores to draw on.
+        report: called with the stage, what is done and all.
+    """
+    keep_memory()
+    torch.set_num_threads(threads)
+    manifest = load_manifest(base)
+    ways = ways_of(base, threads)
+    records = {way.name: Record() for way in ways}
+    scene_at = scenes_of(open_model(base), manifest.set, seed)
+    first = scene_at(0)
+    quota = {way.name: _quota(way, first, scenes, threads) for way in ways}
+    stick = yardstick()
+    for index in range(scenes):
+        scene = scene_at(index)
+        wanted = [way for way in ways if index < quota[way.name]]
+        turn = index % len(wanted)
+        _one_scene(scene, wanted[turn:] + wanted[:turn], records, manifest, index, threads)
+        if report is not None:
+            report("scenes", index + 1, scenes)
+    _other_loads(base, [way for way in ways if way.offered], records, seed, threads, report)
+    paper = next((records[w.name] for w in ways if w.name.startswith("the paper's")), None)
+    points = [_point(way, records[way.name], paper) for way in ways]
+    offered = [p for p in points if p.offered and p.flip is not None and not p.side]
+    kept = front([(p.ms.median, p.flip.mean) for p in offered if p.flip is not None])
+    on_front = {p.name for p, yes in zip(offered, kept, strict=True) if yes}
+    points = [_with_front(p, p.name in on_front) for p in points]
+    frontier = Frontier(
+        set=manifest.set,
+        seed=seed,
+        scenes=scenes,
+        canvas=first.canvas,
+        threads=threads,
+        clock="processor" if threads == 1 else "wall",
+        machine=machine(),
+        revision=revision(),
+        torch=torch.__version__.split("+")[0],
+        yardstick_ms=(stick + yardstick()) / 2,
+        streaming_ms=statistics.median(paper.all_ms) if paper is not None else 0.0,
+        converged={n: float(np.mean(r.converged)) for n, r in records.items() if r.converged},
+        points=tuple(sorted(points, key=lambda p: p.ms.median)),
+    )
+    pictures = {name: record.pictures for name, record in records.items() if record.pictures}
+    return Measured(
+        frontier, pictures, [reference_of(scene_at(i), manifest) for i in range(min(SHOWN, scenes))]
+    )
+
+
+def _timed(run: Draw, threads: int) -> tuple[float, Image]:
+    """Milliseconds and the picture. One thread's processor time is its time on an idle machine."""
+    clock = time.process_time if threads == 1 else time.perf_counter
+    started = clock()
+    image = run()
+    return 1000 * (clock() - started), image
+
+
+def _quota(way: Way, scene: Scene, scenes: int, threads: int) -> int:
+    """How many scenes a way draws; its first frames, which load and warm up, are not counted."""
+    run = way.prepare(scene)
+    run()
+    ms, _ = _timed(run, threads)
+    most = TIMED if not way.drawn else scenes if way.offered else COMPARED
+    return max(1, min(scenes, most, max(LEAST, int(1000 * SLOW_S / (REPEATS * ms)))))
+
+
+def _one_scene(
+    scene: Scene,
+    ways: Sequence[Way],
+    records: dict[str, Record],
+    manifest: Manifest,
+    index: int,
+    threads: int,
+) -> None:
+    exact = reference_of(scene, manifest)
+    load = load_of(compile_scene(scene, model=manifest.name))
+    many = None
+    if index < CONVERGED:
+        many = _converged(scene, manifest)
+    runs = [(way, way.prepare(scene)) for way in ways]
+    best: dict[str, float] = {}
+    shown: dict[str, Image] = {}
+    for _ in range(REPEATS):
+        for way, run in runs:
+            ms, shown[way.name] = _timed(run, threads)
+            records[way.name].all_ms.append(ms)
+            best[way.name] = min(ms, best.get(way.name, math.inf))
+    for way, _ in runs:
+        record = records[way.name]
+        record.ms.append(best[way.name])
+        record.loads.append(load)
+        record.fitted.append(best[way.name])
+        if not way.drawn:
+            continue
+        picture = enlarged(shown[way.name], exact.shape[1], exact.shape[0])
+        record.flip.append(flip(picture, exact))
+        record.psnr.append(psnr(picture, exact))
+        if index < SHOWN:
+            record.pictures.append(picture)
+        if many is not None:
+            record.converged.append(flip(picture, many))
+
+
+def _converged(scene: Scene, manifest: Manifest) -> Image:
+    return reference_image(lower(scene, manifest, None, Diagnostics()), per_side=8)
+
+
+def enlarged(picture: Image, width: int, height: int) -> Image:
+    """A picture at another size, each channel by bilinear interpolation; the same where it has that size."""
+    if picture.shape[:2] == (height, width):
+        return picture
+    channels = [
+        np.asarray(
+            PIL.Image.fromarray(np.ascontiguousarray(picture[..., i], np.float32)).resize(
+                (width, height), PIL.Image.Resampling.BILINEAR
+            )
+        )
+        for i in range(3)
+    ]
+    return from_samples(np.stack(channels, 2), None)
+
+
+def _other_loads(
+    base: str,
+    ways: Sequence[Way],
+    records: dict[str, Record],
+    seed: int,
+    threads: int,
+    report: Report | None,
+) -> None:
+    """Time offered ways on other canvases and on more objects, so that their cost can be told from them."""
+    manifest = load_manifest(base)
+    model = open_model(base)
+    plain, many = scenes_of(model, manifest.set, seed), scenes_of(model, MANY, seed)
+    cases = [(plain(i), (side, side)) for side in SIDES for i in range(FITTED)]
+    cases += [(scene, scene.canvas) for scene in map(many, range(FITTED))]
+    for done, (scene, canvas) in enumerate(cases):
+        scene = scene.model_copy(update={"canvas": canvas})
+        load = load_of(compile_scene(scene, model=base))
+        for way in ways:
+            record = records[way.name]
+            if (way.side and canvas != scene_canvas(plain)) or statistics.median(record.ms) > 1000:
+                continue
+            run = way.prepare(scene)
+            ms = min(_timed(run, threads)[0] for _ in range(REPEATS + 1))
+            record.loads.append(load)
+            record.fitted.append(ms)
+        if report is not None:
+            report("other canvases and counts", done + 1, len(cases))
+
+
+def scene_canvas(scene_at: Callable[[int], Scene]) -> tuple[int, int]:
+    """Canvas of a set's scenes."""
+    return scene_at(0).canvas
+
+
+def promised(values: Sequence[float]) -> float:
+    """A bound that a new value of the same kind exceeds with a probability of at most 2.5 %.
+
+    The k-th smallest of n values, k = ceil(0.975 (n + 1)); a little more than the largest where n is under 39
+    (Vovk, Gammerman, Shafer, *Algorithmic Learning in a Random World*, 2005: a conformal quantile).
+    """
+    ordered = sorted(values)
+    k = math.ceil(PROMISED * (len(ordered) + 1))
+    if k <= len(ordered):
+        return ordered[k - 1]
+    return 1.5 * ordered[-1]
+
+
+def _point(way: Way, record: Record, paper: Record | None) -> Point:
+    errors = quality = None
+    if record.flip:
+        errors = Errors(
+            float(np.mean(record.flip)),
+            float(np.percentile(record.flip, 95)),
+            MARGIN * promised(record.flip),
+            max(record.flip),
+        )
+        quality = Quality(float(np.mean(record.psnr)), float(np.percentile(record.psnr, 5)), min(record.psnr))
+    cost: Cost | None = None
+    if way.offered:
+        cost = fit_cost(record.loads, record.fitted, way.skip, fixed=bool(way.side))
+    return Point(
+        name=way.name,
+        backend=way.backend,
+        model=way.model,
+        renderer=way.renderer,
+        samples=way.samples,
+        skip=way.skip,
+        spp=way.spp,
+        side=way.side,
+        offered=way.offered,
+        why_not=way.why_not,
+        scenes=len(record.ms),
+        ms=Times(statistics.median(record.all_ms), float(np.percentile(record.all_ms, 95))),
+        ratio_to_streaming=_ratio(paper, record),
+        flip=errors,
+        psnr=quality,
+        cost=cost,
+        parameters=way.parameters,
+        bytes=way.bytes,
+        on_front=False,
+        command=way.command,
+    )
+
+
+def _ratio(paper: Record | None, record: Record) -> float:
+    """How many times as long the paper's frames took, on the scenes that both drew."""
+    if paper is None:
+        return 0.0
+    both = min(len(paper.ms), len(record.ms))
+    return sum(paper.ms[:both]) / sum(record.ms[:both])
+
+
+def _with_front(point: Point, on_front: bool) -> Point:
+    return replace(point, on_front=on_front)
+
+
+def machine() -> str:
+    """The processor."""
+    name = platform.processor() or platform.machine()
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
+            name = next(
+                (line.partition(":")[2].strip() for line in file if line.startswith("model name")), name
+            )
+    except OSError:
+        pass
+    return f"{name}, {platform.machine()}"

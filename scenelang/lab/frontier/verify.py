@@ -1,0 +1,126 @@
+"""Whether the promised errors hold on scenes that the frontier never saw."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import torch
+
+from scenelang.backend.neural import open_model
+from scenelang.lab.frontier.ways import ways_of
+from scenelang.measure.choose import error_scale
+from scenelang.measure.cost import load_of
+from scenelang.measure.frontier import Frontier
+from scenelang.measure.metrics import flip
+from scenelang.measure.scenes import reference_of, scenes_of
+from scenelang.models.manifest import load_manifest
+from scenelang.program.compile import compile_scene
+from scenelang.training.loop import revision
+
+KEPT: Final = 0.95
+"""Share of scenes in which a promise has to hold."""
+SLOW: Final = 6
+"""Scenes of the first case for ways that take over half a second a frame; the other cases have none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """Scenes that promises are tried on.
+
+    Args:
+        name: what they are called.
+        set: of `scenelang.measure.sets`.
+        canvas: instead of the set's; None for the set's own.
+        share: of the scenes that are asked for.
+    """
+
+    name: str
+    set: str
+    canvas: tuple[int, int] | None
+    share: float
+
+
+CASES: Final = (
+    Case("256 x 256", "", None, 1.0),
+    Case("128 x 128", "", (128, 128), 0.3),
+    Case("512 x 512", "", (512, 512), 0.2),
+    Case("16 objects", "many", None, 0.2),
+)
+
+
+def verify(
+    frontier: Frontier,
+    base: str,
+    scenes: int,
+    seed: int,
+    report: Callable[[str, int, int], None] | None = None,
+) -> dict[str, Any]:
+    """Draw unseen scenes by every offered point and count in how many the promised FLIP is kept.
+
+    Args:
+        frontier: the promises.
+        base: the model named like the set.
+        scenes: of the first case; the others take a share.
+        seed: of the scenes; another than the frontier's.
+        report: called with the case, scenes done and all.
+
+    Returns:
+        For JSON: for each case and point ``scenes``, ``kept`` (share), ``worst`` (FLIP over the promise) and
+        ``promise`` (FLIP of a usual scene), and ``held``: whether every share is at least `KEPT`.
+
+    Raises:
+        ValueError: the seed is the frontier's own.
+    """
+    if seed == frontier.seed:
+        raise ValueError(f"seed {seed} made the promises; verify with another")
+    torch.set_num_threads(1)
+    model, manifest = open_model(base), load_manifest(base)
+    points = {p.name: p for p in frontier.points if p.offered and p.flip is not None}
+    ways = [w for w in ways_of(base, 1) if w.name in points and not w.side and w.backend == "neural"]
+    cases = {}
+    for case in CASES:
+        scene_at = scenes_of(model, case.set or manifest.set, seed)
+        count = max(1, round(scenes * case.share))
+        ratios: dict[str, list[float]] = {way.name: [] for way in ways}
+        for index in range(count):
+            scene = scene_at(index)
+            if case.canvas is not None:
+                scene = scene.model_copy(update={"canvas": case.canvas})
+            exact = reference_of(scene, manifest)
+            load = load_of(compile_scene(scene, model=base))
+            scale = error_scale(scene.canvas, load.objects)
+            for way in ways:
+                point = points[way.name]
+                if point.ms.median > 500 and (case.set or case.canvas or index >= SLOW):
+                    continue
+                found = point.flip
+                assert found is not None
+                promise = found.bound * scale
+                error = flip(way.prepare(scene)(), exact)
+                ratios[way.name].append(error / promise if promise > 0 else (1.0 if error <= 0 else 2.0))
+            if report is not None:
+                report(case.name, index + 1, count)
+        cases[case.name] = {name: _summary(values) for name, values in ratios.items() if values}
+    return {
+        "format": 1,
+        "set": manifest.set,
+        "seed": seed,
+        "frontier_seed": frontier.seed,
+        "frontier_revision": frontier.revision,
+        "revision": revision(),
+        "machine": platform.machine(),
+        "held": all(row["kept"] >= KEPT for rows in cases.values() for row in rows.values()),
+        "cases": cases,
+    }
+
+
+def _summary(ratios: list[float]) -> dict[str, float]:
+    kept = sum(ratio <= 1.0 for ratio in ratios)
+    return {
+        "scenes": len(ratios),
+        "kept": round(kept / len(ratios), 4),
+        "worst": round(max(ratios), 3),
+    }

@@ -1,0 +1,195 @@
+"""Every way to draw a set's scenes that the frontier measures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import torch
+
+from scenelang.backend.neural import draw_program, open_model
+from scenelang.backend.render import Samples
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import lower
+from scenelang.image import Image, from_samples
+from scenelang.models.manifest import Manifest, available, load_manifest
+from scenelang.models.weights import read_facts
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import Program
+from scenelang.reference.image import reference_image
+from scenelang.renderers.streaming import Streaming, StreamingConfig
+from scenelang.scene.schema import Scene
+
+FULL = 256  # pixels along a side at which the paper's renderer is timed
+Draw = Callable[[], Image]
+
+
+class Prepare(Protocol):
+    """Compiles a scene, which is not timed, and returns what draws it, which is."""
+
+    def __call__(self, scene: Scene) -> Draw: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A way to draw; the fields it shares with `scenelang.measure.frontier.Point` are said there.
+
+    Args:
+        prepare: compiles scenes for it.
+        drawn: whether there is a picture worth comparing; untrained weights are only timed.
+    """
+
+    name: str
+    prepare: Prepare = field(repr=False)
+    backend: Literal["neural", "reference"] = "neural"
+    model: str | None = None
+    renderer: str = "reference"
+    samples: Samples = "adaptive"
+    skip: bool = True
+    spp: int = 0
+    side: int = 0
+    why_not: str | None = None
+    drawn: bool = True
+    parameters: int = 0
+    bytes: int = 0
+    command: str | None = None
+
+    @property
+    def offered(self) -> bool:
+        return self.why_not is None
+
+
+def ways_of(base: str, threads: int) -> list[Way]:
+    """All ways to draw the scenes of a set.
+
+    Args:
+        base: the model named like the set.
+        threads: cores to draw on.
+
+    Raises:
+        RenderError: a model's weights are missing or damaged.
+    """
+    manifests = [m for m in map(load_manifest, available()) if m.set == load_manifest(base).set]
+    found: list[Way] = []
+    for manifest in sorted(manifests, key=lambda m: (m.name != base, m.name)):
+        found += _of_model(manifest, base, threads)
+    found += [*_references(load_manifest(base)), *_paper(base, threads)]
+    return found
+
+
+def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
+    name = manifest.name
+    facts = read_facts(name)
+    side = manifest.sizes[0][0] if manifest.sizes else 0
+
+    def way(title: str, why_not: str | None = None, **options: Any) -> Way:
+        words = [f"--{key} {value}" for key, value in options.items() if key != "skip"]
+        if manifest.renderer == "reading":
+            options["skip"] = False  # every sample reads every object
+        line = " ".join(["scenelang render scene.nsg -o scene.png --model", name, *words])
+        if side:
+            line += f" --size {side}x{side}"
+        return Way(
+            title,
+            _neural(name, side, threads, **options),
+            model=name,
+            renderer=manifest.renderer,
+            side=side,
+            why_not=why_not,
+            parameters=facts.parameters,
+            bytes=facts.bytes,
+            command=None if why_not else line,
+            **options,
+        )
+
+    yield way(name)
+    if manifest.renderer == "framed":
+        yield way(f"{name}, four samples", samples="four")
+        yield way(f"{name}, one sample", samples="one")
+        yield way(f"{name}, nothing skipped", "the same picture, later", skip=False)
+
+
+def _neural(name: str, side: int, threads: int, **options: Any) -> Prepare:
+    def prepare(scene: Scene) -> Draw:
+        if side:
+            scene = scene.model_copy(update={"canvas": (side, side)})
+        program = compile_scene(scene, model=name)
+        model = open_model(name)
+
+        def run() -> Image:
+            return draw_program(program, model, threads=threads, **options).image
+
+        return run
+
+    return prepare
+
+
+def _references(manifest: Manifest) -> Iterator[Way]:
+    for per_side, why_not in (
+        (2, None),
+        (1, "drawn for comparison: the language defines four"),
+        (4, "drawn for comparison: the language defines four"),
+    ):
+        yield Way(
+            f"exact reference, {per_side**2} spp",
+            _exact(manifest, per_side),
+            backend="reference",
+            spp=per_side**2,
+            skip=False,
+            why_not=why_not,
+            command=None if why_not else "scenelang render scene.nsg -o scene.png --backend reference",
+        )
+
+
+def _exact(manifest: Manifest, per_side: int) -> Prepare:
+    def prepare(scene: Scene) -> Draw:
+        graph = lower(scene.model_copy(update={"model": manifest.name}), manifest, None, Diagnostics())
+        return lambda: reference_image(graph, per_side=per_side)
+
+    return prepare
+
+
+def _paper(base: str, threads: int) -> Iterator[Way]:
+    """The paper's streaming renderer at the full size, untrained: what a frame of it takes."""
+    for width, title in ((1.0, "the paper's streaming"), (1 / 8, "streaming, 1/8 of the filters")):
+        yield Way(
+            f"{title}, {FULL}²",
+            _untrained(base, width, threads),
+            renderer="streaming",
+            why_not="random weights, to take its time",
+            drawn=False,
+            parameters=sum(p.numel() for p in _random(width).parameters()),
+        )
+
+
+@lru_cache(maxsize=4)
+def _random(width: float) -> Streaming:
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(1)
+        made = Streaming(StreamingConfig(resolution=FULL, width=width)).requires_grad_(False).eval()
+    made.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    return made
+
+
+def _untrained(base: str, width: float, threads: int) -> Prepare:
+    def prepare(scene: Scene) -> Draw:
+        program = compile_scene(scene, model=base)
+        return lambda: from_samples(_streamed(program, width, threads), None)
+
+    return prepare
+
+
+def _streamed(program: Program, width: float, threads: int) -> np.ndarray:
+    before = torch.get_num_threads()
+    torch.set_num_threads(threads)
+    try:
+        with torch.no_grad():
+            vectors = torch.from_numpy(program.vectors.copy())[None]
+            found = _random(width)(vectors, torch.from_numpy(program.tokens.astype(np.int64))[None])
+    finally:
+        torch.set_num_threads(before)
+    picture: np.ndarray = found[0].permute(1, 2, 0).clamp(0, 1).numpy()
+    return picture

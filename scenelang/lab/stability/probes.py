@@ -1,0 +1,243 @@
+"""What the stability suite varies: one quantity at a time, from what was trained to far beyond.
+
+A probe makes a random scene for a value of its quantity; the same index gives the same random numbers at
+every value, so that a curve differs by the quantity alone. The base is that of the set `shapes2d`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenelang.measure.sets import SETS, Rng, SetConfig, random_object, random_scene
+from scenelang.scene.schema import (
+    Bend,
+    Chain,
+    Combine,
+    Link,
+    Object,
+    Rotate,
+    Scale,
+    Scene,
+    Shear,
+    Transform,
+    Translate,
+    Twirl,
+)
+
+BASE = SETS["shapes2d"]
+Make = Callable[[Rng, float], Scene]
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """One quantity and its scenes.
+
+    Args:
+        title: what a chart is headed.
+        quantity: what the axis says.
+        values: of the quantity, ascending.
+        healthy: the value that the others are compared with.
+        make: a scene for a value.
+        folded: whether the compiler may fold affine maps; else the lifting multiplies every one of them.
+    """
+
+    title: str
+    quantity: str
+    values: tuple[float, ...]
+    healthy: float
+    make: Make
+    folded: bool = True
+
+
+def _with(**changes: object) -> Callable[[Rng], Scene]:
+    config = replace(BASE, **changes)  # type: ignore[arg-type]
+    return lambda rng: random_scene(rng, config)
+
+
+def _objects(rng: Rng, count: float) -> Scene:
+    return _with(objects=(int(count),) * 2)(rng)
+
+
+def _operators(rng: Rng, count: float) -> Scene:
+    """One object and so many operators after it, none of them a plain union."""
+    scene = _with(objects=(int(count) + 1,) * 2, unions=0.0)(rng)
+    words: tuple[Combine, ...] = ("smooth", "subtract", "intersect")
+    # intersections leave little of a picture: objects are larger, so that something is there to be wrong
+    return _joined(scene, lambda i: "union" if i == 0 else words[int(rng.integers(3))], 1.6)
+
+
+def _blends(rng: Rng, count: float) -> Scene:
+    return _joined(_with(objects=(int(count) + 1,) * 2)(rng), lambda i: "smooth" if i else "union", 1.0)
+
+
+def _joined(scene: Scene, word: Callable[[int], Combine], larger: float) -> Scene:
+    (chain,) = scene.nodes
+    assert isinstance(chain, Chain)
+    links = []
+    for i, link in enumerate(chain.children):
+        assert isinstance(link.node, Object)
+        moves = [_larger(t, larger) for t in link.node.transforms]
+        links.append(Link(op=word(i), node=link.node.model_copy(update={"transforms": tuple(moves)})))
+    return scene.model_copy(update={"nodes": (Chain(children=tuple(links)),)})
+
+
+def _larger(move: Transform, factor: float) -> Transform:
+    if isinstance(move, Scale):
+        return Scale(x=move.x * factor, y=move.y * factor, z=1.0)
+    return move
+
+
+def _affine_steps(rng: Rng, steps: float) -> Scene:
+    return _with(affine_steps=max(3, int(steps)))(rng)
+
+
+def _warp(rng: Rng, factor: float) -> Scene:
+    return _with(warp=BASE.warp * factor)(rng)
+
+
+def _size(rng: Rng, factor: float) -> Scene:
+    return _with(size=factor)(rng)
+
+
+def _canvas(rng: Rng, side: float) -> Scene:
+    return _with(canvas=(int(side),) * 2)(rng)
+
+
+def _object_with(rng: Rng, moves: Callable[[Object], list[Transform]]) -> Scene:
+    """A base scene whose objects have other chains."""
+    scene = random_scene(rng, BASE)
+    (chain,) = scene.nodes
+    assert isinstance(chain, Chain)
+    links = []
+    for link in chain.children:
+        assert isinstance(link.node, Object)
+        links.append(
+            Link(op=link.op, node=link.node.model_copy(update={"transforms": tuple(moves(link.node))}))
+        )
+    return scene.model_copy(update={"nodes": (Chain(children=tuple(links)),)})
+
+
+def _thin(rng: Rng, ratio: float) -> Scene:
+    def moves(node: Object) -> list[Transform]:
+        return [Scale(x=t.x, y=t.x / ratio, z=1.0) if isinstance(t, Scale) else t for t in node.transforms]
+
+    return _object_with(rng, moves)
+
+
+def _sheared(rng: Rng, k: float) -> Scene:
+    def moves(node: Object) -> list[Transform]:
+        *first, rotate, translate = node.transforms
+        return [*first, Shear(axes="xy", k=k), rotate, translate]
+
+    return _object_with(rng, moves)
+
+
+def _order(rng: Rng, kind: float) -> Scene:
+    """0: as trained; 1: affine maps in any order after the deformations; 2: deformations after them, about
+    the origin of the world; 3: a deformation between affine maps."""
+
+    def moves(node: Object) -> list[Transform]:
+        twirl, bend, scale, rotate, translate = node.transforms
+        some = [scale, rotate, translate]
+        if kind == 1:
+            return [twirl, bend, *(some[i] for i in rng.permutation(3))]
+        if kind == 2:
+            return [*some, twirl, bend]
+        if kind == 3:
+            return [twirl, scale, bend, rotate, translate]
+        return list(node.transforms)
+
+    return _object_with(rng, moves)
+
+
+PROBES: dict[str, Probe] = {
+    "objects": Probe("objects of a scene", "objects", (1, 2, 4, 8, 16, 32, 64, 128), 4, _objects),
+    "operators": Probe(
+        "operators in a row: smooth, subtract, intersect",
+        "operators",
+        (1, 2, 3, 4, 5, 6, 7, 8),
+        3,
+        _operators,
+    ),
+    "blends": Probe("smooth unions in a row", "smooth unions", (1, 2, 4, 8, 16, 32, 64), 4, _blends),
+    "affine": Probe(
+        "affine maps of each object, each lifted by itself",
+        "affine maps",
+        (3, 4, 8, 16, 32, 64),
+        3,
+        _affine_steps,
+        folded=False,
+    ),
+    "warp": Probe(
+        "deformations beyond the base set's ±0.8", "times the range", (0.5, 1, 1.5, 2, 2.5, 3), 1, _warp
+    ),
+    "size": Probe("sizes beyond the base set's", "times the size", (0.03, 0.1, 0.3, 1, 2, 4, 8), 1, _size),
+    "thin": Probe("thin objects", "ratio of the scales", (1, 3, 10, 30, 100, 300), 3, _thin),
+    "shear": Probe("sheared objects", "shear", (0, 0.5, 1, 2, 4, 8), 0, _sheared),
+    "order": Probe(
+        "orders of transformations",
+        "order (0 as trained, 1 affine shuffled, 2 deformed last, 3 mixed)",
+        (0, 1, 2, 3),
+        0,
+        _order
+    ),
+    "canvas": Probe("canvas sizes", "pixels along a side", (32, 64, 128, 256, 512, 1024), 256, _canvas),
+}  # fmt: skip
+
+
+def apart(rng: Rng, count: int = 9) -> list[Object]:
+    """Objects that do not overlap, in cells of a grid: what order they come in makes no difference."""
+    side = math.isqrt(count - 1) + 1
+    cell = 2.0 / side
+    found = []
+    config = SetConfig(warp=0.0, deformed=False)
+    for i in range(count):
+        node = random_object(rng, config)
+        turn = next(t for t in node.transforms if isinstance(t, Rotate))
+        place = Translate(x=(i % side + 0.5) * cell - 1, y=(i // side + 0.5) * cell - 1)
+        found.append(node.model_copy(update={"transforms": (Scale.uniform(0.42 * cell), turn, place)}))
+    return found
+
+
+def union_of(nodes: list[Object]) -> Scene:
+    """A union in order."""
+    links = tuple(Link(op="union", node=node) for node in nodes)
+    return Scene(model="shapes2d", nodes=(Chain(children=links),))
+
+
+def animated(rng: Rng, frames: int) -> list[Scene]:
+    """Frames of a base scene whose objects turn by 3 degrees, drift by a pixel and sway a little each."""
+    scene = random_scene(rng, BASE)
+    (chain,) = scene.nodes
+    assert isinstance(chain, Chain)
+    drifts = [(float(rng.normal()), float(rng.normal())) for _ in chain.children]
+    out = []
+    for frame in range(frames):
+        links = []
+        for link, (dx, dy) in zip(chain.children, drifts, strict=True):
+            assert isinstance(link.node, Object)
+            moves = [_moved(t, frame, dx, dy) for t in link.node.transforms]
+            links.append(Link(op=link.op, node=link.node.model_copy(update={"transforms": tuple(moves)})))
+        out.append(scene.model_copy(update={"nodes": (Chain(children=tuple(links)),)}))
+    return out
+
+
+def _moved(move: Transform, frame: int, dx: float, dy: float) -> Transform:
+    if isinstance(move, Rotate):
+        return Rotate(angle=move.angle + math.radians(3.0 * frame))
+    if isinstance(move, Translate):
+        return Translate(x=move.x + dx * frame / 128, y=move.y + dy * frame / 128)
+    if isinstance(move, Twirl):
+        return Twirl(k=move.k + 0.02 * math.sin(frame))
+    if isinstance(move, Bend):
+        return Bend(k=move.k + 0.02 * math.cos(frame))
+    return move
+
+
+def rng_of(seed: int, index: int, attempt: int = 0) -> Rng:
+    """Random numbers of a scene."""
+    return np.random.default_rng([seed, 77, index, attempt])

@@ -1,0 +1,75 @@
+"""From the stability suite to what a manifest says: how far a model may be taken, and what it does beyond.
+
+A value is within range while pictures are hardly told from exact ones (`HARDLY`), or no worse than the
+model's usual ones by more than `SLACK`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from scenelang.measure.sets import SETS
+
+HARDLY, SLACK = 40.0, 1.0  # dB, of mean PSNR
+WARP = SETS["shapes2d"].warp
+SCALES = 0.2, 0.55  # of the base set
+# Quantity of a manifest -> the probe that varies it, and what its values are multiplied by at either end.
+QUANTITIES: dict[str, tuple[str, float, float]] = {
+    "objects": ("objects", 1.0, 1.0),
+    "smooth": ("blends", 1.0, 1.0),
+    "twirl": ("warp", WARP, WARP),
+    "bend": ("warp", WARP, WARP),
+    "scale": ("size", *SCALES),
+    "thin": ("thin", 1.0, 1.0),
+}
+FROM_NOTHING = {"smooth": 0.0}  # what the least value is where the probe starts later
+BOTH_WAYS = {"twirl", "bend"}  # the range is the same on either side of 0
+
+
+def measured_ranges(found: Mapping[str, Any]) -> tuple[dict[str, list[float]], dict[str, str]]:
+    """What the suite says of a model.
+
+    Args:
+        found: of `scenelang.lab.stability.suite.run_stability`.
+
+    Returns:
+        Ranges ``quantity -> [low, high]`` for the manifest's ``trained``, and lines about what lies beyond
+        for ``measured.stability``.
+    """
+    ranges: dict[str, list[float]] = {}
+    lines: dict[str, str] = {}
+    for quantity, (name, low_unit, high_unit) in QUANTITIES.items():
+        probe = found["probes"].get(name)
+        if probe is None:
+            continue
+        rows = probe["rows"]
+        first, last = _healthy(rows, probe["healthy"])
+        low, high = rows[first]["value"] * low_unit, rows[last]["value"] * high_unit
+        low = FROM_NOTHING.get(quantity, low)
+        if quantity in BOTH_WAYS:
+            low = -high
+        ranges[quantity] = [int(v) if v == int(v) else round(v, 4) for v in (low, high)]
+        beyond = [*rows[:first], *rows[last + 1 :]] if quantity not in BOTH_WAYS else rows[last + 1 :]
+        shown = [beyond[0], beyond[-1]] if len(beyond) > 1 else beyond
+        unit = {True: low_unit, False: high_unit}
+        said = [
+            f"{row['value'] * unit[row['value'] < probe['healthy']]:g}: {row['psnr']['mean']:.1f} dB "
+            f"(worst {row['psnr']['worst']:.1f})"
+            for row in shown
+        ]
+        if said:
+            lines[quantity] = ", ".join(said)
+    return ranges, lines
+
+
+def _healthy(rows: list[dict[str, Any]], healthy: float) -> tuple[int, int]:
+    """The first and the last row, around the healthy one, up to which all is well."""
+    centre = next(i for i, row in enumerate(rows) if row["value"] == healthy)
+    least = min(HARDLY, rows[centre]["psnr"]["mean"] - SLACK)
+    first = last = centre
+    while first > 0 and rows[first - 1]["psnr"]["mean"] >= least:
+        first -= 1
+    while last + 1 < len(rows) and rows[last + 1]["psnr"]["mean"] >= least:
+        last += 1
+    return first, last

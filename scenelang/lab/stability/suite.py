@@ -1,0 +1,302 @@
+"""The stability suite: how a model's error grows as scenes leave what it was trained on.
+
+PSNR alone misleads across canvas sizes and object counts, because most of a picture is flat and right: an
+error is also given per edge pixel (of the exact picture) and per covered pixel, as the sum of absolute
+errors, averaged over channels, over the number of such pixels.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.backend.neural import draw_program
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import lower
+from scenelang.graph.steps import Affine, Step, Warp
+from scenelang.graph.transforms import step_of
+from scenelang.image import Image
+from scenelang.lab.stability.probes import PROBES, Probe, animated, apart, rng_of, union_of
+from scenelang.lifting import exact
+from scenelang.lifting.learned import lift_geometry
+from scenelang.measure.metrics import flip, psnr
+from scenelang.measure.scenes import coverage, sized, spread
+from scenelang.models.load import Model
+from scenelang.passes import OPTIONAL
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import Program
+from scenelang.reference.image import reference_image
+from scenelang.renderers.draw import draw
+from scenelang.renderers.framed import Framed
+from scenelang.scene.schema import Chain, Object, Scene
+
+EDGE = 2 / 255  # a pixel of an edge differs by more from a neighbour
+LEAST_COVER = 0.02  # share of the canvas; scenes with less are drawn again
+FRAMES = 8
+SIZES = {"canvas"}  # probes that only models of any size can take
+IDEAL = 8  # samples along a pixel's side of a picture whose own sampling hardly shows
+
+Array = npt.NDArray[np.float64]
+Report = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """A picture against the exact one.
+
+    Args:
+        psnr: dB, at most 50.
+        flip: mean FLIP in [0, 1].
+        per_edge: absolute error per edge pixel.
+        per_covered: absolute error per covered pixel.
+        square: mean squared error, which no cap hides.
+    """
+
+    psnr: float
+    flip: float
+    per_edge: float
+    per_covered: float
+    square: float
+
+
+def exact_picture(
+    scene: Scene, model: Model, per_side: int = 2
+) -> tuple[Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """The exact picture over white (H, W, 3), which pixels are covered, and which are on an edge.
+
+    Args:
+        scene: what is drawn.
+        model: that its names are known by.
+        per_side: samples along each side of a pixel; 2 is the definition.
+    """
+    clear = scene.model_copy(update={"background": None})
+    graph = lower(clear, model.manifest, None, Diagnostics())
+    found = np.asarray(reference_image(graph, per_side=per_side), np.float64)
+    alpha = found[..., 3:]
+    picture = found[..., :3] * alpha + (1 - alpha)
+    edge = np.zeros(alpha.shape[:2], bool)
+    for axis in (0, 1):
+        step = np.abs(np.diff(np.concatenate([picture, alpha], 2), axis=axis)).max(2) > EDGE
+        first, last = [(0, 0), (0, 0)], [(0, 0), (0, 0)]
+        first[axis], last[axis] = (1, 0), (0, 1)
+        edge |= np.pad(step, first) | np.pad(step, last)
+    return picture, alpha[..., 0] > 0, edge
+
+
+def compare(picture: Image, reference: tuple[Array, Any, Any]) -> Errors:
+    """Errors of a picture against what `exact_picture` gave."""
+    exact_one, covered, edge = reference
+    gap = float(np.abs(np.asarray(picture, np.float64)[..., :3] - exact_one).mean(2).sum())
+    return Errors(
+        psnr(picture, exact_one),
+        flip(picture, exact_one),
+        gap / max(1, edge.sum()),
+        gap / max(1, covered.sum()),
+        float(np.square(np.asarray(picture, np.float64)[..., :3] - exact_one).mean()),
+    )
+
+
+def unfolded(scene: Scene, program: Program, model: Model) -> Program:
+    """The same Program, its geometry vectors lifted one affine map after the other.
+
+    The exact lifting does so in float32, to show what rounding adds up to.
+
+    Args:
+        scene: one chain of objects, deformations first.
+        program: compiled of it without dropping rows.
+        model: that it was compiled for.
+    """
+    (chain,) = scene.nodes
+    assert isinstance(chain, Chain)
+    vectors = program.vectors.copy()
+    lifting = model.codes().lifting
+    if lifting is not None:
+        nodes = [link.node for link in chain.children if isinstance(link.node, Object)]
+        steps = [[step_of(t, 2) for t in node.transforms] for node in nodes]
+        leaves = [model.manifest.geometries.index(node.geometry) for node in nodes]
+        chains: list[list[Step]] = [[s for s in chain if isinstance(s, Affine | Warp)] for chain in steps]
+        vectors[:, : lifting.codes.shape[1]] = lift_geometry(lifting, chains, leaves)
+        return dataclasses.replace(program, vectors=vectors)
+    for row, link in zip(vectors, chain.children, strict=True):
+        assert isinstance(link.node, Object)
+        g = exact.leaf_vector(row[exact.CODE].tolist()).astype(np.float32)
+        for transform in link.node.transforms:
+            step = step_of(transform, 2)
+            if isinstance(step, Affine):
+                matrix = exact.affine_matrix(step.rows)
+            else:
+                matrix = exact.warp_matrix(step, exact.INNER)  # type: ignore[arg-type]
+            g = matrix.astype(np.float32) @ g
+        row[: exact.D_G] = g
+    return dataclasses.replace(program, vectors=vectors)
+
+
+def picture_of(model: Model, program: Program, **options: Any) -> Image:
+    """A Program's picture; options are those of `renderers.draw.draw`."""
+    if not isinstance(model.network, Framed):
+        return draw_program(program, model, threads=1).image
+    return draw(
+        model.network, program.vectors, program.tokens, program.canvas, program.background, **options
+    ).image
+
+
+def _drawn(model: Model, scene: Scene, folded: bool) -> Image:
+    without = () if folded else OPTIONAL
+    program = compile_scene(scene, model=model.manifest.name, codes=model.codes(), without=without)
+    return picture_of(model, program if folded else unfolded(scene, program, model))
+
+
+def scene_of(probe: Probe, value: float, index: int, seed: int, model: Model) -> Scene:
+    """The scene of a probe at a value; drawn again while it covers too little of the canvas."""
+    scale = 1.0
+    for attempt in range(200):
+        scene = sized(probe.make(rng_of(seed, index, attempt), value), model.manifest)
+        if coverage(scene, model.manifest) >= LEAST_COVER * scale:
+            return scene
+        scale *= 0.97  # thin and tiny objects never cover that much
+    return scene
+
+
+def run_probe(
+    model: Model, name: str, scenes: int, seed: int, report: Report | None = None
+) -> dict[str, Any]:
+    """A curve: errors at every value of a probe; none for one that the model's canvas rules out."""
+    probe = PROBES[name]
+    rows = []
+    values = probe.values if name not in SIZES or not model.manifest.sizes else ()
+    for at, value in enumerate(values):
+        found, ideal = [], []
+        for index in range(scenes):
+            scene = scene_of(probe, value, index, seed, model)
+            picture = _drawn(model, scene, probe.folded)
+            found.append(compare(picture, exact_picture(scene, model)))
+            if name in SIZES:
+                ideal.append(compare(picture, exact_picture(scene, model, IDEAL)).per_edge)
+        rows.append(
+            {
+                "value": value,
+                "psnr": spread([e.psnr for e in found], 5),
+                "flip": spread([e.flip for e in found], 95),
+                "db": round(-10 * math.log10(max(1e-12, float(np.mean([e.square for e in found])))), 3),
+                "per_edge": round(float(np.mean([e.per_edge for e in found])), 6),
+                "per_covered": round(float(np.mean([e.per_covered for e in found])), 6),
+            }
+        )
+        if name in SIZES:
+            rows[-1]["per_edge_ideal"] = round(float(np.mean(ideal)), 6)
+        if report is not None:
+            report(name, at + 1, len(probe.values))
+    return {"title": probe.title, "quantity": probe.quantity, "healthy": probe.healthy, "rows": rows}
+
+
+def order_of_disjoint(model: Model, scenes: int, seed: int) -> dict[str, float]:
+    """Objects that do not overlap, in two orders: how far apart the pictures are, and a healthy PSNR."""
+    most, values = 0.0, []
+    for index in range(scenes):
+        rng = rng_of(seed, index)
+        nodes = apart(rng)
+        first = sized(union_of(nodes), model.manifest)
+        second = sized(union_of([nodes[i] for i in rng.permutation(len(nodes))]), model.manifest)
+        a, b = _drawn(model, first, True), _drawn(model, second, True)
+        most = max(most, float(np.abs(np.asarray(a) - np.asarray(b)).max()))
+        values.append(psnr(a, exact_picture(first, model)[0]))
+    return {"largest_difference": round(most, 6), "psnr": round(float(np.mean(values)), 3)}
+
+
+def flicker(model: Model, scenes: int, seed: int) -> dict[str, float]:
+    """Change from frame to frame that the exact animation does not have, over the change that it has.
+
+    Both are root mean squares over pixels; 0 is none, 1 as much again as the picture moves. Animations in
+    which nothing moves do not count, and where none does more are drawn.
+    """
+    ratios: list[float] = []
+    for index in itertools.count():
+        if index >= scenes and ratios:
+            break
+        frames = [sized(f, model.manifest) for f in animated(rng_of(seed, index), FRAMES)]
+        ours = [np.asarray(_drawn(model, f, True), np.float64) for f in frames]
+        exact_ones = [exact_picture(f, model)[0] for f in frames]
+        extra = real = 0.0
+        for i in range(1, FRAMES):
+            change = exact_ones[i] - exact_ones[i - 1]
+            extra += float(np.square(ours[i] - ours[i - 1] - change).sum())
+            real += float(np.square(change).sum())
+        if real > 0:
+            ratios.append(math.sqrt(extra / real))
+    return {"mean": round(float(np.mean(ratios)), 5), "worst": round(max(ratios), 5)}
+
+
+def arithmetic(model: Model, scenes: int, seed: int) -> dict[str, float]:
+    """What tiles, threads and skipping change of a picture at most, on base scenes."""
+    probe = PROBES["objects"]
+    most = {"tiles": 0.0, "threads": 0.0, "skipping": 0.0}
+    if not isinstance(model.network, Framed):
+        return most  # draws whole pictures
+    for index in range(scenes):
+        scene = scene_of(probe, 4, index, seed, model)
+        program = compile_scene(scene, model=model.manifest.name, codes=model.codes())
+        base = np.asarray(picture_of(model, program))
+        for name, options in (
+            ("tiles", {"tile": 1999}),
+            ("threads", {"threads": 2, "tile": 1 << 13}),
+            ("skipping", {"skip": False}),
+        ):
+            other = np.asarray(picture_of(model, program, **options))
+            most[name] = max(most[name], float(np.abs(other - base).max()))
+    return {k: round(v, 7) for k, v in most.items()}
+
+
+INVARIANTS: dict[str, Callable[[Model, int, int], dict[str, float]]] = {
+    "order_of_disjoint": order_of_disjoint,
+    "flicker": flicker,
+    "arithmetic": arithmetic,
+}
+
+
+def run_stability(
+    model: Model,
+    scenes: int,
+    seed: int,
+    only: tuple[str, ...] = (),
+    report: Report | None = None,
+) -> dict[str, Any]:
+    """The whole suite, or the probes and invariants named.
+
+    Args:
+        model: what draws.
+        scenes: of every value.
+        seed: of the scenes.
+        only: names of `PROBES` and `INVARIANTS`; all by default.
+        report: called with a name, values done and all.
+
+    Returns:
+        For JSON: ``probes`` and ``invariants`` by name, and what was measured on what.
+    """
+    started = time.perf_counter()
+    probes = {n: run_probe(model, n, scenes, seed, report) for n in PROBES if not only or n in only}
+    probes = {name: probe for name, probe in probes.items() if probe["rows"]}
+    invariants = {}
+    for name, measure in INVARIANTS.items():
+        if not only or name in only:
+            invariants[name] = measure(model, scenes, seed)
+            if report is not None:
+                report(name, 1, 1)
+    return {
+        "model": model.manifest.name,
+        "weights": model.digest,
+        "scenes": scenes,
+        "seed": seed,
+        "machine": platform.machine(),
+        "seconds": round(time.perf_counter() - started, 1),
+        "probes": probes,
+        "invariants": invariants,
+    }

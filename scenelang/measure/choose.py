@@ -1,0 +1,214 @@
+"""Which point of the frontier draws a scene: the fastest that is good enough, or the best that is in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from scenelang.measure.cost import Load, predicted_ms
+from scenelang.measure.frontier import Frontier, Point
+from scenelang.models.choose import names_used, paints
+from scenelang.models.manifest import Manifest
+from scenelang.scene.schema import Scene
+
+OBJECTS: Final = 4
+"""Objects of the largest scenes whose errors were measured; more have more outlines to be wrong at."""
+
+
+class NothingFits(Exception):
+    """No point draws the scene as fast or as exactly as asked; says which comes nearest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What the command line asks for; None for no limit.
+
+    Args:
+        ms: most milliseconds of a frame on this machine.
+        flip: most mean FLIP.
+    """
+
+    ms: float | None
+    flip: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A point and what it promises for a scene on this machine.
+
+    Args:
+        point: from the frontier.
+        ms: what 95 of 100 frames stay under.
+        flip: what 97.5 of 100 scenes stay under.
+    """
+
+    point: Point
+    ms: float
+    flip: float
+
+    def told(self) -> str:
+        return f"{self.point.name}: {_ms(self.ms)} and FLIP {self.flip:.2g} at most"
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The point that draws, and why.
+
+    Args:
+        offer: the chosen one.
+        runner_up: the one that would be next.
+        refused: names of points that cannot draw the scene, and the reason.
+        notes: lines for people.
+    """
+
+    offer: Offer
+    runner_up: Offer | None
+    refused: dict[str, str]
+    notes: tuple[str, ...]
+
+
+def error_scale(canvas: tuple[int, int], objects: int) -> float:
+    """By how much a promised error grows for a scene unlike those that were measured, at 256 x 256.
+
+    Errors lie along outlines. On a smaller canvas more of the pixels do, in proportion to its shorter side,
+    and with more than `OBJECTS` objects there is more outline, in proportion to their number. A larger canvas
+    or fewer objects promise no less error than was measured.
+    """
+    return max(1.0, 256 / min(canvas)) * max(1.0, objects / OBJECTS)
+
+
+def refusal(point: Point, manifest: Manifest | None, scene: Scene | None, compiled: str | None) -> str | None:
+    """Why a point cannot draw a scene, None if it can.
+
+    Args:
+        point: from the frontier.
+        manifest: of the point's model; None for the reference.
+        scene: the scene; None for a compiled program.
+        compiled: the model that the program was compiled for.
+    """
+    if not point.offered:
+        return point.why_not or "not offered"
+    if compiled is not None:
+        if point.backend == "reference":
+            return "a compiled program keeps only what the network needs"
+        return None if point.model == compiled else f"the program was compiled for `{compiled}`"
+    if scene is None or manifest is None:
+        return None
+    lacking = [
+        name
+        for used, known in zip(
+            names_used(scene),
+            (manifest.geometries, manifest.materials, manifest.transforms, manifest.material_ops),
+            strict=True,
+        )
+        for name in sorted(used.difference(known))
+    ]
+    if lacking:
+        return f"has no `{lacking[0]}`"
+    if not paints(manifest, scene):
+        if manifest.sizes and scene.canvas not in manifest.sizes:
+            sizes = ", ".join(f"{w} x {h}" for w, h in manifest.sizes)
+            return f"draws {sizes} pixels only"
+        return "draws on white only"
+    return None
+
+
+def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: float) -> list[Offer]:
+    """What points promise for a scene, the fastest first.
+
+    Args:
+        points: that can draw it.
+        load: of the scene.
+        canvas: its pixels.
+        scale: how much slower this machine is than the one that was measured.
+    """
+    found = []
+    for point in points:
+        if point.cost is None or point.flip is None:
+            continue
+        ms = predicted_ms(point.cost, load, point.skip) * point.cost.spread * scale
+        found.append(Offer(point, ms, min(1.0, point.flip.bound * error_scale(canvas, load.objects))))
+    return sorted(found, key=lambda o: (o.ms, o.flip))
+
+
+def choose(found: Sequence[Offer], wanted: Wanted, refused: dict[str, str]) -> Choice:
+    """The fastest offer that keeps the error, or the one of least error that keeps the time.
+
+    Of offers that promise nearly the same error, within 2 %, the faster one is better.
+
+    Args:
+        found: from `offers`.
+        wanted: at least one limit. With both the fastest that keeps both is taken.
+        refused: why other points cannot draw the scene, to be told.
+
+    Raises:
+        NothingFits: no offer keeps the limits.
+    """
+    if not found:
+        raise NothingFits("nothing on the frontier draws this scene" + _because(refused))
+    good = [
+        o
+        for o in found
+        if (wanted.flip is None or o.flip <= wanted.flip) and (wanted.ms is None or o.ms <= wanted.ms)
+    ]
+    if not good:
+        raise NothingFits(_nearest(found, wanted))
+    if wanted.flip is not None:
+        ranked = sorted(good, key=lambda o: (o.ms, o.flip))
+        others = sorted((o for o in found if o is not ranked[0]), key=lambda o: (o not in good, o.ms))
+    else:
+        least = min(o.flip for o in good)
+        ranked = sorted(
+            good, key=lambda o: (o.flip > 1.02 * least, o.ms if o.flip <= 1.02 * least else o.flip)
+        )
+        others = sorted((o for o in found if o is not ranked[0]), key=lambda o: (o not in good, o.flip))
+    first = ranked[0]
+    runner_up = others[0] if others else None
+    return Choice(first, runner_up, refused, tuple(_notes(first, runner_up, wanted, good)))
+
+
+def _notes(first: Offer, runner_up: Offer | None, wanted: Wanted, good: Sequence[Offer]) -> list[str]:
+    if wanted.flip is not None:
+        limit = f"FLIP {wanted.flip:g}" + (f" and {wanted.ms:g} ms" if wanted.ms is not None else "")
+        why = f"the fastest of {len(good)} that keep {limit}"
+    else:
+        why = f"the most exact of {len(good)} that keep {wanted.ms:g} ms"
+    notes = [f"chosen by the frontier: {first.told()}, {why}"]
+    if runner_up is not None:
+        lacks = []
+        if wanted.ms is not None and runner_up.ms > wanted.ms:
+            lacks.append("too slow")
+        if wanted.flip is not None and runner_up.flip > wanted.flip:
+            lacks.append("not exact enough")
+        if not lacks:
+            lacks.append("slower" if wanted.flip is not None else "no more exact")
+        notes.append(f"runner-up: {runner_up.told()}, {' and '.join(lacks)}")
+    return notes
+
+
+def _nearest(found: Sequence[Offer], wanted: Wanted) -> str:
+    """What comes nearest to limits that nothing keeps."""
+    asked = [f"{wanted.ms:g} ms"] if wanted.ms is not None else []
+    asked += [f"FLIP {wanted.flip:g}"] if wanted.flip is not None else []
+    fastest, nearest = min(found, key=lambda o: o.ms), min(found, key=lambda o: (o.flip, o.ms))
+    if wanted.flip is not None and nearest.flip <= wanted.flip and wanted.ms is not None:
+        keeps = min((o for o in found if o.flip <= wanted.flip), key=lambda o: o.ms)
+        return f"nothing draws this scene within {' and '.join(asked)}; exact enough is {keeps.told()}"
+    if wanted.flip is not None and nearest.flip > wanted.flip:
+        return f"nothing draws this scene within {' and '.join(asked)}; the most exact is {nearest.told()}"
+    return f"nothing draws this scene within {' and '.join(asked)}; the fastest is {fastest.told()}"
+
+
+def _because(refused: dict[str, str]) -> str:
+    told = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
+    return f" ({told})" if told else ""
+
+
+def _ms(value: float) -> str:
+    return f"{value:.0f} ms" if value >= 10 else f"{value:.1f} ms"
+
+
+def machine_scale(frontier: Frontier, here_ms: float) -> float:
+    """How many times as long as there this machine takes, by the yardstick."""
+    return here_ms / frontier.yardstick_ms if frontier.yardstick_ms > 0 else 1.0

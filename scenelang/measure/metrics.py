@@ -1,0 +1,71 @@
+"""Image metrics between a picture and its reference: PSNR, SSIM, FLIP.
+
+All take float arrays (H, W, 3) of sRGB-encoded values in [0, 1].
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+MOST_DB = 50.0
+
+
+def over_white(picture: Array) -> Array:
+    """Colours (H, W, 3), float64, of a picture that may have alpha."""
+    values = np.asarray(picture, np.float64)
+    if values.shape[2] == 3:
+        return values
+    return np.asarray(values[..., :3] * values[..., 3:] + 1 - values[..., 3:])
+
+
+def psnr(picture: Array, reference: Array) -> float:
+    """Peak signal-to-noise ratio in dB, at most `MOST_DB`, so that a perfect picture counts for something."""
+    error = float(np.mean((np.asarray(picture, np.float64) - np.asarray(reference, np.float64)) ** 2))
+    return MOST_DB if error <= 0 else min(MOST_DB, -10 * math.log10(error))
+
+
+def ssim(picture: Array, reference: Array) -> float:
+    """Structural similarity (Wang et al. 2004), 11-pixel Gaussian window; in [-1, 1], 1 for equal ones.
+
+    Pictures under 11 pixels along a side get a smaller window, which makes their figures their own.
+    """
+    import torch
+    from pytorch_msssim import ssim as torch_ssim
+
+    window = min(11, *((side - 1) // 2 * 2 + 1 for side in reference.shape[:2]))
+    a, b = (
+        torch.from_numpy(np.ascontiguousarray(np.moveaxis(np.asarray(v, np.float32), 2, 0)))[None]
+        for v in (picture, reference)
+    )
+    return float(torch_ssim(a, b, data_range=1.0, win_size=window))
+
+
+def flip_map(picture: Array, reference: Array) -> npt.NDArray[np.float32]:
+    """FLIP error of each pixel (H, W), LDR, in [0, 1].
+
+    Source: Andersson et al., FLIP: A Difference Evaluator for Alternating Images, 2020 (their tool).
+    """
+    import flip_evaluator
+
+    a, b = (np.ascontiguousarray(v, np.float32) for v in (reference, picture))
+    error, _, _ = flip_evaluator.evaluate(a, b, "LDR", applyMagma=False)
+    return np.asarray(error, np.float32)[:, :, 0]
+
+
+def flip(picture: Array, reference: Array) -> float:
+    """Mean FLIP error in [0, 1], 0 for equal pictures."""
+    return float(flip_map(picture, reference).mean())
+
+
+def measure(picture: Array, reference: Array) -> dict[str, float]:
+    """All three by name."""
+    return {
+        "psnr": psnr(picture, reference),
+        "ssim": ssim(picture, reference),
+        "flip": flip(picture, reference),
+    }

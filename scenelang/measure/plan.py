@@ -1,0 +1,181 @@
+"""What drawing a scene takes, before and after each rewrite, and what was left out: no more than it needs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from scenelang.backend.neural import draw_program
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import Spans, lower
+from scenelang.graph.nodes import Fold, Graph, Leaf
+from scenelang.graph.steps import Affine
+from scenelang.graph.walk import nodes
+from scenelang.measure.metrics import MOST_DB, flip, over_white, psnr
+from scenelang.models.choose import WHITE, choose_model, names_used
+from scenelang.models.load import Model
+from scenelang.models.manifest import Manifest, available, load_manifest
+from scenelang.program.program import TOKENS, Program
+from scenelang.reference.image import reference_image
+from scenelang.scene.schema import Scene
+
+REPEATS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """The size of a graph.
+
+    Args:
+        objects: leaves.
+        matrices: affine maps and deformations on leaves and folds: each is one matrix of the lifting.
+        affines, deformations: of these.
+        folds: groups, chains and boolean nodes.
+        tokens: children of folds by the word that joins each, of the words in use; of a stream the tokens
+            of its rows.
+    """
+
+    objects: int
+    matrices: int
+    affines: int
+    deformations: int
+    folds: int
+    tokens: Mapping[str, int]
+
+
+def count(graph: Graph) -> Counts:
+    """Count a graph's parts."""
+    found = [node for node, _ in nodes(graph.root)]
+    steps = [move.step for node in found for move in node.moves]
+    affines = sum(isinstance(step, Affine) for step in steps)
+    folds = [node for node in found if isinstance(node, Fold)]
+    return Counts(
+        objects=sum(isinstance(node, Leaf) for node in found),
+        matrices=len(steps),
+        affines=affines,
+        deformations=len(steps) - affines,
+        folds=len(folds),
+        tokens=token_counts(TOKENS[link.op] for fold in folds for link in fold.links),
+    )
+
+
+def token_counts(tokens: Iterable[int]) -> dict[str, int]:
+    """How many rows join by each word, of the words in use."""
+    values = list(tokens)
+    return {word: values.count(value) for word, value in TOKENS.items() if value in values}
+
+
+def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
+    """Sizes after ``lower`` and each pass, and whether the pass changed anything."""
+    out = []
+    before: Graph | None = None
+    for name, graph in graphs.items():
+        now = count(graph)
+        out.append(
+            {
+                "stage": name,
+                "objects": now.objects,
+                "matrices": now.matrices,
+                "affines": now.affines,
+                "deformations": now.deformations,
+                "folds": now.folds,
+                "tokens": dict(now.tokens),
+                "changed": before is not None and graph != before,
+            }
+        )
+        before = graph
+    return out
+
+
+def choice(scene: Scene, chosen: str, asked: bool) -> dict[str, Any]:
+    """Which model draws a scene, why, and what would have been next.
+
+    Args:
+        scene: what is drawn.
+        chosen: the model that draws it.
+        asked: whether the command line named it.
+    """
+    others = [load_manifest(name) for name in available() if name != chosen]
+    free = scene.model_copy(update={"model": None})
+    runner_up = choose_model(free, others)
+    if asked:
+        why = "by --model"
+    elif scene.model is not None:
+        why = "named by the scene"
+    else:
+        why = "the smallest that has all it uses"
+    lacking = {m.name: missing(free, m) for m in others}
+    return {
+        "model": chosen,
+        "why": why,
+        "runner_up": runner_up.name if runner_up else None,
+        "lacking": {name: names for name, names in lacking.items() if names},
+    }
+
+
+def missing(scene: Scene, manifest: Manifest) -> list[str]:
+    """What a scene needs and a model does not have: names, its canvas, its background."""
+    has = (manifest.geometries, manifest.materials, manifest.transforms, manifest.material_ops)
+    names = sorted(
+        name for used, known in zip(names_used(scene), has, strict=True) for name in used.difference(known)
+    )
+    if manifest.sizes and scene.canvas not in manifest.sizes:
+        names.append("a canvas of {} × {}".format(*scene.canvas))
+    if manifest.white and scene.background != WHITE:
+        names.append("a background that is not white")
+    return names
+
+
+def drawing_cost(
+    scene: Scene, program: Program, model: Model, spans: Spans | None = None, threads: int = 1
+) -> dict[str, Any]:
+    """Draw a Program and say what it took and how far it is off.
+
+    Args:
+        scene: what the Program was compiled of.
+        program: its Program.
+        model: what draws it.
+        spans: where the scene was written.
+        threads: for drawing.
+
+    Returns:
+        ``pixels`` of the canvas, ``evaluated`` (pixels that an object reached; the network saw no other),
+        ``refined`` (pixels sampled four times), ``samples``, ``meetings`` (a sample and an object through
+        the network), ``meetings_unskipped`` (every sample with every object), ``ms`` (the best of three
+        frames, after one that does not count), ``psnr`` (dB, at most 50), ``flip`` (None without its
+        package) and ``parameters``.
+    """
+    drawing = draw_program(program, model, threads=threads)
+    times = []
+    for _ in range(REPEATS):
+        started = time.perf_counter()
+        drawing = draw_program(program, model, threads=threads)
+        times.append(1000 * (time.perf_counter() - started))
+    exact = over_white(reference_image(lower(scene, model.manifest, spans, Diagnostics())))
+    width, height = program.canvas
+    samples = width * height + 4 * drawing.refined
+    if model.manifest.renderer != "framed":  # which take every sample, and meet every object there
+        samples = drawing.pairs // max(1, len(program))
+    return {
+        "pixels": width * height,
+        "evaluated": drawing.met,
+        "refined": drawing.refined,
+        "samples": samples,
+        "meetings": drawing.pairs,
+        "meetings_unskipped": samples * len(program),
+        "ms": round(min(times), 2),
+        "psnr": round(min(MOST_DB, psnr(over_white(drawing.image), exact)), 2),
+        "flip": _flip(over_white(drawing.image), exact),
+        "parameters": sum(p.numel() for p in model.network.parameters()),
+    }
+
+
+def _flip(picture: np.ndarray, exact: np.ndarray) -> float | None:
+    try:
+        return round(flip(picture, exact), 5)
+    except ImportError:
+        return None

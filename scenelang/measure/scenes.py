@@ -1,0 +1,59 @@
+"""Scenes of a set as a model draws them, their exact pictures, and figures over all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from scenelang.backend.neural import draw_program
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import lower
+from scenelang.image import Image
+from scenelang.measure.sets import scenes
+from scenelang.models.load import Model
+from scenelang.models.manifest import Manifest
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import Program
+from scenelang.reference.image import reference_image
+from scenelang.scene.schema import Scene
+
+PROBE = 48  # pixels along a side of the picture that tells how much a scene covers
+
+
+def reference_of(scene: Scene, manifest: Manifest) -> Image:
+    """The exact picture of a scene over its background."""
+    return reference_image(lower(scene, manifest, None, Diagnostics()))
+
+
+def coverage(scene: Scene, manifest: Manifest) -> float:
+    """About which share of the canvas a scene covers."""
+    small = scene.model_copy(update={"canvas": (PROBE, PROBE), "background": None})
+    return float(reference_of(small, manifest)[..., 3].mean())
+
+
+def scenes_of(model: Model, name: str, seed: int) -> Callable[[int], Scene]:
+    """The scenes of a set by index, as `scenes` makes them for a model, on a canvas that it draws."""
+    made = scenes(name, seed, lambda scene: coverage(scene, model.manifest))
+    return lambda index: sized(made(index), model.manifest)
+
+
+def sized(scene: Scene, manifest: Manifest) -> Scene:
+    """The scene on a canvas that a model draws."""
+    return scene.model_copy(update={"canvas": manifest.sizes[0]}) if manifest.sizes else scene
+
+
+def draw_scene(model: Model, scene: Scene, threads: int = 1) -> tuple[Program, Image]:
+    """Compile a scene and draw it with a model."""
+    program = compile_scene(scene, model=model.manifest.name, codes=model.codes())
+    return program, draw_program(program, model, threads=threads).image
+
+
+def spread(values: list[float], bad_end: int) -> dict[str, float]:
+    """Mean, worst and the percentile ``bad_end``, which says where the bad values lie; named p5."""
+    worst = max(values) if bad_end > 50 else min(values)
+    return {
+        "mean": round(float(np.mean(values)), 5),
+        "p5": round(float(np.percentile(values, bad_end)), 5),
+        "worst": round(worst, 5),
+    }

@@ -1,0 +1,138 @@
+"""The stability suite: its measures on pictures of known error, its scenes, and the recorded bounds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from scenelang.image import Image
+from scenelang.lab.stability.probes import PROBES, animated, apart, rng_of, union_of
+from scenelang.lab.stability.suite import (
+    OPTIONAL,
+    compare,
+    exact_picture,
+    flicker,
+    order_of_disjoint,
+    picture_of,
+    run_stability,
+    scene_of,
+    unfolded,
+)
+from scenelang.measure.metrics import MOST_DB
+from scenelang.measure.scenes import sized
+from scenelang.models.load import Model, load_model
+from scenelang.program.compile import compile_scene
+from scenelang.renderers.frames import local_points, read_frame
+from scenelang.scene.schema import Chain, Object, Scale, Scene, Translate
+
+RECORDED = Path(__file__).parents[2] / "docs" / "results" / "stability.json"
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return load_model("shapes2d")
+
+
+def test_edges_and_cover_of_a_square(model: Model) -> None:
+    # a white canvas with a white square: it covers pixels, and its outline is an edge all the same
+    square = Object(geometry="square", transforms=(Scale.uniform(2**0.5 / 2),))
+    picture, covered, edge = exact_picture(Scene(model="shapes2d", canvas=(16, 16), nodes=(square,)), model)
+    assert picture.shape == (16, 16, 3)
+    assert covered.sum() == 8 * 8
+    # pixels on either side of the outline
+    assert edge.sum() == (8 * 8 - 6 * 6) + 4 * 8
+    wrong = picture.copy()
+    wrong[0, 0] = 0.0
+    errors = compare(wrong.astype(np.float32).view(Image), (picture, covered, edge))
+    assert errors.per_edge == pytest.approx(1 / edge.sum())
+    assert errors.per_covered == pytest.approx(1 / 64)
+
+
+def test_lifting_one_map_after_the_other_gives_the_same_chain(model: Model) -> None:
+    scene = scene_of(PROBES["affine"], 16, 0, 5, model)
+    program = compile_scene(scene, model="shapes2d", without=OPTIONAL)
+    x, y = torch.rand(2, 50, generator=torch.Generator().manual_seed(1)) * 2 - 1
+    for one, other in zip(unfolded(scene, program, model).vectors, program.vectors, strict=True):
+        # merged deformations and single ones are other numbers for the same map
+        ways = [torch.stack(local_points(read_frame(g[:32]), x, y)) for g in (one, other)]
+        torch.testing.assert_close(*ways, rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", list(PROBES))
+def test_probes_vary_one_thing(name: str, model: Model) -> None:
+    probe = PROBES[name]
+    assert probe.healthy in probe.values
+    first, again = (probe.make(rng_of(1, 2), probe.values[-1]) for _ in range(2))
+    assert first == again
+    assert probe.make(rng_of(1, 2), probe.values[0]) != first
+    for value in (probe.values[0], probe.values[-1]):
+        compile_scene(probe.make(rng_of(1, 3), value), model="shapes2d")  # raises where it is refused
+
+
+def test_objects_apart_do_not_overlap(model: Model) -> None:
+    for index in range(5):
+        nodes = apart(rng_of(3, index))
+        covers = [exact_picture(union_of([node]), model)[1] for node in nodes]
+        assert np.sum(covers, 0).max() == 1
+
+
+def test_an_animation_moves_a_little(model: Model) -> None:
+    frames = animated(rng_of(2, 0), 3)
+    first, second = (exact_picture(f, model)[0] for f in frames[:2])
+    assert 0 < float(np.abs(first - second).mean()) < 0.1
+
+
+def test_order_makes_no_difference_to_what_is_apart(model: Model) -> None:
+    assert order_of_disjoint(model, 1, 4)["largest_difference"] < 1 / 255
+
+
+def test_a_picture_of_another_scene_is_told(model: Model) -> None:
+    """A model that draws something else is measured as wrong."""
+    chain = PROBES["objects"].make(rng_of(1, 1), 2)
+    (links,) = chain.nodes
+    assert isinstance(links, Chain)
+    reference = exact_picture(chain, model)
+    moved = union_of([Object(geometry="star", transforms=(Translate(x=0.5, y=0.0),))])
+    assert compare(exact_picture(moved, model)[0].astype(np.float32).view(Image), reference).psnr < 20
+
+
+def test_recorded_bounds_hold(model: Model) -> None:
+    """The first scene of the recorded suite at both ends of every probe is no worse than recorded."""
+    recorded = json.loads(RECORDED.read_text("utf-8"))
+    assert recorded["weights"] == model.digest, "run `scenelang lab stability shapes2d` again"
+    for name, probe in recorded["probes"].items():
+        assert [row["value"] for row in probe["rows"]] == list(PROBES[name].values)
+        for row in (probe["rows"][0], probe["rows"][-1]):
+            if name == "canvas" and row["value"] > 256:
+                continue
+            scene = scene_of(PROBES[name], row["value"], 0, recorded["seed"], model)
+            program = compile_scene(scene, model="shapes2d", without=OPTIONAL)
+            if not PROBES[name].folded:
+                program = unfolded(scene, program, model)
+            found = compare(picture_of(model, program), exact_picture(scene, model))
+            assert found.psnr >= row["psnr"]["worst"] - 0.5, (name, row["value"])
+    invariants = recorded["invariants"]
+    assert invariants["order_of_disjoint"]["largest_difference"] < 1 / 255
+    assert invariants["arithmetic"]["tiles"] < 1 / 255
+    assert invariants["arithmetic"]["threads"] < 1 / 255
+
+
+@pytest.mark.slow
+def test_the_whole_suite_runs(model: Model) -> None:
+    found = run_stability(model, 1, 9)
+    assert set(found["probes"]) == set(PROBES)
+    for probe in found["probes"].values():
+        for row in probe["rows"]:
+            assert 20 < row["psnr"]["worst"] <= MOST_DB
+
+
+def test_flicker_of_one_scene_looks_on_until_something_moves(model: Model) -> None:
+    """All frames of this seed's first animation are white."""
+    for frame in animated(rng_of(2021, 0), 3):
+        assert (exact_picture(sized(frame, model.manifest), model)[0] == 1).all()
+    found = flicker(model, 1, 2021)
+    assert 0 < found["mean"] == found["worst"] < 0.2

@@ -1,0 +1,334 @@
+"""The frontier: which points it keeps, what it promises, and what it chooses."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenelang.image import from_samples
+from scenelang.lab.frontier.measure import enlarged, promised
+from scenelang.measure.choose import (
+    NothingFits,
+    Wanted,
+    choose,
+    error_scale,
+    machine_scale,
+    offers,
+    refusal,
+)
+from scenelang.measure.cost import Load
+from scenelang.measure.frontier import (
+    Cost,
+    Errors,
+    Frontier,
+    Point,
+    Quality,
+    Times,
+    between,
+    front,
+)
+from scenelang.models.manifest import load_manifest
+from scenelang.scene.schema import Object, Scale, Scene, Twist
+
+
+def point(name: str, ms: float, flip: float | None, **more: object) -> Point:
+    made = Point(
+        name=name,
+        backend="neural",
+        model="shapes2d",
+        renderer="framed",
+        samples="adaptive",
+        skip=True,
+        spp=0,
+        side=0,
+        offered=True,
+        why_not=None,
+        scenes=10,
+        ms=Times(ms, 1.2 * ms),
+        ratio_to_streaming=1000 / ms,
+        flip=None if flip is None else Errors(flip / 2, 0.9 * flip, flip, 1.1 * flip),
+        psnr=None if flip is None else Quality(40.0, 35.0, 30.0),
+        cost=Cost(ms, 0.0, 0.0, 0.0, 0.0, 1.0),
+        parameters=100,
+        bytes=400,
+        on_front=False,
+        command=f"scenelang render scene.nsg -o scene.png --model {name}",
+    )
+    return replace(made, **more)  # type: ignore[arg-type]
+
+
+def frontier(*points: Point) -> Frontier:
+    return Frontier(
+        set="shapes2d",
+        seed=1,
+        scenes=10,
+        canvas=(256, 256),
+        threads=1,
+        clock="processor",
+        machine="a machine",
+        revision="0" * 40,
+        torch="2.11.0",
+        yardstick_ms=1.0,
+        streaming_ms=1000.0,
+        converged={"a": 0.001},
+        points=points,
+    )
+
+
+# ---------------------------------------------------------------- the front
+
+figures = st.lists(
+    st.tuples(st.integers(1, 6).map(float), st.integers(0, 6).map(float)), min_size=0, max_size=12
+)
+
+
+@given(figures)
+def test_the_front_is_what_brute_force_finds(points: list[tuple[float, float]]) -> None:
+    def beaten(i: int) -> bool:
+        a = points[i]
+        return any(
+            (b[0] <= a[0] and b[1] <= a[1] and b != a) or (b == a and j < i)
+            for j, b in enumerate(points)
+            if j != i
+        )
+
+    assert front(points) == [not beaten(i) for i in range(len(points))]
+
+
+def test_points_between_the_fastest_and_the_nearest_are_counted() -> None:
+    points = [point(n, ms, e) for n, ms, e in (("a", 1, 0.5), ("b", 2, 0.6), ("c", 3, 0.1), ("d", 9, 0.01))]
+    assert between([*points, point("slow", 20, 0.2), point("timed", 4, None)]) == 2
+
+
+# ---------------------------------------------------------------- promises
+
+
+@pytest.mark.parametrize(("count", "rank"), [(39, 39), (40, 40), (79, 78), (100, 99), (1000, 976)])
+def test_the_promise_is_a_high_order_statistic(count: int, rank: int) -> None:
+    values = list(np.random.default_rng(count).permutation(count) + 1.0)
+    assert promised(values) == rank
+    assert rank == math.ceil(0.975 * (count + 1))
+
+
+def test_few_scenes_promise_more_than_their_worst() -> None:
+    assert promised([0.1, 0.2]) == pytest.approx(0.3)
+
+
+def test_promises_are_kept_by_new_values_of_the_same_kind() -> None:
+    """Over many draws, 97.5 % of new values stay under the bound, whatever the distribution."""
+    rng = np.random.default_rng(1)
+    kept = []
+    for _ in range(400):
+        values = rng.lognormal(0, 1.5, 80)
+        kept.append(np.mean(rng.lognormal(0, 1.5, 200) <= promised(values.tolist())))
+    assert np.mean(kept) >= 0.972
+
+
+def test_a_stated_speed_of_the_machine_is_taken() -> None:
+    assert machine_scale(frontier(), 2.5) == 2.5
+
+
+def test_smaller_canvases_and_more_objects_promise_less() -> None:
+    assert error_scale((256, 256), 1) == error_scale((1024, 300), 4) == 1.0
+    assert error_scale((128, 512), 4) == 2.0
+    assert error_scale((256, 256), 16) == 4.0
+    assert error_scale((64, 64), 8) == 8.0
+
+
+# ---------------------------------------------------------------- choosing
+
+LOAD = Load(2, 65536, 1e4, 100.0)
+LADDER = [point("fast", 2, 0.05), point("middle", 10, 0.01), point("slow", 50, 0.001), point("bad", 60, 0.02)]
+
+
+def chosen(wanted: Wanted, points: list[Point] = LADDER, scale: float = 1.0, load: Load = LOAD) -> str:
+    return choose(offers(points, load, (256, 256), scale), wanted, {}).offer.point.name
+
+
+@pytest.mark.parametrize(
+    ("wanted", "name"),
+    [
+        (Wanted(None, 0.06), "fast"),
+        (Wanted(None, 0.05), "fast"),
+        (Wanted(None, 0.03), "middle"),
+        (Wanted(None, 0.005), "slow"),
+        (Wanted(None, 1.0), "fast"),
+        (Wanted(2, None), "fast"),
+        (Wanted(30, None), "middle"),
+        (Wanted(100, None), "slow"),
+        (Wanted(20, 0.02), "middle"),
+    ],
+)
+def test_the_choice_is_the_cheapest_that_suffices(wanted: Wanted, name: str) -> None:
+    assert chosen(wanted) == name
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 9), st.integers(0, 9)), min_size=1, max_size=8),
+    st.none() | st.integers(0, 10),
+    st.none() | st.integers(0, 10),
+)
+def test_the_choice_is_what_brute_force_finds(
+    figures: list[tuple[int, int]], ms: int | None, flip: int | None
+) -> None:
+    points = [point(f"p{i}", t, e / 100) for i, (t, e) in enumerate(figures)]
+    wanted = Wanted(ms, None if flip is None else flip / 100)
+    good = [(t, e) for t, e in figures if (ms is None or t <= ms) and (flip is None or e <= flip)]
+    if ms is None and flip is None:
+        return
+    if not good:
+        with pytest.raises(NothingFits):
+            chosen(wanted, points)
+        return
+    best = min(good) if flip is not None else min(good, key=lambda g: (g[1], g[0]))
+    assert figures[int(chosen(wanted, points)[1:])] == best
+
+
+def test_a_slower_machine_and_a_larger_scene_choose_a_faster_way() -> None:
+    assert chosen(Wanted(30, None), scale=1.0) == "middle"
+    assert chosen(Wanted(30, None), scale=4.0) == "fast"
+    per_object = [replace(p, cost=Cost(0, 1000 * p.ms.median, 0, 0, 0, 1.0)) for p in LADDER]
+    assert chosen(Wanted(30, None), per_object, load=Load(2, 65536, 0, 0)) == "middle"
+    assert chosen(Wanted(30, None), per_object, load=Load(12, 65536, 0, 0)) == "fast"
+
+
+def test_times_count_with_their_spread() -> None:
+    wide = [replace(p, cost=Cost(p.ms.median, 0, 0, 0, 0, 4.0)) for p in LADDER]
+    assert chosen(Wanted(30, None), wide) == "fast"
+
+
+def test_nearly_equal_errors_leave_it_to_time() -> None:
+    points = [point("a", 10, 0.0100), point("b", 40, 0.0099)]
+    assert chosen(Wanted(100, None), points) == "a"
+
+
+def test_many_objects_need_a_more_exact_way() -> None:
+    assert chosen(Wanted(None, 0.02)) == "middle"
+    assert chosen(Wanted(None, 0.02), load=Load(16, 65536, 1e4, 100.0)) == "slow"
+
+
+def test_what_nothing_draws_is_told_with_what_comes_nearest() -> None:
+    with pytest.raises(NothingFits, match=r"within 1 ms; the fastest is fast: 2\.0 ms"):
+        chosen(Wanted(1, None))
+    with pytest.raises(NothingFits, match=r"within FLIP 0\.0001; the most exact is slow"):
+        chosen(Wanted(None, 0.0001))
+    with pytest.raises(NothingFits, match=r"within 20 ms and FLIP 0\.005; exact enough is slow: 50 ms"):
+        chosen(Wanted(20, 0.005))
+    with pytest.raises(NothingFits, match=r"nothing on the frontier draws this scene \(a: has no `x`\)"):
+        choose([], Wanted(1, None), {"a": "has no `x`"})
+
+
+def test_the_choice_tells_why_and_what_was_next() -> None:
+    choice = choose(offers(LADDER, LOAD, (256, 256), 1.0), Wanted(None, 0.03), {})
+    assert choice.runner_up is not None
+    assert choice.runner_up.point.name == "slow"
+    assert choice.notes[0].endswith("the fastest of 3 that keep FLIP 0.03")
+    assert choice.notes[1].endswith("slower")
+    choice = choose(offers(LADDER, LOAD, (256, 256), 1.0), Wanted(30, None), {})
+    assert choice.notes[0].endswith("the most exact of 2 that keep 30 ms")
+    assert choice.notes[1].startswith("runner-up: fast")
+    assert choice.notes[1].endswith("no more exact")
+
+
+def test_points_that_cannot_draw_a_scene_are_refused() -> None:
+    manifest = load_manifest("shapes2d")
+    fixed = replace(manifest, sizes=((64, 64),), white=True)
+    scene = Scene(nodes=(Object(geometry="square", transforms=(Scale(x=0.5, y=0.5, z=1),)),))
+    one = point("a", 1, 0.1)
+    assert refusal(one, manifest, scene, None) is None
+    assert refusal(one, fixed, scene, None) == "draws 64 x 64 pixels only"
+    small = scene.model_copy(update={"canvas": (64, 64)})
+    assert refusal(one, fixed, small, None) is None
+    grey = small.model_copy(update={"background": (0.5, 0.5, 0.5)})
+    assert refusal(one, fixed, grey, None) == "draws on white only"
+    twisted = Scene(nodes=(Object(geometry="square", transforms=(Twist(k=0.3),)),))
+    assert refusal(one, manifest, twisted, None) == "has no `twist`"
+    assert refusal(one, manifest, None, "shapes2d") is None
+    assert refusal(one, manifest, None, "other") == "the program was compiled for `other`"
+    exact = point("exact", 1, 0.0, backend="reference", model=None)
+    assert refusal(exact, None, scene, None) is None
+    assert refusal(exact, None, None, "shapes2d") == "a compiled program keeps only what the network needs"
+    assert refusal(point("x", 1, 0.1, offered=False, why_not="no"), manifest, scene, None) == "no"
+
+
+# ---------------------------------------------------------------- the file
+
+
+def test_the_file_comes_back() -> None:
+    made = frontier(*LADDER, point("timed", 5, None, cost=None, model=None))
+    text = made.to_json()
+    again = Frontier.from_json(text.encode())
+    assert again == Frontier.from_json(again.to_json().encode())
+    assert again.to_json() == text
+    assert [p.name for p in again.points] == [p.name for p in made.points]
+    assert again.points[-1].flip is None
+
+
+def test_points_in_8_bits_of_older_files_are_left_out() -> None:
+    old = json.loads(frontier(*LADDER).to_json())
+    for index, told in enumerate(old["points"]):
+        told["precision"] = "int8" if index == 1 else "float32"
+    read = Frontier.from_json(json.dumps(old).encode())
+    assert [p.name for p in read.points] == ["fast", "slow", "bad"]
+
+
+def damaged() -> list[tuple[str, object]]:
+    return [
+        ("format", 2),
+        ("points", {}),
+        ("points", [1]),
+        ("canvas", [256]),
+        ("canvas", [256, "256"]),
+        ("seed", -1),
+        ("seed", True),
+        ("yardstick_ms", None),
+        ("yardstick_ms", "1"),
+        ("converged", {"a": "b"}),
+        ("machine", 3),
+        ("unknown", 1),
+    ]
+
+
+@pytest.mark.parametrize(("key", "value"), damaged())
+def test_damaged_files_are_refused(key: str, value: object) -> None:
+    told = json.loads(frontier(*LADDER).to_json())
+    told[key] = value
+    with pytest.raises(ValueError, match=r"frontier|format|points|canvas|hold"):
+        Frontier.from_json(json.dumps(told).encode())
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("samples", "two"),
+        ("backend", "x"),
+        ("ms", None),
+        ("ms", {"median": 1}),
+        ("flip", {"mean": -1, "p95": 0, "bound": 0, "worst": 0}),
+        ("cost", [1]),
+        ("offered", 1),
+        ("model", 3),
+    ],
+)
+def test_damaged_points_are_refused(key: str, value: object) -> None:
+    told = json.loads(frontier(*LADDER).to_json())
+    told["points"][1][key] = value
+    with pytest.raises(ValueError, match=r"point|hold|missing"):
+        Frontier.from_json(json.dumps(told).encode())
+
+
+def test_enlarging_keeps_flat_colours_and_corners() -> None:
+    small = from_samples(np.full((8, 8, 3), 0.25, np.float32), None)
+    np.testing.assert_allclose(enlarged(small, 32, 32), np.full((32, 32, 3), 0.25))
+    halves = np.zeros((2, 2, 3), np.float32)
+    halves[:, 1] = 1
+    wide = np.asarray(enlarged(from_samples(halves, None), 64, 64))
+    assert (wide[:, 0] == 0).all()
+    assert (wide[:, -1] == 1).all()
+    assert enlarged(small, 8, 8) is small

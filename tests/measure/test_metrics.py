@@ -1,0 +1,59 @@
+"""Metrics against closed forms, and the sets against what they say of themselves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from scenelang.measure.metrics import flip, flip_map, psnr, ssim
+from scenelang.measure.sets import SETS, random_scene
+from scenelang.program.compile import compile_scene
+
+GREY = np.full((32, 48, 3), 0.5, np.float32)
+
+
+def test_psnr_of_a_constant_error() -> None:
+    assert psnr(GREY + 0.1, GREY) == pytest.approx(20.0, abs=1e-4)
+    assert psnr(GREY + 0.01, GREY) == pytest.approx(40.0, abs=1e-3)
+
+
+def test_psnr_of_equal_pictures_is_the_cap() -> None:
+    assert psnr(GREY, GREY) == 50.0
+
+
+def test_ssim_and_flip_of_equal_pictures() -> None:
+    assert ssim(GREY, GREY) == pytest.approx(1.0)
+    assert flip(GREY, GREY) == 0.0
+
+
+def test_ssim_of_two_constants_is_the_luminance_term() -> None:
+    a, b, c1 = 0.5, 0.6, 0.01**2
+    want = (2 * a * b + c1) / (a * a + b * b + c1)
+    assert ssim(GREY + 0.1, GREY) == pytest.approx(want, abs=1e-4)
+
+
+def test_flip_map_is_where_the_error_is() -> None:
+    spoilt = GREY.copy()
+    spoilt[:, 40:] = 1.0
+    error = flip_map(spoilt, GREY)
+    assert error.shape == (32, 48)
+    assert error[:, 44:].mean() > 0.1 > 10 * error[:, :20].mean()
+
+
+def test_small_pictures_have_an_ssim() -> None:
+    assert math.isfinite(ssim(GREY[:5, :7], GREY[:5, :7]))
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_every_scene_of_a_set_compiles(name: str) -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        program = compile_scene(random_scene(rng, SETS[name]))
+        assert len(program) <= SETS[name].objects[1]
+
+
+def test_a_set_is_the_same_every_time() -> None:
+    a, b = (random_scene(np.random.default_rng([3, 1]), SETS["tree"]) for _ in range(2))
+    assert a == b

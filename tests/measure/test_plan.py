@@ -1,0 +1,138 @@
+"""What `scenelang explain-plan` says, against counts by hand."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import scenelang as nsg
+from scenelang.backend.neural import draw_program
+from scenelang.cli.main import cli
+from scenelang.graph.nodes import Graph
+from scenelang.measure.plan import choice, drawing_cost, missing, stages, token_counts
+from scenelang.models.load import load_model
+from scenelang.models.manifest import load_manifest
+from scenelang.passes import PASSES
+from scenelang.program.compile import compile_scene
+from scenelang.renderers.draw import CORNER, draw
+from scenelang.renderers.stream import SLACK
+
+SCENE = """
+subtract { pentagon { scale(0.4); } triangle { scale(0.1); } }
+group {
+  square { scale(0.2); rotate(0deg); rotate(30deg); twirl(0.4); }
+  star { translate(5, 0); }
+  translate(0.1, 0);
+}
+"""
+
+
+def test_counts_of_a_scene_by_hand() -> None:
+    graphs: dict[str, Graph] = {}
+    compile_scene(nsg.loads(SCENE), after=graphs.__setitem__)
+    rows = {row["stage"]: row for row in stages(graphs)}
+    assert list(rows) == ["lower", *(step.name for step in PASSES)]
+    # scale, two rotations, a twirl; a translation; one on the group; a scale each
+    assert (rows["lower"]["objects"], rows["lower"]["affines"], rows["lower"]["deformations"]) == (4, 7, 1)
+    assert rows["lower"]["folds"] == 3  # the file, the group, the subtraction
+    assert rows["drop_identities"]["affines"] == 6
+    assert rows["drop_identities"]["changed"]
+    assert rows["drop_unseen"]["objects"] == 3  # the star is off the canvas
+    assert not rows["check_trained"]["changed"]
+    # the file joins the subtraction and the group, these two things each
+    assert rows["lower"]["tokens"] == {"union": 5, "subtract": 1}
+    assert rows["linearise"]["tokens"] == {"union": 3, "subtract": 1}
+    assert rows["drop_hidden"]["tokens"] == {"union": 2, "subtract": 1}
+
+
+def test_a_pass_that_changes_no_count_is_seen_to_work() -> None:
+    graphs: dict[str, Graph] = {}
+    compile_scene(nsg.loads("square { scale(0.5); twirl(0.1); }"), after=graphs.__setitem__)
+    changed = {row["stage"]: row["matrices"] for row in stages(graphs) if row["changed"]}
+    assert changed == {"fold_warps": 2}  # the deformation comes first now: as many matrices, others
+
+
+def test_cost_of_a_drawing() -> None:
+    scene = nsg.loads("canvas(40, 30); chain { square { scale(0.5); } subtract star { scale(0.2); } }")
+    program = compile_scene(scene)
+    cost = drawing_cost(scene, program, load_model("shapes2d"))
+    assert cost["pixels"] == 1200
+    assert cost["samples"] == 1200 + 4 * cost["refined"]
+    assert cost["meetings_unskipped"] == 2 * cost["samples"]
+    assert 0 < cost["meetings"] < cost["meetings_unskipped"]
+    assert cost["refined"] < cost["evaluated"] < 1200
+    assert cost["psnr"] > 40
+    assert 0 <= cost["flip"] < 0.05
+    assert cost["parameters"] == sum(p.numel() for p in load_model("shapes2d").network.parameters())
+    assert token_counts(program.tokens.tolist()) == {"union": 1, "subtract": 1}
+
+
+def test_pixels_that_no_object_reaches_are_not_evaluated() -> None:
+    """A leaf reaches its unit disc, a little more for what the network may bulge, and a corner of a pixel."""
+    side, radius = 200, 0.4
+    scene = nsg.loads(f"canvas({side}, {side}); star {{ scale({radius}); }}")
+    model = load_model("shapes2d")
+    program = compile_scene(scene)
+    drawing = draw_program(program, model, threads=1)
+    across = (np.arange(side) + 0.5) * 2 / side - 1
+    far = np.hypot(across[:, None], across[None, :])
+    reach = radius * (1 + SLACK) + CORNER * 2 / side
+    assert drawing.met == int((far <= reach).sum())
+    arguments = (model.framed, program.vectors, program.tokens, program.canvas, program.background)
+    assert draw(*arguments, skip=False).met == side * side
+    assert draw(*arguments, threads=3, tile=999).met == drawing.met
+    everywhere = draw(*arguments, adaptive=False)
+    assert drawing.met * 0.95 < everywhere.met <= drawing.met
+    assert everywhere.refined == side * side
+
+
+def test_the_choice_says_why() -> None:
+    free, named = nsg.loads("star { }"), nsg.loads('model "shapes2d"; star { }')
+    assert choice(free, "shapes2d", asked=False)["why"] == "the smallest that has all it uses"
+    assert choice(named, "shapes2d", asked=False)["why"] == "named by the scene"
+    assert choice(named, "shapes2d", asked=True)["why"] == "by --model"
+    assert missing(free, load_manifest("shapes2d")) == []
+    sphere = nsg.Scene(nodes=(nsg.Object("sphere", transforms=(nsg.Twist(k=0.1),)),))
+    assert missing(sphere, load_manifest("shapes2d")) == ["sphere", "twist"]
+    small = replace(load_manifest("shapes2d"), sizes=((32, 32),), white=True)
+    assert missing(nsg.loads("canvas(32, 32); star { }"), small) == []
+    other = nsg.loads("canvas(64, 32); background(none); star { }")
+    assert missing(other, small) == ["a canvas of 64 × 32", "a background that is not white"]
+
+
+@pytest.mark.parametrize("kind", ["text", "json"])
+def test_the_command(tmp_path: Path, kind: str) -> None:
+    file = tmp_path / "scene.nsg"
+    file.write_text(SCENE)
+    found = CliRunner().invoke(cli, ["explain-plan", str(file), "--size", "32x32", "--format", kind])
+    assert found.exit_code == 0
+    if kind == "json":
+        plan = json.loads(found.output)
+        assert plan["rows"] == 3
+        assert plan["tokens"] == {"union": 2, "subtract": 1}
+    else:
+        assert "drop_unseen" in found.output
+        assert "3 rows of 64 numbers" in found.output
+        assert re.search(r"pixels +[\d,]+ of 1,024 evaluated \(\d+\.\d %\)", found.output)
+        header = next(line for line in found.output.splitlines() if line.startswith("after"))
+        assert header.split()[1:8] == [
+            "objects",
+            "matrices",
+            "affine",
+            "deform",
+            "folds",
+            "union",
+            "subtract",
+        ]
+
+
+def test_a_scene_with_mistakes_has_no_plan(tmp_path: Path) -> None:
+    file = tmp_path / "scene.nsg"
+    file.write_text("squre { }")
+    assert CliRunner().invoke(cli, ["explain-plan", str(file)]).exit_code == 1
