@@ -7,7 +7,7 @@ import math
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from scenelang.scene.operators import binary, finite, same_unit
 from scenelang.scene.values import UNITS, Angle, Problem, RangeValue, Vec, describe, pack, unpack
@@ -39,15 +39,14 @@ def number(value: Any, operand: int = 0) -> float:
     raise Problem("E0301", f"expected a number, found {describe(value)}", help, operand)
 
 
-def angle(value: Any, operand: int = 0) -> float:
+def angle(value: Any, operand: int = 0, fix: Literal["angle", "hue"] = "angle") -> float:
     """An angle in radians; 0 needs no unit."""
     if value.__class__ is Angle:
         return value.rad
     if value.__class__ is float:
         if value == 0.0:
             return 0.0
-        message = "expected an angle, found a bare number"
-        raise Problem("E0302", message, "give it a unit: deg, rad or turn", operand, "angle")
+        raise Problem("E0302", "expected an angle, found a bare number", operand=operand, fix=fix)
     raise Problem("E0301", f"expected an angle, found {describe(value)}", None, operand)
 
 

@@ -102,9 +102,8 @@ def same_unit(a: float, ua: str, b: float, ub: str) -> str:
         raise Problem("E0303", "an angle and a time do not combine")
     if (a, b)[bare] == 0.0:
         return "angle"
-    help = "give it a unit: deg, rad or turn"
     notes = {1 - bare: "an angle"}
-    raise Problem("E0302", "a bare number beside an angle", help, operand=bare, fix="angle", notes=notes)
+    raise Problem("E0302", "a bare number beside an angle", operand=bare, fix="angle", notes=notes)
 
 
 def _unit_of(op: str, a: float, ua: str, b: float, ub: str) -> str:

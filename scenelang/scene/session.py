@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix, Label
+from scenelang.diagnostics.diagnostic import Diagnostics, Fix, Label
 from scenelang.diagnostics.span import Span
 from scenelang.scene.damage import NONE, Damage
 from scenelang.scene.schema import Animation
@@ -222,7 +222,11 @@ class Session:
             self, problem.code, problem.message, blamed, place
         ):
             return
-        fix = angle_fix(operand) if problem.fix == "angle" and operand is not None else None
+        help, fix = problem.help, None
+        if problem.fix:
+            from scenelang.scene.angles import angle_advice
+
+            help, fix = angle_advice(operand, self.defined, hue=problem.fix == "hue")
         labels = [
             Label(other.span, words)
             for index, words in problem.notes.items()
@@ -233,7 +237,7 @@ class Session:
             if defined is not None:
                 labels.append(Label(defined, f"'{operand.name.text}' is defined here"))
         before = len(self.diagnostics)
-        self.error(problem.code, problem.message, place, help=problem.help, fix=fix, labels=tuple(labels))
+        self.error(problem.code, problem.message, place, help=help, fix=fix, labels=tuple(labels))
         if len(self.diagnostics) > before:
             remember(self, problem.code, problem.message, blamed)
 
@@ -263,17 +267,3 @@ class Session:
         self.objects += number
         if self.objects > MAX_OBJECTS:
             raise self.halt("E0320", f"more than {MAX_OBJECTS:,} objects in one scene", span)
-
-
-def angle_fix(expr: nodes.Expr) -> Fix:
-    """Give a bare number the unit it most likely had: degrees, or radians for a small fraction."""
-    inner = expr.operand if isinstance(expr, nodes.Unary) else expr
-    if isinstance(inner, nodes.Number):
-        small = abs(inner.value) <= 6.2832 and not inner.value.is_integer()
-        unit = "rad" if small else "deg"
-        return Fix(f"add '{unit}'", (Edit(Span(inner.span.source, inner.span.end, inner.span.end), unit),))
-    source, start, end = expr.span.source, expr.span.start, expr.span.end
-    if isinstance(expr, nodes.NameRef | nodes.CallExpr | nodes.Member | nodes.Index):
-        return Fix("multiply by '1deg'", (Edit(Span(source, end, end), " * 1deg"),))
-    opening, closing = Edit(Span(source, start, start), "("), Edit(Span(source, end, end), ") * 1deg")
-    return Fix("multiply by '1deg'", (opening, closing))

@@ -150,7 +150,7 @@ TEXTURE: Final[dict[str, Spec]] = {
         help="it is called color(c), with c as #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)",
     ),
     "grayscale": Spec(("a",), 1, lambda a: make(Grayscale, {"kind": "grayscale", "amount": number(a)})),
-    "hue": Spec(("angle",), 1, lambda h: make(Hue, {"kind": "hue", "angle": angle(h)})),
+    "hue": Spec(("angle",), 1, lambda h: make(Hue, {"kind": "hue", "angle": angle(h, fix="hue")})),
 }
 EVEN_SCALE: Final = Spec(("s",), 1, _scale_of_one)
 

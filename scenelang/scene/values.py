@@ -25,7 +25,7 @@ class Problem(Exception):
         message: the fact.
         help: advice.
         operand: which operand or argument is to blame, from 0; None for all of it.
-        fix: ``angle`` where that operand lacks the unit of an angle.
+        fix: ``angle`` or ``hue`` where that operand lacks the unit of one; the help comes with the fix.
         notes: words for further operands, by their numbers.
     """
 
