@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import write_whole
+from scenelang.files import write_output
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -34,18 +34,21 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         return pillow.fromarray(self.to_uint8())
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file whose format its suffix names, whole or not at all.
-
-        Formats without alpha (JPEG) get the picture over white.
+        """Write a file whose format its suffix names, whole or not at all; see `encode`.
 
         Raises:
             ValueError: Pillow knows no format of that suffix.
             OSError: the file cannot be written.
         """
+        write_output(path, self.encode(image_format(path)))
+
+    def encode(self, kind: str = "PNG") -> bytes:
+        """What a file holds, in one of Pillow's formats.
+
+        Formats without alpha (JPEG) get the picture over white.
+        """
         from PIL import Image as pillow
 
-        target = Path(path)
-        kind = image_format(target)
         image = self.to_pil()
         data = io.BytesIO()
         try:
@@ -54,14 +57,12 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
             white = pillow.new("RGBA", image.size, "white")
             data = io.BytesIO()
             pillow.alpha_composite(white, image.convert("RGBA")).convert("RGB").save(data, kind)
-        write_whole(target, data.getvalue())
+        return data.getvalue()
 
     def _repr_png_(self) -> bytes | None:
         if self.ndim != 3 or self.shape[2] not in (3, 4):
             return None
-        data = io.BytesIO()
-        self.to_pil().save(data, "PNG")
-        return data.getvalue()
+        return self.encode()
 
 
 def image_format(path: str | os.PathLike[str]) -> str:

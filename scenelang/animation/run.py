@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from scenelang.animation.pictures import Film
 from scenelang.animation.store import Store, deliver
 from scenelang.animation.targets import Target
 from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.files import output_place, write_whole
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
@@ -158,7 +158,7 @@ def _drawn(
             started = time.perf_counter()
             if frame.key not in asked:
                 asked.add(frame.key)
-                if store.has(frame.key):
+                if store.has(frame.key, frame.shot.scene.canvas):
                     made.resumed += 1
                 else:
                     if workers is None and _pays(painter, jobs, made.drawn, spent_s, len(numbers) - index):
@@ -215,12 +215,11 @@ def _numbered(store: Store, target: Target, numbers: range, keys: Sequence[str])
     last = {key: index for index, key in enumerate(keys)}
     files = []
     for index, (number, key) in enumerate(zip(numbers, keys, strict=True)):
-        part = store.file(key)
-        if last[key] != index:
-            part = store.folder / f"copy{store.suffix}"
-            shutil.copyfile(store.file(key), part)
         file = target.file(number)
-        os.replace(part, file)
+        if last[key] == index:
+            os.replace(store.file(key), file)
+        else:
+            write_whole(file, store.file(key).read_bytes())
         files.append(file)
     return files
 
@@ -255,11 +254,13 @@ def _encode(
 
 
 def ready(target: Target) -> None:
-    """Find out before any work whether a format can be written.
+    """Find out before any work whether a format can be written, and that no input is lost by it.
 
     Raises:
         RenderError: it cannot.
+        NotWritten: the target is an input.
     """
+    output_place(target.path)
     if target.kind == "video":
         from scenelang.animation.video import check_video
 

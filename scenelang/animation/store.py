@@ -10,18 +10,21 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import shutil
-import sys
+import re
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Final
 
 from scenelang.backend.errors import RenderError
+from scenelang.files import lock, open_own, output_place, write_whole
 
 if TYPE_CHECKING:
     from scenelang.image import Image
 
 _LOCK: Final = "lock"
+_FRAME: Final = re.compile(r"[0-9a-f]{40}\.\w+")
+_PASSING: Final = re.compile(r"film\.\w+|\.[0-9a-f]{40}\.\w+\.[0-9a-z]+\.part")
+"""What was half-written when a run was killed."""
 
 
 class Busy(RenderError):
@@ -36,25 +39,31 @@ def frame_key(*parts: object) -> str:
 class Store:
     """A folder of frames; while it is open no other process may use it.
 
+    The folder may be a stranger's: no link in it is followed, and only files named like our own are removed.
+
     Args:
         folder: made if it is not there.
         suffix: of the frames' files, which names their format.
 
     Raises:
         Busy: another process has it.
+        RenderError: the folder, or what is locked in it, is a link.
         OSError: the folder cannot be made.
     """
 
     def __init__(self, folder: Path, suffix: str = ".png") -> None:
         self.folder, self.suffix = folder, suffix
         self._made = [p for p in (folder, *folder.parents) if not p.exists()]
+        for place in (folder, folder / _LOCK):
+            if place.is_symlink():
+                raise RenderError(f"cannot keep frames in '{folder}': '{place.name}' is a link")
         folder.mkdir(parents=True, exist_ok=True)
-        self._lock = (folder / _LOCK).open("wb")
-        if not _locked(self._lock.fileno()):
+        self._lock = os.fdopen(open_own(folder / _LOCK), "rb")
+        if lock(self._lock.fileno(), folder / _LOCK) is False:
             self._lock.close()
             raise Busy(f"another process is drawing into '{folder}'")
-        for part in folder.glob(".*.part"):  # half-written when a run was killed
-            part.unlink(missing_ok=True)
+        for part in self._named(_PASSING):
+            part.unlink()
 
     def __enter__(self) -> Store:
         return self
@@ -62,20 +71,18 @@ class Store:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._lock.close()
-        if kind is not None and not any(self.folder.glob(f"*{self.suffix}")):
+        if kind is not None and not self._named(_FRAME):
             self.remove()  # nothing worth keeping
+        self._lock.close()
 
     def file(self, key: str) -> Path:
         """Where the frame of a key lies, or will lie."""
         return self.folder / f"{key}{self.suffix}"
 
-    def has(self, key: str) -> bool:
-        """Whether a frame is there, whole: files are renamed into place."""
-        try:
-            return self.file(key).stat().st_size > 0
-        except FileNotFoundError:
-            return False
+    def has(self, key: str, size: tuple[int, int]) -> bool:
+        """Whether a frame is there, whole and of a size (width, height)."""
+        file = self.file(key)
+        return not file.is_symlink() and file.is_file() and _whole(file, size)
 
     def put(self, key: str, image: Image) -> None:
         """Keep a frame.
@@ -83,30 +90,49 @@ class Store:
         Raises:
             OSError: it cannot be written.
         """
-        image.save(self.file(key))
+        put_frame(self.file(key), image)
 
     def remove(self) -> None:
-        """Take the folder away, and those above it that were made for it and are empty."""
+        """Take our files away, and where nothing else is there the folder and those that were made for it."""
+        for file in (*self._named(_FRAME), *self._named(_PASSING), self.folder / _LOCK):
+            with contextlib.suppress(OSError):
+                file.unlink()
         self._lock.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
-        for folder in self._made[1:]:
+        for folder in (self.folder, *self._made[1:]):
             with contextlib.suppress(OSError):
                 folder.rmdir()
 
+    def _named(self, pattern: re.Pattern[str]) -> list[Path]:
+        with contextlib.suppress(FileNotFoundError):
+            return [self.folder / name for name in os.listdir(self.folder) if pattern.fullmatch(name)]
+        return []
 
-def _locked(handle: int) -> bool:
-    """Take a lock that ends with the process, however it ends."""
-    if sys.platform == "win32":
-        return True  # where two runs at once do work twice, and harm nothing
-    import fcntl
+
+def _whole(file: Path, size: tuple[int, int]) -> bool:
+    """Whether a file holds a picture of a size, without damage."""
+    from PIL import Image
+
+    from scenelang.image import image_format
 
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+        with Image.open(file, formats=[image_format(file)]) as image:
+            if image.size != size:
+                return False
+            image.load()
+    except Exception:  # Pillow has no base class for what its readers raise
         return False
-    except OSError:
-        return True  # a file system without locks
     return True
+
+
+def put_frame(file: Path, image: Image) -> None:
+    """Write a picture in the format that its file's suffix names; a link in its place is replaced.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    from scenelang.image import image_format
+
+    write_whole(file, image.encode(image_format(file)))
 
 
 def deliver(part: Path, target: Path) -> None:
@@ -115,7 +141,7 @@ def deliver(part: Path, target: Path) -> None:
     Raises:
         OSError: it cannot; ``target`` stays as it was.
     """
-    place = target.resolve() if target.is_symlink() else target
+    place = output_place(target)
     with part.open("rb") as file:
         os.fsync(file.fileno())
     os.replace(part, place)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from scenelang.animation.painting import paint
+from scenelang.animation.store import put_frame
 from scenelang.backend.errors import RenderError
 from scenelang.program.store import parse_program
 from scenelang.renderers.kept import Kept
@@ -43,7 +44,7 @@ def _exactly(source: BinaryIO, size: int) -> bytes:
 def _answer(head: dict[str, object], data: bytes, kept: Kept) -> dict[str, object]:
     file, split = Path(str(head["file"])), int(str(head["split"]))
     try:
-        paint(parse_program(data), "cpu", threads=1, split=split, kept=kept).save(file)
+        put_frame(file, paint(parse_program(data), "cpu", threads=1, split=split, kept=kept))
     except RenderError as error:
         return {"error": str(error)}
     except OSError as error:

@@ -152,14 +152,14 @@ def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> se
     from scenelang.cli.inputs import STDIN
     from scenelang.cli.main import describe
     from scenelang.cli.say import say_trouble
-    from scenelang.files import write_whole
+    from scenelang.files import followed, write_whole
 
     lost = set()
     for name, text in changed.items():
         if name == STDIN:
             continue
         try:
-            write_whole(Path(name), in_bytes(text, Path(name)))
+            write_whole(followed(name), in_bytes(text, Path(name)))
         except OSError as error:
             say_trouble(describe(error))
             lost.add(name)

@@ -35,10 +35,13 @@ def command(
     from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import read_input, unused_defines
     from scenelang.cli.needs import need_metrics
+    from scenelang.cli.outputs import composed
     from scenelang.cli.say import say_diagnostics
     from scenelang.diagnostics.diagnostic import SceneError
 
     need_metrics()
+    stem = "stdin" if scene == "-" else Path(scene).stem
+    target = out if out is not None else composed(Path(f"{stem}-compare.png"))
     found = read_input(scene, request, Clock())
     found.diagnostics.items += unused_defines(request)
     if found.scene is None or found.diagnostics.errors:
@@ -63,7 +66,5 @@ def command(
     exact = over_white(draw_exact(found.scene, spans=found.spans, model=request.model))
     figures = measure(picture, exact)
     text = f"PSNR {figures['psnr']:.2f} dB  SSIM {figures['ssim']:.4f}  FLIP {figures['flip']:.4f}"
-    stem = "stdin" if scene == "-" else Path(scene).stem
-    target = out if out is not None else Path(f"{stem}-compare.png")
     side_by_side(picture, exact, text).save(target)
     click.echo(f"{text}  {target}")

@@ -14,7 +14,7 @@ from scenelang.cli.diffs import show_difference
 from scenelang.cli.folders import SUFFIX, scenes
 from scenelang.cli.main import describe
 from scenelang.cli.say import say_diagnostics, say_trouble
-from scenelang.files import read_regular, write_whole
+from scenelang.files import followed, read_regular, write_whole
 
 STDIN: Final = "-"
 MAX_BYTES: Final = 10_000_000  # as every scene; the module that says so would cost half of the start-up
@@ -129,7 +129,7 @@ class _Run:
             sys.stdout.buffer.flush()
         elif result != text:
             try:
-                write_whole(name, result.encode("utf-8"))
+                write_whole(followed(name), result.encode("utf-8"))
             except OSError as error:
                 say_trouble(describe(error))
                 self.unreadable += 1

@@ -128,9 +128,9 @@ def _picture(dot: str, kind: str, text: str) -> bytes:
 
 
 def _put_picture(data: bytes, out: str | None) -> None:
-    from scenelang.files import write_whole
+    from scenelang.files import write_output
 
     if out is None or out == "-":
         sys.stdout.buffer.write(data)
     else:
-        write_whole(out, data)
+        write_output(out, data)

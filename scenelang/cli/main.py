@@ -13,7 +13,7 @@ from typing import Any, Final
 import click
 
 from scenelang.backend.errors import RenderError
-from scenelang.files import NotWritten
+from scenelang.files import NotWritten, inputs_kept
 
 # Command -> what `--help` says. Each lies in a file of its name as `command`, imported when it is called;
 # a keyword's file ends in an underscore, and a dash is one.
@@ -111,7 +111,7 @@ class _Commands(Commands):
             return super().make_context(info_name, args, parent, **extra)
 
     def invoke(self, ctx: click.Context) -> object:
-        with _told():
+        with _told(), inputs_kept():
             return super().invoke(ctx)
 
 

@@ -19,7 +19,7 @@ def targets(names: Sequence[str], out: str) -> list[Path]:
         out: a file for one scene; a folder for many, or where it is there already or ends in a slash.
 
     Raises:
-        click.UsageError: no format has the suffix, two scenes have one name, or a file is in the way.
+        click.UsageError: no format has the suffix, two scenes have one name, or a file or link is in the way.
         OSError: the folder cannot be made.
     """
     from scenelang.image import image_format
@@ -40,7 +40,7 @@ def targets(names: Sequence[str], out: str) -> list[Path]:
         what = "a picture" if _is_picture(path) else "an animation" if is_animation(out) else None
         if what is not None:
             raise click.UsageError(f"'{out}' names {what}; {len(names)} scenes need a folder.")
-    files = [path / f"{_stem(name)}.png" for name in names]
+    files = [composed(path / f"{_stem(name)}.png") for name in names]
     owner: dict[str, str] = {}
     for name, file in zip(names, files, strict=True):
         first = owner.setdefault(file.name.casefold(), name)
@@ -48,6 +48,17 @@ def targets(names: Sequence[str], out: str) -> list[Path]:
             raise click.UsageError(f"'{first}' and '{name}' would both be drawn to '{file}'.")
     path.mkdir(parents=True, exist_ok=True)
     return files
+
+
+def composed(file: Path) -> Path:
+    """A file whose name the user did not write.
+
+    Raises:
+        click.UsageError: it is a link, which may lead anywhere.
+    """
+    if file.is_symlink():
+        raise click.UsageError(f"'{file}' is a link; it is followed only where -o names it.")
+    return file
 
 
 def _is_picture(path: Path) -> bool:

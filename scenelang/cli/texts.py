@@ -14,6 +14,6 @@ def put_text(text: str, out: str | None) -> None:
     if out is None or out == "-":
         click.echo(text, nl=False)
         return
-    from scenelang.files import write_whole
+    from scenelang.files import write_output
 
-    write_whole(out, text.encode())
+    write_output(out, text.encode())

@@ -63,13 +63,13 @@ def command(
 
     from scenelang.animation.targets import is_animation
     from scenelang.cli.animation import Wanted, wanted_target
-    from scenelang.cli.outputs import targets
+    from scenelang.cli.outputs import composed, targets
     from scenelang.cli.say import wants_color
     from scenelang.watching.changes import Changes, stamps
     from scenelang.watching.picture import Easel, Outdated, Wish
     from scenelang.watching.screen import Screen
 
-    out = f"{file.stem}.png" if out is None else out
+    out = str(composed(Path(f"{file.stem}.png"))) if out is None else out
     wanted = Wanted(frames, fps, None, "auto", False)
     target = None
     if frame is None and (is_animation(out) or wanted.certain or out.endswith(("/", "\\"))):

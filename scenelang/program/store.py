@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import read_json, read_regular, write_whole
+from scenelang.files import read_json, read_regular, write_output
 from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
 
 FORMAT = 1
@@ -37,7 +37,7 @@ def save_program(program: Program, path: str | Path) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    write_whole(Path(path), program_bytes(program))
+    write_output(path, program_bytes(program))
 
 
 def program_bytes(program: Program) -> bytes:

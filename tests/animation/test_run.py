@@ -205,9 +205,37 @@ def test_half_a_frame_is_no_frame(tmp_path: Path) -> None:
     path, out = write(tmp_path), tmp_path / "a.gif"
     interrupted(path, out, 2)
     work = find_target(str(out)).work
-    (work / ".x.png.abcd.part").write_bytes(b"half")
+    (work / f".{'a' * 40}.png.scenelang.part").write_bytes(b"half")
     assert nsg.animate(path, out, size=SMALL, backend="reference").resumed == 2
     assert left(tmp_path) == ["a.gif"]
+
+
+@pytest.mark.parametrize("name", ["a.gif", "f-%03d.jpg"])
+@pytest.mark.parametrize("damage", ["cut", "no picture", "another size", "a link", "another format"])
+def test_a_damaged_frame_is_drawn_again(tmp_path: Path, name: str, damage: str) -> None:
+    path, out = write(tmp_path), tmp_path / name
+    interrupted(path, out, 3)
+    kept = sorted(find_target(str(out)).work.glob(f"*{'.jpg' if 'jpg' in name else '.png'}"))
+    frame = kept[0]
+    whole = frame.read_bytes()
+    if damage == "cut":
+        frame.write_bytes(whole[: len(whole) // 2])
+    elif damage == "no picture":
+        frame.write_bytes(b"no picture")
+    elif damage == "another size":
+        Image.new("RGB", (5, 5)).save(frame)
+    elif damage == "another format":
+        Image.new("RGB", SMALL).save(frame, "BMP")
+    else:
+        (tmp_path / "elsewhere").write_bytes(whole)
+        frame.unlink()
+        frame.symlink_to(tmp_path / "elsewhere")
+    made = nsg.animate(path, out, size=SMALL, backend="reference")
+    assert (made.resumed, made.drawn) == (2, 4)
+    whole_made = nsg.animate(path, tmp_path / f"whole-{name}", size=SMALL, backend="reference")
+    for a, b in zip(made.files, whole_made.files, strict=True):
+        assert a.read_bytes() == b.read_bytes()
+        assert not a.is_symlink()
 
 
 def test_two_runs_at_once(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from scenelang.files import NotWritten, write_whole
+from scenelang.files import NotWritten, write_output, write_whole
 from tests.cli.conftest import Folder
 from tests.cli.test_commands import tiny_config
 from tests.hardening.processes import leavings, one_line, run
@@ -123,13 +123,18 @@ def test_devices_stay_devices(folder: Folder) -> None:
 
 
 def test_permissions_and_links_are_kept(tmp_path: Path) -> None:
-    target, link = tmp_path / "a", tmp_path / "link"
+    """A link is followed where a user named it, and replaced where we chose its name."""
+    target, link, ours = tmp_path / "a", tmp_path / "link", tmp_path / "ours"
     target.write_bytes(b"1")
     target.chmod(0o640)
     link.symlink_to("a")
-    write_whole(link, b"2")
+    ours.symlink_to("a")
+    write_output(link, b"2")
+    write_whole(ours, b"3")
     assert link.is_symlink()
     assert target.read_bytes() == b"2"
+    assert not ours.is_symlink()
+    ours.unlink()
     assert stat.S_IMODE(target.stat().st_mode) == 0o640
     mask = os.umask(0o027)
     try:
@@ -147,6 +152,50 @@ def test_long_names(tmp_path: Path) -> None:
         write_whole(tmp_path / ("x" * 256), b"1")
     assert caught.value.filename.endswith("x" * 256)
     assert len(os.listdir(tmp_path)) == 2
+
+
+KILLED = """
+import os, signal
+from scenelang.files import write_whole
+os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+write_whole("out", b"half")
+"""
+
+
+def test_what_a_killed_process_leaves_goes_with_the_next_writing(folder: Folder) -> None:
+    """What others are writing, or what is not ours, stays."""
+    import subprocess
+
+    subprocess.run([sys.executable, "-c", KILLED], cwd=folder.path, check=False)
+    Path(".out.png.part").touch()
+    assert len(os.listdir()) == 2
+    write_whole("out", b"whole")
+    assert sorted(os.listdir()) == [".out.png.part", "out"]
+
+
+@pytest.mark.parametrize("locks", [True, False])
+def test_two_write_one_file_at_once(folder: Folder, monkeypatch: pytest.MonkeyPatch, locks: bool) -> None:
+    """The second comes just before the first renames its file."""
+    import fcntl
+
+    def no_locks(*_: object) -> None:
+        raise OSError(37, "No locks available")
+
+    if not locks:
+        monkeypatch.setattr(fcntl, "flock", no_locks)
+    replace, seen = os.replace, []
+
+    def late(part: Path, place: Path) -> None:
+        seen.append(part)
+        if len(seen) == 1:
+            write_whole("out", b"second")
+        replace(part, place)
+
+    monkeypatch.setattr(os, "replace", late)
+    write_whole("out", b"first")
+    assert Path("out").read_bytes() == b"first"
+    assert len(set(seen)) == 2
+    assert os.listdir() == ["out"]
 
 
 def test_readers_that_have_enough(folder: Folder) -> None:

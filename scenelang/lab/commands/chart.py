@@ -45,7 +45,7 @@ def command(folder: Path, out: Path | None) -> None:
         for kind in ("png", "svg"):
             write_whole(out / f"{name}.{kind}", experiment_chart(result, kind))
         try:
-            strips(result, folder).save(out / f"{name}-strips.png")
+            write_whole(out / f"{name}-strips.png", strips(result, folder).encode())
         except OSError as error:
             click.echo(f"{name}: no strips: {error}", err=True)
         click.echo(f"{name}: {out / name}.md, .png, .svg")

@@ -73,7 +73,7 @@ def command(
             progress=_progress(name) if sys.stderr.isatty() else None,
         )
         write_whole(out / f"{name}.json", (json.dumps(summary, indent=2) + "\n").encode())
-        worst_sheet(loaded, name, seed, cases).save(out / f"{name}-worst.png")
+        write_whole(out / f"{name}-worst.png", worst_sheet(loaded, name, seed, cases).encode())
         p, s, f = summary["psnr"], summary["ssim"], summary["flip"]
         click.echo(
             f"{name}: PSNR {p['mean']:.2f} dB (p5 {p['p5']:.2f}, worst {p['worst']:.2f}), "

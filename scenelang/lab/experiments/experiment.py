@@ -263,5 +263,5 @@ def _strips(run: Run, shown: Tensor, exact: Tensor, folder: Path) -> str:
         row: Sequence[Tensor] = [image.nan_to_num(0.5).permute(1, 2, 0) for image in images[:STRIP]]
         picture = np.ascontiguousarray(torch.cat(list(row), 1).numpy(), np.float32)
         folder.mkdir(parents=True, exist_ok=True)
-        picture.view(Image).save(folder / file)
+        write_whole(folder / file, picture.view(Image).encode())
     return name
