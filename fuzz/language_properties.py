@@ -39,7 +39,7 @@ def _rules() -> dict[str, list[list[str]]]:
     from lark import Lark
     from lark.lexer import PatternStr
 
-    from scenelang.syntax.generate import grammar_path
+    from scenelang.syntax.tables import grammar_path
 
     lark = Lark(
         grammar_path().read_text(encoding="utf-8"), parser="lalr", lexer="basic", maybe_placeholders=False

@@ -14,7 +14,7 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.scene.session import deep_stack
 from scenelang.syntax import parse
-from scenelang.syntax.generate import grammar_path
+from scenelang.syntax.tables import grammar_path
 from scenelang.syntax.tokens import MAX_MISTAKES
 
 MOST_FOR_LARK = 400

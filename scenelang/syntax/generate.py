@@ -1,11 +1,13 @@
-"""Make `tables.json` from the grammar: ``python -m scenelang.syntax.generate``.
+"""From the grammar to `tables.json`: Lark builds the LALR tables, and what is kept is plain JSON.
 
-Lark reads the grammar and builds the LALR tables; what is kept is plain JSON. States are numbered in the
-order a breadth-first walk meets them, so the same grammar always gives the same bytes.
+States are numbered in the order a breadth-first walk meets them, so the same grammar always gives the same
+bytes. `scenelang.syntax.tables` calls this where there are no current tables, and so does the build of a
+wheel (``hatch_build.py``).
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 from pathlib import Path
 from typing import Any
@@ -14,13 +16,8 @@ from lark import Lark
 from lark.grammar import Rule
 from lark.lexer import PatternStr
 
-PACKAGE = Path(__file__).resolve().parent.parent
-
-
-def grammar_path() -> Path:
-    """Where the grammar lies: inside an installed package, beside it in a checkout."""
-    inside = PACKAGE / "grammar" / "scenelang.lark"
-    return inside if inside.exists() else PACKAGE.parent / "grammar" / "scenelang.lark"
+from scenelang.files import write_whole
+from scenelang.syntax.tables import source_mark
 
 
 def generate(grammar: str) -> dict[str, Any]:
@@ -85,23 +82,14 @@ def _rule(rule: Rule, origins: list[str]) -> tuple[int, int, str]:
     return len(rule.expansion), origins.index(rule.origin.name), callback
 
 
-def encode(data: dict[str, Any]) -> str:
-    """JSON with one state or rule a line, so that a change of the grammar shows as a readable diff."""
-    parts = []
-    for key, value in data.items():
-        if isinstance(value, list) and key != "declared":
-            rows = ",\n".join(json.dumps(row, separators=(",", ":")) for row in value)
-            parts.append(f'"{key}": [\n{rows}\n]')
-        else:
-            parts.append(f'"{key}": {json.dumps(value)}')
-    return "{\n" + ",\n".join(parts) + "\n}\n"
+def make(grammar: Path, place: Path) -> dict[str, Any]:
+    """Make the tables and write them to a file; where that cannot be written, they are made all the same.
 
-
-def main() -> None:
-    """Write `tables.json` beside this file."""
-    text = encode(generate(grammar_path().read_text(encoding="utf-8")))
-    (PACKAGE / "syntax" / "tables.json").write_text(text, encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    Args:
+        grammar: the grammar's file.
+        place: of `tables.json`.
+    """
+    data = {"source": source_mark(grammar), **generate(grammar.read_text("utf-8"))}
+    with contextlib.suppress(OSError):
+        write_whole(place, json.dumps(data, separators=(",", ":")).encode())
+    return data

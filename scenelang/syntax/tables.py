@@ -1,17 +1,22 @@
-"""The parse tables at run time: read from the generated `tables.json`, no Lark import.
+"""The parse tables at run time: read from `tables.json`, no Lark import.
 
-`scenelang.syntax.generate` makes that file from `grammar/scenelang.lark`. Importing Lark and building the
-tables takes over 100 ms of a process that should answer within 250; reading them takes about 2.
+The grammar is the source and the tables its product. A wheel brings them; in a checkout they are made by
+`scenelang.syntax.generate` when they are first needed and whenever the grammar has changed. Importing Lark
+and building them takes over 100 ms of a process that should answer within 250; reading them takes about 2.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+from zlib import crc32
 
+PACKAGE: Final = Path(__file__).resolve().parent.parent
+PLACE: Final = PACKAGE / "syntax" / "tables.json"
 END = 0
 """The kind of the end of the text."""
 
@@ -68,7 +73,36 @@ def decode(data: dict[str, Any]) -> Tables:
     )
 
 
+def grammar_path() -> Path:
+    """Where the grammar lies: inside an installed package, beside it in a checkout."""
+    inside = PACKAGE / "grammar" / "scenelang.lark"
+    return inside if inside.exists() else PACKAGE.parent / "grammar" / "scenelang.lark"
+
+
+def source_mark(grammar: Path) -> int:
+    """A checksum of what tables are made from: a grammar, and the program that makes them."""
+    return crc32(grammar.read_bytes(), crc32(Path(__file__).with_name("generate.py").read_bytes()))
+
+
+def current(grammar: Path, place: Path, *, shipped: bool) -> dict[str, Any]:
+    """The plain data of `tables.json`, made anew where it is missing, damaged or of another grammar.
+
+    Args:
+        grammar: the grammar's file.
+        place: of `tables.json`.
+        shipped: whether both came in a wheel, where they belong together.
+    """
+    with contextlib.suppress(OSError, ValueError):
+        found = json.loads(place.read_text("utf-8"))
+        if isinstance(found, dict) and (shipped or found.get("source") == source_mark(grammar)):
+            return found
+    from scenelang.syntax.generate import make  # and Lark with it
+
+    return make(grammar, place)
+
+
 @cache
 def tables() -> Tables:
-    """The shipped tables, read once."""
-    return decode(json.loads(Path(__file__).with_name("tables.json").read_text(encoding="utf-8")))
+    """The tables of the grammar."""
+    grammar = grammar_path()
+    return decode(current(grammar, PLACE, shipped=grammar.is_relative_to(PACKAGE)))

@@ -23,9 +23,8 @@ from scenelang.diagnostics.span import SourceFile
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.scene.evaluate import evaluate
 from scenelang.syntax import nodes, parse
-from scenelang.syntax.generate import grammar_path
 from scenelang.syntax.lexer import scan
-from scenelang.syntax.tables import tables
+from scenelang.syntax.tables import grammar_path, tables
 from scenelang.syntax.tokens import Report
 from tests.models import SOLIDS
 
