@@ -11,6 +11,7 @@ from typing import Final
 from lsprotocol import types
 
 from scenelang.lsp.workspace import Document, Workspace
+from scenelang.scene import library
 from scenelang.scene.vocabulary import Vocabulary
 from scenelang.syntax.lexer import UNITS
 
@@ -64,7 +65,8 @@ def strings(
 
 
 def _paths(docs: Workspace, document: Document) -> Iterator[Item]:
-    """Scenes that can be imported, below the import root."""
+    """Scenes that can be imported: the library's, and those below the import root."""
+    yield from (Item(name, Kind.File, rank="a") for name in library.names())
     folder = document.path.parent if document.path is not None else next(iter(docs.folders), None)
     if folder is None:
         return

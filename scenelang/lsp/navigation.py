@@ -9,6 +9,7 @@ from lsprotocol import types
 
 from scenelang.lsp.symbols import Symbol, Use
 from scenelang.lsp.workspace import Document, Workspace, uri_of
+from scenelang.scene import library
 from scenelang.scene.vocabulary import LANGUAGE
 from scenelang.syntax import nodes
 from scenelang.syntax.tables import tables
@@ -85,8 +86,10 @@ def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.Pr
     use = document.names.at(offset)
     if use is None:
         return None
-    if docs.definition(document, use) is None:
+    found = docs.definition(document, use)
+    if found is None:
         raise Refused(f"'{use.text}' is not defined in a scene file")
+    _check_owner(found[0], use)
     return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
 
 
@@ -101,6 +104,7 @@ def rename(docs: Workspace, document: Document, offset: int, new: str) -> types.
     if found is None or use is None:
         return None
     where, symbol = found
+    _check_owner(where, use)
     if new == symbol.name:
         return None
     _check_name(new, symbol)
@@ -128,6 +132,11 @@ def plain_edit(edit: types.WorkspaceEdit) -> types.WorkspaceEdit:
         if isinstance(item, types.TextDocumentEdit)
     }
     return types.WorkspaceEdit(changes=changes)
+
+
+def _check_owner(where: Document, use: Use) -> None:
+    if where.path is not None and library.owns(where.path):
+        raise Refused(f"'{use.text}' belongs to the library that ships")
 
 
 def _check_name(new: str, symbol: Symbol) -> None:

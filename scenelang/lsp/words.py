@@ -199,7 +199,8 @@ ANIMATED: Final[dict[str, Word]] = {
 }
 
 GEOMETRIES: Final[dict[str, str]] = {
-    "square": "Half-side 1/√2, so that its corners lie on the unit circle.",
+    "square": "Corners on the unit circle: sides of √2, half a side is 0.707. "
+    'For sides of your own, `import "std/shapes" as s;` and `s.rect(w, h)`.',
     "triangle": "Regular, circumradius 1, a vertex at +y.",
     "pentagon": "Regular, circumradius 1, a vertex at +y.",
     "star": "Five points, outer radius 1, inner radius 0.381966, a point at +y.",

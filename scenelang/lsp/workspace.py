@@ -21,6 +21,7 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.lsp.names import Names
 from scenelang.lsp.symbols import Symbol, Use
 from scenelang.lsp.text import Encoding, Lines, applied
+from scenelang.scene import library
 from scenelang.scene.imports import Unreadable, read_source
 from scenelang.scene.session import MAX_BYTES
 from scenelang.syntax import nodes
@@ -216,6 +217,8 @@ class Workspace:
 
     def imported(self, document: Document, text: str) -> Document | None:
         """The document that an import's path means."""
+        if library.is_reserved(text):
+            return self.by_path(library.find(text))
         folder = document.path.parent if document.path is not None else next(iter(self.folders), None)
         if folder is None or not text or "\0" in text or os.path.isabs(text) or PureWindowsPath(text).drive:
             return None

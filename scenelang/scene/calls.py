@@ -13,6 +13,7 @@ from scenelang.scene.objects import HOLDERS, prepare_module_call, prepare_object
 from scenelang.scene.references import lookup, wrong_kind
 from scenelang.scene.scope import Binding, Scope
 from scenelang.scene.settings import prepare_setting
+from scenelang.scene.shapes import in_library
 from scenelang.scene.statements import Action, Place, inner, prepare_block, states
 from scenelang.scene.transforms import GEOMETRY, TEXTURE
 from scenelang.scene.unknown import VALUES, report_unknown, unknown, unknown_member
@@ -135,6 +136,8 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
     candidates = _candidates(stmt, place, scope)
     hint, fix = did_you_mean(name.text, candidates, name.span)
+    if hint is None and place.kind in HOLDERS:
+        hint, fix = in_library(stmt, unit, scope)
     if hint is None:
         hint, fix = instead(name.text, elsewhere.WORDS, candidates, name.span)
     if hint is None and elsewhere.STATEMENTS.get(name.text):

@@ -85,11 +85,6 @@ COLOURS: Final = {
 """Colours by their names on the web."""
 
 WORDS: Final = {
-    "cube": "square",
-    "box": "square",
-    "rect": "square",
-    "rectangle": "square",
-    "quad": "square",
     "ball": "sphere",
     "donut": "torus",
     "doughnut": "torus",
@@ -140,7 +135,6 @@ STATEMENTS: Final = {
     "linear_extrude": "a 2D scene is not extruded",
     "rotate_extrude": "a 2D scene is not extruded",
     "mirror": "write scale(-1, 1);",
-    "polygon": "a polygon is an intersection of squares in a chain { … }",
     "text": "no model draws text",
     "echo": "nothing is printed while a scene is made",
     "print": "nothing is printed while a scene is made",

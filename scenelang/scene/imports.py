@@ -10,7 +10,9 @@ from typing import Final
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.diagnostics.suggest import listing
 from scenelang.files import read_regular
+from scenelang.scene import library
 from scenelang.scene.build import Builder
 from scenelang.scene.damage import find_damage
 from scenelang.scene.scope import Binding, Env
@@ -80,7 +82,33 @@ class Loader:
 
     def find(self, stmt: nodes.Import, unit: Unit) -> Path | None:
         """The file that an import means; None after a report."""
-        session, span, text = unit.session, stmt.path.span, stmt.path.value
+        session, span = unit.session, stmt.path.span
+        path = self._locate(stmt.path, unit)
+        if path is None:
+            return None
+        if path in self.chain:
+            names = " → ".join(p.name for p in [*self.chain[self.chain.index(path) :], path])
+            # The first file of the chain, unless it is standard input, was not imported.
+            around = self.sites[max(0, self.chain.index(path) + 1 - len(self.chain) + len(self.sites)) :]
+            labels = tuple([Label(site, "which imports this") for site in around])
+            session.error("E0216", f"import cycle: {names}", span, labels=labels)
+            return None
+        self.count += 1
+        if self.count > MAX_IMPORTS:
+            raise session.halt("E0324", f"more than {MAX_IMPORTS:,} imports", span)
+        if len(self.chain) > MAX_IMPORT_DEPTH:
+            raise session.halt("E0324", f"imports nested deeper than {MAX_IMPORT_DEPTH}", span)
+        return path
+
+    def _locate(self, written: nodes.String, unit: Unit) -> Path | None:
+        """The place of a file of the library, or inside the root; None after a report."""
+        session, span, text = unit.session, written.span, written.value
+        if library.is_reserved(text):
+            shipped = library.find(text)
+            if shipped is None:
+                help = f"it has {listing(library.names())}; a file of your own is './{text}'"
+                session.error("E0214", f"the library has no '{text}'", span, help=help)
+            return shipped
         folder = unit.path.parent if unit.path is not None else self.root
         if folder is None or self.root is None:
             help = "load the scene from a file, or give a root"
@@ -103,26 +131,17 @@ class Loader:
             session.error("E0215", f"'{text}' lies outside the import root", span, help=help)
             return None
         self.wanted.update({Path(os.path.abspath(folder / text)): None, path: None})
-        if path in self.chain:
-            names = " → ".join(p.name for p in [*self.chain[self.chain.index(path) :], path])
-            # The first file of the chain, unless it is standard input, was not imported.
-            around = self.sites[max(0, self.chain.index(path) + 1 - len(self.chain) + len(self.sites)) :]
-            labels = tuple([Label(site, "which imports this") for site in around])
-            session.error("E0216", f"import cycle: {names}", span, labels=labels)
-            return None
-        self.count += 1
-        if self.count > MAX_IMPORTS:
-            raise session.halt("E0324", f"more than {MAX_IMPORTS:,} imports", span)
-        if len(self.chain) > MAX_IMPORT_DEPTH:
-            raise session.halt("E0324", f"imports nested deeper than {MAX_IMPORT_DEPTH}", span)
         return path
 
     def read(self, path: Path, stmt: nodes.Import, unit: Unit) -> nodes.File | None:
         """The parsed file; None after a report."""
         if path in self.parsed:
             return self.parsed[path]
-        name = os.path.normpath(os.path.join(os.path.dirname(unit.source.name), stmt.path.value))
         text, span, session = stmt.path.value, stmt.path.span, unit.session
+        if library.is_reserved(text):
+            name = library.called(text)
+        else:
+            name = os.path.normpath(os.path.join(os.path.dirname(unit.source.name), text))
         try:
             given = self.texts.get(path)
             source = read_source(path, name) if given is None else SourceFile(name, given)
@@ -130,7 +149,8 @@ class Loader:
             session.error(error.code, f"cannot read '{text}': {error}", span)
             return None
         except OSError as error:
-            session.error("E0214", f"cannot read '{text}': {_reason(error)}", span)
+            help, fix = library.meant(text, span)
+            session.error("E0214", f"cannot read '{text}': {_reason(error)}", span, help=help, fix=fix)
             return None
         file = parse(source, session.diagnostics)
         self.parsed[path] = file

@@ -6,14 +6,13 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.scene import spans
+from scenelang.scene import library, spans
 from scenelang.scene.build import Builder, ChainBuilder, make
 from scenelang.scene.expressions import prepare
 from scenelang.scene.references import entering, lookup
 from scenelang.scene.schema import Boolean, Chain, Group, Material, Object
 from scenelang.scene.scope import Definition, Env
 from scenelang.scene.session import MAX_NODE_DEPTH, Session
-from scenelang.scene.spans import Calls
 from scenelang.scene.statements import (
     Action,
     Body,
@@ -82,6 +81,8 @@ def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
         if not fits:
             return None
         help = f"size it in its block: {name} {{ scale(0.5); }}"
+        if name == "square":
+            help += f'; its sides are sqrt(2) long, those of rect(w, h) in "{library.SHAPES}" as written'
         session.error("E0308", f"'{name}' takes no arguments", stmt.args[0].span, help=help)
         return None
     if not fits:
@@ -227,9 +228,8 @@ def prepare_module_call(stmt: nodes.Call, definition: Definition, place: Place) 
     where = spans.Place(stmt.name.span, stmt.span)
 
     def action(env: Env, out: Builder) -> None:
-        frame = enter(env)
         before = session.calls
-        session.calls = Calls(where.name, before)
+        frame = enter(env)
         inside = Builder()
         run_body(Body(definition.run, 1), frame, inside, session, where.name)
         session.calls = before

@@ -238,9 +238,8 @@ def _call_fn(
     session.defined[id(expr.name.span.source), expr.name.span.start] = definition.node.name.span
 
     def run(env: Env) -> Any:
-        frame = enter(env)
         before = session.calls
-        session.calls = Calls(expr.name.span, before)
+        frame = enter(env)
         value = definition.run(frame)
         session.calls = before
         session.depth -= 1
@@ -259,7 +258,7 @@ def entering(
 ) -> Run | None:
     """How to make the slots of one call, which also counts it; None if the arguments do not fit.
 
-    The caller takes 1 from the session's depth when the call is over.
+    When the call is over, the caller takes 1 from the session's depth and puts its calls back.
     """
     params = definition.node.params
     session, span = unit.session, name.span
@@ -287,12 +286,15 @@ def entering(
         session.tick(definition.weight, span)
         frame: Env = [UNBOUND] * definition.slots
         frame[0] = link(env)
-        slot = 1
+        before, slot = session.calls, 1
+        inside = Calls(span, before)
         for get in given:
+            session.calls = before if get is not None else inside  # defaults are the callee's
             frame[slot] = get(env) if get is not None else definition.defaults[slot - 1](frame)
             if session.watch is not None:
                 session.watch(params[slot - 1].name.span, frame[slot])
             slot += 1
+        session.calls = inside
         return frame
 
     return enter

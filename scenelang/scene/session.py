@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Fix, Label
 from scenelang.diagnostics.span import Span
+from scenelang.scene import library
 from scenelang.scene.damage import NONE, Damage
 from scenelang.scene.schema import Animation
 from scenelang.scene.spans import Calls, SpanMap
@@ -195,11 +196,18 @@ class Session:
         fix: Fix | None = None,
         labels: tuple[Label, ...] = (),
     ) -> None:
-        """Report a mistake with the calls that led to it, unless it may follow from one of syntax."""
+        """Report a mistake with the calls that led to it, unless it may follow from one of syntax.
+
+        One that shows in the library that ships is reported where that is called.
+        """
+        site = self.calls.outside() if self.calls is not None and library.holds(span.source) else None
+        if site is not None:
+            labels, fix, span = (Label(span, "which is used here"),), None, site
         place = (id(span.source), span.start, span.end)
         if self.reported.setdefault(place, code) != code or self.follows(code, span):
             return  # one place, one mistake: what else is wrong there most likely comes of it
-        self.diagnostics.add(code, message, span, labels=[*labels, *self.call_labels()], help=help, fix=fix)
+        around = self.call_labels() if site is None else []
+        self.diagnostics.add(code, message, span, labels=[*labels, *around], help=help, fix=fix)
 
     def model_label(self) -> tuple[Label, ...]:
         """Where the scene names its model, if it does."""
@@ -213,6 +221,9 @@ class Session:
             operand = operands[problem.operand]
         place = operand.span if operand else span
         if (id(place.source), place.start, place.end) in self.reported:
+            return
+        if library.holds(place.source):
+            self.error(problem.code, problem.message, place, help=problem.help)
             return
         from scenelang.scene.blame import joined, remember  # only mistakes need it
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from scenelang.diagnostics.span import Span
+from scenelang.scene import library
 
 
 class Place(NamedTuple):
@@ -21,6 +22,13 @@ class Calls(NamedTuple):
     span: Span
     outer: Calls | None
 
+    def outside(self) -> Span | None:
+        """The innermost call that is not written in the library."""
+        calls: Calls | None = self
+        while calls is not None and library.holds(calls.span.source):
+            calls = calls.outer
+        return None if calls is None else calls.span
+
 
 @dataclass(slots=True)
 class SpanMap:
@@ -34,7 +42,13 @@ class SpanMap:
     _calls: dict[int, Calls] = field(default_factory=dict)
 
     def record(self, node: object, place: Place, calls: Calls | None = None) -> None:
-        """Remember where ``node`` was written and through which calls it came about."""
+        """Remember where ``node`` was written and through which calls it came about.
+
+        What the library makes counts as written where it is called.
+        """
+        if calls is not None and library.holds(place.name.source):
+            site = calls.outside() or place.name
+            place = Place(site, site)
         self._places[id(node)] = place
         if calls is not None:
             self._calls[id(node)] = calls

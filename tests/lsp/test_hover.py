@@ -32,7 +32,7 @@ def test_hover_tells_an_object_s_composed_chain(client: Client, uri: str) -> Non
     text = hover(client, client.at(uri, "square", 1))
     assert "the first of 3" in text
     assert "[   1    0  0.5 ]" in text
-    assert "Half-side" in text
+    assert "half a side is 0.707" in text
 
 
 def test_hover_tells_what_a_model_offers_and_words_mean(client: Client, uri: str) -> None:

@@ -38,6 +38,26 @@ def test_references_and_highlights_mean_the_same_name(client: Client, uri: str, 
     assert sorted(mark["kind"] for mark in marks) == [2, 2, 3]
 
 
+def test_the_library_that_ships_is_read_and_never_changed(client: Client, folder: Path) -> None:
+    text = 'import "std/shapes" as s;\ns.disc(0.3);\n'
+    uri = client.open((folder / "shaped.nsg").as_uri(), text)
+    assert client.diagnostics(uri) == []
+    found = client.request("textDocument/definition", client.at(uri, "disc", 1))
+    assert found["uri"].endswith("std/shapes.nsg")
+    assert client.request("textDocument/definition", client.at(uri, "std/", 1))["uri"] == found["uri"]
+    said = client.request("textDocument/hover", client.at(uri, "disc", 1))["contents"]["value"]
+    assert "module disc(r = 1, sides = sides_of(r))" in said
+    assert "A disc of radius r" in said
+    offered = client.request("textDocument/completion", client.at(uri, "disc", 0))["items"]
+    assert {"disc", "rect", "arrow"} <= {item["label"] for item in offered}
+    offered = client.request("textDocument/completion", client.at(uri, "shapes", 0))["items"]
+    assert "std/shapes" in {item["label"] for item in offered}
+    for method, more in (("prepareRename", {}), ("rename", {"newName": "round"})):
+        said = client.refused(f"textDocument/{method}", {**client.at(uri, "disc", 1), **more})
+        assert "belongs to the library that ships" in said
+    client.close(uri)
+
+
 def test_rename_goes_across_imports_and_keeps_the_meaning(client: Client, uri: str) -> None:
     at = client.at(uri, "lib.dot", 5)
     assert client.request("textDocument/prepareRename", at)["placeholder"] == "dot"
