@@ -8,7 +8,7 @@ import click
 @click.command("lsp")
 @click.option("--stdio", is_flag=True, help="Speak over standard input and output; the default.")
 @click.option(
-    "--tcp", type=click.IntRange(1, 65535), metavar="PORT", help="Listen on a port of this machine."
+    "--tcp", type=click.IntRange(1, 65535), metavar="PORT", help="Serve one client on a port of this machine."
 )
 @click.option("--log", type=click.Path(dir_okay=False), metavar="FILE", help="Write a log to a file.")
 def command(stdio: bool, tcp: int | None, log: str | None) -> None:
@@ -17,6 +17,8 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
     Editors start it themselves; docs/editors.md says how.
     """
     import logging
+    import socket
+    import sys
 
     from scenelang.cli.main import Trouble
 
@@ -37,9 +39,12 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
     if not log:  # requests that are refused are answered as such; the library would print a trace
         logging.getLogger("pygls").setLevel(logging.CRITICAL)
     server = make_server()
-    if tcp is not None:
-        server.start_tcp("127.0.0.1", tcp)
+    if tcp is None:
+        server.serve(sys.stdin.buffer, sys.stdout.buffer)
     else:
-        server.start_io()
+        with socket.create_server(("127.0.0.1", tcp)) as listener:
+            connection, _ = listener.accept()
+        with connection, connection.makefile("rb") as source, connection.makefile("wb") as answers:
+            server.serve(source, answers)
     if not server.was_shut_down:  # the protocol: an exit that was not announced is a failure
         raise click.exceptions.Exit(1)

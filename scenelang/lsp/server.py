@@ -15,15 +15,17 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import wraps
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, BinaryIO, Final, TypeVar
 
 from lsprotocol import types
+from pygls.exceptions import JsonRpcException, JsonRpcInvalidRequest
 from pygls.lsp.server import LanguageServer
 from pygls.protocol import LanguageServerProtocol
 from pygls.protocol.language_server import lsp_method
 
 from scenelang.lsp.check import Checked, Superseded, Task, check
 from scenelang.lsp.convert import to_diagnostic
+from scenelang.lsp.incoming import Incoming
 from scenelang.lsp.settings import Settings
 from scenelang.lsp.workspace import Document, Workspace, path_of
 
@@ -33,6 +35,21 @@ _DEEP: Final = 10_000  # trees are up to 200 levels deep, walks take a few calls
 
 class Protocol(LanguageServerProtocol):
     """pygls's protocol without its own copies of documents, which split lines by other rules."""
+
+    def structure_message(self, data: dict[str, Any]) -> Any:
+        """A message from its JSON; a request that is none of the protocol's is answered as such."""
+        try:
+            return super().structure_message(data)
+        except JsonRpcException as error:
+            if "id" in data and "method" in data:
+                self._send_response(data["id"], error=error.to_response_error())
+            raise
+
+    @lsp_method(types.INITIALIZE)
+    def lsp_initialize(self, params: types.InitializeParams) -> Any:
+        if self._workspace is not None:
+            raise JsonRpcInvalidRequest("the server is initialized already")
+        return (yield from super().lsp_initialize(params))
 
     @lsp_method(types.TEXT_DOCUMENT_DID_OPEN)
     def lsp_text_document__did_open(self, params: types.DidOpenTextDocumentParams) -> Any:
@@ -69,6 +86,13 @@ class Server(LanguageServer):
         known = [folder.resolve() for folder in folders if folder is not None]
         self.docs = Workspace(encoding, known)  # type: ignore[arg-type]
         self.settings = Settings.read(params.initialization_options)
+
+    def serve(self, source: BinaryIO, answers: BinaryIO) -> None:
+        """Answer one client until it is gone."""
+        error = {"code": JsonRpcInvalidRequest.CODE, "message": "a message of 100 MB or more"}
+        refused = {"jsonrpc": self.protocol.VERSION, "id": None, "error": error}
+        incoming = Incoming(source, lambda: self.protocol._send_data(refused))
+        self.start_io(incoming, answers)  # type: ignore[arg-type]  # it has what is called
 
     # ------------------------------------------------------------ diagnostics
 
@@ -165,8 +189,6 @@ def quiet(empty: Any = None) -> Callable[[F], F]:
     def decorate(handler: F) -> F:
         @wraps(handler)
         def safe(server: Server, params: Any) -> Any:
-            from pygls.exceptions import JsonRpcException
-
             try:
                 return handler(server, params)
             except JsonRpcException:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+MAX_PAUSE_MS: Final = 60_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +29,7 @@ class Settings:
 
     @classmethod
     def read(cls, options: Any) -> Settings:
-        """The settings in what a client sent; what is missing or of another type keeps its default."""
+        """What a client sent; what is missing, of another type or out of range has its default."""
         if not isinstance(options, dict):
             return cls()
         given = options.get("scenelang", options)
@@ -35,11 +37,11 @@ class Settings:
             return cls()
         hints = given.get("inlayHints")
         hints = hints if isinstance(hints, dict) else {}
-        debounce, model, root = given.get("debounceMs"), given.get("model"), given.get("root")
-        if not isinstance(debounce, int | float) or isinstance(debounce, bool):
-            debounce = cls().debounce_ms
+        pause, model, root = given.get("debounceMs"), given.get("model"), given.get("root")
+        if isinstance(pause, bool) or not isinstance(pause, int | float) or not 0 <= pause <= MAX_PAUSE_MS:
+            pause = cls().debounce_ms
         return cls(
-            debounce_ms=min(max(float(debounce), 0.0), 60_000.0),
+            debounce_ms=float(pause),
             model=model if isinstance(model, str) and model else None,
             root=Path(root).expanduser() if isinstance(root, str) and root else None,
             value_hints=hints.get("values") is not False,

@@ -23,7 +23,6 @@ from scenelang.lsp.symbols import Symbol, Use
 from scenelang.lsp.text import Encoding, Lines, applied
 from scenelang.scene import library
 from scenelang.scene.imports import Unreadable, read_source
-from scenelang.scene.session import MAX_BYTES
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Edit, Parsed, parse_edited, parse_whole
 from scenelang.syntax.tables import END
@@ -35,6 +34,8 @@ if TYPE_CHECKING:
     from scenelang.lsp.check import Checked
 
 MAX_FILES: Final = 2000  # of a workspace that are searched for references and symbols
+MAX_TEXT: Final = 2_000_000
+"""Characters of a text that is parsed; its tree, tokens and places take a hundred times as many bytes."""
 
 
 @dataclass(eq=False)
@@ -85,7 +86,7 @@ class Document:
         """Take over one change of the client's."""
         text, edit = applied(self.lines, change)
         source = SourceFile(self.source.name, text)
-        self.parsed = parse_edited(self.parsed, source, edit) if len(text) <= MAX_BYTES else too_large(source)
+        self.parsed = _parsed(source, (self.parsed, edit))
         self.edits.append(edit)
         self.semantic = [moved for d in self.semantic if (moved := _carried(d, edit, source)) is not None]
         for name in ("lines", "names"):
@@ -144,8 +145,7 @@ class Workspace:
         """Open a buffer, or open it anew."""
         path = path_of(uri)
         source = SourceFile(str(path) if path is not None else uri, text)
-        parsed = parse_whole(source) if len(text) <= MAX_BYTES else too_large(source)
-        document = Document(uri, _resolved(path), parsed, version, self.encoding)
+        document = Document(uri, _resolved(path), _parsed(source), version, self.encoding)
         self.open[uri] = document
         return document
 
@@ -175,7 +175,7 @@ class Workspace:
             source = read_source(path, str(path))
         except (OSError, Unreadable, ValueError):
             return None
-        document = Document(uri_of(path), path, parse_whole(source), None, self.encoding)
+        document = Document(uri_of(path), path, _parsed(source), None, self.encoding)
         self._closed[path] = (stamp, document)
         return document
 
@@ -264,12 +264,15 @@ class Workspace:
                     yield other, use
 
 
-def too_large(source: SourceFile) -> Parsed:
-    """A text that nobody would draw: it has no tree, and says why."""
+def _parsed(source: SourceFile, edited: tuple[Parsed, Edit] | None = None) -> Parsed:
+    """The tree of a text, by an edit of the one before where there was one; none of a large text."""
+    if len(source.text) <= MAX_TEXT:
+        return parse_whole(source) if edited is None else parse_edited(edited[0], source, edited[1])
     tokens = Tokens(source)
     tokens.append(END, len(source.text), len(source.text))
-    message = f"a file of more than {MAX_BYTES // 1_000_000} MB"
-    return Parsed(source, [], [], tokens, (Diagnostic("E0324", message, Span(source, 0, 0)),), [])
+    message = f"a text of more than {MAX_TEXT // 1_000_000} MB, which the language server does not read"
+    help = "`scenelang check` does, up to 10 MB"
+    return Parsed(source, [], [], tokens, (Diagnostic("E0324", message, Span(source, 0, 0), help=help),), [])
 
 
 def path_of(uri: str) -> Path | None:

@@ -68,7 +68,7 @@ class Client:
         self.published: dict[str, list[Json]] = {}
         self.logged: list[Json] = []
         self.asked: list[Json] = []
-        self._answers: dict[int, Json] = {}
+        self._answers: dict[int | None, Json] = {}
         self._inbox: queue.Queue[Json | None] = queue.Queue()
         self._id = 0
         self.stderr: list[bytes] = []
@@ -151,8 +151,8 @@ class Client:
             self._answers[message["id"]] = message
         return True
 
-    def answer(self, request: int, seconds: float = PATIENCE_S) -> Json:
-        """The whole answer to a request."""
+    def answer(self, request: int | None, seconds: float = PATIENCE_S) -> Json:
+        """The whole answer to a request; to None, that to what is no request."""
         end = time.monotonic() + seconds
         while request not in self._answers:
             assert self._take(end - time.monotonic()), f"no answer to {request}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import socket
 import subprocess
@@ -15,6 +16,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from scenelang.lsp.incoming import Incoming
+from scenelang.lsp.settings import Settings
+from scenelang.lsp.workspace import MAX_TEXT
 from tests.lsp.client import PATIENCE_S, Client, Json
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -104,6 +108,61 @@ def test_documents_that_are_not_there_get_empty_answers(client: Client) -> None:
     assert client.stop() == 0
 
 
+@pytest.mark.parametrize("method", ["hover", "completion", "definition"])
+@pytest.mark.parametrize(
+    "place", [{"line": -1, "character": 0}, {"line": 0, "character": 1 << 40}, None, "x"]
+)
+def test_positions_that_are_none_are_refused(lasting: Client, method: str, place: Any) -> None:
+    uri = lasting.open("untitled:a", "let a = 1;\n")
+    params = {"textDocument": {"uri": uri}, "position": place}
+    assert "Invalid" in lasting.refused(f"textDocument/{method}", params)
+
+
+def test_a_second_initialization_is_refused(client: Client) -> None:
+    uri = client.open("untitled:a", "let a = 1;\n")
+    params = {"processId": None, "rootUri": None, "capabilities": {}}
+    assert "initialized already" in client.refused("initialize", params)
+    assert client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+
+
+@pytest.mark.parametrize("length", [b"100000000", b"9" * 30, b"9" * 5000])
+def test_a_message_that_is_too_long_is_refused(client: Client, length: bytes) -> None:
+    """However much of it comes, the next one is read."""
+    assert client.process.stdin is not None
+    for body in (b"", b'{"jsonrpc": "2.0", "id": 1}', b"x" * 100_000):
+        client.process.stdin.write(b"Content-Length: " + length + b"\r\n\r\n" + body)
+        client.process.stdin.flush()
+        assert client.answer(None)["error"]["code"] == -32600
+        assert "unknownRequest" in client.refused("some/unknownRequest", {})
+    assert client.stop() == 0
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 100), st.integers(0, 2), st.sampled_from([b"", b"\n", b"\r\n", b"Content-Length: 1"]))
+def test_the_next_message_is_found(cut: int, chunks: int, end: bytes) -> None:
+    """Wherever the pieces end in which the one before is passed over; lines stay short."""
+    chunk = 1 << 16
+    body = b"x" * max(0, chunks * chunk - cut) + end
+    said: list[None] = []
+    data = b"Content-Length: 1234567890\r\n\r\n" + body + b"Content-Length: 2\r\n\r\n{}"
+    incoming = Incoming(io.BytesIO(data), lambda: said.append(None))
+    while (line := incoming.readline()) != b"Content-Length: 2\r\n":
+        assert line
+        assert len(line) <= chunk + 64
+    assert incoming.readline() == b"\r\n"
+    assert incoming.read(2) == b"{}"
+    assert incoming.readline() == b""
+    assert len(said) == 1
+
+
+@pytest.mark.parametrize(
+    "pause", [1e300, 10**400, float("nan"), float("inf"), -1, 60_001, True, False, "7", None]
+)
+def test_a_pause_that_is_none_is_the_usual_one(pause: Any) -> None:
+    assert Settings.read({"debounceMs": pause}) == Settings()
+    assert Settings.read({"debounceMs": 60_000}).debounce_ms == 60_000
+
+
 def test_a_cancelled_request_is_answered_all_the_same(client: Client) -> None:
     uri = client.open("untitled:a", "let a = 1;\n")
     request = client.start("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
@@ -171,9 +230,11 @@ def test_a_long_evaluation_is_dropped_when_its_text_has_changed() -> None:
 
 
 def test_a_text_beyond_the_limit_is_refused_at_once(client: Client) -> None:
-    uri = client.open("untitled:a", "square { }\n" * 1_000_000)
-    found = client.next_diagnostics(uri)
-    assert [d["code"] for d in found] == ["E0324"]
+    client.replace(client.open("untitled:a", "square { }\n"), "square { }\n" * (MAX_TEXT // 11 + 1))
+    uri = client.open("untitled:b", client.texts["untitled:a"])
+    for name in ("untitled:a", uri):
+        while [d["code"] for d in client.next_diagnostics(name)] != ["E0324"]:
+            pass
     client.replace(uri, "squar { }\n")
     assert [d["code"] for d in client.diagnostics(uri)] == ["E0204"]
     assert client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
