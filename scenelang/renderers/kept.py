@@ -61,7 +61,7 @@ class Kept:
             reaching = rows[(low <= top) & (high >= bottom)]
             keys.append(hashlib.sha256(common + reaching.tobytes()).digest())
         fits = self._picture.shape[:2] == (height, width) and len(self._keys) == len(keys)
-        same = [fits and key == old for key, old in zip(keys, self._keys or keys, strict=False)]
+        same = [fits and key == self._keys[index] for index, key in enumerate(keys)]
         return Shown(keys, same, self._picture)
 
     def keep(self, picture: npt.NDArray[np.float32], shown: Shown, stream: Stream) -> None:
