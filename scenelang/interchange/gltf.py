@@ -19,7 +19,10 @@ Plane = Literal["xy", "xz"]
 MOST_DEPTH: Final = 150
 """Nodes within nodes; text nests 200 levels."""
 
-_SUFFIX: Final = re.compile(r"([._ -]?\d+|[._ -](copy|instance|mesh|geo|shape|obj))+$", re.IGNORECASE)
+_ENDING: Final = re.compile(r"[._ -]?(?<!\d)\d+$|[._ -](?:copy|instance|mesh|geo|shape|obj)$")
+"""One ending of a node's name; several are taken off one at a time."""
+_MOST_LETTERS: Final = 200
+"""A longer name is not compared with those of geometries."""
 _FLAT: Final = 1e-6
 """How far the entries of a matrix that mix z with x and y may be from 0: they are written in float32."""
 _MOST_NAME: Final = 40
@@ -71,13 +74,15 @@ def import_gltf(gltf: Gltf, *, model: str | None = None, plane: Plane = "xy") ->
 
 
 def geometry_of(names: Iterable[str | None], geometries: Iterable[str]) -> str | None:
-    """The geometry that the first fitting name means: case and suffixes such as ``.001`` do not count."""
+    """The geometry that the first fitting name means: case and endings such as ``.001`` do not count."""
     known = {name.casefold(): name for name in geometries}
     for name in names:
-        folded = (name or "").strip().casefold()
-        for candidate in (folded, _SUFFIX.sub("", folded)):
-            if candidate in known:
-                return known[candidate]
+        rest = (name or "").strip().casefold()
+        while rest and len(rest) <= _MOST_LETTERS:
+            if rest in known:
+                return known[rest]
+            ending = _ENDING.search(rest)
+            rest = rest[: ending.start()] if ending else ""
     return None
 
 

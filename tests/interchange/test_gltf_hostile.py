@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from scenelang.interchange.gltf import GltfError, import_gltf, load_gltf
 from scenelang.interchange.gltf_file import MOST_BYTES, parse_gltf
 from tests.interchange.documents import Json, document, read, write
+from tests.work import ends
 
 GOOD = document([{"name": "star", "mesh": 0}])
 
@@ -125,3 +126,11 @@ def test_no_uri_is_followed(tmp_path: Path) -> None:
     finally:
         watching = False
     assert [name for name in opened if not name.isdigit() and "manifest.json" not in name] == [str(path)]
+
+
+def test_names_of_many_endings_are_read_soon() -> None:
+    ends("""if True:
+        from scenelang.interchange.gltf import geometry_of
+        odd = ["1" * 40 + "x", "1" * 10**6 + "x", ".copy" * 10**6 + "x", "1x" * 10**6, "_1" * 100 + "x"]
+        assert geometry_of([*odd, "star" + ".1" * 98], ["star"]) == "star"
+    """)
