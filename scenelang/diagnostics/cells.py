@@ -5,7 +5,9 @@ Nothing in a scene may move the cursor or colour a terminal: what does not print
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import groupby
 from unicodedata import category, east_asian_width
 
@@ -51,8 +53,8 @@ class Line:
         starts: the cell of each code point, and after the last one where the line ends.
     """
 
-    cells: list[str]
-    starts: list[int]
+    cells: Sequence[str]
+    starts: Sequence[int]
 
     def cell(self, column: int) -> int:
         """The cell of a column from 1; past the end the line goes on in single cells."""
@@ -62,8 +64,11 @@ class Line:
         return self.starts[-1] + index - len(self.starts) + 1
 
 
+@lru_cache(maxsize=64)  # diagnostics that follow each other often share lines
 def in_cells(text: str) -> Line:
     """Lay a line out in cells."""
+    if text.isascii() and text.isprintable():
+        return Line(text, range(len(text) + 1))
     cells: list[str] = []
     starts = []
     for char in text:
@@ -83,10 +88,10 @@ def in_cells(text: str) -> Line:
 
 def left_out(text: str, at: int) -> int:
     """How many code points in front of offset ``at`` are not laid out: none but in a very long line."""
-    return max(0, at - _BEFORE) if len(text) > LONGEST else 0
+    return max(0, at - _BEFORE) // _BEFORE * _BEFORE if len(text) > LONGEST else 0
 
 
-def window(line: Line, first: int, last: int, width: int) -> tuple[list[str], int]:
+def window(line: Line, first: int, last: int, width: int) -> tuple[Sequence[str], int]:
     """The part of a line that is shown, and how far to the left it moves.
 
     Args:
@@ -103,7 +108,7 @@ def window(line: Line, first: int, last: int, width: int) -> tuple[list[str], in
         start = first - 1 - (spare // 2 if spare > 0 else 4)
         start = max(0, min(start, max(len(cells), last + 1) - width))
     end = min(len(cells), start + width)
-    shown = cells[start:end]
+    shown = list(cells[start:end])
     # A cut may go through a wide character; the half that is left becomes a space.
     if start:
         shown[0] = "…"
@@ -122,7 +127,7 @@ class Canvas:
     def __init__(self) -> None:
         self.rows: list[list[tuple[str, str]]] = []
 
-    def put(self, row: int, cell: int, text: str | list[str], style: str = "") -> None:
+    def put(self, row: int, cell: int, text: Sequence[str], style: str = "") -> None:
         """Write over what is there; a string takes its cells by `in_cells`."""
         while len(self.rows) <= row:
             self.rows.append([])

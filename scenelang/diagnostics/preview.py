@@ -52,7 +52,8 @@ def _places(source: SourceFile, edits: list[Edit]) -> list[tuple[int, int, list[
         if last > first and column == 1 and (not edit.replacement or edit.replacement.endswith("\n")):
             last -= 1  # it takes whole lines
         if places and places[-1][1] >= first:
-            places[-1] = (places[-1][0], max(last, places[-1][1]), [*places[-1][2], edit])
+            places[-1] = (places[-1][0], max(last, places[-1][1]), places[-1][2])
+            places[-1][2].append(edit)
         else:
             places.append((first, last, [edit]))
     return places
@@ -67,11 +68,13 @@ def _inserted(
     start, old = start + skipped, old[skipped : skipped + LONGEST]
     new, marks = "", []
     for edit in edits:
-        cut = min(edit.span.start - start, len(old))
+        cut = edit.span.start - start
+        if cut > len(old) and marks:
+            break
         new += old[at:cut]
         marks.append((len(new) + 1, len(new) + len(edit.replacement) + 1))
         new += edit.replacement
-        at = cut
+        at = min(cut, len(old))
     new += old[at:]
     line = in_cells(new)
     places = [(line.cell(left), line.cell(right)) for left, right in marks]
@@ -79,8 +82,8 @@ def _inserted(
     cells, moved = window(line, places[0][0], places[-1][1], room)
     canvas = Canvas()
     canvas.put(0, 0, cells)
-    for left, right in places:
-        text = new[marks[places.index((left, right))][0] - 1 : marks[places.index((left, right))][1] - 1]
+    for (left, right), (first, stop) in zip(places, marks, strict=True):
+        text = new[first - 1 : stop - 1]
         lead = len(in_cells(text[: len(text) - len(text.lstrip())]).cells)
         tail = len(in_cells(text[len(text.rstrip()) :]).cells)
         if left - moved + lead < len(cells):
