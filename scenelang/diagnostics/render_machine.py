@@ -87,6 +87,7 @@ def render_github(diagnostics: Iterable[Diagnostic]) -> str:
 
 
 def _escaped(text: str, further: str = "") -> str:
+    """Text with the characters encoded that GitHub's runner decodes, and no others."""
     for char in "%\r\n" + further:
         text = text.replace(char, f"%{ord(char):02X}")
     return text
