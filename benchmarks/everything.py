@@ -25,23 +25,15 @@ def commands(out: Path, budget: float, scenes: int) -> list[list[str]]:
         budget: processor minutes of each training.
         scenes: of evaluations; suites that draw many scenes for each value take a share of it.
     """
-    few = max(1, scenes // 20)
+    few, some = max(1, scenes // 20), max(2, scenes // 5)
+    experiments = f"{out}/experiments"
+    options = "--budget", f"{budget}", "--scenes", f"{max(8, scenes)}"
     return [
-        [
-            "lab",
-            "experiment",
-            "all",
-            "-o",
-            f"{out}/experiments",
-            "--budget",
-            f"{budget}",
-            "--scenes",
-            f"{max(8, scenes)}",
-        ],
-        ["lab", "chart", f"{out}/experiments"],
-        ["lab", "eval", "shapes2d", "--all-sets", "--scenes", f"{max(2, scenes // 5)}", "-o", f"{out}/eval"],
-        ["lab", "stability", "shapes2d", "--scenes", f"{few}", "-o", f"{out}/stability"],
-        ["lab", "frontier", "shapes2d", "--scenes", f"{max(2, scenes // 5)}", "-o", f"{out}/frontier"],
+        ["experiment", "all", "-o", experiments, *options],
+        ["chart", experiments],
+        ["eval", "shapes2d", "--all-sets", "--scenes", f"{some}", "-o", f"{out}/eval"],
+        ["stability", "shapes2d", "--scenes", f"{few}", "-o", f"{out}/stability"],
+        ["frontier", "shapes2d", "--scenes", f"{some}", "-o", f"{out}/frontier"],
     ]
 
 
@@ -53,7 +45,7 @@ def main() -> None:
     given = parser.parse_args()
     for command in commands(given.out, given.budget, given.scenes):
         started = time.perf_counter()
-        subprocess.run([sys.executable, "-m", "scenelang", *command], check=True)
+        subprocess.run([sys.executable, "-m", "scenelang", "lab", *command], check=True)
         print(f"-- {command[0]}: {time.perf_counter() - started:.0f} s", flush=True)
 
 

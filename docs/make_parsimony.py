@@ -1,16 +1,14 @@
 """Write the tables of docs/parsimony.md from the JSON files in docs/results/.
 
 python docs/make_parsimony.py
-python docs/make_parsimony.py --measure
 
-`plans.json` is measured here with --measure; `experiments/parts.json` is what
-`scenelang lab experiment parts` writes, and `passes.json` what `python -m tests.passes.prove` writes.
+`plans.json` is what `scenelang lab plans examples/*.nsg` wrote, `experiments/parts.json` what
+`scenelang lab experiment parts` did, and `passes.json` what `python -m tests.passes.prove` did.
 docs/make_pictures.py draws the chart.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -20,7 +18,6 @@ from typing import Any
 from scenelang.files import write_whole
 from scenelang.lab.parsimony import (
     WAYS,
-    measure_examples,
     size_groups,
     size_of,
     verdict,
@@ -241,15 +238,7 @@ def filled(page: str, made: Mapping[str, str]) -> str:
 
 
 def main() -> None:
-    """Measure if asked to, and write the page."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--measure", action="store_true", help="draw all examples first, which takes minutes")
-    if parser.parse_args().measure:
-        paths = sorted((HERE.parent / "examples").glob("*.nsg"))
-        found = measure_examples(
-            paths, lambda plan: print(plan["file"], f"{plan['drawing']['ms']:.0f} ms", flush=True)
-        )
-        write_whole(RESULTS / "plans.json", (json.dumps(found, indent=1) + "\n").encode())
+    """Write the page."""
     write_whole(PAGE, filled(PAGE.read_text("utf-8"), tables()).encode())
 
 

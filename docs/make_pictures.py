@@ -215,7 +215,7 @@ def stability() -> bytes:
     """Charts of the stability suite, from what `scenelang lab stability` wrote: of every model measured."""
     paths = sorted((DOCS / "results").glob("stability*.json"), key=lambda path: len(path.name))
     reports = [json.loads(path.read_text("utf-8")) for path in paths]
-    return _few_colours(stability_chart(reports, "png"))
+    return _few_colours(stability_chart(reports))
 
 
 def _few_colours(chart: bytes) -> bytes:
@@ -231,7 +231,7 @@ def experiments() -> dict[str, Callable[[], bytes]]:
         found = json.loads(path.read_text("utf-8"))
         if path.stem in CHARTED:
             name = f"experiments/{path.stem}.png"
-            made[name] = lambda found=found: _few_colours(experiment_chart(found, "png"))
+            made[name] = lambda found=found: _few_colours(experiment_chart(found))
         if path.stem in STRIPPED:
             name = f"experiments/{path.stem}-strips.png"
             made[name] = lambda found=found: png(experiment_strips(found, folder).to_pil().quantize(128))
@@ -240,12 +240,12 @@ def experiments() -> dict[str, Callable[[], bytes]]:
 
 def parts() -> bytes:
     """What each part of the renderer buys, from what `scenelang lab experiment parts` wrote."""
-    return _few_colours(parts_chart(json.loads(PARTS.read_text("utf-8")), "png"))
+    return _few_colours(parts_chart(json.loads(PARTS.read_text("utf-8"))))
 
 
 def frontier() -> bytes:
     """The shipped frontier's charts."""
-    return _few_colours(frontier_chart(Frontier.from_json(frontier_path("shapes2d").read_bytes()), "png"))
+    return _few_colours(frontier_chart(Frontier.from_json(frontier_path("shapes2d").read_bytes())))
 
 
 def plan() -> dict[str, Callable[[], bytes]]:

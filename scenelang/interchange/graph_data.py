@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from scenelang.graph.nodes import Fold, Graph, Leaf, Move, Node
+from scenelang.graph.nodes import Graph, Leaf, Move, Node
 from scenelang.graph.steps import Affine
 from scenelang.scene.session import deep_stack
 
@@ -41,16 +41,6 @@ def _move(move: Move) -> dict[str, Any]:
     if isinstance(step, Affine):
         return {"affine": [list(step.rows[at : at + 4]) for at in (0, 4, 8)]}
     return {"twirl": step.twirl, "bend": list(step.bend)}
-
-
-def graph_size(graph: Graph) -> int:
-    """Nodes in a graph."""
-    count, stack = 0, [graph.root]
-    while stack:
-        fold = stack.pop()
-        count += 1 + len(fold.links)
-        stack += [link.node for link in fold.links if isinstance(link.node, Fold)]
-    return count
 
 
 def program_data(program: Program) -> dict[str, Any]:

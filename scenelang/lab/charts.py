@@ -1,4 +1,4 @@
-"""Charts of measurements, drawn from their JSON by matplotlib as PNG or SVG."""
+"""Charts of measurements, drawn from their JSON by matplotlib as PNG."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ INK, FAINT, LINE, WARN = "#22303c", "#c9d1d8", "#1f77b4", "#c8452f"
 COLUMNS = 3
 
 
-def stability_chart(results: Sequence[Mapping[str, Any]], kind: str) -> bytes:
+def stability_chart(results: Sequence[Mapping[str, Any]]) -> bytes:
     """PSNR of every probe: the mean as a line, from the 5th percentile up shaded, the worst as dots.
 
     Args:
         results: of `run_stability`, one a model; the first is drawn in full.
-        kind: "png" or "svg".
     """
     plt = pyplot()
     first = results[0]
@@ -32,9 +31,8 @@ def stability_chart(results: Sequence[Mapping[str, Any]], kind: str) -> bytes:
         axis.set_axis_off()
     if len(results) > 1:
         axes.flat[0].legend(fontsize=7, frameon=False)
-    data = figure_bytes(figure, kind)
-    plt.close(figure)
-    return data
+    figure.tight_layout()
+    return figure_png(figure)
 
 
 def _probe(axis: Any, curves: Sequence[Mapping[str, Any]]) -> None:
@@ -69,7 +67,6 @@ def pyplot() -> Any:
     plt.rcParams.update(
         {
             "font.family": "DejaVu Sans",
-            "svg.hashsalt": "scenelang",
             "axes.spines.top": False,
             "axes.spines.right": False,
             "axes.edgecolor": FAINT,
@@ -78,9 +75,9 @@ def pyplot() -> Any:
     return plt
 
 
-def figure_bytes(figure: Any, kind: str) -> bytes:
+def figure_png(figure: Any, dpi: int = 80) -> bytes:
+    """The figure as a PNG; it is closed."""
     data = io.BytesIO()
-    figure.tight_layout()
-    about = {"Date": None} if kind == "svg" else {"Software": None}
-    figure.savefig(data, format=kind, dpi=80, metadata=about)
+    figure.savefig(data, format="png", dpi=dpi, metadata={"Software": None})
+    pyplot().close(figure)
     return data.getvalue()

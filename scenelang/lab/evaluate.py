@@ -58,7 +58,7 @@ def evaluate_set(
     seed: int,
     *,
     threads: int = 1,
-    progress: Callable[[int, int], None] | None = None,
+    report: Callable[[str, int, int], None] | None = None,
 ) -> tuple[dict[str, Any], list[Case]]:
     """Draw a set and compare.
 
@@ -68,7 +68,7 @@ def evaluate_set(
         count: scenes.
         seed: of the scenes.
         threads: for drawing.
-        progress: called with scenes done and all.
+        report: called with the set, scenes done and all.
 
     Returns:
         A summary for JSON, and every case.
@@ -81,8 +81,8 @@ def evaluate_set(
         program, picture = draw_scene(model, scene, threads)
         figures = measure(picture, reference_of(scene, model.manifest))
         cases.append(Case(index, _last_word(program.tokens), len(program), figures))
-        if progress is not None:
-            progress(index + 1, count)
+        if report is not None:
+            report(name, index + 1, count)
     summary = {
         "set": name,
         "scenes": count,

@@ -16,7 +16,7 @@ from scenelang.backend.neural import open_model
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
-from scenelang.lab.charts import FAINT, INK, LINE, WARN, figure_bytes, pyplot
+from scenelang.lab.charts import FAINT, INK, LINE, WARN, figure_png, pyplot
 from scenelang.measure.metrics import over_white, psnr
 from scenelang.measure.plan import choice, drawing_cost, stages, token_counts
 from scenelang.models.load import Model
@@ -165,12 +165,11 @@ def verdict(run: Mapping[str, Any], parts: Mapping[str, Any]) -> Verdict:
     return Verdict(changes[0], changes[1], word)
 
 
-def parts_chart(parts: Mapping[str, Any], kind: str) -> bytes:
+def parts_chart(parts: Mapping[str, Any]) -> bytes:
     """PSNR without each part beside the whole renderer's, and by each size.
 
     Args:
         parts: what ``scenelang lab experiment parts`` wrote.
-        kind: "png" or "svg".
     """
     plt = pyplot()
     sizes = size_groups(parts)
@@ -183,9 +182,8 @@ def parts_chart(parts: Mapping[str, Any], kind: str) -> bytes:
     for axis, (name, runs) in zip(axes[1:], sizes.items(), strict=True):
         _sizes(axis, name, runs, parts)
         axis.set_ylim(min(shown) - 1, max(shown) + 1)
-    data = figure_bytes(figure, kind)
-    plt.close(figure)
-    return data
+    figure.tight_layout()
+    return figure_png(figure)
 
 
 def size_groups(parts: Mapping[str, Any]) -> dict[str, list[Mapping[str, Any]]]:

@@ -182,7 +182,6 @@ class MaterialValue:
         self.material = material
 
 
-Scalar = float | Angle | Time
 Value = float | bool | str | Angle | Time | Vec | RangeValue | MaterialValue | Poison | None
 
 UNITS: Final[dict[type, str]] = {float: "number", Angle: "angle", Time: "time"}

@@ -56,7 +56,7 @@ def test_an_experiment_is_trained_measured_and_drawn(tmp_path: Path) -> None:
     assert [run["psnr"] for run in again["runs"]] == [run["psnr"] for run in found["runs"]]
     drawn = CliRunner().invoke(cli, ["lab", "chart", str(tmp_path)])
     assert drawn.exit_code == 0, drawn.output
-    for suffix in (".md", ".png", ".svg", "-strips.png"):
+    for suffix in (".md", ".png", "-strips.png"):
         assert (tmp_path / f"table2{suffix}").stat().st_size > 100
 
 
@@ -76,7 +76,6 @@ def test_every_size_of_a_vector_is_drawn_at_its_own_resolution(tmp_path: Path) -
     (run,) = [run for run in EXPERIMENTS["table1"](0.3, 1) if run.name == "geometry 2"]
     found = run_one(run, Settings(tmp_path, 8))
     assert found["resolution"] == SIZES_SIDE
-    assert found["curve"]
 
 
 def result(name: str, group: str, psnr: float, **more: Any) -> dict[str, Any]:

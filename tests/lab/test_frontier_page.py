@@ -133,7 +133,7 @@ def test_charts_label_every_point_that_has_an_error() -> None:
         inside = axis.get_window_extent().padded(1)
         assert all(inside.contains(*text.get_window_extent().min) for text in axis.texts)
     pyplot().close(figure)
-    png = frontier_chart(frontier(*POINTS[:5]), "png")
+    png = frontier_chart(frontier(*POINTS[:5]))
     assert PIL.Image.open(io.BytesIO(png)).size == (1100, 1300)
 
 

@@ -12,6 +12,7 @@ TABLE: Final = {
     "eval": "Measure a model on unseen scenes.",
     "stability": "Measure a model far beyond its training.",
     "frontier": "Measure speed against error of every way to draw.",
+    "plans": "Measure what drawing scenes takes, and what leaving less out would cost.",
     "experiment": "Train several designs alike and compare them.",
     "chart": "Draw tables and charts of experiments.",
     "train": "Train the weights of another renderer or lifting.",

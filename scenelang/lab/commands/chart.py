@@ -20,7 +20,7 @@ import click
 def command(folder: Path, out: Path | None) -> None:
     """Draw what `scenelang lab experiment` left in FOLDER.
 
-    Of each NAME.json: NAME.md, a table with the paper's figures beside ours; NAME.png and NAME.svg, a chart;
+    Of each NAME.json: NAME.md, a table with the paper's figures beside ours; NAME.png, a chart;
     NAME-strips.png, the same scenes drawn by every run.
     """
     try:
@@ -42,10 +42,9 @@ def command(folder: Path, out: Path | None) -> None:
     for name, path in found.items():
         result = json.loads(path.read_text("utf-8"))
         write_whole(out / f"{name}.md", (table_of(result) + "\n").encode())
-        for kind in ("png", "svg"):
-            write_whole(out / f"{name}.{kind}", experiment_chart(result, kind))
+        write_whole(out / f"{name}.png", experiment_chart(result))
         try:
             write_whole(out / f"{name}-strips.png", strips(result, folder).encode())
         except OSError as error:
             click.echo(f"{name}: no strips: {error}", err=True)
-        click.echo(f"{name}: {out / name}.md, .png, .svg")
+        click.echo(f"{name}: {out / name}.md, .png")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ import click
 
 from scenelang.cli import options
 from scenelang.cli.needs import need_metrics
+from scenelang.lab.commands.common import write_json
 
 if TYPE_CHECKING:
     from scenelang.lab.designs.studies import Study
@@ -56,7 +56,6 @@ def command(
     import torch
 
     from scenelang.backend.neural import choose_device, keep_memory
-    from scenelang.files import write_whole
     from scenelang.lab.experiments.experiment import Settings, run_experiment
     from scenelang.lab.experiments.lpips import LpipsError
     from scenelang.lab.experiments.runs import EXPERIMENTS
@@ -78,8 +77,7 @@ def command(
                 raise click.UsageError(str(error)) from None
             click.echo(f"{name} left out: {error}", err=True)
             continue
-        out.mkdir(parents=True, exist_ok=True)
-        write_whole(out / f"{name}.json", (json.dumps(found, indent=1) + "\n").encode())
+        write_json(out / f"{name}.json", found)
         for run in found["runs"]:
             click.echo(
                 f"{name}: {run['name']}, {run['group']}: PSNR {run['psnr']['mean']:.2f} dB, "
@@ -87,9 +85,10 @@ def command(
             )
 
 
-def _report(run: Run, study: Study, psnr: float) -> None:
+def _report(run: Run, study: Study, psnr: float | None) -> None:
+    reached = "" if psnr is None else f", PSNR {psnr:.2f} dB"
     click.echo(
         f"{run.name}, {run.group}: {study.progress.seconds:.0f} of {study.config.seconds:g} s, "
-        f"{study.progress.step:,} steps, PSNR {psnr:.2f} dB",
+        f"{study.progress.step:,} steps{reached}",
         err=True,
     )

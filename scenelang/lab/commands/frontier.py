@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from scenelang.cli.needs import need_metrics
-from scenelang.lab.commands.eval import DEFAULT_SEED
+from scenelang.lab.commands import common
 
 if TYPE_CHECKING:
     from scenelang.measure.frontier import Frontier
@@ -20,14 +18,14 @@ VERIFY_SEED = 4042
 
 @click.command("frontier")
 @click.argument("model")
-@click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True)
+@common.out
 @click.option("--scenes", default=80, show_default=True, type=click.IntRange(1, 100_000))
 @click.option(
     "--seed",
     type=click.IntRange(0, 2**31 - 1),
-    help=f"Of the scenes.  [default: {DEFAULT_SEED}; {VERIFY_SEED} to verify]",
+    help=f"Of the scenes.  [default: {common.DEFAULT_SEED}; {VERIFY_SEED} to verify]",
 )
-@click.option("--threads", default=1, show_default=True, type=click.IntRange(1, 256))
+@common.threads
 @click.option("--verify", is_flag=True, help="Check that promised errors hold on other scenes.")
 @click.option(
     "--promises",
@@ -50,7 +48,7 @@ def command(
 
     That is all shipped models of the set, with and without skipping and with other samplings, the exact
     reference, and the time of the paper's streaming renderer at full size. Writes frontier.json,
-    frontier.png, frontier.svg and frontier.html, which needs no other file, into OUT.
+    frontier.png and frontier.html, which needs no other file, into FOLDER.
 
     With --verify draws other scenes and counts in how many the promised errors of the shipped frontier are
     kept, writes verified.json, and exits with 1 if that is under 95 %.
@@ -74,27 +72,22 @@ def command(
     if verify:
         ctx.exit(0 if _verify(base, out, scenes, seed, promises) else 1)
     else:
-        _measure(base, out, scenes, DEFAULT_SEED if seed is None else seed, threads)
+        _measure(base, out, scenes, common.DEFAULT_SEED if seed is None else seed, threads)
 
 
 def _measure(base: str, out: Path, scenes: int, seed: int, threads: int) -> None:
     from scenelang.files import write_whole
+    from scenelang.lab.frontier.chart import frontier_chart
     from scenelang.lab.frontier.measure import measure_frontier
     from scenelang.lab.frontier.page import frontier_page
     from scenelang.measure.frontier import NAME
 
-    measured = measure_frontier(base, scenes, seed, threads, _report if sys.stderr.isatty() else None)
+    measured = measure_frontier(base, scenes, seed, threads, common.reporter())
     frontier = measured.frontier
     write_whole(out / NAME, frontier.to_json().encode())
     page = frontier_page(frontier, measured.pictures, measured.exact)
     write_whole(out / "frontier.html", page.encode())
-    try:
-        from scenelang.lab.frontier.chart import frontier_chart
-
-        for kind in ("png", "svg"):
-            write_whole(out / f"frontier.{kind}", frontier_chart(frontier, kind))
-    except ImportError:
-        click.echo("no chart: matplotlib is missing; pip install 'scenelang[charts]'", err=True)
+    common.write_chart(out / "frontier.png", lambda: frontier_chart(frontier))
     click.echo(_table(frontier))
 
 
@@ -120,7 +113,7 @@ def _table(frontier: Frontier) -> str:
 
 
 def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path | None) -> bool:
-    from scenelang.files import read_regular, write_whole
+    from scenelang.files import read_regular
     from scenelang.lab.frontier.verify import KEPT, verify
     from scenelang.measure.frontier import MOST_BYTES, Frontier, frontier_path
 
@@ -132,16 +125,10 @@ def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path 
     except ValueError as error:
         raise click.UsageError(f"'{path}' is no frontier: {error}") from None
     try:
-        found = verify(
-            frontier,
-            base,
-            scenes,
-            VERIFY_SEED if seed is None else seed,
-            _report if sys.stderr.isatty() else None,
-        )
+        found = verify(frontier, base, scenes, VERIFY_SEED if seed is None else seed, common.reporter())
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    write_whole(out / "verified.json", (json.dumps(found, indent=1) + "\n").encode())
+    common.write_json(out / "verified.json", found)
     for case, rows in found["cases"].items():
         click.echo(case)
         for name, row in rows.items():
@@ -150,8 +137,3 @@ def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path 
     least = f"every promise is kept in at least {100 * KEPT:.0f} % of the scenes"
     click.echo(least if found["held"] else f"not {least}")
     return bool(found["held"])
-
-
-def _report(name: str, done: int, count: int) -> None:
-    end = "\n" if done == count else ""
-    click.echo(f"\r{name}: {done}/{count}{end}", nl=False, err=True)

@@ -134,12 +134,6 @@ class WithHiddenLayer(Framed):
         return self.update(levels, features @ candidate, bump, state, colour, object_colour)
 
 
-class NoRegister(FramedStudent):
-    """See `WithoutRegister`."""
-
-    network = WithoutRegister
-
-
 class NoScale(FramedStudent):
     """The cell gets distances in leaf units: they are not multiplied by the object's distance scale."""
 
@@ -153,18 +147,6 @@ class NoScale(FramedStudent):
         found = super().trace(scenes, x, y, given)
         found.distance = found.distance * stretch(scenes)[..., None]  # the loss asks for world units
         return found
-
-
-class SharedCell(FramedStudent):
-    """See `TokenAsInput`."""
-
-    network = TokenAsInput
-
-
-class HiddenLayer(FramedStudent):
-    """See `WithHiddenLayer`."""
-
-    network = WithHiddenLayer
 
 
 class NeverForced(FramedStudent):
@@ -215,12 +197,17 @@ class OtherCodes(FramedStudent):
         return q, scale, self.table[scenes.leaf]
 
 
+def _with(network: type[Framed]) -> type[FramedStudent]:
+    """A student whose renderer is another one."""
+    return type(network.__name__, (FramedStudent,), {"network": network})
+
+
 VARIANTS: Mapping[str, type[FramedStudent]] = {
-    "no register": NoRegister,
+    "no register": _with(WithoutRegister),
     "no distance scale": NoScale,
     "no frame": NoFrame,
-    "token as input": SharedCell,
-    "hidden layer": HiddenLayer,
+    "token as input": _with(TokenAsInput),
+    "hidden layer": _with(WithHiddenLayer),
     "never forced": NeverForced,
     "pictures alone": PicturesAlone,
     "code": OtherCodes,

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from scenelang.lab.designs.pictures import (
     PictureConfig,
@@ -43,7 +43,7 @@ from scenelang.lab.designs.students import (
     make_student,
 )
 from scenelang.renderers.streaming import SMALLEST
-from scenelang.training.checkpoint import load_tensors, save_tensors
+from scenelang.training.checkpoint import load_tensors, pack_training, save_tensors, unpack_training
 from scenelang.training.losses import leaf_loss, trace_loss
 from scenelang.training.scenes import Batch, SceneConfig, leaf_batch, points_of
 
@@ -164,6 +164,7 @@ class Study:
         if isinstance(self.student, StreamingStudent):
             self.student.renderer.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.averaged = copy.deepcopy(self.student).requires_grad_(False)
+        self._networks = nn.ModuleDict({"student": self.student, "averaged": self.averaged})
         self.parameters = [p for p in self.student.parameters() if p.requires_grad]
         self.optimiser = torch.optim.Adam(self.parameters, lr=config.rate, betas=(0.9, 0.99))
         self.generator = torch.Generator(device).manual_seed(config.seed)
@@ -281,13 +282,6 @@ class Study:
         if self.folder is None:
             return
         self.folder.mkdir(parents=True, exist_ok=True)
-        tensors = {f"student.{k}": v for k, v in self.student.state_dict().items()}
-        tensors |= {f"averaged.{k}": v for k, v in self.averaged.state_dict().items()}
-        names = {id(p): k for k, p in self.student.named_parameters()}
-        for parameter, state in self.optimiser.state.items():
-            for key, value in state.items():
-                tensors[f"optimiser.{names[id(parameter)]}.{key}"] = torch.as_tensor(value)
-        tensors["generator"] = self.generator.get_state()
         header = {
             "format": 1,
             "config": self.config.to_json(),
@@ -296,26 +290,13 @@ class Study:
             "level": self._level,
             "seconds": self.progress.seconds,
         }
-        tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
+        tensors = pack_training(self._networks, self.optimiser, self.generator)
         save_tensors(self.folder / "checkpoint.safetensors", tensors, header)
 
     def _resume(self, path: Path, device: str) -> None:
         tensors, header = load_tensors(path, device)
-        known = {"warm": False, **header["config"]}  # of studies from before there was a choice
-        if known != json.loads(json.dumps(self.config.to_json())):
+        if header["config"] != json.loads(json.dumps(self.config.to_json())):
             raise ValueError(f"{path} was trained with another configuration")
-
-        def under(prefix: str) -> dict[str, Tensor]:
-            return {k.removeprefix(prefix): v for k, v in tensors.items() if k.startswith(prefix)}
-
-        self.student.load_state_dict(under("student."))
-        self.averaged.load_state_dict(under("averaged."))
-        for name, parameter in self.student.named_parameters():
-            state = under(f"optimiser.{name}.")
-            if state:
-                self.optimiser.state[parameter] = {
-                    k: v.cpu() if k == "step" else v.clone() for k, v in state.items()
-                }
-        self.generator.set_state(tensors["generator"].cpu())
+        unpack_training(tensors, self._networks, self.optimiser, self.generator)
         self.progress = Progress(header["step"], header["seconds"], math.nan)
-        self._young, self._level = header["young"], header.get("level", SMALLEST)
+        self._young, self._level = header["young"], header["level"]

@@ -11,7 +11,7 @@ from PIL import Image as pillow
 from PIL import ImageDraw
 
 from scenelang.image import Image
-from scenelang.lab.charts import FAINT, INK, figure_bytes, pyplot
+from scenelang.lab.charts import FAINT, INK, figure_png, pyplot
 from scenelang.lab.experiments import paper
 
 Result = Mapping[str, Any]
@@ -19,19 +19,15 @@ LABEL, LINE, ENLARGED = 170, 4, 2  # pixels; how much larger strips are shown
 THEIRS = "#8a97a3"
 
 
-def experiment_chart(found: Result, kind: str) -> bytes:
+def experiment_chart(found: Result) -> bytes:
     """The chart of an experiment.
 
     Args:
         found: of `scenelang.lab.experiments.experiment.run_experiment`.
-        kind: "png" or "svg".
     """
-    plt = pyplot()
-    draw = _DRAWN.get(found["experiment"], _bars)
-    figure = draw(plt, found)
-    data = figure_bytes(figure, kind)
-    plt.close(figure)
-    return data
+    figure = _DRAWN.get(found["experiment"], _bars)(pyplot(), found)
+    figure.tight_layout()
+    return figure_png(figure)
 
 
 def _compare(plt: Any, found: Result) -> Any:

@@ -7,7 +7,6 @@ where it stopped and a run that two experiments share is trained once.
 
 from __future__ import annotations
 
-import json
 import math
 import platform
 from collections.abc import Callable, Iterator, Sequence
@@ -23,9 +22,9 @@ from torch import Tensor
 from scenelang.files import write_whole
 from scenelang.image import Image
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, pictures, random_scenes
-from scenelang.lab.designs.students import StreamingStudent, Student
-from scenelang.lab.designs.studies import Study, StudyConfig, level_at
-from scenelang.lab.experiments.runs import EXPERIMENTS, SIDE, Run
+from scenelang.lab.designs.students import Student
+from scenelang.lab.designs.studies import Study, StudyConfig
+from scenelang.lab.experiments.runs import EXPERIMENTS, Run
 from scenelang.measure.metrics import MOST_DB, measure
 from scenelang.renderers.stream import SMOOTH
 from scenelang.training.loop import revision
@@ -35,9 +34,11 @@ if TYPE_CHECKING:
 
 UNSEEN = 2021  # seed of the scenes that are measured; trainings use small ones
 STRIP = 8  # scenes of a strip
-FEW = 24  # scenes of a curve over time
 CHUNK = 8  # scenes drawn at once
-POINTS = 6  # of a curve over time
+REPORTS = 6  # while a run trains
+
+
+Report = Callable[["Run", "Study", float | None], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +61,7 @@ def run_experiment(
     budget_s: float,
     seed: int,
     settings: Settings,
-    report: Callable[[Run, Study, float], None] | None = None,
+    report: Report | None = None,
 ) -> dict[str, Any]:
     """Train and measure all runs of an experiment.
 
@@ -69,7 +70,7 @@ def run_experiment(
         budget_s: processor seconds of a training.
         seed: of parameters and training scenes.
         settings: where and how.
-        report: called with a run, its study and the PSNR so far, a few times a run.
+        report: called with a run, its study and at its end the PSNR, a few times a run.
 
     Returns:
         What is written to ``FOLDER/NAME.json``.
@@ -97,34 +98,20 @@ def white(side: int, settings: Settings) -> dict[str, Any]:
     return _figures(torch.ones_like(exact), exact)
 
 
-def run_one(
-    run: Run, settings: Settings, report: Callable[[Run, Study, float], None] | None = None
-) -> dict[str, Any]:
+def run_one(run: Run, settings: Settings, report: Report | None = None) -> dict[str, Any]:
     """Train one run, or what is left of it, and measure it."""
     config = run.study
     study = Study(
         config, settings.folder / "runs" / run.folder, settings.device, _perceptual(config, settings)
     )
-    # kept beside the checkpoint, for runs that are measured again
-    kept = settings.folder / "runs" / run.folder / "curve.json"
-    curve: list[list[float]] = json.loads(kept.read_text("utf-8")) if kept.exists() else []
-    finite = True
-    due = config.seconds / POINTS
+    finite, due = True, 0.0
     for progress in study.run():
         finite = finite and math.isfinite(progress.loss)
         if not finite:
             break
-        if progress.seconds >= due * (len(curve) + 1) and progress.seconds < config.seconds:
-            r, blend = min(run.side, SIDE), 1.0
-            if config.student.renderer == "streaming":
-                r, blend = level_at(progress.seconds / config.seconds, r, config.grow)
-            few, exact = _measured(run, study, FEW, r, settings)
-            found = _psnr(draw(study.averaged, few, r, blend), exact)
-            curve.append([round(progress.seconds, 1), round(found, 2)])
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(kept, json.dumps(curve).encode())
-            if report is not None:
-                report(run, study, curve[-1][1])
+        if progress.seconds >= due and report is not None:
+            report(run, study, None)
+            due = progress.seconds + config.seconds / REPORTS
     finite = finite and all(bool(p.isfinite().all()) for p in study.averaged.parameters())
     scenes, exact = _measured(run, study, settings.scenes, run.side, settings)
     shown = draw(study.averaged, scenes, run.side)
@@ -145,7 +132,6 @@ def run_one(
         "resolution": run.side,
         "scenes": len(scenes.leaf),
         **figures,
-        "curve": curve,
         "strip": _strips(run, shown, exact, settings.folder),
     }
 
@@ -191,20 +177,9 @@ def _exact(scenes: Scenes, r: int) -> Tensor:
 
 
 @torch.no_grad()
-def draw(student: Student, scenes: Scenes, r: int, blend: float = 1.0) -> Tensor:
-    """A student's pictures (B, 3, R, R).
-
-    Args:
-        student: what draws.
-        scenes: what is drawn.
-        r: pixels R along a side.
-        blend: share of the newest level, of a student that grows.
-    """
-    if isinstance(student, StreamingStudent):
-        images = [student.image(some, r, blend) for some in _chunks(scenes)]
-    else:
-        images = [student.image(some, r) for some in _chunks(scenes)]
-    return torch.cat(images).clamp(0.0, 1.0).cpu()
+def draw(student: Student, scenes: Scenes, r: int) -> Tensor:
+    """A student's pictures (B, 3, R, R), of scenes at R pixels along a side."""
+    return torch.cat([student.image(some, r) for some in _chunks(scenes)]).clamp(0.0, 1.0).cpu()
 
 
 def _psnr(shown: Tensor, exact: Tensor) -> float:

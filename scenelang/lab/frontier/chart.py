@@ -1,13 +1,17 @@
-"""The frontier as charts: milliseconds against FLIP, and against PSNR."""
+"""The frontier as charts: milliseconds against FLIP, and against PSNR.
+
+Labels are placed here: `adjustText`, which does that too, needs scipy and left labels on top of each other.
+"""
 
 from __future__ import annotations
 
-import io
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from scenelang.lab.charts import FAINT, INK, pyplot
-from scenelang.lab.frontier.labels import place_labels
+import numpy as np
+
+from scenelang.lab.charts import FAINT, INK, figure_png, pyplot
 from scenelang.measure.frontier import Frontier, Point, front
 
 FLOOR: Final = 5e-5
@@ -21,19 +25,9 @@ MARKS: Final = {
 }
 
 
-def frontier_chart(frontier: Frontier, kind: str) -> bytes:
-    """Both charts above each other.
-
-    Args:
-        frontier: figures.
-        kind: "png" or "svg".
-    """
-    figure = frontier_figure(frontier)
-    data = io.BytesIO()
-    about = {"Date": None} if kind == "svg" else {"Software": None}
-    figure.savefig(data, format=kind, dpi=100, metadata=about)
-    pyplot().close(figure)
-    return data.getvalue()
+def frontier_chart(frontier: Frontier) -> bytes:
+    """Both charts above each other, as a PNG."""
+    return figure_png(frontier_figure(frontier), dpi=100)
 
 
 def frontier_figure(frontier: Frontier) -> Any:
@@ -64,7 +58,7 @@ def frontier_figure(frontier: Frontier) -> Any:
     figure.text(0.01, 0.004, caption, fontsize=7.5, color=INK)
     figure.tight_layout(rect=(0, 0.03, 1, 1))
     for axis in axes:
-        place_labels(figure, axis)
+        _place_labels(figure, axis)
     return figure
 
 
@@ -85,7 +79,7 @@ def _chart(
             markeredgewidth=1.4,
             linestyle="none",
             zorder=3,
-            label=short_name(point, frontier.set),  # `place_labels` reads it
+            label=short_name(point, frontier.set),  # `_place_labels` reads it
         )
     _front(axis, drawn, low_is_good)
     timed = [p for p in frontier.points if value(p) is None]
@@ -162,3 +156,61 @@ def _front(axis: Any, drawn: Sequence[tuple[Point, float]], low_is_good: bool) -
     if steps:
         xs, ys = zip(*steps, strict=True)
         axis.plot(xs, ys, drawstyle="steps-post", color=INK, linewidth=1.3, zorder=2, label="_front")
+
+
+PLACES: Final = [
+    (dx * reach, dy * reach)
+    for reach in (1.0, 1.8, 2.8, 4.0, 5.5, 7.5)
+    for dx, dy in ((9, 0), (-9, 0), (7, 8), (7, -9), (-7, 8), (-7, -9), (0, 10), (0, -11))
+]
+"""Points from a mark to its label's near side, the best first."""
+
+
+def _place_labels(figure: Any, axis: Any) -> None:
+    """Write each mark's label, as matplotlib calls it, beside it: where it covers least of what is there."""
+    from matplotlib.patheffects import Normal, Stroke
+    from matplotlib.transforms import Bbox
+
+    figure.canvas.draw()
+    window, dots = axis.get_window_extent(), figure.dpi / 72  # dots of a point
+    taken = [text.get_window_extent() for text in axis.texts]
+    marks = []
+    for line in axis.get_lines():
+        at = axis.transData.transform(line.get_xydata())
+        if line.get_label() == "_front":  # a staircase, which steps after its points
+            for (x0, y0), (x1, y1) in itertools.pairwise(at):
+                for a, b in (((x0, y0), (x1, y0)), ((x1, y0), (x1, y1))):
+                    taken.append(Bbox([np.minimum(a, b) - 2, np.maximum(a, b) + 2]))
+        elif not line.get_label().startswith("_"):
+            marks.append((*at[0], line))
+            taken.append(Bbox([at[0] - 7, at[0] + 7]))
+    for x, y, mark in sorted(marks, key=lambda m: m[:2]):
+        label = axis.annotate(
+            mark.get_label(),
+            mark.get_xydata()[0],
+            xytext=(0, 0),
+            textcoords="offset points",
+            fontsize=8,
+            color=INK,
+            va="center",
+            zorder=4,
+            arrowprops={"arrowstyle": "-", "color": "#8b98a3", "linewidth": 0.6, "shrinkB": 5},
+            path_effects=[Stroke(linewidth=2.5, foreground="white"), Normal()],
+        )
+        size = label.get_window_extent()
+
+        def box(dx: float, dy: float, x: float = x, y: float = y, size: Any = size) -> Any:
+            left = x + dx * dots - size.width * (0 if dx > 0 else 1 if dx < 0 else 0.5)
+            return Bbox.from_bounds(left, y + dy * dots - size.height / 2, size.width, size.height)
+
+        def cost(place: tuple[float, float], box: Any = box) -> float:
+            found = box(*place)
+            inside = Bbox.intersection(found, window)
+            outside = found.width * found.height - (inside.width * inside.height if inside else 0.0)
+            shared = (Bbox.intersection(found, other) for other in taken)
+            return float(50 * outside + sum(both.width * both.height for both in shared if both))
+
+        dx, dy = min(PLACES, key=cost)
+        taken.append(box(dx, dy))
+        label.set(position=(dx, dy), ha="left" if dx > 0 else "right" if dx < 0 else "center")
+        label.arrow_patch.set_visible(abs(dx) + abs(dy) > 14)

@@ -6,12 +6,14 @@ down slows all of them. Ways that take long draw fewer scenes; the file says how
 
 from __future__ import annotations
 
+import contextlib
 import math
 import platform
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 
 import numpy as np
 import PIL.Image
@@ -121,7 +123,7 @@ def measure_frontier(
     offered = [p for p in points if p.offered and p.flip is not None and not p.side]
     kept = front([(p.ms.median, p.flip.mean) for p in offered if p.flip is not None])
     on_front = {p.name for p, yes in zip(offered, kept, strict=True) if yes}
-    points = [_with_front(p, p.name in on_front) for p in points]
+    points = [replace(p, on_front=p.name in on_front) for p in points]
     frontier = Frontier(
         set=manifest.set,
         seed=seed,
@@ -235,7 +237,7 @@ def _other_loads(
         load = load_of(compile_scene(scene, model=base))
         for way in ways:
             record = records[way.name]
-            if (way.side and canvas != scene_canvas(plain)) or statistics.median(record.ms) > 1000:
+            if (way.side and canvas != plain(0).canvas) or statistics.median(record.ms) > 1000:
                 continue
             run = way.prepare(scene)
             ms = min(_timed(run, threads)[0] for _ in range(REPEATS + 1))
@@ -243,11 +245,6 @@ def _other_loads(
             record.fitted.append(ms)
         if report is not None:
             report("other canvases and counts", done + 1, len(cases))
-
-
-def scene_canvas(scene_at: Callable[[int], Scene]) -> tuple[int, int]:
-    """Canvas of a set's scenes."""
-    return scene_at(0).canvas
 
 
 def promised(values: Sequence[float]) -> float:
@@ -276,27 +273,17 @@ def _point(way: Way, record: Record, paper: Record | None) -> Point:
     cost: Cost | None = None
     if way.offered:
         cost = fit_cost(record.loads, record.fitted, way.skip, fixed=bool(way.side))
+    shared = {f.name: getattr(way, f.name) for f in fields(Way) if f.name not in ("prepare", "drawn")}
     return Point(
-        name=way.name,
-        backend=way.backend,
-        model=way.model,
-        renderer=way.renderer,
-        samples=way.samples,
-        skip=way.skip,
-        spp=way.spp,
-        side=way.side,
+        **shared,
         offered=way.offered,
-        why_not=way.why_not,
         scenes=len(record.ms),
         ms=Times(statistics.median(record.all_ms), float(np.percentile(record.all_ms, 95))),
         ratio_to_streaming=_ratio(paper, record),
         flip=errors,
         psnr=quality,
         cost=cost,
-        parameters=way.parameters,
-        bytes=way.bytes,
         on_front=False,
-        command=way.command,
     )
 
 
@@ -308,18 +295,10 @@ def _ratio(paper: Record | None, record: Record) -> float:
     return sum(paper.ms[:both]) / sum(record.ms[:both])
 
 
-def _with_front(point: Point, on_front: bool) -> Point:
-    return replace(point, on_front=on_front)
-
-
 def machine() -> str:
     """The processor."""
     name = platform.processor() or platform.machine()
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
-            name = next(
-                (line.partition(":")[2].strip() for line in file if line.startswith("model name")), name
-            )
-    except OSError:
-        pass
+    with contextlib.suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines()
+        name = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), name)
     return f"{name}, {platform.machine()}"

@@ -7,7 +7,7 @@ every value, so that a curve differs by the quantity alone. The base is that of 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,21 +74,30 @@ def _blends(rng: Rng, count: float) -> Scene:
     return _joined(_with(objects=(int(count) + 1,) * 2)(rng), lambda i: "smooth" if i else "union", 1.0)
 
 
-def _joined(scene: Scene, word: Callable[[int], Combine], larger: float) -> Scene:
+def _rebuilt(
+    scene: Scene,
+    moves: Callable[[int, Object], Sequence[Transform]],
+    word: Callable[[int, Combine], Combine] = lambda _, op: op,
+) -> Scene:
+    """A scene of one chain of objects, with other transforms and other words between them."""
     (chain,) = scene.nodes
     assert isinstance(chain, Chain)
     links = []
     for i, link in enumerate(chain.children):
         assert isinstance(link.node, Object)
-        moves = [_larger(t, larger) for t in link.node.transforms]
-        links.append(Link(op=word(i), node=link.node.model_copy(update={"transforms": tuple(moves)})))
+        node = link.node.model_copy(update={"transforms": tuple(moves(i, link.node))})
+        links.append(Link(op=word(i, link.op), node=node))
     return scene.model_copy(update={"nodes": (Chain(children=tuple(links)),)})
 
 
-def _larger(move: Transform, factor: float) -> Transform:
-    if isinstance(move, Scale):
-        return Scale(x=move.x * factor, y=move.y * factor, z=1.0)
-    return move
+def _joined(scene: Scene, word: Callable[[int], Combine], larger: float) -> Scene:
+    def moves(_: int, node: Object) -> list[Transform]:
+        return [
+            Scale(x=t.x * larger, y=t.y * larger, z=1.0) if isinstance(t, Scale) else t
+            for t in node.transforms
+        ]
+
+    return _rebuilt(scene, moves, lambda i, _: word(i))
 
 
 def _affine_steps(rng: Rng, steps: float) -> Scene:
@@ -107,40 +116,26 @@ def _canvas(rng: Rng, side: float) -> Scene:
     return _with(canvas=(int(side),) * 2)(rng)
 
 
-def _object_with(rng: Rng, moves: Callable[[Object], list[Transform]]) -> Scene:
-    """A base scene whose objects have other chains."""
-    scene = random_scene(rng, BASE)
-    (chain,) = scene.nodes
-    assert isinstance(chain, Chain)
-    links = []
-    for link in chain.children:
-        assert isinstance(link.node, Object)
-        links.append(
-            Link(op=link.op, node=link.node.model_copy(update={"transforms": tuple(moves(link.node))}))
-        )
-    return scene.model_copy(update={"nodes": (Chain(children=tuple(links)),)})
-
-
 def _thin(rng: Rng, ratio: float) -> Scene:
-    def moves(node: Object) -> list[Transform]:
+    def moves(_: int, node: Object) -> list[Transform]:
         return [Scale(x=t.x, y=t.x / ratio, z=1.0) if isinstance(t, Scale) else t for t in node.transforms]
 
-    return _object_with(rng, moves)
+    return _rebuilt(random_scene(rng, BASE), moves)
 
 
 def _sheared(rng: Rng, k: float) -> Scene:
-    def moves(node: Object) -> list[Transform]:
+    def moves(_: int, node: Object) -> list[Transform]:
         *first, rotate, translate = node.transforms
         return [*first, Shear(axes="xy", k=k), rotate, translate]
 
-    return _object_with(rng, moves)
+    return _rebuilt(random_scene(rng, BASE), moves)
 
 
 def _order(rng: Rng, kind: float) -> Scene:
     """0: as trained; 1: affine maps in any order after the deformations; 2: deformations after them, about
     the origin of the world; 3: a deformation between affine maps."""
 
-    def moves(node: Object) -> list[Transform]:
+    def moves(_: int, node: Object) -> list[Transform]:
         twirl, bend, scale, rotate, translate = node.transforms
         some = [scale, rotate, translate]
         if kind == 1:
@@ -151,7 +146,7 @@ def _order(rng: Rng, kind: float) -> Scene:
             return [twirl, scale, bend, rotate, translate]
         return list(node.transforms)
 
-    return _object_with(rng, moves)
+    return _rebuilt(random_scene(rng, BASE), moves)
 
 
 PROBES: dict[str, Probe] = {
@@ -213,17 +208,11 @@ def animated(rng: Rng, frames: int) -> list[Scene]:
     """Frames of a base scene whose objects turn by 3 degrees, drift by a pixel and sway a little each."""
     scene = random_scene(rng, BASE)
     (chain,) = scene.nodes
-    assert isinstance(chain, Chain)
-    drifts = [(float(rng.normal()), float(rng.normal())) for _ in chain.children]
-    out = []
-    for frame in range(frames):
-        links = []
-        for link, (dx, dy) in zip(chain.children, drifts, strict=True):
-            assert isinstance(link.node, Object)
-            moves = [_moved(t, frame, dx, dy) for t in link.node.transforms]
-            links.append(Link(op=link.op, node=link.node.model_copy(update={"transforms": tuple(moves)})))
-        out.append(scene.model_copy(update={"nodes": (Chain(children=tuple(links)),)}))
-    return out
+    drifts = [(float(rng.normal()), float(rng.normal())) for _ in chain.children]  # type: ignore[union-attr]
+    return [
+        _rebuilt(scene, lambda i, node, f=f: [_moved(t, f, *drifts[i]) for t in node.transforms])  # type: ignore[misc]
+        for f in range(frames)
+    ]
 
 
 def _moved(move: Transform, frame: int, dx: float, dy: float) -> Transform:

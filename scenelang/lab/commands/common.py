@@ -1,0 +1,67 @@
+"""What the laboratory's commands share: the model, reports of progress, files."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+if TYPE_CHECKING:
+    from scenelang.models.load import Model
+
+DEFAULT_SEED: Final = 2021
+Report = Callable[[str, int, int], None]
+
+out = click.option(
+    "-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True, metavar="FOLDER"
+)
+weights = click.option(
+    "--weights", type=click.Path(path_type=Path, exists=True, dir_okay=False), help="Other weights."
+)
+threads = click.option("--threads", default=1, show_default=True, type=click.IntRange(1, 256))
+seed = click.option("--seed", default=DEFAULT_SEED, show_default=True, type=click.IntRange(0, 2**31 - 1))
+
+
+def reporter() -> Report | None:
+    """Says on a terminal what is done of a stage; None elsewhere."""
+    return _report if sys.stderr.isatty() else None
+
+
+def _report(name: str, done: int, count: int) -> None:
+    end = "\n" if done == count else ""
+    click.echo(f"\r{name}: {done}/{count}{end}", nl=False, err=True)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a record whole, and its folder."""
+    from scenelang.files import write_whole
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, (json.dumps(value, indent=1) + "\n").encode())
+
+
+def write_chart(path: Path, draw: Callable[[], bytes]) -> None:
+    """Write a chart; says what is missing where none can be drawn."""
+    from scenelang.files import write_whole
+
+    try:
+        write_whole(path, draw())
+    except ImportError:
+        click.echo("no chart: matplotlib is missing; pip install 'scenelang[charts]'", err=True)
+
+
+def model_to_measure(name: str, weights: Path | None) -> Model:
+    """A shipped model, or one with other weights; what cannot be loaded ends the command."""
+    from scenelang.backend.errors import RenderError
+    from scenelang.models.load import ModelError, load_model
+
+    try:
+        return load_model(name, path=weights)
+    except KeyError:
+        raise click.UsageError(f"no model '{name}'") from None
+    except ModelError as error:
+        raise RenderError(str(error)) from None
