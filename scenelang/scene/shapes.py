@@ -82,7 +82,7 @@ def in_library(stmt: nodes.Call, unit: Unit, scope: Scope) -> tuple[str | None, 
     message = f"write '{edit.replacement}'"
     if imported:
         return help, Fix(message, (edit,))
-    return help, Fix(f"import it and {message}", (_before(unit, stmt, text), edit))
+    return help, Fix(f"import it and {message}", _with_import(edit, unit, text))
 
 
 def _is_library(value: object) -> bool:
@@ -99,9 +99,12 @@ def _edit(stmt: nodes.Call, shape: Shape, alias: str) -> Edit | None:
     return Edit(name, f"{alias}.{shape.module}") if fits else None
 
 
-def _before(unit: Unit, stmt: nodes.Call, text: str) -> Edit:
-    """The import, on a line of its own at the head of the file."""
-    first = unit.first or stmt
-    if isinstance(first, nodes.Version):
-        return Edit(Span(first.span.source, first.span.end, first.span.end), f"\n{text}")
-    return Edit(Span(first.span.source, first.span.start, first.span.start), f"{text}\n")
+def _with_import(edit: Edit, unit: Unit, text: str) -> tuple[Edit, ...]:
+    """An edit, and the import on a line of its own at the head of the file."""
+    first = unit.first.span if unit.first is not None else edit.span
+    source = first.source
+    if isinstance(unit.first, nodes.Version):
+        return Edit(Span(source, first.end, first.end), f"\n{text}"), edit
+    if first.start == edit.span.start:
+        return (Edit(edit.span, f"{text}\n{edit.replacement}"),)
+    return Edit(Span(source, first.start, first.start), f"{text}\n"), edit

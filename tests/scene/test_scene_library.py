@@ -311,5 +311,9 @@ def test_what_is_imported_already_is_used() -> None:
     with pytest.raises(nsg.SceneError):
         nsg.loads('import "std/shapes" as form; let s = 1; circle;', diagnostics=found)
     assert found.items[0].help == "form.disc(r)"
+    with pytest.raises(nsg.SceneError) as raised:
+        nsg.loads("star; circle;")
+    (only,) = raised.value.diagnostics
+    assert apply_fixes("star; circle;", [only])[0] == 'import "std/shapes" as s;\nstar; s.disc();'
     with pytest.raises(nsg.SceneError, match="rect"):
         nsg.loads("square(0.5);")
