@@ -51,8 +51,7 @@ def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
             os.set_blocking(handle, True)
         elif not stat.S_ISREG(mode):
             raise OSError(errno.EINVAL, "not a regular file", name)
-        if stat.S_ISREG(mode) and (inputs := _INPUTS.get()) is not None:
-            inputs.add(name)
+        note_input(name)
         with os.fdopen(handle, "rb", closefd=False) as file:
             return file.read(most_bytes + 1)
     finally:
@@ -102,6 +101,12 @@ def inputs_kept() -> Iterator[None]:
         _INPUTS.reset(token)
 
 
+def note_input(name: str) -> None:
+    """Have `write_output` refuse a file, within `inputs_kept`."""
+    if (inputs := _INPUTS.get()) is not None:
+        inputs.add(name)
+
+
 def write_whole(target: str | os.PathLike[str], data: bytes) -> None:
     """Write to a temporary file beside ``target``, flush it to the disk, then rename it over ``target``.
 
@@ -141,9 +146,10 @@ def output_place(target: str | os.PathLike[str]) -> Path:
     Raises:
         NotWritten: it is an input as well.
     """
-    for name in _INPUTS.get() or ():
+    inputs = (_INPUTS.get() or set()) if os.path.isfile(target) else set()
+    for name in inputs:
         same = False
-        with contextlib.suppress(OSError):  # one of the two is not there
+        with contextlib.suppress(OSError):  # it is gone by now
             same = os.path.samefile(name, target)
         if same:
             raise NotWritten(errno.EINVAL, "it is an input of the same command", os.fspath(target))

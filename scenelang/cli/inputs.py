@@ -10,6 +10,7 @@ from pathlib import Path
 from scenelang.cli.clock import Clock
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.files import note_input
 from scenelang.scene.evaluate import evaluate
 from scenelang.scene.imports import Unreadable, decode_source, read_source
 from scenelang.scene.params import Defines
@@ -70,6 +71,7 @@ def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
     """
     try:
         if name == STDIN:
+            note_input("/dev/stdin")  # which may be a file, by `<`
             return decode_source(sys.stdin.buffer.read(MAX_BYTES + 1), "<stdin>")
         return read_source(Path(name), name)
     except Unreadable as error:

@@ -10,7 +10,7 @@ import pytest
 
 from scenelang.animation.store import Store
 from tests.cli.conftest import Folder
-from tests.hardening.processes import leavings
+from tests.hardening.processes import leavings, one_line, run
 from tests.hardening.test_writing import WRITERS, scenes
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
@@ -133,6 +133,14 @@ def test_outputs_by_the_inputs_own_names(folder: Folder, command: tuple[str, ...
     assert result.exit_code == 2
     assert "is an input" in result.stderr
     assert Path(out).read_bytes() == before
+
+
+def test_an_output_that_is_standard_input(folder: Folder) -> None:
+    before = Path(folder.write("a.nsg")).read_bytes()
+    with open("a.nsg") as file:
+        said = one_line(run("convert", "-", "-o", "a.nsg", stdin=file))
+    assert "is an input" in said
+    assert Path("a.nsg").read_bytes() == before
 
 
 def test_commands_that_work_in_place(folder: Folder) -> None:
