@@ -56,7 +56,8 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/renderers/draw.py": DRAWING,
     "scenelang/renderers/frame*.py": DRAWING,
     "scenelang/renderers/kept.py": DRAWING,
-    "scenelang/renderers/stream.py": DRAWING,
+    "scenelang/renderers/coverage.py": DRAWING,
+    "scenelang/renderers/field.py": DRAWING,
     "scenelang/lifting/exact.py": ("tests/lifting/test_exact.py", *DRAWING),
     "scenelang/lifting/learned.py": (
         "tests/lifting/test_learned.py",

@@ -123,7 +123,8 @@ def _manifest() -> bytes:
 @cache
 def _small() -> bytes:
     """A network of the smallest sizes, so that most of a file is header."""
-    from scenelang.renderers.framed import Framed, FramedConfig
+    from scenelang.renderers.field import FramedConfig
+    from scenelang.renderers.framed import Framed
 
     config = FramedConfig(decoder_width=2)
     with torch.random.fork_rng(devices=[]):

@@ -16,7 +16,8 @@ from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.weights import MOST_BYTES, Codes, codes_of, read_header, read_weights, weights_path
 from scenelang.models.weights import ModelError as ModelError
 from scenelang.program.program import WIDTH
-from scenelang.renderers.framed import Framed, FramedConfig
+from scenelang.renderers.field import FramedConfig
+from scenelang.renderers.framed import Framed
 from scenelang.renderers.reading import Reading, ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 

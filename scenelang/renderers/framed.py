@@ -1,69 +1,31 @@
-"""The framed renderer's network: an LSTM per sample that meets each object in the object's own frame.
+"""The framed renderer's network in torch: its parameters, and its answers along streams for training.
 
-Letters: B streams, N objects, P points, C = `code`, F = `features`, S = `state`, G = `decoder_width`,
-L = `paint_lines`. Distances are in world units, leaf coordinates in leaf units.
-
-For a point and an object the frame gives the point's leaf coordinates exactly (`frames.py`). Two learned
-parts then draw:
-
-1. The decoder turns leaf coordinates into F distance-like features. Its weights are a linear function of
-   the object's code, so that shapes live in codes: swap two codes and the shapes swap. It has rectified
-   linear units, which represent straight edges exactly, and its output is multiplied by the object's
-   distance scale.
-2. The cell is an LSTM (Hochreiter and Schmidhuber 1997) whose gates are clamped lines in what it is shown
-   and what it remembers, chosen by the boolean token. A part of it is a register that carries the colour
-   under one gate of its own, so that colour is kept, not re-learned.
-
-No pixel looks at another and nothing here knows a leaf, an operator or a resolution.
+What it computes is `scenelang.renderers.field`, whose letters are used here. P is its M in training.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
-TOKENS = 4
-EMPTY = 1.0  # world units: the margin before the first object, out of reach of every blend
-RADIUS = 2.0  # leaf units: the decoder sees points in this disc, farther ones at its rim
+from scenelang.renderers.arrays_torch import TORCH
+from scenelang.renderers.field import EMPTY, TOKENS, FramedConfig, FramedNetwork
 
 
-@dataclass(frozen=True, slots=True)
-class FramedConfig:
-    """Sizes of the network.
-
-    Args:
-        code: entries of the geometry code.
-        material_code: entries of the material code.
-        features: distance-like features F of an object at a point.
-        state: entries S of the LSTM state.
-        decoder_width: hidden units of the decoder's two layers.
-        paint_lines: lines L of which the highest opens the register's gate.
-    """
-
-    code: int = 4
-    material_code: int = 12
-    features: int = 1
-    state: int = 1
-    decoder_width: int = 32
-    paint_lines: int = 2
-
-    def to_json(self) -> dict[str, Any]:
-        return asdict(self)
-
-
-class Framed(nn.Module):
-    """Parameters and step functions of the framed renderer.
+class Framed(nn.Module, FramedNetwork):
+    """Parameters of the framed renderer.
 
     Args:
         config: sizes.
         geometries: number of geometry codes.
         materials: number of material codes.
     """
+
+    xp = TORCH
 
     def __init__(self, config: FramedConfig, geometries: int, materials: int) -> None:
         super().__init__()
@@ -83,7 +45,7 @@ class Framed(nn.Module):
         self.decoder_b = nn.ParameterList(
             nn.Parameter((torch.rand(c.code + 1, b) * 2 - 1) / fan) for b in sizes[1:]
         )
-        self.far = nn.Parameter(torch.ones(c.features))  # growth of the features beyond the rim
+        self.far = nn.Parameter(torch.ones(c.features))
         self.edge_slope = nn.Parameter(torch.tensor(math.log(50.0)))
 
         rows = c.state + c.paint_lines
@@ -101,94 +63,6 @@ class Framed(nn.Module):
         known = {id(p) for p in decoder}
         return decoder, [p for p in self.parameters() if id(p) not in known]
 
-    # ------------------------------------------------------------------ weights for objects
-
-    def decoder_weights(self, code: Tensor) -> list[tuple[Tensor, Tensor]]:
-        """Decoder layers of objects: [(M, in, out), (M, out)] * 3 from codes (M, C)."""
-        one = torch.cat([code, torch.ones_like(code[:, :1])], 1)  # (M, C + 1)
-        return [
-            (torch.einsum("mc,cab->mab", one, w), one @ b)
-            for w, b in zip(self.decoder_w, self.decoder_b, strict=True)
-        ]
-
-    def cell_weights(self) -> tuple[Tensor, ...]:
-        """Parameters of the cell, each with tokens in front: lines, biases, candidate, bump.
-
-        The steeper a gate, the lower its bump, so that what a blend adds shrinks as it narrows.
-        """
-        gain = self.cell_gain.exp()
-        bump = self.bump / gain[:, : self.config.state]
-        return self.cell_lines * gain[:, None], self.cell_bias, self.candidate.clamp(-1.0, 1.0), bump
-
-    def object_albedo(self, material_code: Tensor) -> Tensor:
-        """Albedo (M, 3) of material codes (M, material_code)."""
-        albedo: Tensor = material_code @ self.albedo[:-1] + self.albedo[-1]
-        return albedo
-
-    # ------------------------------------------------------------------ network
-
-    def decode(self, q: Tensor, scale: Tensor, layers: list[tuple[Tensor, Tensor]]) -> Tensor:
-        """Features (M, P, F) of leaf coordinates.
-
-        Args:
-            q: leaf coordinates (M, P, 2).
-            scale: distance scale (M,): world distance per leaf distance.
-            layers: from `decoder_weights`.
-        """
-        radius = torch.linalg.vector_norm(q, dim=-1, keepdim=True)  # (M, P, 1)
-        x = q * (RADIUS / radius.clamp_min(RADIUS))
-        for i, (w, b) in enumerate(layers):
-            x = torch.baddbmm(b[:, None], x, w)  # (M, P, G), last (M, P, F)
-            if i < 2:
-                x = torch.relu_(x) if not torch.is_grad_enabled() else torch.relu(x)
-        x = x + (radius - RADIUS).clamp_min(0.0) * self.far
-        features: Tensor = x * scale[:, None, None]
-        return features
-
-    def step(
-        self,
-        features: Tensor,
-        state: Tensor,
-        colour: Tensor,
-        object_colour: Tensor,
-        weights: tuple[Tensor, ...],
-    ) -> tuple[Tensor, Tensor]:
-        """One object: the LSTM cell and the register.
-
-        Args:
-            features: (B, P, F).
-            state: (B, P, S).
-            colour: the register (B, P, 3).
-            object_colour: (B, 1, 3).
-            weights: lines (B, F + S, S + L), biases (B, S + L), candidate (B, F, S), bump (B, S).
-        """
-        lines, bias, candidate, bump = weights
-        levels = torch.baddbmm(bias[:, None], torch.cat([features, state], -1), lines)  # (B, P, S + L)
-        return self.update(levels, features @ candidate, bump, state, colour, object_colour)
-
-    def update(
-        self,
-        levels: Tensor,
-        candidate: Tensor,
-        bump: Tensor,
-        state: Tensor,
-        colour: Tensor,
-        object_colour: Tensor,
-    ) -> tuple[Tensor, Tensor]:
-        """State and register behind the gates.
-
-        Args:
-            levels: of the gates before they are clamped (B, P, S + L).
-            candidate: what the state becomes where its gate is open (B, P, S).
-            bump: by how much a half-open gate lowers the state, times four (B, S), or (B, P, S).
-            state, colour, object_colour: as `step` takes them.
-        """
-        take = levels[..., : self.config.state].clamp(0.0, 1.0)
-        paint = levels[..., self.config.state :].amax(-1, keepdim=True).clamp(0.0, 1.0)
-        bump = bump[:, None] if bump.dim() < take.dim() else bump
-        state = state + take * (candidate - state) - bump * take * (1 - take)
-        return state, colour + paint * (object_colour - colour)
-
     def trace(
         self,
         q: Tensor,
@@ -201,7 +75,7 @@ class Framed(nn.Module):
         """Run streams for training, keeping what the image of every prefix shows.
 
         Args:
-            q: leaf coordinates (B, N, P, 2).
+            q: leaf coordinates (B, N, d, P).
             scale: (B, N).
             code: (B, N, C).
             colours: (B, N, 3).
@@ -209,29 +83,32 @@ class Framed(nn.Module):
             given: exact distance (B, N, P) and colour (B, N, P, 3) after every object, from which each
                 step then starts in place of its own answers (teacher forcing, Williams and Zipser 1989).
         """
-        b, n, p, _ = q.shape
-        layers = self.decoder_weights(code.reshape(b * n, -1))
-        features = self.decode(q.reshape(b * n, p, 2), scale.reshape(-1), layers).view(b, n, p, -1)
+        b, n, d, p = q.shape
+        decoder = self.decoder_weights(code.reshape(b * n, -1))
+        q = q.reshape(b * n, d, p)
+        features = self.decode(
+            q, self.xp.length(q.unbind(1))[:, None], scale.reshape(-1, 1, 1), decoder
+        ).view(b, n, -1, p)
         weights = self.cell_weights()
-        state = torch.zeros(b, p, self.config.state, dtype=q.dtype, device=q.device)
-        state[..., 0] = EMPTY
-        colour = torch.zeros(b, p, 3, dtype=q.dtype, device=q.device)
-        margins, shown = [], []
+        state = torch.zeros(b, self.config.state, p, dtype=q.dtype, device=q.device)
+        state[:, 0] = EMPTY
+        colour = torch.zeros(b, 3, p, dtype=q.dtype, device=q.device)
+        depth, shown = [], []
         for i in range(n):
             t = tokens[:, i]
             if given is not None and i > 0:
-                state = torch.cat([given[0][:, i - 1, :, None], state[..., 1:]], -1)
-                colour = given[1][:, i - 1]
+                state = torch.cat([given[0][:, i - 1, None], state[:, 1:]], 1)
+                colour = given[1][:, i - 1].mT
             state, colour = self.step(
-                features[:, i], state, colour, colours[:, i, None], tuple(w[t] for w in weights)
+                features[:, i], state, colour, colours[:, i, :, None], tuple(w[t] for w in weights)
             )
-            margins.append(state[..., 0])
-            shown.append(colour)
+            depth.append(state[:, 0])
+            shown.append(colour.mT)
         return Trace(
-            distance=features[..., 0],
-            alone=features[..., 0] * self.edge_slope.exp(),
-            depth=torch.stack(margins, 1),
-            margin=torch.stack(margins, 1) * self.read_slope.exp(),
+            distance=features[:, :, 0],
+            alone=features[:, :, 0] * self.edge_slope.exp(),
+            depth=torch.stack(depth, 1),
+            margin=torch.stack(depth, 1) * self.read_slope.exp(),
             colour=torch.stack(shown, 1),
         )
 

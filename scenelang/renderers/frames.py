@@ -1,27 +1,63 @@
 """From geometry vectors to frames: where a world point lies in each object's own space.
 
 The inverse reading of `scenelang.lifting.exact`'s layout. All of it is linear algebra and turns by an
-angle; nothing here is learned.
+angle; nothing here is learned. Points are one array (d, M), and d is whatever the frames are made for.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from scenelang.lifting import exact
 from scenelang.program.program import ProgramError
-
-Warp = tuple[float, float, float]  # twirl, bend x, bend y
-Frame = tuple[float, float, float, float, float, float]  # a b c, d e f
+from scenelang.renderers.arrays import Array, Arrays
 
 FAR = 1e15  # leaf units: where points lie that float32 cannot follow; out of reach of everything
 TAME = 1e8  # frames of smaller numbers cannot lead a point out of float32
 MOST = 1e31  # the compiler keeps maps and deformations below this
-BLEND_REACH = 0.3  # world units: farther objects cannot change a blend (2 k for the trained k = 0.15)
+
+Number = Array | float
+"""A number, or one for each of many objects: an array (…, 1), which goes beside coordinates (…, M)."""
+Point = Sequence[Array]
+"""The d coordinates, each (…, M), of points."""
+
+
+class Affine(NamedTuple):
+    """An affine map: d rows of d factors and a shift."""
+
+    rows: tuple[tuple[Number, ...], ...]
+
+    def __call__(self, xp: Arrays, p: Point) -> Point:
+        """Points mapped."""
+        return [_combine(xp, row, p) + row[-1] for row in self.rows]
+
+
+class Warp(NamedTuple):
+    """A clockwise turn of the first two coordinates by an angle t |p| + b · p."""
+
+    twirl: Number
+    bend: tuple[Number, ...]
+
+    def __call__(self, xp: Arrays, p: Point) -> Point:
+        """Points turned."""
+        angle = _combine(xp, self.bend, p)
+        if not (isinstance(self.twirl, float) and self.twirl == 0.0):
+            angle = xp.add_product(angle, xp.length(p), self.twirl)
+        cos, sin = xp.cos(angle), xp.sin(angle)
+        x, y, *others = p
+        return [xp.add_product(x * cos, y, sin), xp.add_product(y * cos, x, -sin), *others]
+
+
+def _combine(xp: Arrays, factors: tuple[Number, ...], p: Point) -> Array:
+    """The sum (…, M) of coordinates times a factor each."""
+    total = p[0] * factors[0]
+    for coordinate, factor in zip(p[1:], factors[1:], strict=False):
+        total = xp.add_product(total, coordinate, factor)
+    return total
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +73,7 @@ class ObjectFrame:
         wild: whether points may leave float32 on the way, which costs a detour through float64.
     """
 
-    steps: tuple[Frame | Warp, ...]
+    steps: tuple[Affine | Warp, ...]
     scale: float
     stretch: float
     centre: tuple[float, float]
@@ -70,14 +106,14 @@ def read_frame(g: np.ndarray) -> ObjectFrame:
     middle_linear, middle_shift = _invert(middle)
     last_linear, last_shift = _invert(last)
     reach, moved = float(np.linalg.norm(middle_linear, 2)), float(np.hypot(*middle_shift))
-    steps: list[Frame | Warp] = []
+    steps: list[Affine | Warp] = []
     stretch = 1.0
     for frame, warps, radius in ((last, outer, reach + moved), (middle, inner, 1.0)):
         if not np.array_equal(frame, (1, 0, 0, 0, 1, 0)):
-            steps.append(tuple(frame.tolist()))
+            steps.append(Affine(tuple(map(tuple, frame.reshape(2, 3).tolist()))))
         for twirl, x, y in warps.tolist():
             if twirl or x or y:
-                steps.append((twirl, x, y))
+                steps.append(Warp(twirl, (x, y)))
                 stretch *= 1.0 + radius * (abs(twirl) + float(np.hypot(x, y)))
     total = last_linear @ middle_linear
     rows = np.linalg.norm(last_linear if outer.any() else total, axis=1).tolist()
@@ -104,23 +140,15 @@ def _invert(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return linear, -linear @ frame[[2, 5]]
 
 
-def local_points(frame: ObjectFrame, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
-    """Leaf coordinates of world points, any shape."""
+def local_points(xp: Arrays, frame: ObjectFrame, p: Array) -> Array:
+    """Leaf coordinates of world points, both (d, M)."""
     if frame.wild:
-        x, y = x.double(), y.double()
-    for step in frame.steps:
-        if len(step) == 6:
-            a, b, c, d, e, f = step
-            x, y = (x * a).add_(y, alpha=b).add_(c), (x * d).add_(y, alpha=e).add_(f)
-        else:
-            twirl, bend_x, bend_y = step
-            angle = x * bend_x
-            if bend_y:
-                angle.add_(y, alpha=bend_y)
-            if twirl:
-                angle.add_(torch.hypot(x, y), alpha=twirl)
-            cos, sin = angle.cos(), angle.sin()
-            x, y = (x * cos).addcmul_(y, sin), (y * cos).addcmul_(x, sin, value=-1.0)
-    if frame.wild:
-        return x.clamp(-FAR, FAR).float(), y.clamp(-FAR, FAR).float()
-    return x, y
+        return xp.narrow(xp.stack(way_back(xp, frame.steps, list(xp.wide(p))), 0).clip(-FAR, FAR))
+    return xp.stack(way_back(xp, frame.steps, list(p)), 0) if frame.steps else p
+
+
+def way_back(xp: Arrays, steps: Iterable[Affine | Warp], p: Point) -> Point:
+    """Points carried through maps and warps in turn."""
+    for step in steps:
+        p = step(xp, p)
+    return p

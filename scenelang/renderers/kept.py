@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.renderers.coverage import Coverage
 from scenelang.renderers.frames import ObjectFrame
-from scenelang.renderers.stream import Stream
 
 _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
 
@@ -42,17 +42,17 @@ class Kept:
     _keys: list[bytes] = field(default_factory=list)
     _picture: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 4), np.float32))
 
-    def compare(self, stream: Stream, canvas: tuple[int, int], tiles: Sequence[range]) -> Shown:
+    def compare(self, coverage: Coverage, canvas: tuple[int, int], tiles: Sequence[range]) -> Shown:
         """What the tiles of a new picture will show.
 
         Args:
-            stream: its objects.
+            coverage: its objects.
             canvas: width and height in pixels.
             tiles: rows of pixels of each tile.
         """
         width, height = canvas
         px = 2 / min(width, height)  # world units
-        rows, low, high = _rows(stream, px)
+        rows, low, high = _rows(coverage, px)
         common = repr((canvas, list(tiles))).encode()
         keys = []
         for tile in tiles:
@@ -64,27 +64,25 @@ class Kept:
         same = [fits and key == self._keys[index] for index, key in enumerate(keys)]
         return Shown(keys, same, self._picture)
 
-    def keep(self, picture: npt.NDArray[np.float32], shown: Shown, stream: Stream) -> None:
+    def keep(self, picture: npt.NDArray[np.float32], shown: Shown, frames: dict[bytes, ObjectFrame]) -> None:
         """Take a finished picture as the one before the next."""
-        self._picture, self._keys, self.frames = picture.copy(), shown.keys, stream.frames
+        self._picture, self._keys, self.frames = picture.copy(), shown.keys, frames
 
 
 def _rows(
-    stream: Stream, px: float
+    coverage: Coverage, px: float
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """All that a row's pixels depend on (N, bytes), and the lowest and highest y that it reaches (N,)."""
-    codes = stream.codes.tobytes()  # decoders are computed together: one for all of a scene's leaves
+    scene = coverage.field
+    codes = scene.codes.tobytes()  # decoders are computed together: one for all of a scene's leaves
     found, low, high = [], [], []
-    for row, vector in zip(stream.rows, stream.vectors, strict=True):
+    for row, vector in zip(scene.rows, scene.vectors, strict=True):
         reach = row.reach + _ROOM_PX * px * row.frame.growth
         ymin, ymax = (-np.inf, np.inf) if row.reach == float("inf") else row.frame.box(reach)[1::2]
         low.append(ymin)
         high.append(ymax)
-        parts = (
-            vector.tobytes(),
-            row.colour.cpu().numpy().tobytes(),
-            repr((row.token, row.reach, row.touch)),
-        )
-        found.append(hashlib.sha256(codes + parts[0] + parts[1] + parts[2].encode()).digest())
+        colour = scene.xp.to_numpy(row.colour).tobytes()
+        rest = repr((row.token, row.reach)).encode()
+        found.append(hashlib.sha256(codes + vector.tobytes() + colour + rest).digest())
     table = np.frombuffer(b"".join(found), np.uint8).reshape(len(found), 32)
     return table, np.array(low), np.array(high)

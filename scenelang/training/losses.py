@@ -81,8 +81,8 @@ def leaf_loss(
         unasked: names of terms to leave out.
     """
     codes = network.codes if codes is None else codes
-    one = torch.ones(len(codes), device=batch.q.device)
-    features = network.decode(batch.q, one, network.decoder_weights(codes))[..., 0]
+    radius = torch.linalg.vector_norm(batch.q, dim=1, keepdim=True)
+    features = network.decode(batch.q, radius, 1.0, network.decoder_weights(codes))[:, 0]
     inside = (batch.distance < 0).float()
     terms = {
         "alone": cross_entropy(features * network.edge_slope.exp(), 1 - inside),

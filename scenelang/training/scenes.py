@@ -52,7 +52,7 @@ class Batch:
     """Streams at points, with what the exact picture shows after every object.
 
     Args:
-        q: leaf coordinates (B, N, P, 2).
+        q: leaf coordinates (B, N, 2, P).
         scale: distance scale (B, N).
         leaf: geometry index (B, N).
         rgb: colours (B, N, 3).
@@ -190,7 +190,7 @@ class LeafBatch:
     """Points in the spaces of all leaves G.
 
     Args:
-        q: leaf coordinates (G, P, 2).
+        q: leaf coordinates (G, 2, P).
         distance: signed distance, leaf units (G, P).
     """
 
@@ -209,7 +209,7 @@ def leaf_batch(p: int, g: torch.Generator) -> LeafBatch:
     even = torch.stack([radius * angle.cos(), radius * angle.sin()], -1)
     q = torch.where((torch.arange(p, device=g.device) % 2 == 0)[:, None], near, even)
     shape = (v[:, None] for v in sectors(g.device).unbind(-1))
-    return LeafBatch(q, sector_distance(q[..., 0], q[..., 1], *shape))
+    return LeafBatch(q.mT, sector_distance(q[..., 0], q[..., 1], *shape))
 
 
 def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Batch:
@@ -252,7 +252,7 @@ def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Bat
     order[:, : _edges(config)] = math.inf
     keep = order.topk(p, dim=1).indices  # (B, P)
     keep_n = keep[:, None].expand(b, n, p)
-    q = torch.stack([qx, qy], -1).gather(2, keep_n[..., None].expand(b, n, p, 2))
+    q = torch.stack([qx, qy], 2).gather(3, keep_n[:, :, None].expand(b, n, 2, p))
     colour = torch.stack([c.expand(*big_d.shape, 3) for big_d, c in steps], 1)
     depth = torch.stack([big_d for big_d, _ in steps], 1)
     return Batch(

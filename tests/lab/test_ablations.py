@@ -16,7 +16,7 @@ from scenelang.lab.designs.ablations import SEEDS, SIZES, VARIANTS, ablation_run
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, random_scenes
 from scenelang.lab.designs.students import FramedStudent, StudentConfig, make_student
 from scenelang.lab.designs.studies import Study, StudyConfig
-from scenelang.renderers.framed import FramedConfig
+from scenelang.renderers.field import FramedConfig
 from scenelang.training.losses import leaf_loss, trace_loss
 from scenelang.training.scenes import SceneConfig, leaf_batch, random_batch
 
@@ -126,7 +126,7 @@ def test_without_a_frame_points_are_the_world_s() -> None:
     student = make("no frame")
     g = student.lifting.lift(scenes)[..., :32]
     q, scale, code = student.read(g, scenes, x, y)
-    torch.testing.assert_close(q, torch.stack([x, y], -1)[:, None].expand(-1, 4, -1, -1))
+    torch.testing.assert_close(q, torch.stack([x, y], 1)[:, None].expand(-1, 4, -1, -1))
     assert (scale == 1).all()
     assert code.shape[-1] == 32
     torch.testing.assert_close(code, g)

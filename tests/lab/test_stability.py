@@ -26,6 +26,7 @@ from scenelang.measure.metrics import MOST_DB
 from scenelang.measure.scenes import sized
 from scenelang.models.load import Model, load_model
 from scenelang.program.compile import compile_scene
+from scenelang.renderers.arrays_torch import TORCH
 from scenelang.renderers.frames import local_points, read_frame
 from scenelang.scene.schema import Chain, Object, Scale, Scene, Translate
 
@@ -55,10 +56,10 @@ def test_edges_and_cover_of_a_square(model: Model) -> None:
 def test_lifting_one_map_after_the_other_gives_the_same_chain(model: Model) -> None:
     scene = scene_of(PROBES["affine"], 16, 0, 5, model)
     program = compile_scene(scene, model="shapes2d", without=OPTIONAL)
-    x, y = torch.rand(2, 50, generator=torch.Generator().manual_seed(1)) * 2 - 1
+    p = torch.rand(2, 50, generator=torch.Generator().manual_seed(1)) * 2 - 1
     for one, other in zip(unfolded(scene, program, model).vectors, program.vectors, strict=True):
         # merged deformations and single ones are other numbers for the same map
-        ways = [torch.stack(local_points(read_frame(g[:32]), x, y)) for g in (one, other)]
+        ways = [local_points(TORCH, read_frame(g[:32]), p) for g in (one, other)]
         torch.testing.assert_close(*ways, rtol=1e-3, atol=1e-3)
 
 

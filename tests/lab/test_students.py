@@ -97,7 +97,7 @@ def test_frames_are_read_out_of_vectors() -> None:
             for turn in (float(scenes.bend[b, n]) * px, float(scenes.twirl[b, n]) * np.hypot(px, py)):
                 cos, sin = np.cos(turn), np.sin(turn)
                 px, py = cos * px + sin * py, -sin * px + cos * py
-            np.testing.assert_allclose(q[b, n].numpy(), np.stack([px, py], 1), atol=2e-4)
+            np.testing.assert_allclose(q[b, n].numpy(), np.stack([px, py]), atol=2e-4)
             smallest = np.linalg.svd(world[:2, :2], compute_uv=False)[1]
             assert float(scale[b, n]) == pytest.approx(smallest, rel=1e-4)
 

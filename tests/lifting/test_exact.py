@@ -10,6 +10,8 @@ from scenelang.graph.levels import Levels
 from scenelang.graph.steps import Affine, Rows, Step, Warp
 from scenelang.lifting.exact import INNER_WARPS, OUTER_WARPS, leaf_vector, lift_colours, lift_many, matrices
 from scenelang.reference.image import carry_back, distance_scale
+from scenelang.renderers.arrays import NUMPY
+from scenelang.renderers.arrays_torch import TORCH
 from scenelang.renderers.frames import local_points, read_frame
 
 CODE = (0.5, -1.0, 2.0, 3.0)
@@ -51,12 +53,11 @@ def test_vector_is_the_product_of_matrices(inner: int, outer: int) -> None:
 def test_vector_carries_points_back_as_the_reference_does(inner: int, outer: int) -> None:
     rng = np.random.default_rng(100 + inner * 10 + outer)
     levels = random_levels(rng, inner, outer)
-    x, y = rng.uniform(-2, 2, (2, 50))
+    p = rng.uniform(-2, 2, (2, 50))
     frame = read_frame(lift_many([levels], [CODE])[0])
-    got = local_points(frame, torch.from_numpy(x), torch.from_numpy(y))
-    want = carry_back(steps_of(levels), x, y)
-    for a, b in zip(got, want, strict=True):
-        np.testing.assert_allclose(a.numpy(), b, rtol=1e-9, atol=1e-9)
+    want = carry_back(steps_of(levels), *p)
+    np.testing.assert_allclose(local_points(NUMPY, frame, p), want, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(local_points(TORCH, frame, torch.from_numpy(p)), want, rtol=1e-9, atol=1e-9)
     assert frame.scale == pytest.approx(distance_scale(steps_of(levels)), rel=1e-9)
 
 

@@ -20,8 +20,9 @@ from scenelang.models.load import load_model
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
 from scenelang.program.compile import compile_scene
-from scenelang.renderers.draw import CORNER, draw
-from scenelang.renderers.stream import SLACK
+from scenelang.renderers.coverage import CORNER
+from scenelang.renderers.draw import draw
+from scenelang.renderers.field import SLACK
 
 SCENE = """
 subtract { pentagon { scale(0.4); } triangle { scale(0.1); } }

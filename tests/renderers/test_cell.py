@@ -6,7 +6,8 @@ import torch
 from torch import Tensor
 
 from scenelang.reference.fold import BLEND, fold
-from scenelang.renderers.framed import TOKENS, Framed, FramedConfig
+from scenelang.renderers.field import TOKENS, FramedConfig
+from scenelang.renderers.framed import Framed
 
 STEEP = 1e7
 
@@ -33,13 +34,13 @@ def ideal() -> Framed:
 def stream(network: Framed, d: Tensor, colours: Tensor, tokens: Tensor) -> tuple[Tensor, Tensor]:
     """State and register after objects at distances d (N, P) of colours (N, 3)."""
     weights = network.cell_weights()
-    state, colour = d[0][None, :, None], colours[0].expand(1, d.shape[1], 3)
+    state, colour = d[0][None, None], colours[0][:, None].expand(1, 3, d.shape[1])
     for i in range(1, len(d)):
         t = tokens[i : i + 1]
         state, colour = network.step(
-            d[i][None, :, None], state, colour, colours[i].view(1, 1, 3), tuple(w[t] for w in weights)
+            d[i][None, None], state, colour, colours[i].view(1, 3, 1), tuple(w[t] for w in weights)
         )
-    return state[0, :, 0], colour[0]
+    return state[0, 0], colour[0].T
 
 
 def test_lines_express_the_whole_fold() -> None:
@@ -59,12 +60,12 @@ def test_lines_express_the_whole_fold() -> None:
 def test_a_shut_gate_is_shut_and_asks_for_nothing() -> None:
     """Outside its interval a gate is 0 or 1 exactly, and no gradient comes through it."""
     network = Framed(FramedConfig(), 4, 1)
-    levels = torch.tensor([[[-0.01, -3.0, -0.2], [1.01, 0.3, 7.0]]], requires_grad=True)
-    state, colour = torch.full((1, 2, 1), 0.25), torch.zeros(1, 2, 3)
-    bump, shown = torch.full((1, 1), 0.1), torch.ones(1, 1, 3)
-    new, painted = network.update(levels, torch.full((1, 2, 1), -0.5), bump, state, colour, shown)
+    levels = torch.tensor([[[-0.01, 1.01], [-3.0, 0.3], [-0.2, 7.0]]], requires_grad=True)
+    state, colour = torch.full((1, 1, 2), 0.25), torch.zeros(1, 3, 2)
+    bump, shown = torch.full((1, 1, 1), 0.1), torch.ones(1, 3, 1)
+    new, painted = network.update(levels, torch.full((1, 1, 2), -0.5), bump, state, colour, shown)
     assert new.flatten().tolist() == [0.25, -0.5]
-    assert painted[0, :, 0].tolist() == [0.0, 1.0]
+    assert painted[0, 0].tolist() == [0.0, 1.0]
     (new.sum() + painted.sum()).backward()
     assert not levels.grad.any()  # type: ignore[union-attr]
 
@@ -81,7 +82,7 @@ def test_a_given_state_replaces_the_network_s_own() -> None:
     """Given what it answers itself a stream is unchanged; given something else, one step follows from it."""
     torch.manual_seed(1)
     network, g = Framed(FramedConfig(), 4, 1).requires_grad_(False), torch.Generator().manual_seed(2)
-    q = torch.randn(2, 4, 30, 2, generator=g)
+    q = torch.randn(2, 4, 2, 30, generator=g)
     scale, code, colours = (
         torch.ones(2, 4),
         torch.randn(2, 4, 4, generator=g),
@@ -97,7 +98,7 @@ def test_a_given_state_replaces_the_network_s_own() -> None:
     torch.testing.assert_close(given.depth[:, 0], own.depth[:, 0])
     weights = tuple(w[tokens[:, 3]] for w in network.cell_weights())
     state, colour = network.step(
-        own.distance[:, 3, :, None], depth[:, 2, :, None], shown[:, 2], colours[:, 3, None], weights
+        own.distance[:, 3, None], depth[:, 2, None], shown[:, 2].mT, colours[:, 3, :, None], weights
     )
-    torch.testing.assert_close(given.depth[:, 3], state[..., 0])
-    torch.testing.assert_close(given.colour[:, 3], colour)
+    torch.testing.assert_close(given.depth[:, 3], state[:, 0])
+    torch.testing.assert_close(given.colour[:, 3], colour.mT)

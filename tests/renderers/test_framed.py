@@ -12,10 +12,10 @@ from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.load import Model, load_model
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
+from scenelang.renderers.coverage import Coverage
 from scenelang.renderers.draw import draw
-from scenelang.renderers.framed import Framed, FramedConfig
-from scenelang.renderers.frames import local_points
-from scenelang.renderers.stream import Stream
+from scenelang.renderers.field import Field, FramedConfig
+from scenelang.renderers.framed import Framed
 from scenelang.scene.schema import Object, Scale, Scene, Translate
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")
@@ -95,13 +95,13 @@ def test_streaming_equals_the_network_it_was_trained_as(model: Model) -> None:
     """The inference path (channels first, folded weights, skipping off) against `Framed.trace`."""
     network = model.network
     for program in programs("chains", 4):
-        stream = Stream(network, program.vectors, program.tokens, skip=False)
-        x, y = torch.from_numpy(np.random.default_rng(0).uniform(-1, 1, (2, 500)).astype(np.float32))
-        shade = stream.shade(x, y)
-        q = torch.stack([torch.stack(local_points(r.frame, x, y), -1) for r in stream.rows])
-        scale = torch.tensor([r.frame.scale for r in stream.rows])
+        field = Field(network, program.vectors, program.tokens)
+        p = torch.from_numpy(np.random.default_rng(0).uniform(-1, 1, (2, 500)).astype(np.float32))
+        shade = Coverage(field, skip=False).shade(p)
+        q = torch.stack([field.local(r, p) for r in field.rows])
+        scale = torch.tensor([r.frame.scale for r in field.rows])
         codes = torch.from_numpy(program.vectors[:, :4].copy())
-        colours = torch.stack([r.colour[:, 0] for r in stream.rows])
+        colours = torch.stack([r.colour[:, 0] for r in field.rows])
         tokens = torch.from_numpy(program.tokens.astype(np.int64))
         trace = network.trace(q[None], scale[None], codes[None], colours[None], tokens[None])
         coverage = (0.5 - trace.margin[0, -1] / 4).clamp(0, 1)

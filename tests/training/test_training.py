@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from scenelang.models.load import load_model
-from scenelang.renderers.framed import FramedConfig
+from scenelang.renderers.field import FramedConfig
 from scenelang.training.checkpoint import load_tensors
 from scenelang.training.config import Phase, TrainConfig, read_config
 from scenelang.training.loop import train
@@ -40,7 +40,7 @@ def test_batches_show_what_the_oracle_shows() -> None:
             state = (float("inf"), (0.0, 0.0, 0.0))
             for n in range(int(batch.count[b])):
                 corners = oracle.outline(GEOMETRIES[batch.leaf[b, n]])
-                d = oracle.polygon_distance(corners, *batch.q[b, n, p].tolist()) * float(batch.scale[b, n])
+                d = oracle.polygon_distance(corners, *batch.q[b, n, :, p].tolist()) * float(batch.scale[b, n])
                 c = tuple(batch.rgb[b, n].tolist())
                 state = (d, c) if n == 0 else oracle.step(state, d, c, WORDS[batch.tokens[b, n]])
                 if abs(state[0]) < 1e-4 or abs(d) < 1e-4:

@@ -5,7 +5,7 @@ shipped renderer knows nothing of them. `ablation_runs` lists the study: the sam
 seed for all.
 
 Letters: B streams, N objects, P points, F features, S state, L lines of the paint gate, as in
-`renderers/framed.py`.
+`renderers/field.py`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from scenelang.lab.designs.pictures import Scenes, stretch
 from scenelang.lab.designs.students import FramedStudent, StudentConfig
 from scenelang.lab.designs.studies import RATES, StudyConfig
 from scenelang.lifting import exact
-from scenelang.renderers.framed import TOKENS, Framed, FramedConfig, Trace
+from scenelang.renderers.field import TOKENS, FramedConfig
+from scenelang.renderers.framed import Framed, Trace
 from scenelang.training.scenes import GEOMETRIES
 
 HIDDEN = 16  # units of the hidden layer that the cell had
@@ -50,7 +51,7 @@ class WithoutRegister(Framed):
         self.readout_b = nn.Parameter(torch.zeros(3))
 
     def cell_weights(self) -> tuple[Tensor, ...]:
-        return (*super().cell_weights(), self.from_colour)
+        return (*super().cell_weights(), self.from_colour.mT)
 
     def step(
         self,
@@ -61,10 +62,10 @@ class WithoutRegister(Framed):
         weights: tuple[Tensor, ...],
     ) -> tuple[Tensor, Tensor]:
         lines, bias, candidate, bump, from_colour = weights
-        levels = torch.baddbmm(bias[:, None], torch.cat([features, state], -1), lines)
-        new = features @ candidate + object_colour @ from_colour
+        levels = self.xp.dense(torch.cat([features, state], 1), lines, bias)
+        new = candidate @ features + from_colour @ object_colour
         state, _ = self.update(levels, new, bump, state, colour, object_colour)  # its gate is unused
-        return state, state @ self.readout + self.readout_b
+        return state, self.readout.T @ state + self.readout_b[:, None]
 
 
 class TokenAsInput(Framed):
@@ -88,7 +89,7 @@ class TokenAsInput(Framed):
 
     def cell_weights(self) -> tuple[Tensor, ...]:
         lines = self.cell_lines * self.cell_gain.exp()[:, None]
-        return lines.expand(TOKENS, -1, -1), self.cell_bias
+        return lines.mT.expand(TOKENS, -1, -1), self.cell_bias
 
     def step(
         self,
@@ -99,10 +100,10 @@ class TokenAsInput(Framed):
         weights: tuple[Tensor, ...],
     ) -> tuple[Tensor, Tensor]:
         lines, bias = weights
-        outputs = torch.baddbmm(bias[:, None], torch.cat([features, state], -1), lines)
+        outputs = self.xp.dense(torch.cat([features, state], 1), lines, bias)
         s = self.config.state
         return self.update(
-            outputs[..., : -2 * s], outputs[..., -2 * s : -s], outputs[..., -s:], state, colour, object_colour
+            outputs[:, : -2 * s], outputs[:, -2 * s : -s], outputs[:, -s:], state, colour, object_colour
         )
 
 
@@ -117,7 +118,7 @@ class WithHiddenLayer(Framed):
         self.cell_w2 = nn.Parameter(torch.randn(TOKENS, HIDDEN, rows) / math.sqrt(HIDDEN))
 
     def cell_weights(self) -> tuple[Tensor, ...]:
-        return (*super().cell_weights(), self.cell_w1, self.cell_b1, self.cell_w2)
+        return (*super().cell_weights(), self.cell_w1.mT, self.cell_b1, self.cell_w2.mT)
 
     def step(
         self,
@@ -128,10 +129,10 @@ class WithHiddenLayer(Framed):
         weights: tuple[Tensor, ...],
     ) -> tuple[Tensor, Tensor]:
         lines, bias, candidate, bump, w1, b1, w2 = weights
-        plain = torch.cat([features, state], -1)
-        hidden = torch.relu(torch.baddbmm(b1[:, None], plain, w1))  # (B, P, HIDDEN)
-        levels = torch.baddbmm(torch.baddbmm(bias[:, None], plain, lines), hidden, w2)
-        return self.update(levels, features @ candidate, bump, state, colour, object_colour)
+        plain = torch.cat([features, state], 1)
+        hidden = self.xp.dense(plain, w1, b1).relu()  # (B, HIDDEN, P)
+        levels = self.xp.dense(plain, lines, bias) + w2 @ hidden
+        return self.update(levels, candidate @ features, bump, state, colour, object_colour)
 
 
 class NoScale(FramedStudent):
@@ -170,7 +171,7 @@ class NoFrame(FramedStudent):
 
     def read(self, g: Tensor, scenes: Scenes, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         b, n = scenes.leaf.shape
-        world = torch.stack([x, y], -1)[:, None].expand(b, n, -1, 2)
+        world = torch.stack([x, y], 1)[:, None].expand(b, n, 2, -1)
         return world, torch.ones_like(g[..., 0]), g
 
 

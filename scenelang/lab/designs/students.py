@@ -15,7 +15,10 @@ from torch import Tensor, nn
 from scenelang.lab.designs.encoders import Encoders, LiftingConfig
 from scenelang.lab.designs.pictures import Scenes, exact_vectors, pixel_centres
 from scenelang.lifting import exact
-from scenelang.renderers.framed import Framed, FramedConfig, Trace
+from scenelang.renderers.arrays_torch import TORCH
+from scenelang.renderers.field import FramedConfig
+from scenelang.renderers.framed import Framed, Trace
+from scenelang.renderers.frames import Affine, Warp, way_back
 from scenelang.renderers.reading import Reading, ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 from scenelang.training.scenes import GEOMETRIES
@@ -177,7 +180,7 @@ class FramedStudent(PointStudent):
         """What the decoder is shown at world points (B, P) of geometry vectors (B, N, 32).
 
         Returns:
-            Points (B, N, P, 2), distance scales (B, N), codes (B, N, C).
+            Points (B, N, 2, P), distance scales (B, N), codes (B, N, C).
         """
         q, scale = read_points(g, x, y)
         return q, scale, g[..., exact.CODE]
@@ -205,27 +208,25 @@ class FramedStudent(PointStudent):
 
 
 def read_points(g: Tensor, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
-    """Leaf coordinates and distance scales out of geometry vectors, as `frames.local_points` reads them.
+    """Leaf coordinates and distance scales out of geometry vectors.
 
     Args:
         g: (B, N, 32).
         x, y: world points (B, P).
 
     Returns:
-        (B, N, P, 2) and (B, N), differentiable in g.
+        (B, N, 2, P) and (B, N), differentiable in g.
     """
-    px, py = x[:, None], y[:, None]
+    steps: list[Affine | Warp] = []
     for frame, group in ((exact.FRAME, exact.OUTER), (exact.MIDDLE, exact.INNER)):
-        a, b, c, d, e, f = g[..., frame, None].unbind(-2)  # each (B, N, 1)
-        px, py = a * px + b * py + c, d * px + e * py + f
+        numbers = g[..., frame, None].unbind(-2)  # each (B, N, 1)
+        steps.append(Affine((numbers[:3], numbers[3:])))
         for start in range(group.start, group.stop, 3):
-            twirl, bend_x, bend_y = g[..., start : start + 3, None].unbind(-2)
-            radius = (px.square() + py.square() + 1e-12).sqrt()
-            angle = twirl * radius + bend_x * px + bend_y * py
-            cos, sin = angle.cos(), angle.sin()
-            px, py = cos * px + sin * py, cos * py - sin * px
+            twirl, *bend = g[..., start : start + 3, None].unbind(-2)
+            steps.append(Warp(twirl, tuple(bend)))
+    q = torch.stack(list(way_back(TORCH, steps, (x[:, None], y[:, None]))), 2)
     last, middle = (g[..., s].reshape(*g.shape[:-1], 2, 3)[..., :2] for s in (exact.FRAME, exact.MIDDLE))
-    return torch.stack([px, py], -1), 1 / largest_stretch(middle @ last).clamp_min(1e-3)
+    return q, 1 / largest_stretch(middle @ last).clamp_min(1e-3)
 
 
 def largest_stretch(m: Tensor) -> Tensor:

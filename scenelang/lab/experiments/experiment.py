@@ -26,7 +26,7 @@ from scenelang.lab.designs.students import Student
 from scenelang.lab.designs.studies import Study, StudyConfig
 from scenelang.lab.experiments.runs import EXPERIMENTS, Run
 from scenelang.measure.metrics import MOST_DB, measure
-from scenelang.renderers.stream import SMOOTH
+from scenelang.renderers.field import SMOOTH
 from scenelang.training.loop import revision
 
 if TYPE_CHECKING:

@@ -1,0 +1,93 @@
+"""The dozen functions by which numpy arrays and torch tensors differ; all else is written as both have it.
+
+The field is written once, for a network whose `xp` is `NUMPY` here or `TORCH` (`arrays_torch.py`). Points lie
+along the last axis, M, and functions leave their arguments as they are, `put` aside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from typing import Any, ClassVar
+
+import numpy as np
+
+Array = Any
+"""A numpy array, or a torch tensor on any device."""
+Layers = Sequence[tuple[Array, Array]]
+"""Weights (…, out, in) and biases (…, out)."""
+
+
+class Arrays:
+    """Functions on arrays of numpy; a subclass has those of another library."""
+
+    to_numpy: ClassVar[Any] = staticmethod(np.asarray)
+    concat: ClassVar[Any] = staticmethod(np.concatenate)  # (parts, axis)
+    stack: ClassVar[Any] = staticmethod(np.stack)  # (parts, axis)
+    packed: ClassVar[Any] = staticmethod(np.ascontiguousarray)  # the same entries, contiguous in memory
+    where: ClassVar[Any] = staticmethod(np.flatnonzero)  # indices (k,) of the true entries of a mask (M,)
+    exp: ClassVar[Any] = np.exp
+    cos: ClassVar[Any] = np.cos
+    sin: ClassVar[Any] = np.sin
+    minimum: ClassVar[Any] = np.minimum
+
+    def array(self, values: np.ndarray, like: Array) -> Array:
+        """An array of a numpy array, where another one lies."""
+        return values
+
+    def full(self, shape: tuple[int, ...], value: float, like: Array) -> Array:
+        """An array of one value, of the type of another one and where that lies."""
+        return np.full(shape, value, like.dtype)
+
+    def wide(self, x: Array) -> Array:
+        """In float64."""
+        return x.astype(np.float64)
+
+    def narrow(self, x: Array) -> Array:
+        """In float32."""
+        return x.astype(np.float32)
+
+    def largest(self, x: Array) -> Array:
+        """The largest over rows: (…, 1, M) of (…, R, M)."""
+        return x.max(-2, keepdims=True)
+
+    def length(self, p: Sequence[Array]) -> Array:
+        """Euclidean lengths of points, by their coordinates."""
+        return np.sqrt(sum(coordinate * coordinate for coordinate in p))
+
+    def add_product(self, total: Array, x: Array, factor: Array | float) -> Array:
+        """``total + x * factor``, rounded once where the library can."""
+        found = x * factor
+        found += total
+        return found
+
+    def dense(self, x: Array, w: Array, b: Array) -> Array:
+        """A layer ``w @ x + b``: (…, in, M), (…, out, in), (…, out)."""
+        found = w @ x
+        found += b[..., None]
+        return found
+
+    def perceptron(self, x: Array, layers: Layers) -> Array:
+        """Layers with rectified linear units between them; (…, out, M) of (…, in, M)."""
+        for layer in layers[:-1]:
+            x = self.dense(x, *layer)
+            np.maximum(x, 0.0, out=x)
+        return self.dense(x, *layers[-1])
+
+    def take(self, x: Array, index: Array) -> Array:
+        """Entries (…, k) of (…, M)."""
+        return x.take(index, -1)
+
+    def put(self, x: Array, index: Array, values: Array) -> None:
+        """Overwrite entries of (…, M) by values (…, k)."""
+        x[..., index] = values
+
+    def inference(self) -> AbstractContextManager[object]:
+        """Within it no gradients are kept, and numbers beyond float32 pass without a warning."""
+        return np.errstate(all="ignore")
+
+    def one_core(self) -> None:
+        """Have this thread compute each operation on one core."""
+
+
+NUMPY = Arrays()
