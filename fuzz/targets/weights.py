@@ -26,7 +26,7 @@ from scenelang.diagnostics.span import SourceFile
 from scenelang.models import weights
 from scenelang.models.load import Model, load_network
 from scenelang.models.manifest import ROOT, Manifest, load_manifest
-from scenelang.models.weights import ModelError, codes_of, read_facts, read_header
+from scenelang.models.weights import ModelError, codes_of, open_weights, read_facts
 from scenelang.passes import check_scene
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import ProgramError
@@ -79,7 +79,7 @@ def _check_weights(data: bytes) -> None:
     except ModelError:
         return
     hold(codes is not None, "weights of a network have codes")
-    header = read_header(data)
+    header = open_weights(data).header
     plain = {name: value.contiguous() for name, value in network.state_dict().items()}
     written = save(plain, {"scenelang": json.dumps(header, sort_keys=True)})
     again = load_network(written, manifest)

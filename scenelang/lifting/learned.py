@@ -69,6 +69,9 @@ def read_lifting(tensors: Mapping[str, npt.NDArray[Any]], prefix: str = "lifting
         for side, kind in kinds
     }
     lifting = Lifting(array("codes"), array("material_codes"), encoders)
+    held = 2 + sum(2 * len(layers) for layers in encoders.values())
+    if sum(name.startswith(prefix) for name in tensors) > held:
+        raise ValueError("it holds tensors that no encoder has")
     for side, kind in kinds:
         _check(
             kind, encoders[kind], (lifting.codes if side == "geometry" else lifting.material_codes).shape[1]

@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors.torch import load
 from torch import Tensor
 
 from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.models.weights import MOST_BYTES, Codes, codes_of, read_header, read_weights, weights_path
+from scenelang.models.weights import LIFTING, Codes, codes_of, open_weights, read_weights, weights_path
 from scenelang.models.weights import ModelError as ModelError
 from scenelang.program.program import WIDTH
 from scenelang.renderers.field import FramedConfig
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.reading import Reading, ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
+from scenelang.tensors import TensorError
 
 MOST_WIDTH = 1024
 RENDERER = "renderer."
@@ -75,33 +75,32 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
     Raises:
         ModelError: the file does not fit the manifest or itself, or holds numbers that are not finite.
     """
-    if len(data) > MOST_BYTES:
-        raise ModelError(f"weights of more than {MOST_BYTES} bytes")
-    header = read_header(data)
+    file = open_weights(data)
     make = _MAKERS.get(manifest.renderer)
     if make is None:
         raise ModelError(f"an unknown renderer '{manifest.renderer}'")
     try:
         with torch.random.fork_rng(devices=[]):
             # Not on the meta device, which takes no memory but 1.8 s to import what it stands on.
-            network = make(header["config"], manifest, len(data))
+            network = make(file.header["config"], manifest, len(data))
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise ModelError(f"bad network sizes: {error}") from None
     try:
-        tensors = load(data)
+        tensors = {name: torch.from_numpy(array) for name, array in file.arrays().items()}
         if not isinstance(network, Framed):
             tensors = {
                 name.removeprefix(RENDERER): tensor.float() if tensor.dtype == torch.float16 else tensor
                 for name, tensor in tensors.items()
-                if name.startswith(RENDERER)
+                if not name.startswith(LIFTING)
             }
         network.load_state_dict(tensors, assign=True)
-    except Exception as error:
-        # safetensors raises its own class, torch a RuntimeError; both say what does not fit
+    except (TensorError, RuntimeError) as error:  # both say what does not fit
         raise ModelError(f"damaged weights: {' '.join(str(error).split())[:300]}") from None
     for name, parameter in network.named_parameters():
-        if parameter.dtype != torch.float32 or not torch.isfinite(parameter).all():
-            raise ModelError(f"weights '{name}' are not finite float32 numbers")
+        if parameter.dtype != torch.float32:
+            raise ModelError(
+                f"damaged weights: tensor `{name}` is {parameter.dtype}, where float32 is needed"
+            )
     return network.requires_grad_(False).eval().to(device)
 
 
@@ -161,7 +160,7 @@ def load_model(name: str, device: str = "cpu", path: Path | None = None) -> Mode
         ) from None
     network = load_network(data, manifest, device)
     lifted = None if isinstance(network, Framed) else codes_of(manifest, data)
-    return Model(manifest, network, hashlib.sha256(data).hexdigest(), read_header(data), lifted)
+    return Model(manifest, network, hashlib.sha256(data).hexdigest(), open_weights(data).header, lifted)
 
 
 def place_of(network: Network) -> torch.device:

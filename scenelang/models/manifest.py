@@ -7,11 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from scenelang.files import read_json
+from scenelang.files import read_json, read_regular
 
 ROOT = Path(__file__).parent
 MOST: Final = 1e300
 """Bound of the numbers in ranges."""
+_MOST_BYTES: Final = 1 << 20
+_LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
+"""Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""
+_RANGES: Final = {"objects", "smooth", "twirl", "bend", "scale", "thin"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +60,16 @@ class Manifest:
     white: bool = False
 
     @staticmethod
-    def from_json(text: str) -> Manifest:
+    def from_json(text: str | bytes) -> Manifest:
         """Read a manifest.
 
         Raises:
             ValueError: it is no JSON, a field is missing or unknown, or holds what it cannot.
         """
-        data = read_json(text.encode("utf-8"))
+        text = text.encode("utf-8") if isinstance(text, str) else text
+        if len(text) > _MOST_BYTES:
+            raise ValueError(f"a manifest of more than {_MOST_BYTES:,} bytes")
+        data = read_json(text)
         if not isinstance(data, dict) or data.pop("format", None) != 1:
             raise ValueError("not a model manifest of format 1")
         data = {"set": data.get("name"), "sizes": [], "white": False, **data}
@@ -81,11 +88,16 @@ class Manifest:
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
         value = self.measured.get("sets", {}).get(self.set, {}).get("flip", 1.0)
-        return float(value) if type(value) in (int, float) else 1.0
+        return float(value)
 
 
 def _is_text(value: Any) -> bool:
     return isinstance(value, str) and value != "" and value.isprintable()
+
+
+def _is_name(value: Any) -> bool:
+    """Names of models and sets name files too."""
+    return _is_text(value) and len(value) <= 100 and value[0] != "." and not set(value) & set('"\\/:')
 
 
 def _is_word(value: Any) -> bool:
@@ -97,7 +109,9 @@ def _are_words(value: Any) -> bool:
 
 
 def _are_limits(value: Any) -> bool:
-    return isinstance(value, dict) and all(type(v) is int and 0 <= v < 1 << 31 for v in value.values())
+    return isinstance(value, dict) and all(
+        type(v) is int and 0 <= v <= _LIMITS.get(key, -1) for key, v in value.items()
+    )
 
 
 def _is_range(value: Any) -> bool:
@@ -116,7 +130,7 @@ def _are_sizes(value: Any) -> bool:
 
 
 def _are_ranges(value: Any) -> bool:
-    return isinstance(value, dict) and all(map(_is_range, value.values()))
+    return isinstance(value, dict) and value.keys() <= _RANGES and all(map(_is_range, value.values()))
 
 
 def _are_figures(value: Any) -> bool:
@@ -126,11 +140,13 @@ def _are_figures(value: Any) -> bool:
     lines, sets = value.get("stability", {}), value.get("sets", {})
     if not isinstance(sets, dict) or not all(isinstance(figures, dict) for figures in sets.values()):
         return False
+    if not all(_is_range([0, figures.get("flip", 1)]) for figures in sets.values()):
+        return False
     return isinstance(lines, dict) and all(map(_is_text, lines.values()))
 
 
 _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
-    "name": lambda value: _is_text(value) and '"' not in value and "\\" not in value,
+    "name": _is_name,
     "summary": _is_text,
     "dimension": lambda value: type(value) is int and value in (2, 3),
     "renderer": _is_word,
@@ -143,7 +159,7 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "limits": _are_limits,
     "trained": _are_ranges,
     "measured": _are_figures,
-    "set": _is_text,
+    "set": _is_name,
     "sizes": _are_sizes,
     "white": lambda value: type(value) is bool,
 }
@@ -164,7 +180,7 @@ def load_manifest(name: str) -> Manifest:
     """
     if name not in available():
         raise KeyError(name)
-    found = Manifest.from_json((ROOT / name / "manifest.json").read_text("utf-8"))
+    found = Manifest.from_json(read_regular(ROOT / name / "manifest.json", _MOST_BYTES))
     if found.name != name:
         raise ValueError(f"the manifest of `{name}` calls itself `{found.name[:40]}`")
     return found

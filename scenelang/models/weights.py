@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import math
-import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenelang.files import read_json, read_regular
+from scenelang.files import read_regular
 from scenelang.models.manifest import ROOT, Manifest, load_manifest
+from scenelang.tensors import TensorError, TensorFile, read_tensors
 
 if TYPE_CHECKING:
     from scenelang.lifting.learned import Lifting
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 MOST_BYTES = 64 << 20
 LIFTING = "lifting."
 """In front of the names of a lifting's tensors, where a file holds it beside a renderer's."""
-_MOST_HEADER = 1 << 20
 
 
 class ModelError(Exception):
@@ -66,42 +66,24 @@ def weights_path(name: str) -> Path:
 
 
 def read_weights(path: Path) -> bytes:
-    """The bytes of a weights file.
+    """The bytes of a weights file; of a larger one than any, the first.
 
     Raises:
         OSError: it cannot be read.
-        ModelError: it is larger than any.
     """
-    data = read_regular(path, MOST_BYTES)
-    if len(data) > MOST_BYTES:
-        raise ModelError(f"weights of more than {MOST_BYTES >> 20} MB")
-    return data
+    return read_regular(path, MOST_BYTES)
 
 
-def read_header(data: bytes) -> dict[str, Any]:
-    """The training header of a weights file; raises ModelError where there is none."""
-    metadata = _outer(data).get("__metadata__")
+def open_weights(data: bytes) -> TensorFile:
+    """What a weights file holds.
+
+    Raises:
+        ModelError: it is damaged, foreign or hostile.
+    """
     try:
-        header = read_json(metadata["scenelang"].encode())  # type: ignore[index]
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ModelError(f"no training header: {error}") from None
-    if not isinstance(header, dict) or header.get("format") != 1:
-        raise ModelError("not a weights file of format 1")
-    return header
-
-
-def _outer(data: bytes) -> dict[str, Any]:
-    """The safetensors header of a file: tensors by name, and the metadata."""
-    try:
-        (length,) = struct.unpack("<Q", data[:8])
-        if length > min(_MOST_HEADER, len(data) - 8):
-            raise ValueError(f"a header of {length:,} bytes")
-        outer = read_json(data[8 : 8 + length])
-    except (struct.error, ValueError) as error:
+        return read_tensors(data, MOST_BYTES)
+    except TensorError as error:
         raise ModelError(f"damaged weights: {error}") from None
-    if not isinstance(outer, dict):
-        raise ModelError("damaged weights: the header is no object")
-    return outer
 
 
 def read_facts(name: str) -> Facts:
@@ -112,17 +94,9 @@ def read_facts(name: str) -> Facts:
         ModelError: it is damaged.
     """
     data = read_weights(weights_path(name))
-    training = read_header(data)
-    parameters = sum(_count(name, entry) for name, entry in _outer(data).items() if name != "__metadata__")
-    return Facts(hashlib.sha256(data).hexdigest(), len(data), parameters, training)
-
-
-def _count(name: str, entry: Any) -> int:
-    """Numbers in a tensor that the header lists."""
-    shape = entry.get("shape") if isinstance(entry, dict) else None
-    if not isinstance(shape, list) or not all(type(side) is int and 0 <= side < 1 << 31 for side in shape):
-        raise ModelError(f"damaged weights: tensor `{name[:40]}` has no shape")
-    return math.prod(shape[:8])
+    found = open_weights(data)
+    parameters = sum(math.prod(tensor.shape) for tensor in found.tensors.values())
+    return Facts(hashlib.sha256(data).hexdigest(), len(data), parameters, found.header)
 
 
 @lru_cache(maxsize=8)
@@ -143,39 +117,35 @@ def codes_of(manifest: Manifest, data: bytes) -> Codes:
     Raises:
         ModelError: it is damaged, or not of this model.
     """
-    from safetensors import SafetensorError
-    from safetensors.numpy import load
+    from scenelang.lifting.exact import CODE, D_G, D_M, MATERIAL_CODE
 
-    _outer(data)  # says things once, which safetensors does not ask for
     try:
-        tensors = load(data)
-    except (SafetensorError, ValueError, KeyError, TypeError) as error:
+        tensors = open_weights(data).arrays()
+    except TensorError as error:
         raise ModelError(f"damaged weights: {error}") from None
-    digest = hashlib.sha256(data).hexdigest()
     prefix = "" if manifest.renderer == "framed" else LIFTING
-    geometry = _rows(manifest.geometries, tensors.get(f"{prefix}codes"))
-    material = _rows(manifest.materials, tensors.get(f"{prefix}material_codes"))
+    learned = manifest.lifting == "learned"
+    sides = (D_G, D_M) if learned else (CODE.stop - CODE.start, MATERIAL_CODE.stop - MATERIAL_CODE.start)
+    geometry = _rows(manifest.geometries, tensors, f"{prefix}codes", sides[0])
+    material = _rows(manifest.materials, tensors, f"{prefix}material_codes", sides[1])
     lifting = None
-    if manifest.lifting == "learned":
+    if learned:
         from scenelang.lifting.learned import read_lifting
 
         try:
             lifting = read_lifting(tensors, LIFTING)
         except (KeyError, ValueError) as error:
             raise ModelError(f"damaged weights: the lifting: {error}") from None
-    return Codes(geometry, material, digest, lifting)
+    return Codes(geometry, material, hashlib.sha256(data).hexdigest(), lifting)
 
 
-def _rows(names: tuple[str, ...], table: Any) -> dict[str, tuple[float, ...]]:
-    if (
-        table is None
-        or table.dtype not in ("float32", "float16")
-        or table.ndim != 2
-        or len(table) != len(names)
-    ):
-        found = "no codes" if table is None else f"codes {table.dtype} {list(table.shape)}"
-        raise ModelError(f"{found}, where {len(names)} rows of float32 are needed")
-    rows: list[list[float]] = table.tolist()
-    if not all(math.isfinite(number) for row in rows for number in row):
-        raise ModelError("codes that are not finite")
-    return {name: tuple(row) for name, row in zip(names, rows, strict=True)}
+def _rows(
+    names: tuple[str, ...], tensors: Mapping[str, Any], key: str, side: int
+) -> dict[str, tuple[float, ...]]:
+    table = tensors.get(key)
+    if table is None or table.dtype not in ("float32", "float16") or table.shape != (len(names), side):
+        found = "is missing" if table is None else f"is {table.dtype} {list(table.shape)}"
+        raise ModelError(
+            f"damaged weights: tensor `{key}` {found}; {len(names)} rows of {side} floats are needed"
+        )
+    return {name: tuple(row) for name, row in zip(names, table.tolist(), strict=True)}

@@ -8,18 +8,16 @@ end column), all -1 where unknown. The header is the metadata entry ``scenelang`
 from __future__ import annotations
 
 import json
-import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import read_json, read_regular, write_output
+from scenelang.files import read_regular, write_output
 from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
+from scenelang.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
 
-FORMAT = 1
-MOST_HEADER = 1 << 20
 MOST_BYTES = MOST_HEADER + 8 + MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20)
 
 _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
@@ -97,10 +95,13 @@ def parse_program(data: bytes) -> Program:
     Raises:
         ProgramError: they hold none.
     """
-    if len(data) > MOST_BYTES:
-        raise ProgramError(f"more than {MOST_BYTES:,} bytes, which no program has")
-    tensors = _tensors(data)
-    header = _header(data)
+    try:
+        file = read_tensors(data, MOST_BYTES)
+        _check_layout(file)
+        tensors = file.arrays()
+    except TensorError as error:
+        raise ProgramError(f"not a program: {error}") from None
+    header = _header(file)
     geometries, files = _names(header, "geometries"), _names(header, "files")
     objects = _indexed(tensors["objects"], len(geometries), "objects")
     background, canvas = header["background"], header["canvas"]
@@ -121,63 +122,23 @@ def parse_program(data: bytes) -> Program:
     )
 
 
-def _outer(data: bytes) -> dict[str, Any]:
-    """The safetensors header of a file."""
-    if len(data) < 8:
-        raise ProgramError("not a program: shorter than a header")
-    (length,) = struct.unpack("<Q", data[:8])
-    if length > min(MOST_HEADER, len(data) - 8):
-        raise ProgramError("not a program: its header does not fit")
-    outer = _json(data[8 : 8 + length])
-    if not isinstance(outer, dict):
-        raise ProgramError("not a program: its header is no object")
-    return outer
+def _check_layout(file: TensorFile) -> None:
+    if file.tensors.keys() != _LAYOUT.keys():
+        raise TensorError("it holds other tensors")
+    count = (*file.tensors["vectors"].shape, 0)[0]
+    if count > MOST_OBJECTS:
+        raise TensorError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
+    for name, (kind, rest) in _LAYOUT.items():
+        tensor = file.tensors[name]
+        if tensor.type != kind or tensor.shape != (count, *rest):
+            raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")
 
 
-def _tensors(data: bytes) -> dict[str, npt.NDArray[Any]]:
-    outer = _outer(data)
-    if outer.keys() - {"__metadata__"} != _LAYOUT.keys():
-        raise ProgramError("not a program: it holds other tensors")
-    count = None
-    for name, (dtype, rest) in _LAYOUT.items():
-        entry = outer[name]
-        shape = entry.get("shape") if isinstance(entry, dict) else None
-        if not isinstance(shape, list) or not shape or any(type(side) is not int for side in shape):
-            raise ProgramError(f"tensor `{name}` has no shape")
-        count = shape[0] if count is None else count
-        if entry.get("dtype") != dtype or tuple(shape) != (count, *rest):
-            raise ProgramError(f"tensor `{name}` is {entry.get('dtype')} {shape}")
-        if not 0 <= count <= MOST_OBJECTS:
-            raise ProgramError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
-    from safetensors import SafetensorError
-    from safetensors.numpy import load
-
-    try:
-        tensors: dict[str, npt.NDArray[Any]] = load(data)
-    except (SafetensorError, ValueError, KeyError) as error:
-        raise ProgramError(f"a damaged program: {error}") from None
-    return tensors
-
-
-def _header(data: bytes) -> dict[str, Any]:
-    metadata = _outer(data).get("__metadata__")
-    text = metadata.get("scenelang") if isinstance(metadata, dict) else None
-    if not isinstance(text, str):
-        raise ProgramError("not a program: it has no header of scenelang")
-    header = _json(text.encode("utf-8", "surrogatepass"))
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise ProgramError(f"not a program of format {FORMAT}")
+def _header(file: TensorFile) -> dict[str, Any]:
     fields = {"background", "canvas", "files", "format", "geometries", "model", "weights"}
-    if header.keys() != fields:
+    if file.header.keys() != fields:
         raise ProgramError("the header has missing or unknown fields")
-    return header
-
-
-def _json(data: bytes) -> Any:
-    try:
-        return read_json(data)
-    except ValueError as error:
-        raise ProgramError(f"not a program: a damaged header, {str(error).lower()}") from None
+    return file.header
 
 
 def _names(header: dict[str, Any], key: str) -> list[str]:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load, save
+from safetensors.torch import save
 from torch import Tensor, nn
 
 from scenelang.files import read_regular, write_whole
-from scenelang.models.weights import ModelError, read_header
+from scenelang.models.weights import ModelError
+from scenelang.tensors import TensorError, read_tensors
 
 _MOST_BYTES = 1 << 30
 
@@ -31,14 +31,12 @@ def load_tensors(path: Path, device: str = "cpu") -> tuple[dict[str, Tensor], di
         ModelError: it is no such file, or a damaged one.
     """
     data = read_regular(path, _MOST_BYTES)
-    if len(data) > _MOST_BYTES:
-        raise ModelError(f"'{path}' has more than {_MOST_BYTES:,} bytes")
-    header = read_header(data)
     try:
-        tensors = {key: tensor.to(device) for key, tensor in load(data).items()}
-    except (SafetensorError, ValueError) as error:
+        found = read_tensors(data, _MOST_BYTES)
+        arrays = found.arrays(finite=False)
+    except TensorError as error:
         raise ModelError(f"'{path}' is damaged: {error}") from None
-    return tensors, header
+    return {name: torch.from_numpy(array).to(device) for name, array in arrays.items()}, found.header
 
 
 def pack_training(

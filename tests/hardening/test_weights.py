@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
+from functools import partial
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
+from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
+from fuzz.tensors import mutate
 from scenelang.models import manifest as manifests
 from scenelang.models.load import load_network
 from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.models.weights import ModelError, codes_of, read_header, weights_path
+from scenelang.models.weights import ModelError, codes_of, open_weights, weights_path
+from scenelang.tensors import TensorError, read_tensors
 from scenelang.training.checkpoint import load_tensors
 from tests.cli.conftest import Folder
 
@@ -82,12 +88,30 @@ HARM = {
     "a shape that overflows": tensor("codes", shape=[1 << 62, 4]),
     "a shape of text": tensor("codes", shape="4, 4"),
     "an unknown type": tensor("codes", dtype="F31"),
+    "an offset too many": tensor("codes", data_offsets=[0, 64, 64]),
+    "offsets of a shape too large": tensor("codes", shape=[4, 5]),
+    "a side of true": tensor("codes", shape=[True, 16]),
+    "forty sides": tensor("codes", shape=[4, 4, *[1] * 40]),
+    "a tensor with more to say": tensor("codes", strides=[4, 1]),
+    "a tensor without a type": joined({**outer(), "codes": {"shape": [4, 4], "data_offsets": [0, 64]}}),
+    "a tensor with a name to hide": joined({"\x1b[2J" if k == "codes" else k: v for k, v in outer().items()}),
+    "metadata of others": joined({**outer(), "__metadata__": {**outer()["__metadata__"], "format": "pt"}}),
+    "no metadata": joined({k: v for k, v in outer().items() if k != "__metadata__"}),
+    "metadata that are a list": joined({**outer(), "__metadata__": ["scenelang"]}),
+    "metadata that are a number": joined({**outer(), "__metadata__": {"scenelang": 1}}),
+    "a header of another format": joined({**outer(), "__metadata__": {"scenelang": '{"format": 2}'}}),
+    "a header of format true": joined({**outer(), "__metadata__": {"scenelang": '{"format": true}'}}),
+    "a header that says a thing twice": joined(
+        {**outer(), "__metadata__": {"scenelang": '{"format": 1, "format": 1}'}}
+    ),
     "cut short": DATA[:-100],
     "too long": DATA + b"\0" * 100,
     "no codes": arrays(codes=None),
     "codes of another type": arrays(codes=CODES.astype(np.float64)),
     "codes of too few shapes": arrays(codes=CODES[:3]),
     "codes without rows": arrays(codes=CODES.reshape(-1)),
+    "codes a number too long": arrays(codes=np.zeros((4, 5), np.float32)),
+    "codes a number too short": arrays(material_codes=np.zeros((1, 11), np.float32)),
     "codes that are not numbers": arrays(codes=np.full_like(CODES, np.nan)),
     "codes without end": arrays(codes=np.full_like(CODES, np.inf)),
 }  # fmt: skip
@@ -129,7 +153,53 @@ def test_weights_of_an_earlier_version_are_called_that() -> None:
 def test_the_shipped_weights_are_none_of_these() -> None:
     assert codes_of(SHAPES, DATA).geometry.keys() == set(SHAPES.geometries)
     load_network(arrays(), SHAPES)
-    assert read_header(DATA)["model"] == "shapes2d"
+    assert open_weights(DATA).header["model"] == "shapes2d"
+
+
+def test_messages_name_the_place() -> None:
+    for name, words in (
+        ("a huge shape", "tensor `codes` has no shape"),
+        ("codes without end", "tensor `codes` holds numbers that are not finite"),
+        ("codes a number too long", "tensor `codes` is float32 [4, 5]; 4 rows of 4 floats are needed"),
+        ("offsets of a shape too large", "tensor `codes` is F32 [4, 5], which does not take 64 bytes"),
+        ("a key given twice", "the list of tensors: the key 'codes' is given twice"),
+    ):
+        with pytest.raises(ModelError) as caught:
+            codes_of(SHAPES, HARM[name])
+        assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["shapes2d-reading", "shapes2d-streaming"])
+@pytest.mark.parametrize(
+    "extra", ["codes", "renderer.more", "lifting.more", "lifting.geometry.affine.layers.3.weight"]
+)
+def test_tensors_that_nothing_asks_for(name: str, extra: str) -> None:
+    manifest, data = load_manifest(name), weights_path(name).read_bytes()
+    header = open_weights(data).header
+    made = save({**load(data), extra: np.zeros(3, np.float32)}, metadata={"scenelang": json.dumps(header)})
+    lifting, network = partial(codes_of, manifest, made), partial(load_network, made, manifest)
+    with pytest.raises(ModelError):
+        (lifting if extra.startswith("lifting") else network)()
+
+
+def test_what_is_taken_is_what_safetensors_takes() -> None:
+    """Files damaged at random are refused, or hold what another reader of them finds."""
+    random, taken = Random(4), 0
+    for _ in range(400):
+        data = mutate(DATA, random)
+        try:
+            found = read_tensors(data, len(DATA) * 2).arrays(finite=False)
+        except TensorError:
+            continue
+        try:
+            known = load(data)
+        except SafetensorError as error:
+            pytest.fail(f"taken, where safetensors says: {error}")
+        taken += 1
+        assert found.keys() == known.keys()
+        for key, array in found.items():
+            np.testing.assert_array_equal(array, known[key])
+    assert 40 < taken < 360
 
 
 @pytest.mark.parametrize(
@@ -150,7 +220,7 @@ def test_checkpoints(tmp_path: Path, name: str) -> None:
     """What the file says is tested against the training later; here nothing may break."""
     path = tmp_path / "checkpoint.safetensors"
     path.write_bytes(HARM[name])
-    if name.startswith(("codes", "no codes")):
+    if name.startswith(("codes", "no codes")):  # numbers that are not finite too: those of a training may be
         load_tensors(path)
         return
     with pytest.raises(ModelError):
@@ -198,7 +268,12 @@ MANIFEST = json.loads((manifests.ROOT / "shapes2d" / "manifest.json").read_text(
         {"trained": {"twirl": [2]}},
         {"trained": {"twirl": [2, 1]}}, {"trained": {"twirl": ["a", "b"]}},
         {"trained": {"twirl": [0, 1e308]}},
-        {"trained": 3}, {"measured": []},
+        {"trained": 3}, {"measured": []}, {"name": "../x"}, {"name": ".."}, {"name": "a/b"},
+        {"name": "a" * 101},
+        {"set": "../../x"}, {"set": "C:x"}, {"set": "a\\b"}, {"set": ""}, {"limits": {"depth": 3}},
+        {"limits": {"canvas": 8193}}, {"limits": {"inner_warps": 3}}, {"limits": {"canvas": True}},
+        {"trained": {"shear": [0, 1]}}, {"measured": {"sets": {"shapes2d": {"flip": 10**400}}}},
+        {"measured": {"sets": {"shapes2d": {"flip": "0"}}}}, {"summary": "x" * (1 << 20)},
     ],
     ids=str,
 )  # fmt: skip
@@ -218,7 +293,20 @@ def test_no_manifests(text: str) -> None:
 
 def test_a_manifest_cannot_point_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "good").mkdir()
-    (tmp_path / "good" / "manifest.json").write_text(json.dumps({**MANIFEST, "name": "../../etc"}))
+    (tmp_path / "good" / "manifest.json").write_text(json.dumps({**MANIFEST, "name": "shapes2d"}))
     monkeypatch.setattr(manifests, "ROOT", tmp_path)
     with pytest.raises(ValueError, match="calls itself"):
         load_manifest("good")
+
+
+def test_a_manifest_that_never_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(manifests, "ROOT", tmp_path)
+    for name in ("pipe", "large"):
+        (tmp_path / name).mkdir()
+    os.mkfifo(tmp_path / "pipe" / "manifest.json")
+    with pytest.raises(OSError, match="not a regular file"):
+        load_manifest("pipe")
+    with (tmp_path / "large" / "manifest.json").open("wb") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(ValueError, match="more than"):
+        load_manifest("large")

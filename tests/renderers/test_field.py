@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -200,7 +202,14 @@ def test_tiles_are_whole_rows(network) -> None:
         ({"threads": 3, "split": 7}, 7), ({}, 1),
     ):  # fmt: skip
         told: list[float] = []
-        parts, again = drawn(network, p, progress=told.append, **options)
+        by: set[int] = set()
+
+        def progress(share: float, told: list[float] = told, by: set[int] = by) -> None:
+            told.append(share)
+            by.add(threading.get_ident())
+
+        parts, again = drawn(network, p, progress=progress, **options)
+        assert (threading.get_ident() in by) == (options.get("threads", 1) == 1 or count == 1)
         assert sorted(told) == pytest.approx([(i + 1) / count for i in range(count)])
         np.testing.assert_allclose(parts, one, rtol=0, atol=1e-6)
         assert (again.pairs, again.refined, again.met) == (drawing.pairs, drawing.refined, drawing.met)
@@ -223,13 +232,15 @@ def test_what_stays_is_taken_over(network) -> None:
         frame(0.3, "#f00", 32),
         frame(-0.3, "#f00", 32),
     ]
-    costs = []
+    costs, met = [], []
     for p in frames:
         alone, _ = drawn(network, p, split=8)
         again, drawing = drawn(network, p, split=8, kept=kept)
         np.testing.assert_array_equal(again, alone)
         costs.append(drawing.pairs)
+        met.append((drawing.met, drawing.refined))
     assert costs[:2] == [whole[0], 0]
+    assert met[1] == (0, 0)
     assert 0 < costs[2] < 0.75 * whole[1]  # the square's tiles are those of before
     assert costs[3] == costs[2]
     assert 0 < costs[5] < 0.75 * costs[4]
