@@ -18,7 +18,7 @@ from scenelang.graph.lower import Memory
 from scenelang.scene.evaluate import Evaluation
 from scenelang.scene.imports import Unreadable, read_source
 from scenelang.scene.params import Defines
-from scenelang.scene.schema import Animation, Scene
+from scenelang.scene.schema import Animation, Scene, same_nodes
 from scenelang.scene.spans import SpanMap
 from scenelang.syntax import parse
 
@@ -137,7 +137,7 @@ class Clip:
         """
         from scenelang.program.compile import compile_scene
 
-        if self.reuse and self._last is not None and _same(self._last[0].scene, shot.scene):
+        if self.reuse and self._last is not None and same_nodes(self._last[0].scene, shot.scene):
             return self._last[1]
         program = compile_scene(
             shot.scene,
@@ -148,16 +148,6 @@ class Clip:
         )
         self._last = shot, program
         return program
-
-
-def _same(a: Scene, b: Scene) -> bool:
-    """Whether two frames are made of the very same nodes."""
-    return (
-        len(a.nodes) == len(b.nodes)
-        and a.canvas == b.canvas
-        and a.background == b.background
-        and all(x is y for x, y in zip(a.nodes, b.nodes, strict=True))
-    )
 
 
 def open_clip(path: str | os.PathLike[str], **options: Any) -> Clip:

@@ -12,7 +12,7 @@ from scenelang.cli import options
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from scenelang.cli.checking import Scenes
+    from scenelang.cli.checking import Frames, Scenes
     from scenelang.diagnostics.diagnostic import Diagnostic
     from scenelang.diagnostics.fixes import Settled
     from scenelang.scene.params import Defines
@@ -57,7 +57,10 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
 )
 @click.option("-q", "--quiet", is_flag=True, help="Write diagnostics and no summary.")
 @options.color
-@options.frame
+@click.option(
+    "--frame", type=click.IntRange(0), metavar="N", help="Look at one frame of the animation, from 0."
+)
+@click.option("--all-frames", is_flag=True, help="Look at all frames of the animation.")
 @options.root
 @click.pass_context
 def command(
@@ -74,7 +77,8 @@ def command(
     most: int | None,
     quiet: bool,
     color: options.Color,
-    frame: int,
+    frame: int | None,
+    all_frames: bool,
     root: str | None,
 ) -> None:
     """Report what is wrong with scenes, without drawing them.
@@ -83,6 +87,8 @@ def command(
     over), or - for standard input; with --fix its text then goes to standard output and everything else to
     standard error. CODES are codes of warnings or beginnings of them: W0501,W02.
 
+    Of an animation the first, second, middle and last frame are looked at.
+
     Exits with 0 where there are no errors, 1 where there are (or a difference, with --diff), 2 where a file
     cannot be read or written.
     """
@@ -90,7 +96,10 @@ def command(
     from scenelang.cli.diffs import show_difference
     from scenelang.cli.inputs import STDIN, Request
 
-    scenes = Scenes(Request(defines, model, root, frame), Selection(select, ignore))
+    if frame is not None and all_frames:
+        raise click.UsageError("--frame and --all-frames exclude each other.")
+    frames: Frames = "all" if all_frames else "some" if frame is None else "one"
+    scenes = Scenes(Request(defines, model, root, frame or 0), Selection(select, ignore), frames)
     unreadable = not _read(files, scenes)
     out = _Output(kind, most, quiet, color, (fixes or diff) and STDIN in scenes.sources, scenes)
     if not fixes and not diff:
@@ -109,6 +118,10 @@ def command(
         unreadable |= bool(lost)
         out.fixed(settled, "fixed", lost)
         out.write(left)
+    if all_frames and scenes.unseen:
+        click.echo(
+            f"{scenes.unseen:,} frames were left out: together they exceed the limits of one.", err=True
+        )
     ctx.exit(2 if unreadable else int(_wrong(left, strict)))
 
 

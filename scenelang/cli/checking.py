@@ -7,16 +7,19 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 from scenelang.cli.clock import Clock
 from scenelang.cli.inputs import STDIN, Request, merged, read_input, read_text, unused_defines
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import Settled, settle
 from scenelang.diagnostics.span import SourceFile
-from scenelang.passes import check_scene
-from scenelang.program.compile import find_model
+from scenelang.program.check import check_compiles, check_frames
 from scenelang.scene.params import Defines
 from scenelang.scene.unused import find_unused
+
+Frames = Literal["one", "some", "all"]
+"""Which frames of an animation are looked at: the one asked for; the first, second, middle and last; all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,16 +48,20 @@ class Scenes:
     Args:
         request: what holds for all of them.
         selection: which warnings count.
+        frames: which frames are looked at.
         sources: their texts, by the names that the user wrote.
         unread: what there is to say of those that are no text.
     """
 
     request: Request
     selection: Selection = field(default_factory=Selection)
+    frames: Frames = "some"
     sources: dict[str, SourceFile] = field(default_factory=dict)
     unread: Diagnostics = field(default_factory=Diagnostics)
     names: dict[str, str] = field(default_factory=dict)
     """The names by the files' places on the disk."""
+    unseen: int = 0
+    """How many frames that were to be looked at were not, as they exceed the limits of one scene."""
 
     def read(self, name: str) -> None:
         """Take a scene in, once under any name.
@@ -77,9 +84,11 @@ class Scenes:
     def _check(self, sources: Mapping[str, SourceFile], texts: Mapping[Path, str]) -> Diagnostics:
         # Values from outside remember which params they met, so each round needs its own.
         request = replace(self.request, defines=Defines(self.request.defines.values), texts=texts)
-        parts = [self.unread.items]
+        parts, self.unseen = [self.unread.items], 0
         for name, source in sources.items():
-            parts.append(_find(name, source, request))
+            items, unseen = _find(name, source, request, self.frames)
+            parts.append(items)
+            self.unseen += unseen
         parts.append(unused_defines(request))
         found = merged(parts)
         found.items[:] = [d for d in found.items if self.selection.keeps(d)]
@@ -110,18 +119,24 @@ def _place(name: str) -> str:
     return name if name == STDIN else os.path.realpath(name)
 
 
-def _find(name: str, source: SourceFile, request: Request) -> list[Diagnostic]:
-    """What there is to say of one scene."""
-    found = read_input(name, request, Clock(), source)
+def _find(name: str, source: SourceFile, request: Request, frames: Frames) -> tuple[list[Diagnostic], int]:
+    """What there is to say of one scene, and how many of its frames were to be looked at and were not."""
+    found, left = read_input(name, request, Clock(), source), 0
     if found.scene is not None:
-        manifest = find_model(found.scene, found.diagnostics, model=request.model, spans=found.spans)
-        if manifest is not None:
-            check_scene(found.scene, found.spans, found.diagnostics, manifest)
+        check_compiles(found.scene, found.spans, found.diagnostics, model=request.model)
+    if found.evaluation is not None and frames != "one":
+        looked, wanted = check_frames(
+            found.evaluation,
+            found.diagnostics,
+            first=found.scene,
+            model=request.model,
+            every=frames == "all",
+        )
+        left = wanted - looked
     if found.tree is not None and not found.diagnostics.errors:
-        find_unused(
-            found.tree, found.diagnostics
-        )  # a name that is misspelt where it is used is no second mistake
-    return found.diagnostics.items
+        # A name that is misspelt where it is used is no second mistake.
+        find_unused(found.tree, found.diagnostics)
+    return found.diagnostics.items, left
 
 
 def in_bytes(text: str, path: Path) -> bytes:

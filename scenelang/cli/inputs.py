@@ -11,7 +11,7 @@ from scenelang.cli.clock import Clock
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.files import note_input
-from scenelang.scene.evaluate import evaluate
+from scenelang.scene.evaluate import Evaluation
 from scenelang.scene.imports import Unreadable, decode_source, read_source
 from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
@@ -54,6 +54,7 @@ class Input:
         scene: None if it has errors.
         spans: where its nodes were written.
         diagnostics: what was found so far.
+        evaluation: runs its other frames; None for JSON.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Input:
     scene: Scene | None = None
     spans: SpanMap = field(default_factory=SpanMap)
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
+    evaluation: Evaluation | None = None
 
 
 def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
@@ -106,7 +108,7 @@ def read_input(name: str, request: Request, clock: Clock, source: SourceFile | N
         found.tree = tree = parse(source, found.diagnostics)
     folder = request.root if request.root is not None else "." if path is None else None
     with clock("evaluate"):
-        scene, spans = evaluate(
+        found.evaluation = evaluation = Evaluation(
             tree,
             diagnostics=found.diagnostics,
             defines=request.defines,
@@ -114,8 +116,10 @@ def read_input(name: str, request: Request, clock: Clock, source: SourceFile | N
             root=None if folder is None else Path(folder),
             path=path,
             frame=request.frame,
+            replays=True,
             texts=request.texts,
         )
+        scene, spans = evaluation.run(request.frame)
     return _with_scene(found, scene, spans, request)
 
 

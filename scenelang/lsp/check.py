@@ -14,11 +14,9 @@ from typing import Any, Final
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.graph.lower import Spans
 from scenelang.graph.nodes import Graph
 from scenelang.models.manifest import Manifest
-from scenelang.passes import check_scene
-from scenelang.program.compile import find_model
+from scenelang.program.check import check_compiles, check_frames
 from scenelang.scene.evaluate import Evaluation, in_file_order
 from scenelang.scene.schema import Scene
 from scenelang.scene.session import Halt
@@ -37,7 +35,7 @@ class Seen:
     """What one place had while a scene was evaluated.
 
     Args:
-        values: the first few, in order, equal ones once.
+        values: of the first frame the first few, in order, equal ones once.
         count: how many there were.
     """
 
@@ -97,16 +95,22 @@ def check(task: Task, stop: threading.Event) -> Checked:
     Raises:
         Superseded: ``stop`` was set meanwhile.
     """
-    found = Diagnostics()
+    found, frame = Diagnostics(), 0
     seen: dict[tuple[str, int, int], Seen] = {}
 
     def watch(span: Span, value: Any) -> None:
         if stop.is_set():
             raise Halt
+        if frame:
+            return
         place = seen.setdefault((span.source.name, span.start, span.end), Seen())
         place.count += 1
         if len(place.values) < MAX_SEEN and not any(value is old for old in place.values):
             place.values.append(value)
+
+    def after(stage: str, graph: Graph | None = None) -> None:
+        if stop.is_set():
+            raise Superseded
 
     evaluation = Evaluation(
         task.file,
@@ -115,27 +119,19 @@ def check(task: Task, stop: threading.Event) -> Checked:
         root=task.root,
         path=task.path,
         texts=task.texts,
+        replays=True,
         watch=watch,
     )
     scene, spans = evaluation.run(0)
-    if stop.is_set():
-        raise Superseded
+    after("evaluate")
     if not task.syntax:
         find_unused(task.file, found)
     manifest = None
     if scene is not None and not task.syntax:
-        manifest = find_model(scene, found, model=task.model, spans=spans)
-        if manifest is not None:
-            _compile(scene, spans, found, manifest, stop)
+        manifest = check_compiles(scene, spans, found, model=task.model, after=after)
+    if not task.syntax:
+        frame = 1
+        check_frames(evaluation, found, first=scene, model=task.model, after=after)
+        after("frames")
     wanted = frozenset(evaluation.wanted)
     return Checked(task.file.span.source, in_file_order(found.items), wanted, seen, scene, manifest)
-
-
-def _compile(
-    scene: Scene, spans: Spans, found: Diagnostics, manifest: Manifest, stop: threading.Event
-) -> None:
-    def after(name: str, graph: Graph) -> None:
-        if stop.is_set():
-            raise Superseded
-
-    check_scene(scene, spans, found, manifest, after)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,15 @@ from scenelang.scene.imports import Loader, Unreadable, prepare_file, read_sourc
 from scenelang.scene.misfits import report_misfits
 from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
-from scenelang.scene.session import UNBOUND, Halt, Session, Watch, deep_stack
+from scenelang.scene.session import (
+    MAX_OBJECTS,
+    MAX_STEPS,
+    UNBOUND,
+    Halt,
+    Session,
+    Watch,
+    deep_stack,
+)
 from scenelang.scene.spans import Place, SpanMap
 from scenelang.scene.statements import Body
 from scenelang.scene.unit import Unit
@@ -107,6 +116,7 @@ class Evaluation:
         self.animates = _animates(file)
         self._errors = len(diagnostics.errors)
         words = _choose(file, vocabulary(models), model, diagnostics)
+        self._steps = self._objects = 0
         self._session = session = Session(diagnostics, words, frame, fps, replays=replays and self.animates)
         session.watch = watch
         resolved = path.resolve() if path is not None else None
@@ -131,9 +141,33 @@ class Evaluation:
         self.sources = (file.span.source, *(imported.span.source for imported in loader.parsed.values()))
         """The text of the file and of all that it imports."""
 
+    @property
+    def frames(self) -> int:
+        """Number of frames of the animation, as far as the last run knows; 1 without one."""
+        animation = self._session.settings.animation
+        return 1 if animation is None else animation.frames
+
+    @property
+    def spent(self) -> bool:
+        """Whether all runs together exceed the limits of one."""
+        return self._steps > MAX_STEPS or self._objects > MAX_OBJECTS
+
+    def warn_of_zeros(self) -> None:
+        """Warn of angles that were 0 without a unit whenever they were met, and that frames may change."""
+        errors = self.diagnostics.errors
+        wrong = {d.span for d in errors} | {label.span for d in errors for label in d.labels}
+        for span in self._session.zeros.values():
+            if span not in wrong:
+                message = "0 without a unit, which another frame may change"
+                help = "any other number is an error: multiply by 1deg, 1rad or 1turn"
+                self.diagnostics.add("W0303", message, span, help=help)
+
     def run(self, frame: int) -> tuple[Scene | None, SpanMap]:
-        """Evaluate a frame; the Scene is None if anything was wrong so far, in any frame."""
-        session = self._session
+        """Evaluate a frame; the Scene is None if anything was wrong so far, in any frame.
+
+        What is found in another frame than the first has the frame's number.
+        """
+        session, before = self._session, len(self.diagnostics)
         if not self.animates and frame != 0:
             self.diagnostics.add("E0337", f"frame {frame} of a scene without animate(…)", None)
         session.restart(frame)
@@ -148,6 +182,10 @@ class Evaluation:
                         act(self._unit.root_env, out)
             except Halt:
                 pass
+        self._steps += session.steps
+        self._objects += session.objects
+        if self.animates and frame:
+            name_frame(self.diagnostics, before, frame)
         if self._body is None or len(self.diagnostics.errors) > self._errors:
             return None, session.spans
         settings = session.settings
@@ -247,6 +285,13 @@ def load_source(
     )
     diagnostics.items[start:] = in_file_order(diagnostics.items[start:])
     return (scene if len(diagnostics.errors) == before else None), spans
+
+
+def name_frame(diagnostics: Diagnostics, since: int, frame: int) -> None:
+    """Add the number of a frame to the messages of all diagnostics from index ``since`` on."""
+    for index, d in enumerate(diagnostics.items[since:], since):
+        if d.code != "E0337":  # which names it
+            diagnostics.items[index] = replace(d, message=f"{d.message} (frame {frame})")
 
 
 def in_file_order(found: list[Diagnostic]) -> list[Diagnostic]:

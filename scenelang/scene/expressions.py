@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Final, NamedTuple, TypeVar
 
 from scenelang.diagnostics.span import Span
 from scenelang.scene.scope import Env, Scope
 from scenelang.scene.session import MAX_NESTING
+from scenelang.scene.still import Needs
 from scenelang.scene.unit import Unit
 from scenelang.scene.values import POISON, Problem, Vec
 from scenelang.syntax import nodes
@@ -23,6 +24,8 @@ class Varies:
 
 VARIES: Final = Varies()
 _FOLDED_NUMBERS: Final = 64
+_ANGLES: Final = {"rotate": "angle", "hue": "angle", "sin": "x", "cos": "x", "tan": "x"}
+"""What takes an angle first, and how it calls it."""
 
 
 class Code(NamedTuple):
@@ -80,6 +83,37 @@ def prepare(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
         return _PREPARE[expr.__class__](expr, unit, scope)
     finally:
         unit.nesting -= 1
+
+
+def prepare_arguments(name: str, args: Iterable[nodes.Argument], unit: Unit, scope: Scope) -> dict[int, Code]:
+    """Prepare the arguments of one of the language's own words, by their ids."""
+    wanted, codes = _ANGLES.get(name, ""), {}
+    for index, arg in enumerate(args):
+        is_angle = wanted and (arg.name.text == wanted if arg.name else index == 0)
+        codes[id(arg)] = (_prepare_angle if is_angle else prepare)(arg.value, unit, scope)
+    return codes
+
+
+def _prepare_angle(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
+    """`prepare`, noting a 0 without a unit that may be another number in another frame."""
+    session = unit.session
+    around, session.needs = session.needs, Needs()
+    try:
+        code = prepare(expr, unit, scope)
+    finally:
+        own, session.needs = session.needs, around
+        around.on.append(own)
+    if code.value is not VARIES or not session.replays:
+        return code
+    get = code.run
+
+    def run(env: Env) -> Any:
+        value = get(env)
+        if value.__class__ is float and value == 0.0 and own.varies():
+            session.zeros[id(expr.span.source), expr.span.start, expr.span.end] = expr.span
+        return value
+
+    return Code(run)
 
 
 def folded(unit: Unit, codes: list[Code], function: Callable[..., Any], run: Run) -> Code:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from scenelang.scene.operators import binary, finite, same_unit
-from scenelang.scene.values import UNITS, Angle, Problem, RangeValue, Vec, describe, pack, unpack
+from scenelang.scene.values import UNITS, Angle, Problem, RangeValue, Vec, describe, pack, show, unpack
 
 _MASK = (1 << 64) - 1
 
@@ -23,11 +23,13 @@ class Builtin:
         params: names of its parameters; the last may be repeated if ``variadic``.
         run: its meaning; raises Problem.
         variadic: takes one or more arguments.
+        doubt: a warning about values that it takes; its operand is to blame.
     """
 
     params: tuple[str, ...]
     run: Callable[..., Any]
     variadic: bool = False
+    doubt: Callable[..., Problem | None] | None = None
 
 
 def number(value: Any, operand: int = 0) -> float:
@@ -219,6 +221,13 @@ def _hsv(h: Any, s: Any, v: Any) -> Vec:
     return Vec(colorsys.hsv_to_rgb(turns % 1.0, number(s, 1), number(v, 2)))
 
 
+def _doubt_hue(h: Any, s: Any, v: Any) -> Problem | None:
+    if h.__class__ is not float or abs(h) <= 2.0:
+        return None
+    help = f"a bare hue is in turns: write {show(h)}deg for degrees, or take % 1 where turns are meant"
+    return Problem("W0302", f"a hue of {show(h)} turns", help, operand=0)
+
+
 FUNCTIONS: Final[dict[str, Builtin]] = {
     "sin": Builtin(("x",), _of_angle(math.sin)),
     "cos": Builtin(("x",), _of_angle(math.cos)),
@@ -241,7 +250,7 @@ FUNCTIONS: Final[dict[str, Builtin]] = {
     "len": Builtin(("v",), _len),
     "rand": Builtin(("seed",), rand),
     "rgb": Builtin(("r", "g", "b"), _rgb),
-    "hsv": Builtin(("h", "s", "v"), _hsv),
+    "hsv": Builtin(("h", "s", "v"), _hsv, doubt=_doubt_hue),
 }
 
 CONSTANTS: Final[dict[str, Any]] = {

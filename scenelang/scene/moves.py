@@ -8,7 +8,7 @@ from scenelang.diagnostics.span import Span
 from scenelang.scene import spans
 from scenelang.scene.arguments import bind
 from scenelang.scene.build import Builder
-from scenelang.scene.expressions import VARIES, Code, prepare
+from scenelang.scene.expressions import VARIES, Code, prepare_arguments
 from scenelang.scene.scope import Env
 from scenelang.scene.statements import Action, Place, misplaced
 from scenelang.scene.transforms import EVEN_SCALE, GEOMETRY, TEXTURE, Spec, outside_unit, spread
@@ -21,7 +21,7 @@ def prepare_move(stmt: nodes.Call, place: Place) -> Action | None:
     """The action of a transform or a texture operation; checks that it may stand here."""
     unit, name = place.unit, stmt.name.text
     args = stmt.args or ()
-    codes = {id(arg): prepare(arg.value, unit, place.scope) for arg in args}
+    codes = prepare_arguments(name, args, unit, place.scope)
     spec = _spec(stmt, place)
     if spec is None or not _offered(stmt, place):
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from scenelang.diagnostics.diagnostic import Label
@@ -15,9 +16,10 @@ from scenelang.scene.expressions import (
     folded,
     guarded,
     prepare,
+    prepare_arguments,
     prepares,
 )
-from scenelang.scene.functions import ANIMATED, CONSTANTS, FUNCTIONS
+from scenelang.scene.functions import ANIMATED, CONSTANTS, FUNCTIONS, Builtin
 from scenelang.scene.literals import member
 from scenelang.scene.scope import Binding, Definition, Env, Scope
 from scenelang.scene.session import MAX_DEPTH, UNBOUND
@@ -184,9 +186,9 @@ def _imported(name: nodes.Name, binding: Binding, unit: Unit, scope: Scope) -> C
 
 @prepares(nodes.CallExpr)
 def _call(expr: nodes.CallExpr, unit: Unit, scope: Scope) -> Code:
-    codes = {id(arg): prepare(arg.value, unit, scope) for arg in expr.args}
     name = expr.name
     binding = lookup(name, unit, scope)
+    codes = prepare_arguments(name.text if binding is None else "", expr.args, unit, scope)
     if binding is not None:
         if binding.kind == "poison":
             return POISONED
@@ -220,12 +222,29 @@ def _call(expr: nodes.CallExpr, unit: Unit, scope: Scope) -> Code:
         ordered = found
     args = [arg for arg in ordered if arg is not None]
     inputs = [codes[id(arg)] for arg in args]
-    slow = guarded(unit, builtin.run, expr.span, tuple([arg.value for arg in args]))
+    meaning = builtin.run if builtin.doubt is None else _doubted(builtin, args, unit)
+    slow = guarded(unit, meaning, expr.span, tuple([arg.value for arg in args]))
     if len(inputs) == 1:
         get = inputs[0].run
-        return folded(unit, inputs, builtin.run, lambda env: slow(get(env)))
+        return folded(unit, inputs, meaning, lambda env: slow(get(env)))
     getters = tuple([code.run for code in inputs])
-    return folded(unit, inputs, builtin.run, lambda env: slow(*[get(env) for get in getters]))
+    return folded(unit, inputs, meaning, lambda env: slow(*[get(env) for get in getters]))
+
+
+def _doubted(builtin: Builtin, args: Sequence[nodes.Argument], unit: Unit) -> Callable[..., Any]:
+    """A function that warns of doubtful values."""
+    session = unit.session
+
+    def run(*values: Any) -> Any:
+        result = builtin.run(*values)
+        doubt = builtin.doubt(*values) if builtin.doubt else None
+        if doubt is not None and doubt.operand is not None:
+            span = args[doubt.operand].value.span
+            if not session.follows(doubt.code, span):
+                session.diagnostics.add(doubt.code, doubt.message, span, help=doubt.help)
+        return result
+
+    return run
 
 
 def _call_fn(

@@ -167,3 +167,13 @@ class Scene(Frozen):
         from scenelang.scene.data import from_json
 
         return from_json(text)
+
+
+def same_nodes(a: Scene, b: Scene) -> bool:
+    """Whether two frames are made of the very same nodes."""
+    return (
+        len(a.nodes) == len(b.nodes)
+        and a.canvas == b.canvas
+        and a.background == b.background
+        and all(x is y for x, y in zip(a.nodes, b.nodes, strict=True))
+    )

@@ -153,6 +153,8 @@ class Session:
     """What a parameter belongs to, as a key of ``given``, and its index; by its file and place."""
     given: dict[int, list[list[nodes.Argument | None]]] = field(default_factory=dict)
     """The arguments of all calls of a function or module."""
+    zeros: dict[tuple[int, int, int], Span] = field(default_factory=dict)
+    """Where an angle was a 0 without a unit that frames may change."""
     watch: Watch | None = None
 
     def restart(self, frame: int) -> None:

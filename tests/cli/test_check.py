@@ -143,6 +143,26 @@ def test_frames(folder: Folder) -> None:
     assert "E0337" in folder.run("check", name, "--frame", "10").stdout
 
 
+def test_several_frames_of_an_animation(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By default four, which is what keeps `check` from passing what `render` refuses."""
+    text = "animate(1, 40);\nsquare { rotate(u); }\nif (frame == 7) { star { scale(0 / 0); } }\n"
+    name = folder.write("a.nsg", text)
+
+    def found(*options: str) -> list[str]:
+        return folder.run("check", name, "--format", "concise", *options).stdout.splitlines()
+
+    angle = f"{name}:2:17: error[E0302] expected an angle, found a bare number (frame "
+    assert found() == [f"{angle}1)"]
+    assert found("--frame", "3") == [f"{angle}3)"]
+    assert found("--frame", "0") == []
+    division = f"{name}:3:36: error[E0304] division by zero (frame 7)"
+    assert found("--all-frames") == [f"{angle}1)", division]
+    assert folder.run("check", name, "--all-frames", "--frame", "3").exit_code == 2
+    monkeypatch.setattr("scenelang.scene.evaluate.MAX_OBJECTS", 4)
+    result = folder.run("check", name, "--all-frames")
+    assert "35 frames were left out" in result.stderr
+
+
 def test_models(folder: Folder) -> None:
     name = folder.write("a.nsg")
     assert folder.run("check", name, "--model", "shapes2d").exit_code == 0

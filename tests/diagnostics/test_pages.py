@@ -14,11 +14,10 @@ from scenelang.diagnostics.pages import AREAS, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
 from scenelang.graph import lower
 from scenelang.models.manifest import available, load_manifest
-from scenelang.passes import check_scene
-from scenelang.program.compile import find_model
+from scenelang.program.check import check_compiles, check_frames
 from scenelang.scene import functions, imports, session, settings, values
 from scenelang.scene.data import from_json
-from scenelang.scene.evaluate import load_source
+from scenelang.scene.evaluate import Evaluation, load_source
 from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
 from scenelang.scene.unused import find_unused
@@ -60,21 +59,24 @@ def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
         for name, text in (("scene.nsg", example.text), *page.files):
             (folder / name).parent.mkdir(exist_ok=True)
             (folder / name).write_text(text, "utf-8")
-        told = {"-D": [], "--frame": ["0"]}
+        told = {"-D": [], "--frame": []}
         for name, value in zip(example.options[::2], example.options[1::2], strict=True):
             told[name].append(value)
         defines = Defines(dict(item.split("=", 1) for item in told["-D"]))
         source = SourceFile("scene.nsg", example.text)
         path = folder / "scene.nsg"
-        frame = int(told["--frame"][-1])
-        scene, spans = load_source(
-            source, diagnostics=found, defines=defines, path=path, models=MODELS, frame=frame
+        tree = parse(source, found)
+        evaluation = Evaluation(
+            tree, diagnostics=found, defines=defines, path=path, models=MODELS, replays=True
         )
+        scene, spans = evaluation.run(int(told["--frame"][-1]) if told["--frame"] else 0)
         defines.report_unused(found)
         if not found.errors:
-            find_unused(parse(source, Diagnostics()), found)
-    if scene is not None and (manifest := find_model(scene, found, spans=spans)):
-        check_scene(scene, spans, found, manifest)
+            find_unused(tree, found)
+    if scene is not None:
+        check_compiles(scene, spans, found)
+    if example.language == "nsg" and not told["--frame"]:
+        check_frames(evaluation, found, first=scene)
     return list(found)
 
 
@@ -119,7 +121,7 @@ def test_a_scene_for_two_models_is_shown_where_they_part() -> None:
     source = SourceFile("scene.nsg", "square { scale(0.5); }\nsphere { scale(0.3); }\n")
     scene, spans = load_source(source, diagnostics=found, models=MODELS)
     assert scene is not None
-    assert find_model(scene, found, spans=spans) is None
+    assert check_compiles(scene, spans, found) is None
     (only,) = found
     assert only.message == "no model has both `square` and `sphere`, which `solids3d` has"
     assert only.span is not None

@@ -88,3 +88,9 @@ def test_a_buffer_without_a_file_is_a_scene_too(client: Client) -> None:
     assert found["code"] == "E0204"
     assert "did you mean 'square'?" in found["message"]
     client.close(uri)
+
+
+def test_later_frames_are_looked_at(client: Client, uri: str) -> None:
+    client.replace(uri, "animate(1, 10);\nsquare { rotate(u); }\n")
+    (found,) = client.diagnostics(uri)
+    assert found["message"].startswith("expected an angle, found a bare number (frame 1)")

@@ -28,4 +28,6 @@ CODES: dict[str, str] = {
     "E0336": "background of a model that has its own",
     "E0337": "frame outside the animation",
     "W0301": "component outside 0 to 1",
+    "W0302": "hue that looks like degrees",
+    "W0303": "angle of 0 without a unit that frames may change",
 }

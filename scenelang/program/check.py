@@ -1,0 +1,86 @@
+"""Everything that can be said of a scene before it is lifted, of some frames or all; imports no numpy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import Memory, Spans
+from scenelang.graph.nodes import Graph
+from scenelang.models.manifest import Manifest
+from scenelang.passes import check_scene
+from scenelang.program.compile import find_model
+from scenelang.scene.evaluate import Evaluation, name_frame
+from scenelang.scene.schema import Scene, same_nodes
+
+After = Callable[[str, Graph], None]
+
+
+def check_compiles(
+    scene: Scene,
+    spans: Spans | None,
+    diagnostics: Diagnostics,
+    *,
+    model: str | None = None,
+    after: After | None = None,
+    memory: Memory | None = None,
+) -> Manifest | None:
+    """Run the compiler's checks.
+
+    Args:
+        scene: a concrete scene.
+        spans: where its nodes were written, None if it did not come from text.
+        diagnostics: receives errors and warnings.
+        model: draw with this model instead of the scene's.
+        after, memory: as for `check_scene`.
+
+    Returns:
+        The manifest of the model that draws it; None where there is none.
+    """
+    manifest = find_model(scene, diagnostics, model=model, spans=spans)
+    if manifest is not None:
+        check_scene(scene, spans, diagnostics, manifest, after, memory=memory)
+    return manifest
+
+
+def check_frames(
+    evaluation: Evaluation,
+    diagnostics: Diagnostics,
+    *,
+    first: Scene | None = None,
+    model: str | None = None,
+    every: bool = False,
+    after: After | None = None,
+) -> tuple[int, int]:
+    """Look at further frames of an animation whose first frame has been run.
+
+    They share the limits of one frame: where these are met, the rest is left out.
+
+    Args:
+        evaluation: has run frame 0.
+        diagnostics: those of the evaluation; receives what frame 0 did not have, with the frame's number.
+        first: the scene of frame 0, None if it has errors.
+        model, after: as for `check_compiles`.
+        every: look at all frames, instead of the second, the middle and the last one.
+
+    Returns:
+        How many frames have been looked at, and how many were to be.
+    """
+    count, looked, last, memory = evaluation.frames, 1, first, Memory()
+    chosen = range(1, count) if every else sorted({1, count // 2, count - 1} - {0, count})
+    for frame in chosen:
+        if evaluation.spent:
+            break
+        looked += 1
+        scene, spans = evaluation.run(frame)
+        if scene is None or (last is not None and same_nodes(scene, last)):
+            continue
+        last, found = scene, Diagnostics()
+        check_compiles(scene, spans, found, model=model, after=after, memory=memory)
+        known = {d.code for d in diagnostics}
+        name_frame(found, 0, frame)
+        for d in found:
+            if d.severity == "error" or d.code not in known:
+                diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
+    evaluation.warn_of_zeros()
+    return looked, len(chosen) + 1
