@@ -1,290 +1,206 @@
-"""What people write out of habit, from other languages or other ways of laying out, told in its own words."""
+"""What people write out of habit: looking for it at a mistake, by the table of `syntax.foreign`."""
 
 from __future__ import annotations
 
 import re
+from functools import cache, cached_property
+from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
-from scenelang.syntax import mistakes
-from scenelang.syntax.automaton import fits, reach
-from scenelang.syntax.lexer import UNIT_ALIASES, UNITS
-from scenelang.syntax.spelling import FOREIGN_HEADS, word_for
-from scenelang.syntax.tables import END, tables
-from scenelang.syntax.tokens import Report, Tokens
+from scenelang.syntax.automaton import reach
+from scenelang.syntax.foreign import HABITS, Habit
+from scenelang.syntax.patterns import (
+    MOST,
+    NODES,
+    Change,
+    Columns,
+    Match,
+    block,
+    change,
+    closing,
+    find,
+    pieces,
+)
+from scenelang.syntax.repairs import FOLLOWED
+from scenelang.syntax.slips import Slips
+from scenelang.syntax.spelling import word_for
+from scenelang.syntax.tables import tables
 
-_IMPORT = re.compile(
-    r"""(?P<word>use|include|require)[ \t]*
-        (?:<(?P<angled>[^<>"'\n]+)>|"(?P<quoted>[^"\\\n]+)")[ \t]*(?:;|(?=//)|$)""",
-    re.VERBOSE,
+_FLAT: Final = frozenset(("square", "triangle", "pentagon", "star"))
+_SOLID: Final = frozenset(("sphere", "torus"))
+"""What is drawn in two and in three dimensions; the scene of a text tells which materials there are."""
+
+_MOVES: Final = frozenset(
+    ("translate", "rotate", "scale", "shear", "matrix", "twirl", "bend", "twist", "color")
+)
+_PREFIXES: Final = _MOVES | {
+    "mirror",
+    "resize",
+    "offset",
+    "multmatrix",
+    "linear_extrude",
+    "rotate_extrude",
+    "hull",
+}
+
+_INSIDE: Final = (
+    "it stands in the block: square { translate(1, 0); }, square { material flat { color(#d33); } }"
 )
 
 
-class Habits:
-    """Tells well known mistakes from others and mends their tokens.
+@cache
+def _anchor(pattern: str) -> str:
+    """What a pattern begins with: a bracket, an operand, a name or a word."""
+    head = pieces(pattern)[0]
+    if head.text in ("(", "[", "A"):
+        return head.text
+    return "name" if head.is_hole and not head.words else "word"
 
-    Args:
-        tokens: the tokens; they are edited.
-        report: takes the mistakes.
-    """
 
-    def __init__(self, tokens: Tokens, report: Report) -> None:
-        self.tokens = tokens
-        self.report = report
-        self.literals = tables().literals
+class Habits(Slips):
+    """Tells habits from other mistakes and mends their tokens."""
 
-    def _is(self, index: int, *texts: str) -> bool:
-        kinds = self.tokens.kinds
-        return index < len(kinds) and any(kinds[index] == self.literals[text] for text in texts)
+    def _foreign(self, stack: list[int], first: int, at: int) -> bool:
+        """What `HABITS` knows, or a transform before what it moves.
 
-    def _insert(self, index: int, name: str) -> None:
-        self.tokens.replace(index, 0, [tables().kind(name)])
-
-    def _head_mistake(self, states: list[int], first: int, at: int) -> bool:
-        """`for` and `if` without parentheses or braces."""
-        if self._is(at - 1, "for", "if") and not self._is(at, "("):
-            brace = self._next_brace(at)
-            if brace is None or not self._wrapped_fits(states, at, brace):
-                return False
-            mistakes.report_parentheses(self.tokens, self.report, at, brace)
-            self._insert(brace, ")")
-            self._insert(at, "(")
+        Args:
+            stack: the states before the statement.
+            first: index of its first token.
+            at: index of the token that did not fit.
+        """
+        if self._prefixed(stack, first, at):
             return True
-        if self._is(at - 1, "import") and self._bare_path(at):
-            return True
-        if at == first + 1 and self._bare_argument(states, at):
-            return True
-        if at == first + 2 and self._is(first, "fn", "module") and self._bare_parameters(states, at):
-            return True
-        wants_block = fits(states, self.literals["{"]) and not fits(states, self.literals[";"])
-        if not wants_block or not self._is(at - 1, ")", "else"):
-            return False
-        if not self._is(first, "for", "if", "module") or self._is(at, ";", "}", ")") or self._at_end(at):
-            return False
-        stop = self._end_of_statement(at)
-        few = [self.literals["{"], *self.tokens.kinds[at : min(stop, at + 4)]]
-        if reach(states.copy(), few, 0, len(few)) < len(few):
-            return False
-        bare = [(at, stop)]
-        if self._is(stop, "else") and not self._is(stop + 1, "{", "if"):
-            bare.append((stop + 1, self._end_of_statement(stop + 1)))
-        mistakes.report_braces(self.tokens, self.report, bare)
-        for first, stop in reversed(bare):
-            self._insert(stop, "}")
-            self._insert(first, "{")
-        return True
-
-    def _at_end(self, at: int) -> bool:
-        return self.tokens.kinds[at] == END
-
-    def _bare_path(self, at: int) -> bool:
-        """`import lib/parts.nsg as parts`: the path without its quotes."""
         tokens = self.tokens
-        for stop in range(at + 1, min(at + 20, len(tokens.kinds) - 1)):
-            if tokens.on_new_line(stop) or self._is(stop, ";"):
-                return False
-            if self._is(stop, "as"):
-                break
-        else:
-            return False
-        start, end = tokens.starts[at], tokens.ends[stop - 1]
-        span = Span(tokens.source, start, end)
-        fix = Fix("put quotes around it", (Edit(span, f'"{span.text}"'),))
-        self.report.add("E0126", f"expected a string, found `{span.text}`", start, end, fix=fix)
-        tokens.replace(at, stop - at, [])
-        self._insert(at, "STRING")
-        return True
-
-    def _import_of_others(self, first: int) -> bool:
-        """`use <lib.scad>`, `include "parts.nsg";`: a file without a name for it."""
-        tokens, text = self.tokens, self.tokens.source.text
-        start = tokens.starts[first]
-        line = text[start : text.find("\n", start) if "\n" in text[start:] else len(text)]
-        found = _IMPORT.match(line)
-        if found is None:
-            return False
-        path = found["angled"] or found["quoted"]
-        alias = re.sub(r"\W", "_", path.rpartition("/")[2].partition(".")[0]) or "parts"
-        alias = f"_{alias}" if alias[0].isdigit() or alias in tables().literals else alias
-        end = start + found.end()
-        written = f'import "{path}" as {alias};'
-        message = f"`{found['word']}` without a name for the file"
-        fix: Fix | None = Fix(f"write `{written}`", (Edit(Span(tokens.source, start, end), written),))
-        fix = fix if path.endswith(".nsg") else None  # the file has to be written anew
-        help = f"write {written} and use what it defines as {alias}.…"
-        self.report.add("E0126", message, start, end, help=help, fix=fix)
-        stop = first
-        while not self._at_end(stop) and tokens.starts[stop] < end:
-            tokens.reported.add(tokens.starts[stop])
-            stop += 1
-        tokens.replace(first, stop - first, [tables().kind("BAD_STATEMENT")])
-        tokens.starts[first], tokens.ends[first] = start, end
-        return True
-
-    def _bare_parameters(self, states: list[int], at: int) -> bool:
-        """`fn half x = x / 2;`: parameters without parentheses."""
-        ends = "=" if self._is(at - 2, "fn") else "{"
-        stop = at
-        while stop < at + 40 and self.tokens.kinds[stop] in (tables().kind("NAME"), self.literals[","]):
-            stop += 1
-        if stop == at or not self._is(stop, ends) or not self._wrapped_fits(states, at, stop):
-            return False
-        mistakes.report_parentheses(self.tokens, self.report, at, stop)
-        self._insert(stop, ")")
-        self._insert(at, "(")
-        return True
-
-    def _bare_argument(self, states: list[int], at: int) -> bool:
-        """`color #d33;`: a literal behind a name without parentheses."""
-        kind = tables().kind
-        if self.tokens.kinds[at - 1] != kind("NAME"):
-            return False
-        if self.tokens.kinds[at] not in (kind("NUMBER"), kind("COLOR"), self.literals["["]):
-            return False
-        for stop in range(at + 1, min(at + 40, len(self.tokens.kinds) - 1)):
-            if self._is(stop, ";"):
-                if not self._wrapped_fits(states, at, stop):
-                    return False
-                mistakes.report_parentheses(self.tokens, self.report, at, stop)
-                self._insert(stop, ")")
-                self._insert(at, "(")
-                return True
+        anchors = self._anchors(first, at)
+        for habit in HABITS:
+            for start in anchors[_anchor(habit.pattern)]:
+                match = find(habit.pattern, tokens, start)
+                new = match and change(match, habit.meant, {"material": self._materials[1] or "…"})
+                if match and new and self._reads_on(stack, first, at, match, new):
+                    self._tell(habit, match, new)
+                    return True
         return False
 
-    def _wrapped_fits(self, states: list[int], at: int, stop: int) -> bool:
-        """Whether the tokens ``[at, stop)`` are what belongs between parentheses there."""
-        kinds = self.tokens.kinds
-        # Words that stand for operators elsewhere are mended, and reported, when their turn comes.
-        signs = [(kinds[i], word_for(self.tokens.text(i))) for i in range(at, stop)]
-        meant = [self.literals[sign] if sign else kind for kind, sign in signs]
-        wrapped = [self.literals["("], *meant, self.literals[")"], kinds[stop]]
-        return reach(states.copy(), wrapped, 0, len(wrapped)) == len(wrapped)
-
-    def _next_brace(self, at: int) -> int | None:
-        """Index of the `{` that follows in this statement, None where a `)` or `;` comes first."""
-        depth = 0
-        for index in range(at, len(self.tokens.kinds) - 1):
-            if self._is(index, "{"):
-                return index if depth == 0 else None
-            if self._is(index, ";", "}"):
-                return None
-            depth += self._is(index, "(", "[") - self._is(index, ")", "]")
+    def _anchors(self, first: int, at: int) -> dict[str, list[int]]:
+        """Where a pattern may begin, by what it begins with."""
+        tokens, depth = self.tokens, 0
+        found = {"(": [], "[": [], "A": [], "name": [first], "word": [first, at - 1]}
+        for index in range(at - 1, max(first, at - MOST), -1):
+            text = tokens.text(index)
+            depth += (text in (")", "]")) - (text in ("(", "["))
+            if depth <= 0 and text in ("(", "[", ",", "=", "return") and not found["A"]:
+                found["A"] = [index + 1]
             if depth < 0:
-                return None
-        return None
+                before = tokens.text(index - 1)
+                operand = before in (")", "]") or (before.isidentifier() and before not in ("in", "return"))
+                found[text] = [] if operand else [index]
+                break
+        return found
 
-    def _end_of_statement(self, at: int) -> int:
-        """Index after the statement that begins at a token: after its `;` or its block."""
-        depth = 0
-        for index in range(at, len(self.tokens.kinds) - 1):
-            if self._is(index, "}"):
-                if depth == 0:
-                    return index
-                depth -= 1
-                if depth == 0:
-                    return index + 1
-            elif self._is(index, "{"):
-                depth += 1
-            elif depth == 0 and self._is(index, ";"):
-                return index + 1
-        return len(self.tokens.kinds) - 1
+    def _reads_on(self, stack: list[int], first: int, at: int, match: Match, new: Change) -> bool:
+        """Whether a change lets the rest of the statement read, or the head of one that it makes."""
+        if new.first > at:
+            return False
+        old = self._reach(stack, first, new.first, ([], [], []), new.first, at)
+        reached = self._reach(stack, first, new.first, new.columns, new.stop, at)
+        end = match.stop
+        while end < match.stop + FOLLOWED and not self._is(end - 1, ";", "{", "}") and not self._at_end(end):
+            end += 1
+        headed = match.parts[0][0] == "for" and reached == match.stop
+        return reached > max(old, at) and (reached >= end or headed)
 
-    def _spaced_unit(self, at: int) -> bool:
-        """`30 deg`: mend the number, drop the unit."""
+    def _reach(self, stack: list[int], first: int, begin: int, columns: Columns, stop: int, at: int) -> int:
+        """The first token after a mistake that does not fit where others stand for ``[begin, stop)``."""
+        tokens, rest = self.tokens, slice(stop, max(at, stop) + FOLLOWED)
+        parts = zip((tokens.kinds, tokens.starts, tokens.ends), columns, strict=True)
+        trial = zip(*(all_[first:begin] + its + all_[rest] for all_, its in parts), strict=True)
+        # Words that stand for operators elsewhere are mended, and reported, when their turn comes.
+        words = [(kind, word_for(tokens.source.text[start:end])) for kind, start, end in trial]
+        read = [self.literals[sign] if sign else kind for kind, sign in words]
+        return first + reach(stack.copy(), read, 0, len(read)) + (stop - begin) - len(columns[0])
+
+    def _tell(self, habit: Habit, match: Match, new: Change) -> None:
         tokens = self.tokens
-        kind = tables().kind
-        if not at or tokens.kinds[at] != kind("NAME") or tokens.kinds[at - 1] != kind("NUMBER"):
+        old = tokens.source.text[new.start : new.end]
+        fix: Fix | None = None
+        if habit.safe and "…" not in new.text and "//" not in old and "/*" not in old:
+            shown = " ".join(new.text.split())
+            shown = shown if len(shown) <= 40 else f"{shown[:37]}…"
+            words = f"write `{shown}`" if shown else "remove it"
+            fix = Fix(words, (Edit(Span(tokens.source, new.start, new.end), new.text),))
+        help = habit.help and match.told(habit.help)
+        self.report.add(habit.code, match.told(habit.message), *new.place, help=help, fix=fix)
+        for column, values in zip((tokens.kinds, tokens.starts, tokens.ends), new.columns, strict=True):
+            column[new.first : new.stop] = values
+
+    @cached_property
+    def _materials(self) -> tuple[str | None, str | None]:
+        """What an object without a material has in this text, and what the only material is, if known."""
+        words = set(re.findall(r"\w+", self.tokens.source.text))
+        flat, solid = not words.isdisjoint(_FLAT), not words.isdisjoint(_SOLID)
+        if flat == solid:
+            return None, None
+        return ("flat", "flat") if flat else ("diffuse", None)
+
+    def _prefixed(self, stack: list[int], first: int, at: int) -> bool:
+        """`translate([1, 0]) color("red") square;`: transforms before what they apply to."""
+        tokens = self.tokens
+        calls: list[tuple[int, int]] = []
+        child = first
+        while tokens.text(child) in _PREFIXES and self._is(child + 1, "(") and len(calls) < 20:
+            stop = closing(tokens, child + 1)
+            calls.append((child, stop))
+            child = stop
+        if not calls or calls[0][1] != at or tokens.text(child) in _PREFIXES:
             return False
-        word, gap = tokens.text(at), tokens.source.text[tokens.ends[at - 1] : tokens.starts[at]]
-        if word not in (*UNITS, *UNIT_ALIASES) or gap.strip(" ") or not tokens.text(at - 1)[-1:].isdigit():
+        kinds = tokens.kinds
+        if tokens.starts[child] == tokens.ends[child - 1]:
             return False
-        unit = UNIT_ALIASES.get(word, word)
-        start, end = tokens.starts[at - 1], tokens.ends[at]
-        fix = Fix(
-            f"write `{unit}` right after the number",
-            (Edit(Span(tokens.source, tokens.ends[at - 1], end), unit),),
-        )
-        self.report.add(
-            "E0117",
-            "space between a number and its unit",
-            start,
-            end,
-            help="units are glued to their number",
-            fix=fix,
-        )
-        if word in UNITS:
-            tokens.ends[at - 1] = end
-        else:
-            tokens.reported.add(start)
-        tokens.replace(at, 1, [])
+        named = kinds[child] == tables().kind("NAME")
+        if not (named or self._is(child, *NODES, "for", "if")):
+            return False
+        if reach(stack.copy(), kinds, child, child + 2) <= child + named:
+            return False
+        start, end = tokens.starts[first], tokens.ends[calls[-1][1] - 1]
+        message = f"`{tokens.text(first)}` stands before what it applies to"
+        fix = self._moved_inside(calls, child)
+        self.report.add("E0133", message, start, end, help=_INSIDE, fix=fix)
+        tokens.replace(first, child - first, [])
         return True
 
-    def _unseparated(self, states: list[int], at: int) -> bool:
-        """`[1 2 3]`: put the commas in, as one mistake."""
-        tokens = self.tokens
-        literal = {tables().kind(name) for name in ("NUMBER", "COLOR", "STRING")}
-        stop = at
-        while tokens.kinds[stop] in literal:
-            stop += 1
-        if stop < at + 2 or tokens.kinds[at - 1] not in literal or not fits(states, self.literals[","]):
-            return False
-        gaps = [tokens.ends[index - 1] for index in range(at, stop)]
-        edits = tuple(Edit(Span(tokens.source, gap, gap), ",") for gap in gaps)
-        self.report.add("E0112", "missing `,`", gaps[0], gaps[-1], fix=Fix("insert `,` between them", edits))
-        for index in reversed(range(at, stop)):
-            self._insert(index, ",")
-        return True
-
-    def _grouped_digits(self, at: int) -> bool:
-        """`let n = 1,000;`: commas in a number."""
-        tokens, number = self.tokens, tables().kind("NUMBER")
-        stop = at
-        while (
-            self._is(stop, ",")
-            and tokens.kinds[stop + 1] == number
-            and tokens.starts[at - 1] < tokens.starts[stop] == tokens.ends[stop - 1]
-            and tokens.ends[stop] == tokens.starts[stop + 1]
-            and re.fullmatch(r"[0-9]{3}", tokens.text(stop + 1))
-        ):
+    def _moved_inside(self, calls: list[tuple[int, int]], child: int) -> Fix | None:
+        """Put transforms into the block of what they stand before."""
+        tokens, text = self.tokens, self.tokens.source.text
+        stop = child + 1
+        while self._is(stop, "."):
             stop += 2
+        stop = closing(tokens, stop) if self._is(stop, "(") else stop
+        end = block(tokens, stop)
+        inside = text[tokens.starts[calls[0][0]] : tokens.ends[max(stop, end - 1)]]
+        words = [tokens.text(call) for call, _ in calls]
+        colours = words.count("color")
         if (
-            stop == at
-            or tokens.kinds[at - 1] != number
-            or not re.fullmatch("[0-9]{1,3}", tokens.text(at - 1))
+            self._is(child, "for", "if")
+            or not set(words) <= _MOVES
+            or colours > 1
+            or "//" in inside
+            or "/*" in inside
         ):
-            return False
-        start, end = tokens.starts[at - 1], tokens.ends[stop - 1]
-        text = tokens.source.text[start:end]
-        plain = text.replace(",", "")
-        fix = Fix(f"write `{plain}`", (Edit(Span(tokens.source, start, end), plain),))
-        self.report.add(
-            "E0116", f"`{text}` is not a number", start, end, help="digits are not grouped", fix=fix
+            return None
+        if colours and (self._materials[0] is None or "material" in inside):
+            return None
+        moves = [f"{text[tokens.starts[call] : tokens.ends[last - 1]]};" for call, last in reversed(calls)]
+        moves = [m if m[:5] != "color" else f"material {self._materials[0]} {{ {m} }}" for m in moves]
+        gone = Edit(Span(tokens.source, tokens.starts[calls[0][0]], tokens.starts[child]), "")
+        written = " ".join(moves)
+        if self._is(stop, ";"):
+            place = Span(tokens.source, tokens.starts[stop], tokens.ends[stop])
+            return Fix("put them into its block", (gone, Edit(place, f" {{ {written} }}")))
+        if end == stop:
+            return None
+        last = tokens.ends[end - 2]
+        place = Span(tokens.source, last, last)
+        return Fix(
+            "put them into its block", (gone, Edit(place, f" {written}{' ' * self._is(end - 2, '{')}"))
         )
-        tokens.reported.add(start)
-        tokens.ends[at - 1] = end
-        tokens.replace(at, stop - at, [])
-        return True
-
-    def _loop_of_c(self, first: int) -> bool:
-        """`for (i = 0; i < 3; i++) { … }`."""
-        tokens = self.tokens
-        name = first + 2
-        if not (self._is(first, "for") and self._is(first + 1, "(")):
-            return False
-        if self._is(first + 2, "let") or tokens.text(first + 2) in FOREIGN_HEADS:
-            name += 1
-        if not self._is(name + 1, "="):
-            return False
-        brace = next((i for i in range(name, min(name + 40, len(tokens.kinds))) if self._is(i, "{")), None)
-        if brace is None or not any(self._is(i, ";") for i in range(name, brace)):
-            return False
-        start, end = tokens.ends[first + 1], tokens.end_before(brace)
-        variable = tokens.text(name)
-        help = f"write for ({variable} in 0..<n) {{ … }}"
-        self.report.add("E0126", "`for` takes a range or a vector", start, end, help=help)
-        tokens.replace(name + 1, brace - name - 1, [])
-        for word in (")", "BAD_EXPRESSION", "in"):
-            self._insert(name + 1, word)
-        if name > first + 2:
-            tokens.replace(first + 2, 1, [])
-        return True

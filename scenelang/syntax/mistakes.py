@@ -40,15 +40,6 @@ def report_repair(tokens: Tokens, report: Report, repair: Repair, open_brackets:
         _report_replacement(tokens, report, repair, names)
 
 
-def report_parentheses(tokens: Tokens, report: Report, first: int, stop: int) -> None:
-    """Report parentheses that are missing around the tokens ``[first, stop)``."""
-    before, start, end = tokens.end_before(first), tokens.starts[first], tokens.ends[stop - 1]
-    called = tables().kinds[tokens.kinds[first - 1]] == "NAME"  # no space goes between a name and its `(`
-    opening = Edit(Span(tokens.source, before if called else start, start), "(")
-    fix = Fix("put parentheses around it", (opening, Edit(_empty(tokens, end), ")")))
-    report.add("E0107", "missing parentheses", start, end, fix=fix)
-
-
 def report_braces(tokens: Tokens, report: Report, statements: Sequence[tuple[int, int]]) -> None:
     """Report braces that are missing around statements, each the tokens ``[first, stop)``."""
     edits = []

@@ -58,7 +58,9 @@ class Recovery(Habits):
             return start
         first = self._index(values[depth]) if depth < len(values) else at
         if first < at and (
-            self._loop_of_c(first) or self._grouped_digits(at) or self._import_of_others(first)
+            self._grouped_digits(at)
+            or self._import_of_others(first)
+            or (at - first <= MAX_REPLAY and self._foreign(states[: depth + 1], first, at))
         ):
             del states[depth + 1 :], values[depth:]
             return first

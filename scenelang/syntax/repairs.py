@@ -278,8 +278,6 @@ class Search:
             yield Repair(at, 1, (self.name,), _KEYWORD_AS_NAME + (at < self.at))
         elif kind == self.name:
             yield from self._misspelt(at)
-        if kind == self.name and (operator := word_for(tokens.text(at))):
-            yield Repair(at, 1, (tables().literals[operator],), 1.0)
         cost = _DELETION
         for count in range(1, 4):
             last = at + count - 1
@@ -293,8 +291,10 @@ class Search:
             cost += _FURTHER_DELETION
 
     def _misspelt(self, at: int) -> Iterator[Repair]:
-        """A keyword with a slip."""
+        """A keyword with a slip, or an operator written as a word."""
         if self.kinds[at] == self.name:
+            if operator := word_for(self.tokens.text(at)):
+                yield Repair(at, 1, (tables().literals[operator],), _MISSPELT)
             for word in keywords_near(self.tokens.text(at)):
                 yield Repair(at, 1, (tables().literals[word],), _MISSPELT)
 

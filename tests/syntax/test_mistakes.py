@@ -53,6 +53,7 @@ ONE_LINERS: list[tuple[str, list[tuple[int, str]]]] = [
     ("f(a: 1);", [(4, "E0130")]),
     ("a let = 3;", [(1, "E0131")]),
     ('modle "shapes2d";', [(1, "E0132")]),
+    ("for (i = [0:5]) { star; }", [(6, "E0133")]),
     ("modul x() { square; }\nx();", [(1, "E0132")]),
     ("chain { square; subtrct star; }", [(17, "E0132")]),
     ("parm k = 1;\nlet z = k;", [(1, "E0132")]),

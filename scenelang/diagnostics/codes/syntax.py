@@ -33,5 +33,6 @@ CODES: dict[str, str] = {
     "E0130": "wrong punctuation",
     "E0131": "words in the wrong order",
     "E0132": "misspelt keyword",
+    "E0133": "written as in another language",
     "W0101": "stray semicolon",
 }

@@ -1,0 +1,130 @@
+"""What people write out of habit, from OpenSCAD, GLSL, JavaScript and Python, and what is written here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class Habit:
+    """One habit.
+
+    Args:
+        pattern: what is written (see `syntax.patterns`).
+        meant: what is written here. It is also read in its place, so that the rest can be checked.
+        message: the fact; names and words that the pattern has found may stand in it.
+        help: advice.
+        code: code of the diagnostic.
+        safe: whether ``meant`` is sure to mean the same, and so is a fix.
+    """
+
+    pattern: str
+    meant: str
+    message: str
+    help: str | None = None
+    code: str = "E0133"
+    safe: bool = True
+
+
+def _unsafe(pattern: str, meant: str, message: str, help: str, code: str = "E0133") -> Habit:
+    return Habit(pattern, meant, message, help, code, safe=False)
+
+
+_LOOP: Final = "`for` takes a range or a vector"
+_PASSES: Final = "write for (<i> in 0..<n) { … }"
+_BRACES: Final = "blocks stand in braces"
+_FUNCTION: Final = "a function is `fn` and one expression"
+_PARENTHESES: Final = "missing parentheses"
+_TYPES: Final = "names have no types"
+_RANGE: Final = "ranges are written with `..`"
+_ONCE: Final = "`<n>` cannot be changed"
+_ONCE_HELP: Final = "names keep their values; bind another one with let, or count with for (i in 0..<n) { … }"
+_IMPORT: Final = "functions are there without an import"
+
+HABITS: Final = (
+    # loops and conditions
+    Habit("for (<i> = [<A>:<S>:<B>])", "for (<i> in <A>..<B> step <S>)", _LOOP),
+    Habit("for (<i> = [<A>:<B>])", "for (<i> in <A>..<B>)", _LOOP),
+    Habit("for (<let|var|int?> <i> = <A>; <i> < <B>; <i>++)", "for (<i> in <A>..<<B>)", _LOOP, code="E0126"),
+    Habit("for (<let|var|int?> <i> = <A>; <i> <= <B>; <i>++)", "for (<i> in <A>..<B>)", _LOOP, code="E0126"),
+    _unsafe("for (<type> <i> = <A>; <B?>; <C?>)", "for (<i> in BAD_EXPRESSION)", _LOOP, _PASSES, "E0126"),
+    _unsafe("for (<let?> <i> = <A>; <B?>; <C?>)", "for (<i> in BAD_EXPRESSION)", _LOOP, _PASSES, "E0126"),
+    Habit("for (<let?> <i> <=|of|in> <E>)", "for (<i> in <E>)", _LOOP),
+    Habit("for <i> in <E>: <BODY>", "for (<i> in <E>) { <BODY> }", _BRACES),
+    Habit("if <E>: <BODY>", "if (<E>) { <BODY> }", _BRACES),
+    Habit("<control> <E> {", "<control> (<E>) {", _PARENTHESES, code="E0107"),
+    Habit("<A> if <C> else <B>", "<C> ? <A> : <B>", "`if` does not choose between values"),
+    # functions and modules
+    Habit("<fn> <f>(<PARAMS?>) { return <E> <;?> }", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    Habit("<type> <f>(<PARAMS?>) { return <E> <;?> }", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    Habit("<fn> <f>(<PARAMS?>): return <LINE> <;?>", "fn <f>(<PARAMS>) = <LINE>;", _FUNCTION),
+    Habit("<fn> <f>(<PARAMS?>) <=|-> > <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    _unsafe("<fn> <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, "write fn <f>(x) = x ^ 2;"),
+    _unsafe("<type> <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, "write fn <f>(x) = x ^ 2;"),
+    _unsafe(
+        "void <f>(<P?>) <BLOCK>",
+        "BAD_STATEMENT",
+        "nothing is called by itself",
+        "objects stand at top level; a piece of scene to use again is module <f>() { … }",
+    ),
+    Habit("<let> <f> = (<PARAMS?>) => <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    Habit("<let> <f> = <x> => <E>;", "fn <f>(<x>) = <E>;", _FUNCTION),
+    Habit("<let> <f> = lambda <P?>: <E>;", "fn <f>(<P>) = <E>;", _FUNCTION),
+    Habit("<let> <f> = function(<P?>) { return <E> <;?> } <;?>", "fn <f>(<P>) = <E>;", _FUNCTION),
+    Habit("<let> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    Habit("<type> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    Habit("module <f>(<P?>) = <E>;", "fn <f>(<P>) = <E>;", "`module` where `fn` belongs", code="E0130"),
+    Habit("fn <f>(<PARAMS>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _TYPES),
+    Habit("module <f>(<PARAMS>) {", "module <f>(<PARAMS>) {", _TYPES),
+    Habit("<f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", "missing `fn` before `<f>`", code="E0126"),
+    Habit("fn <f> <P> = <E>;", "fn <f>(<P>) = <E>;", _PARENTHESES, code="E0107"),
+    Habit("module <f> <P> {", "module <f>(<P>) {", _PARENTHESES, code="E0107"),
+    # names
+    Habit("const <type> <n> = <E>;", "let <n> = <E>;", _TYPES),
+    Habit("<let> <n>: <t> = <E>;", "let <n> = <E>;", _TYPES),
+    Habit("uniform <type> <n> = <E>;", "param <n> = <E>;", "it is `param` here"),
+    _unsafe(
+        "uniform <type?> <n>;",
+        "BAD_STATEMENT",
+        "`<n>` has no value",
+        "write param <n> = 0.5 in 0..1; the time is t, after animate(seconds = 2, fps = 24);",
+    ),
+    Habit("param <n> = <E> in (<A>, <B>);", "param <n> = <E> in <A>..<B>;", _RANGE),
+    Habit("<call> <=|:> (<E>);", "<call>(<E>);", "`<call>` is called, not set"),
+    Habit("<call> = <E>;", "<call>(<E>);", "`<call>` is called, not set"),
+    Habit("<call>: <E>;", "<call>(<E>);", "`<call>` is called, not set"),
+    Habit("<n> = <LINE> <;?>", "let <n> = <LINE>;", "missing `let` before `<n>`", code="E0126"),
+    Habit("<n> = <E>;", "let <n> = <E>;", "missing `let` before `<n>`", code="E0126"),
+    _unsafe("<n> <+|-|*|/|%> = <E>;", "let <n> = BAD_EXPRESSION;", _ONCE, _ONCE_HELP),
+    _unsafe("<n>++;", "let <n> = BAD_EXPRESSION;", _ONCE, _ONCE_HELP),
+    _unsafe("<n>--;", "let <n> = BAD_EXPRESSION;", _ONCE, _ONCE_HELP),
+    _unsafe("<n>[<I>] = <E>;", "let <n> = BAD_EXPRESSION;", _ONCE, _ONCE_HELP),
+    # blocks
+    Habit("<n> <VALUES>;", "<n>(<VALUES>);", _PARENTHESES, code="E0107"),
+    Habit("<node>()", "<node>", "`<node>` takes no arguments"),
+    _unsafe(
+        "smooth(<E>)", "smooth", "`smooth` takes no arguments", "it always blends over a distance of 0.15"
+    ),
+    Habit(
+        "material { <call>(",
+        "material <material> { <call>(",
+        "material without a name",
+        "a scene in 2D has `flat`, one in 3D `diffuse` and `volumetric`",
+    ),
+    Habit("material(<n>)", "material <n>", "a material's name stands without parentheses"),
+    # expressions
+    _unsafe("[for <E>]", "BAD_EXPRESSION", "vectors are not made by loops", "write the items out"),
+    _unsafe("[<E> for <F>]", "BAD_EXPRESSION", "vectors are not made by loops", "write the items out"),
+    Habit("[<A>:<S>:<B>]", "<A>..<B> step <S>", _RANGE),
+    Habit("[<A>:<B>]", "<A>..<B>", _RANGE),
+    Habit("(<A>, <E>)", "[<A>, <E>]", "vectors stand in brackets"),
+    # imports
+    Habit("import <library> <LINE?> <;?>", "", _IMPORT),
+    Habit("from <library> import <LINE> <;?>", "", _IMPORT),
+)
+"""Habits that do not parse. The first that fits, and after which more of the text reads, is taken.
+
+Those of code E0133 may depend on all of a text, others on their statement alone: an editor reads no more
+of a text again than it must.
+"""

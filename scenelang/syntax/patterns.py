@@ -1,0 +1,335 @@
+"""Patterns over tokens: what somebody wrote, and what is written here instead, each as one line of text.
+
+A pattern and its replacement are texts with holes: ``for (<i> = [<A>:<B>])`` and ``for (<i> in <A>..<B>)``.
+
+======================  ======================================================================
+``<i>``                 one name
+``<A>``                 tokens of one statement whose brackets match, up to what follows
+``<in|of>``             one of these words or signs; left out of the replacement
+``<type>``              one of the words that `WORDS` has under this name
+``<VALUES>``            the same, where the first of them is a number, a colour or a vector
+``<LINE>``              the rest of the line, or of the statement on it
+``<BODY>``              the same, or all lines below that stand further in
+``<BLOCK>``             a block with its braces
+``<PARAMS>``            parameters; the replacement has them without their types
+``…?`` before ``>``     may be missing
+======================  ======================================================================
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+from scenelang.syntax.tables import END, tables
+from scenelang.syntax.tokens import Tokens
+
+MOST: Final = 200
+"""A hole takes no more tokens; a block twenty times as many."""
+
+TYPES: Final = ("float", "int", "bool", "double", "number", "string", *(f"vec{n}" for n in "234"), "color")
+NODES: Final = ("union", "smooth", "subtract", "intersect", "chain", "group")
+WORDS: Final[Mapping[str, tuple[str, ...]]] = {
+    "type": TYPES,
+    "fn": ("fn", "function", "func", "fun", "def"),
+    "let": ("let", "var", "const"),
+    "node": NODES,
+    "call": (
+        *("translate", "rotate", "scale", "shear", "matrix", "twirl", "bend", "twist", "displace"),
+        *("color", "hue", "grayscale", "flip", "canvas", "background"),
+    ),
+    "control": ("for", "if"),
+    "library": ("math", "numpy", "random", "sys", "os", "Math"),
+}
+"""Words that a hole of this name takes."""
+
+_PIECE = re.compile(
+    r"(?P<gap>\s*)(?:<(?P<hole>[^<>\s?]+)(?P<optional>\??)>"
+    r"|(?P<text>[A-Za-z_]\w*|\.\.<(?!\w+>)|\.\.|[<>=!]=|&&|\|\||\S))"
+)
+_TYPED = re.compile(rf"\b(?:{'|'.join(TYPES)})\s+(?=[A-Za-z_])|\s*:\s*[A-Za-z_]\w*")
+
+
+Columns = tuple[list[int], list[int], list[int]]
+"""Kinds, starts and ends of tokens."""
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A hole or a literal text of a pattern.
+
+    Args:
+        text: the name of the hole, or the literal text.
+        is_hole: which of both.
+        spaced: whether a space stands before it.
+        optional: whether it may be missing.
+        words: what it takes, where that is one of some words.
+    """
+
+    text: str
+    is_hole: bool
+    spaced: bool
+    optional: bool = False
+    words: tuple[str, ...] = ()
+
+
+@cache
+def pieces(pattern: str) -> tuple[Piece, ...]:
+    """A pattern taken apart."""
+    found = []
+    for match in _PIECE.finditer(pattern):
+        hole = match["hole"]
+        choice = tuple(re.findall(r"[^|]+", hole)) if hole and not hole.isidentifier() else ()
+        words = WORDS.get(hole or "", choice)
+        text = hole or match["text"]
+        found.append(Piece(text, bool(hole), bool(match["gap"]), bool(match["optional"]), words))
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """Where the pieces of a pattern were found.
+
+    Args:
+        tokens: the tokens.
+        start, stop: the tokens that it covers.
+        parts: for each piece that is there its key and its tokens. The key of a word is its text.
+        words: the words found for those of `WORDS`.
+    """
+
+    tokens: Tokens
+    start: int
+    stop: int
+    parts: tuple[tuple[str, int, int], ...]
+    words: Mapping[str, str]
+
+    def holes(self) -> dict[str, tuple[int, int]]:
+        """The tokens of each hole."""
+        return {key: (start, stop) for key, start, stop in self.parts if key[0] == "<"}
+
+    def text(self, start: int, stop: int) -> str:
+        """The text of some tokens, with what stands between them."""
+        return self.tokens.source.text[self.tokens.starts[start] : self.tokens.ends[stop - 1]]
+
+    def told(self, words: str) -> str:
+        """Words for a report, with the names that it has in its holes."""
+        names = {key: self.text(*place) for key, place in self.holes().items() if key.islower()}
+        names |= {f"<{key}>": word for key, word in self.words.items()}
+        return re.sub("<[a-z]+>", lambda hole: names.get(hole[0], hole[0]), words)
+
+
+def find(pattern: str, tokens: Tokens, at: int) -> Match | None:
+    """The tokens from ``at`` on that a pattern describes; None where they are others."""
+    wanted = pieces(pattern)
+    parts: list[tuple[str, int, int]] = []
+    names: dict[str, str] = {}  # what stands in the holes for names
+    words: dict[str, str] = {}
+    start = at
+    for number, piece in enumerate(wanted):
+        following = next((p for p in wanted[number + 1 :] if not p.optional), None)
+        stop = _taken(piece, following, tokens, at, start)
+        if stop == at and not piece.optional:
+            return None
+        if stop > at:
+            text = tokens.text(at)
+            hole = piece.is_hole and not piece.words
+            if hole and piece.text.islower() and names.setdefault(piece.text, text) != text:
+                return None  # the same name is meant in both places
+            parts.append((f"<{piece.text}>" if hole else text, at, stop))
+            if piece.words:
+                words[piece.text] = text
+        at = stop
+    return Match(tokens, start, at, tuple(parts), words)
+
+
+def _taken(piece: Piece, following: Piece | None, tokens: Tokens, at: int, start: int) -> int:
+    """Index after the tokens that a piece takes; ``at`` where it takes none."""
+    kind = tokens.kinds[at]
+    if kind == END or (piece.text == "VALUES" and tables().kinds[kind] not in ("NUMBER", "COLOR", "[")):
+        return at
+    if not piece.is_hole or piece.words:
+        return at + (tokens.text(at) in (piece.words or (piece.text,)))
+    if piece.text.islower():
+        return at + (kind == tables().kind("NAME"))
+    if piece.text == "BLOCK":
+        return block(tokens, at)
+    if piece.text == "BODY":
+        return _body(tokens, at, start)
+    one_line = piece.text == "LINE"
+    until = following.text if following is not None and not following.is_hole else ""
+    return _run(tokens, at, until, one_line, alone=following is None and not one_line)
+
+
+def _run(tokens: Tokens, at: int, until: str, one_line: bool, alone: bool) -> int:
+    """Index after tokens whose brackets match, up to a text, or the end of the statement or line."""
+    names = tables().kinds
+    open_: list[str] = []
+    for index in range(at, min(at + MOST, len(tokens.kinds) - 1)):
+        text = names[tokens.kinds[index]]  # braces may have been put in
+        if not open_ and (
+            until in (text, tokens.text(index))
+            or (alone and text == ",")
+            or (one_line and tokens.on_new_line(index))
+        ):
+            return index
+        if text in ("{", "}", ";"):
+            return index
+        if text in ("(", "[", "?"):
+            open_.append(text)
+        elif text in (")", "]") or (text == ":" and open_ and open_[-1] == "?"):
+            while open_ and open_[-1] == "?" != text and text != ":":
+                open_.pop()
+            if not open_:
+                return index
+            open_.pop()
+    return min(at + MOST, len(tokens.kinds) - 1)
+
+
+def closing(tokens: Tokens, at: int, brackets: str = "()") -> int:
+    """Index after the bracket that closes the one at an index; ``at`` where there is none near."""
+    opening, close = (tables().literals[sign] for sign in brackets)
+    depth = 0
+    for index in range(at, min(at + 20 * MOST, len(tokens.kinds) - 1)):
+        depth += (tokens.kinds[index] == opening) - (tokens.kinds[index] == close)
+        if depth <= 0:
+            return index + (index > at)
+    return at
+
+
+def block(tokens: Tokens, at: int) -> int:
+    """Index after the block that begins at an index; ``at`` where none does."""
+    return closing(tokens, at, "{}")
+
+
+def _body(tokens: Tokens, at: int, head: int) -> int:
+    """Index after the rest of a line, or after the lines that stand further in than a head's."""
+
+    def column(index: int) -> int:
+        return tokens.starts[index] - tokens.source.text.rfind("\n", 0, tokens.starts[index])
+
+    opening, close = (tables().literals[sign] for sign in "{}")
+    level = column(head) if tokens.on_new_line(at) else None
+    depth = 0
+    for index in range(at, min(at + 20 * MOST, len(tokens.kinds) - 1)):
+        depth += (tokens.kinds[index] == opening) - (tokens.kinds[index] == close)
+        if depth < 0 or (tokens.on_new_line(index) and (level is None or column(index) <= level)):
+            return index
+    return min(at + 20 * MOST, len(tokens.kinds) - 1)
+
+
+def without_types(text: str) -> str:
+    """Parameters without the types that stand before or after their names."""
+    return _TYPED.sub("", text)
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What a replacement makes of a match, less what both have in common at their ends.
+
+    Args:
+        first, stop: the tokens that go.
+        place: where it is shown: the text that goes, with the name before it.
+        columns: kinds, starts and ends of those that come. Holes that change their order are left out.
+        start, end: the text that goes.
+        text: the text that comes.
+    """
+
+    first: int
+    stop: int
+    place: tuple[int, int]
+    columns: Columns
+    start: int
+    end: int
+    text: str
+
+
+def change(match: Match, replacement: str, extra: Mapping[str, str]) -> Change | None:
+    """What to do to a match for it to become a replacement; None where nothing would change.
+
+    Args:
+        match: where the pattern was found.
+        replacement: the pattern to make of it.
+        extra: texts of holes that the match does not have.
+    """
+    tokens, holes = match.tokens, match.holes()
+    known = {**extra, **match.words}
+    wanted = [
+        Piece(known[p.text], False, p.spaced) if p.is_hole and p.text in known else p
+        for p in pieces(replacement)
+        if not p.is_hole or p.text in known or f"<{p.text}>" in holes
+    ]
+    keys = [f"<{p.text}>" if p.is_hole else p.text for p in wanted]
+    had = [
+        "" if key == "<PARAMS>" and without_types(match.text(i, j)) != match.text(i, j) else key
+        for key, i, j in match.parts
+    ]
+    shorter = min(len(keys), len(had))
+    before = next((n for n in range(shorter) if keys[n] != had[n]), shorter)
+    behind = next((n for n in range(shorter - before) if keys[-1 - n] != had[-1 - n]), shorter - before)
+    middle, gone = wanted[before : len(wanted) - behind], match.parts[before : len(had) - behind]
+    if not middle and not gone:
+        return None
+    first = gone[0][1] if gone else (match.parts[before][1] if before < len(had) else match.stop)
+    stop = gone[-1][2] if gone else first
+    end = tokens.ends[stop - 1] if gone else tokens.starts[first]
+    touching = first > 0 and (not middle or not middle[0].spaced) and before > 0
+    start = tokens.ends[first - 1] if touching else tokens.starts[first]
+    if gone and not middle and behind and not wanted[-behind].spaced:
+        end = tokens.starts[stop]
+    texts = []
+    for number, piece in enumerate(middle):
+        text = piece.text
+        if piece.is_hole:
+            text = match.text(*holes[f"<{piece.text}>"])
+            text = without_types(text) if piece.text == "PARAMS" else text
+        texts.append(" " * (piece.spaced and number > 0) + text)
+    if not gone and behind and wanted[-behind].spaced:
+        texts.append(" ")
+    shown_end = tokens.ends[stop - 1] if gone else end
+    name = match.parts[before - 1] if before and gone and not touching else ("", first, first)
+    shown = tokens.starts[name[1] if name[0].islower() and name[0][0] == "<" else first]
+    columns = _columns(match, middle, first, stop)
+    return Change(first, stop, (shown, max(shown, shown_end)), columns, start, end, "".join(texts))
+
+
+def _columns(match: Match, middle: list[Piece], first: int, stop: int) -> Columns:
+    """The tokens of a replacement: those of holes at their places, others empty, in the order of the text."""
+    tokens, holes, language = match.tokens, match.holes(), tables()
+    kinds: list[int] = []
+    starts: list[int] = []
+    ends: list[int] = []
+    at = tokens.starts[first]
+
+    def put(kind: int, start: int, end: int) -> None:
+        kinds.append(kind)
+        starts.append(start)
+        ends.append(end)
+
+    for piece in middle:
+        place = holes.get(f"<{piece.text}>") if piece.is_hole else None
+        if place is not None and tokens.starts[place[0]] >= at:
+            for index in _untyped(tokens, place) if piece.text == "PARAMS" else range(*place):
+                put(tokens.kinds[index], tokens.starts[index], tokens.ends[index])
+            at = tokens.ends[place[1] - 1]
+        elif piece.text.startswith("BAD_"):
+            put(language.kind(piece.text), at, tokens.ends[stop - 1] if stop > first else at)
+            at = ends[-1]
+        elif piece.is_hole:
+            put(language.kind("BAD_EXPRESSION" if piece.text.isupper() else "NAME"), at, at)
+        else:
+            put(language.literals.get(piece.text, language.kind("NAME")), at, at)
+    return kinds, starts, ends
+
+
+def _untyped(tokens: Tokens, place: tuple[int, int]) -> list[int]:
+    """The tokens of parameters without those of types."""
+    name = tables().kind("NAME")
+    kept = []
+    for index in range(*place):
+        before = tokens.text(index) in TYPES and tokens.kinds[index + 1] == name
+        if not before and ":" not in (tokens.text(index), tokens.text(index - 1)):
+            kept.append(index)
+    return kept

@@ -1,0 +1,59 @@
+"""Habits of other languages: one diagnostic each, at its place, and fixes that mend."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from scenelang.diagnostics.diagnostic import Diagnostic
+from scenelang.diagnostics.fixes import settle
+from scenelang.syntax.foreign import HABITS
+from scenelang.syntax.patterns import WORDS, pieces
+from tests.scene.scene_cases import HERE, mismatch, run_text
+
+CASES = [
+    (title, *body.partition("---\n")[::2])
+    for title, _, body in (
+        case.partition("\n")
+        for case in Path(HERE, "habits.nsgs").read_text("utf-8").removeprefix("=== ").split("\n=== ")
+    )
+]
+"""The title of each habit, what is written, and what the fixes make of it: empty where there is none."""
+
+
+def without_mark(text: str) -> str:
+    return "\n".join(line.partition("//!")[0].rstrip() for line in text.split("\n"))
+
+
+def check(text: str) -> list[Diagnostic]:
+    return list(run_text(text).diagnostics)
+
+
+@pytest.mark.parametrize(("title", "text", "meant"), CASES, ids=[case[0] for case in CASES])
+def test_habit(title: str, text: str, meant: str) -> None:
+    outcome = run_text(text)
+    assert mismatch(text, outcome.diagnostics) == ""
+    bare = without_mark(text)
+    done = settle({0: bare}, lambda texts: [(0, d) for d in check(texts[0])])
+    assert done.texts[0].rstrip() == (meant or bare).rstrip()
+    assert not meant or not done.left, done.left
+
+
+def test_patterns_are_well_formed() -> None:
+    """What is written here names only what the pattern finds."""
+    for habit in HABITS:
+        found = {piece.text for piece in pieces(habit.pattern) if piece.is_hole}
+        used = {piece.text for piece in pieces(habit.meant) if piece.is_hole}
+        assert used <= found | {"material"}, habit
+        assert all(hole.isupper() or len(hole) == 1 or hole in WORDS for hole in used - {"material"}), habit
+
+
+def test_habits_next_to_each_other_are_told_apart() -> None:
+    """One after the other in one text, each is reported where it is."""
+    local = [text for _, text, _ in CASES if not re.search("let |for i|param|uniform|import", text)]
+    texts = [text for text in local if text.count("//!") == 1]
+    together = "".join(f"group {{\n{text}\n}}\n" for text in texts)
+    assert len(texts) > 20
+    assert mismatch(together, run_text(together).diagnostics) == ""
