@@ -14,16 +14,16 @@ def blade(i: int, count: int) -> nsg.Object:
     share = i / count
     angle = 6 * math.pi * math.sqrt(share)
     radius = 0.85 * math.sqrt(share)
-    colour = nsg.Color(rgb=colorsys.hsv_to_rgb(0.6 + 0.4 * share, 0.6, 0.95))
+    colour = nsg.Color(colorsys.hsv_to_rgb(0.6 + 0.4 * share, 0.6, 0.95))
     return nsg.Object(
         "star",
         transforms=(
-            nsg.Twirl(k=0.8),
-            nsg.Scale.uniform(0.03 + 0.07 * share),
+            nsg.Twirl(0.8),
+            nsg.Scale(0.03 + 0.07 * share),
             nsg.Rotate(angle=angle),
-            nsg.Translate(x=radius * math.cos(angle), y=radius * math.sin(angle)),
+            nsg.Translate(radius * math.cos(angle), radius * math.sin(angle)),
         ),
-        material=nsg.Material(name="flat", ops=(colour,)),
+        material=nsg.Material("flat", colour),
     )
 
 

@@ -17,7 +17,7 @@ from pydantic_core import ErrorDetails, PydanticSerializationError
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.files import depth_of_json
-from scenelang.scene import schema
+from scenelang.scene import schema, wording
 from scenelang.scene.json_places import Key, Value, deeper_than, follow, read_places, record_places
 from scenelang.scene.schema import Link, Object, Scene, SceneNode
 from scenelang.scene.session import MAX_NODE_DEPTH, deep_stack
@@ -207,13 +207,8 @@ def _problems(error: ValidationError, source: SourceFile, path: tuple[Key, ...] 
 
 def _problem(item: ErrorDetails, location: tuple[Key, ...], root: Value, source: SourceFile) -> Diagnostic:
     value, path = follow(root, location)
-    said, help = item["msg"].removeprefix("Value error, "), None
-    said = (said[:1].lower() + said[1:]).removeprefix("input ")
+    said, help = wording.said(item), None
     match item["type"]:
-        case "string_pattern_mismatch":
-            said = "not a possible name"
-        case "missing":
-            said = "is missing"
         case "union_tag_not_found":
             said, path = "is missing", f"{path}.kind" if path else "kind"
         case "union_tag_invalid":

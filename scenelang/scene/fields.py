@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from scenelang.scene.wording import refusal
 
 _NOT_0: dict[str, Any] = {"not": {"const": 0}}
 _NOT_000: dict[str, Any] = {"not": {"const": [0, 0, 0]}}
@@ -88,6 +90,9 @@ def _kind_is_required(schema: dict[str, Any]) -> None:
         schema["required"] = ["kind", *schema.get("required", ())]
 
 
+_SEVERAL = frozenset(("children", "nodes", "ops", "transforms"))
+
+
 class Frozen(BaseModel):
     """What all nodes of a Scene are."""
 
@@ -99,6 +104,42 @@ class Frozen(BaseModel):
         defer_build=True,
         json_schema_extra=_kind_is_required,
     )
+
+    def __init__(self, *args: Any, **data: Any) -> None:
+        """A node; its fields may go without their names, in order, and one thing may stand for a sequence.
+
+        Raises:
+            ValueError: a value that does not fit, or no field of that name.
+            TypeError: arguments that stand for no field.
+        """
+        given = self._arranged(args, data)
+        try:
+            super().__init__(**given)
+        except ValidationError as error:
+            raise refusal(type(self).__name__, error, self._names()) from None
+
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # data is validated without it
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        """What a constructor takes, in order."""
+        return [name for name in cls.model_fields if name != "kind"]
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        """Arguments by their names."""
+        names = cls._names()
+        if len(args) > len(names):
+            takes = f"at most {len(names)}: {', '.join(names)}" if names else "none"
+            raise TypeError(f"{cls.__name__}: {len(args)} arguments, where it takes {takes}")
+        for name in names[: len(args)]:
+            if name in data:
+                raise TypeError(f"{cls.__name__}: `{name}` is given twice")
+        given = {**dict(zip(names, args, strict=False)), **data}
+        for name in _SEVERAL & given.keys():
+            if isinstance(given[name], Frozen):
+                given[name] = (given[name],)
+        return given
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
         """What differs from the defaults: the code that makes it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
@@ -37,6 +37,26 @@ def singular(rows: Sequence[Sequence[float]]) -> bool:
     return abs(determinant) < 1e-14
 
 
+def _with_unit(cls: type[Frozen], args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+    """The arguments of a turn, whose angle does not go without a word on its unit."""
+    if args:
+        name = cls.__name__
+        raise TypeError(
+            f"{name}: an angle without its unit: write {name}.degrees({args[0]!r}), "
+            f"or {name}(angle={args[0]!r}) for radians"
+        )
+    return data
+
+
+def _decoded(text: str) -> tuple[float, float, float]:
+    """The colour that ``#d33`` or ``#dd3333`` is."""
+    if not re.fullmatch(r"#([0-9a-fA-F]{3}){1,2}", text):
+        raise ValueError(f"Color: {text!r} is not a colour such as '#d33' or '#dd3333'")
+    digits = text[1:] if len(text) == 7 else "".join(digit * 2 for digit in text[1:])
+    red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
+    return red, green, blue
+
+
 class Translate(Frozen):
     """A move; z is for 3D models."""
 
@@ -45,6 +65,10 @@ class Translate(Frozen):
     y: Length
     z: Length = 0.0
 
+    if TYPE_CHECKING:
+
+        def __init__(self, x: float, y: float, z: float = 0.0) -> None: ...
+
 
 class Rotate(Frozen):
     """A turn by ``angle`` radians, counter-clockwise, about ``axis`` (any length but 0)."""
@@ -52,6 +76,14 @@ class Rotate(Frozen):
     kind: Literal["rotate"] = "rotate"
     angle: Radians
     axis: Axis = (0.0, 0.0, 1.0)
+
+    if TYPE_CHECKING:
+
+        def __init__(self, *, angle: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        return _with_unit(cls, args, data)
 
     @classmethod
     def degrees(cls, angle_deg: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Rotate:
@@ -67,12 +99,24 @@ class Rotate(Frozen):
 
 
 class Scale(Frozen):
-    """Factors along the axes; z is 1 in a 2D scene unless the scale is uniform."""
+    """Factors along the axes, as in text: one alone is for all three, and z is 1 where two are given."""
 
     kind: Literal["scale"] = "scale"
     x: Factor
     y: Factor
     z: Factor
+
+    if TYPE_CHECKING:
+
+        def __init__(self, x: float, y: float | None = None, z: float | None = None) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        given = {name: value for name, value in super()._arranged(args, data).items() if value is not None}
+        if "x" in given and "z" not in given:
+            given["z"] = 1.0 if "y" in given else given["x"]
+            given.setdefault("y", given["x"])
+        return given
 
     @field_validator("x", "y", "z")
     @classmethod
@@ -94,12 +138,20 @@ class Shear(Frozen):
     axes: Literal["xy", "xz", "yx", "yz", "zx", "zy"]
     k: Finite
 
+    if TYPE_CHECKING:
+
+        def __init__(self, axes: Literal["xy", "xz", "yx", "yz", "zx", "zy"], k: float) -> None: ...
+
 
 class Matrix(Frozen):
     """A 4 x 4 affine, rows, for column vectors; the last row is 0 0 0 1."""
 
     kind: Literal["matrix"] = "matrix"
     rows: Affine
+
+    if TYPE_CHECKING:
+
+        def __init__(self, rows: Sequence[Sequence[float]]) -> None: ...
 
     @field_validator("rows")
     @classmethod
@@ -117,12 +169,20 @@ class Twirl(Frozen):
     kind: Literal["twirl"] = "twirl"
     k: Rate
 
+    if TYPE_CHECKING:
+
+        def __init__(self, k: float) -> None: ...
+
 
 class Bend(Frozen):
     """A turn that grows along x."""
 
     kind: Literal["bend"] = "bend"
     k: Rate
+
+    if TYPE_CHECKING:
+
+        def __init__(self, k: float) -> None: ...
 
 
 class Twist(Frozen):
@@ -131,6 +191,10 @@ class Twist(Frozen):
     kind: Literal["twist"] = "twist"
     k: Rate
 
+    if TYPE_CHECKING:
+
+        def __init__(self, k: float) -> None: ...
+
 
 class Displace(Frozen):
     """Adds ``amount`` sin(f x) sin(f y) sin(f z) to the distance, f being ``frequency``; for 3D models."""
@@ -138,6 +202,10 @@ class Displace(Frozen):
     kind: Literal["displace"] = "displace"
     amount: Length
     frequency: Annotated[Finite, Field(description="radians per world unit")]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, amount: float, frequency: float) -> None: ...
 
 
 Transform = Annotated[
@@ -159,14 +227,19 @@ class Color(Frozen):
     kind: Literal["color"] = "color"
     rgb: Rgb
 
+    if TYPE_CHECKING:
+
+        def __init__(self, rgb: str | tuple[float, float, float]) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        given = super()._arranged(args, data)
+        return {**given, "rgb": _decoded(given["rgb"])} if isinstance(given.get("rgb"), str) else given
+
     @classmethod
     def hex(cls, text: str) -> Color:
         """A colour as text writes it: ``#d33`` or ``#dd3333``."""
-        if not re.fullmatch(r"#([0-9a-fA-F]{3}){1,2}", text):
-            raise ValueError(f"{text!r} is no colour such as '#d33' or '#dd3333'")
-        digits = text[1:] if len(text) == 7 else "".join(digit * 2 for digit in text[1:])
-        red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
-        return cls(rgb=(red, green, blue))
+        return cls(text)
 
 
 class Grayscale(Frozen):
@@ -175,12 +248,29 @@ class Grayscale(Frozen):
     kind: Literal["grayscale"] = "grayscale"
     amount: Annotated[Finite, Field(description="0 keeps the colour, 1 is grey")]
 
+    if TYPE_CHECKING:
+
+        def __init__(self, amount: float) -> None: ...
+
 
 class Hue(Frozen):
     """An HSV hue shift by ``angle`` radians."""
 
     kind: Literal["hue"] = "hue"
     angle: Radians
+
+    if TYPE_CHECKING:
+
+        def __init__(self, *, angle: float) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        return _with_unit(cls, args, data)
+
+    @classmethod
+    def degrees(cls, angle_deg: float) -> Hue:
+        """A shift by ``angle_deg`` degrees."""
+        return cls(angle=math.radians(angle_deg))
 
 
 MaterialOp = Annotated[

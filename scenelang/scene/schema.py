@@ -6,7 +6,8 @@ live here: the evaluator returns a `SpanMap` beside the Scene, keyed by `id()` o
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
 
 from pydantic import Field, field_validator, model_validator
 
@@ -38,9 +39,9 @@ class Material(Frozen):
     name: Annotated[Word, Field(description="a material of the model")]
     ops: Annotated[tuple[MaterialOp, ...], Field(description="in order, nearest the leaf first")] = ()
 
-    def __init__(self, name: str | None = None, /, **data: Any) -> None:
-        """A material; its name may be given alone: ``Material("flat", ops=…)``."""
-        super().__init__(**(data if name is None else {"name": name, **data}))
+    if TYPE_CHECKING:
+
+        def __init__(self, name: str, ops: Iterable[MaterialOp] | MaterialOp = ()) -> None: ...
 
 
 class Object(Frozen):
@@ -51,9 +52,14 @@ class Object(Frozen):
     transforms: Transforms = ()
     material: Material | None = None
 
-    def __init__(self, geometry: str | None = None, /, **data: Any) -> None:
-        """An object; its geometry may be given without its name: ``Object("star")``."""
-        super().__init__(**(data if geometry is None else {"geometry": geometry, **data}))
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            geometry: str,
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
 
 
 class Group(Frozen):
@@ -63,6 +69,15 @@ class Group(Frozen):
     children: tuple[SceneNode, ...] = ()
     transforms: Transforms = ()
     material: Material | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            children: Iterable[SceneNode] | SceneNode = (),
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
 
 
 class Boolean(Frozen):
@@ -74,12 +89,30 @@ class Boolean(Frozen):
     transforms: Transforms = ()
     material: Material | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            op: Combine,
+            children: Iterable[SceneNode] | SceneNode = (),
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
+
 
 class Link(Frozen):
     """One child of a chain with the word that joins it to what came before (first: union)."""
 
     op: Combine = "union"
     node: SceneNode
+
+    if TYPE_CHECKING:
+
+        @overload
+        def __init__(self, op: Combine, node: SceneNode) -> None: ...
+        @overload
+        def __init__(self, *, op: Combine = "union", node: SceneNode) -> None: ...
+        def __init__(self, *args: Any, **data: Any) -> None: ...
 
 
 class Chain(Frozen):
@@ -89,6 +122,26 @@ class Chain(Frozen):
     children: Annotated[tuple[Link, ...], Field(json_schema_extra=first_joins_by_union)] = ()
     transforms: Transforms = ()
     material: Material | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            children: Iterable[Link | SceneNode] | SceneNode = (),
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        """A child without a word is joined by union."""
+        given = super()._arranged(args, data)
+        if isinstance(given.get("children"), list | tuple):
+            nodes = (Object, Group, Boolean, Chain)
+            given["children"] = tuple(
+                Link("union", child) if isinstance(child, nodes) else child for child in given["children"]
+            )
+        return given
 
     @field_validator("children")
     @classmethod
@@ -107,6 +160,10 @@ class Animation(Frozen):
     seconds: Annotated[Finite, Field(gt=0)]
     fps: Annotated[Finite, Field(gt=0, description="frames per second")]
     loop: Annotated[bool, Field(strict=True, description="the last frame is followed by the first")] = True
+
+    if TYPE_CHECKING:
+
+        def __init__(self, seconds: float, fps: float, loop: bool = True) -> None: ...
 
     @model_validator(mode="after")
     def _is_bounded(self) -> Animation:
@@ -138,6 +195,25 @@ class Scene(Frozen):
         Animation | None, Field(description="the animation that this Scene is one frame of")
     ] = None
     nodes: Annotated[tuple[SceneNode, ...], Field(description="a union, the last on top")] = ()
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            version: Literal[1] = 1,
+            model: str | None = None,
+            canvas: tuple[int, int] = (256, 256),
+            background: tuple[float, float, float] | None = (1.0, 1.0, 1.0),
+            animation: Animation | None = None,
+            nodes: Iterable[SceneNode] | SceneNode = (),
+        ) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        if args:
+            raise TypeError(f"Scene takes its arguments by name: {', '.join(cls._names())}")
+        return super()._arranged(args, data)
 
     def to_nsg(self) -> str:
         """Canonical text that evaluates back to an equal Scene."""

@@ -107,36 +107,36 @@ def _step(step: Transform | MaterialOp) -> _Code:
     """A transform or a texture operation."""
     match step.kind:
         case "translate":
-            z = (f"z={number(step.z)}",) if number(step.z) != "0" else ()
-            return _Call("nsg.Translate", (f"x={number(step.x)}", f"y={number(step.y)}", *z))
+            z = (number(step.z),) if number(step.z) != "0" else ()
+            return _Call("nsg.Translate", (number(step.x), number(step.y), *z))
         case "rotate":
             head, turn = _angle(step.angle)
             axis = () if repr(step.axis) == "(0.0, 0.0, 1.0)" else (_numbers("axis=", step.axis),)
             return _Call(f"nsg.Rotate{head}", (turn, *axis))
         case "scale":
             if step.x == step.y == step.z:
-                return _Call("nsg.Scale.uniform", (number(step.x),))
-            return _Call("nsg.Scale", tuple(f"{axis}={number(getattr(step, axis))}" for axis in "xyz"))
+                return _Call("nsg.Scale", (number(step.x),))
+            z = (number(step.z),) if step.z != 1.0 else ()
+            return _Call("nsg.Scale", (number(step.x), number(step.y), *z))
         case "shear":
-            return _Call("nsg.Shear", (f'axes="{step.axes}"', f"k={number(step.k)}"))
+            return _Call("nsg.Shear", (f'"{step.axes}"', number(step.k)))
         case "matrix":
-            return _Call("nsg.Matrix", (_tuple("rows=", [_numbers("", row) for row in step.rows]),))
+            return _Call("nsg.Matrix", (_tuple("", [_numbers("", row) for row in step.rows]),))
         case "displace":
-            size = (f"amount={number(step.amount)}", f"frequency={number(step.frequency)}")
-            return _Call("nsg.Displace", size)
+            return _Call("nsg.Displace", (number(step.amount), number(step.frequency)))
         case "flip":
             return _Call("nsg.Flip", ())
         case "color":
             written = hex_colour(step.rgb)
             if written is not None:
-                return _Call("nsg.Color.hex", (f'"{written}"',))
-            return _Call("nsg.Color", (_numbers("rgb=", step.rgb),))
+                return _Call("nsg.Color", (f'"{written}"',))
+            return _Call("nsg.Color", (_numbers("", step.rgb),))
         case "grayscale":
-            return _Call("nsg.Grayscale", (f"amount={number(step.amount)}",))
+            return _Call("nsg.Grayscale", (number(step.amount),))
         case "hue":
             return _Call("nsg.Hue", (f"angle={number(step.angle)}",))
         case _:
-            return _Call(f"nsg.{type(step).__name__}", (f"k={number(step.k)}",))
+            return _Call(f"nsg.{type(step).__name__}", (number(step.k),))
 
 
 def _angle(rad: float) -> tuple[str, str]:

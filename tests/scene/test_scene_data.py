@@ -121,7 +121,7 @@ def test_python_building_checks() -> None:
         lambda: nsg.Scene(canvas=(0, 1)),
         lambda: nsg.Scene(model='a"b'),
     ):
-        with pytest.raises(ValueError, match="validation error"):
+        with pytest.raises(ValueError, match=r"^[A-Z][a-z]+: "):
             wrong()
     with pytest.raises(ValueError, match="frozen"):
         nsg.Object("a").geometry = "b"

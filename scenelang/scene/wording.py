@@ -1,0 +1,71 @@
+"""What pydantic finds wrong, in the words of this language."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Any, Final
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+_MOST: Final = 3  # mistakes that one exception tells
+_WIDTH: Final = 40  # characters of a value that are shown
+_KINDS: Final = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "tuple_type": "a sequence",
+    "model_attributes_type": "what stands there",
+    "model_type": "what stands there",
+}
+
+
+def said(item: ErrorDetails) -> str:
+    """A mistake's message as it stands after the name of its place and a colon."""
+    match item["type"]:
+        case "string_pattern_mismatch":
+            return "not a possible name"
+        case "missing":
+            return "is missing"
+    words = item["msg"].removeprefix("Value error, ")
+    return (words[:1].lower() + words[1:]).removeprefix("input ")
+
+
+def refusal(name: str, error: ValidationError, known: list[str]) -> ValueError:
+    """What a constructor raises.
+
+    Args:
+        name: the class.
+        error: what is wrong with its arguments.
+        known: the names of its arguments.
+    """
+    found = error.errors(include_url=False)
+    lines = [_line(item, known) for item in found[:_MOST]]
+    more = f"; and {len(found) - _MOST} more" if len(found) > _MOST else ""
+    return ValueError(f"{name}: {'; '.join(lines)}{more}")
+
+
+def _line(item: ErrorDetails, known: list[str]) -> str:
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")
+    kind, value = item["type"], item["input"]
+    if kind == "extra_forbidden":
+        near = get_close_matches(path, known, 1)
+        return f"there is no `{path}`, " + (
+            f"did you mean `{near[0]}`?" if near else f"only {', '.join(known)}"
+        )
+    if kind == "missing":
+        return f"`{path}` is missing"
+    if kind == "union_tag_invalid":
+        wanted = item["ctx"]["expected_tags"].replace("'", "")
+        return f"`{path}` is a {_shown(value)}; it may be {wanted}"
+    if kind in _KINDS:
+        return f"`{path}` is {_shown(value)}, not {_KINDS[kind]}"
+    return f"`{path}`: {said(item)}" if path else said(item)
+
+
+def _shown(value: Any) -> str:
+    if hasattr(value, "kind"):
+        return type(value).__name__
+    text = repr(value)
+    return text if len(text) <= _WIDTH else f"{text[: _WIDTH - 1]}…"
