@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from scenelang.lab.experiments.runs import EXPERIMENTS as RUNNABLE
 from scenelang.lab.experiments.tables import markdown, table_of
 
 HERE = Path(__file__).parent
@@ -65,9 +66,12 @@ def experiment(name: str) -> Callable[[], str]:
             return "*Not measured yet.*"
         found = json.loads(path.read_text())
         scenes, side = found["runs"][0]["scenes"], found["runs"][0]["resolution"]
+        seconds = found["budget_s"]
+        command = f"{seconds:g} s of processor time each"  # of an experiment that is no longer run
+        if name in RUNNABLE:
+            command = f"`scenelang lab experiment {name} --budget {seconds / 60:g}`"
         said = (
-            f"`scenelang lab experiment {name} --budget {found['budget_s'] / 60:g}`: "
-            f"{scenes} scenes at {side}², seed {found['seed']}, {found['device']}, "
+            f"{command}: {scenes} scenes at {side}², seed {found['seed']}, {found['device']}, "
             f"{found['threads']} thread, torch {found['torch']}, revision `{found['revision'][:8]}`"
         )
         return f"{table_of(found)}\n\n{said}"

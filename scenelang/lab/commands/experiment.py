@@ -50,14 +50,13 @@ def command(
 ) -> None:
     """Train several renderers and liftings for the same time each and measure them alike.
 
-    NAME is one or more of overfit, compare, table1, table2, table3, table4, losses, seeds, parts, or all.
+    NAME is one or more of overfit, compare, table1, table2, table3, table4, seeds, parts, or all.
     """
     need_metrics()
     import torch
 
     from scenelang.backend.neural import choose_device, keep_memory
     from scenelang.lab.experiments.experiment import Settings, run_experiment
-    from scenelang.lab.experiments.lpips import LpipsError
     from scenelang.lab.experiments.runs import EXPERIMENTS
 
     wanted = list(EXPERIMENTS) if "all" in names else list(dict.fromkeys(names))
@@ -72,11 +71,6 @@ def command(
             found = run_experiment(name, 60 * budget, seed, settings, _report)
         except ValueError as error:
             raise click.UsageError(f"{error}; choose another folder or the same budget") from None
-        except LpipsError as error:
-            if names == (name,):
-                raise click.UsageError(str(error)) from None
-            click.echo(f"{name} left out: {error}", err=True)
-            continue
         write_json(out / f"{name}.json", found)
         for run in found["runs"]:
             click.echo(

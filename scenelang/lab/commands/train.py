@@ -57,15 +57,7 @@ def _train(file: StudentFile, out: Path, budget_s: float, device: str, every: in
     from scenelang.lab.designs.studies import Study
 
     config = file.study
-    perceptual = None
-    if config.perceptual:
-        from scenelang.lab.experiments.lpips import LpipsError, load_lpips
-
-        try:
-            perceptual = load_lpips("alexnet").to(device)
-        except LpipsError as error:
-            raise ValueError(str(error)) from None
-    study = Study(config, out, device, perceptual)
+    study = Study(config, out, device)
     reached = f"{study.progress.seconds:.0f} of {config.seconds:g} s of processor time"
     begin(file.model, reached, study.progress.step, device, out)
     total = 0.0

@@ -1,9 +1,9 @@
 """Training any student on pictures for a stated budget of processor time.
 
-Each renderer is trained the way it asks for. `streaming` sees whole exact pictures and the paper's loss: a
-Gaussian negative log likelihood whose standard deviation is annealed, plus a perceptual loss where one is
-given; it may grow, resolution by resolution (Table 3 of the paper's supplement; Karras et al. 2018).
-`reading` answers random points of many scenes, by squared and absolute error against one exact sample each.
+Each renderer is trained the way it asks for. `streaming` sees whole exact pictures and the paper's loss, a
+Gaussian negative log likelihood whose standard deviation is annealed; it may grow, resolution by resolution
+(Table 3 of the paper's supplement; Karras et al. 2018). `reading` answers random points of many scenes, by
+squared and absolute error against one exact sample each.
 `framed` is asked for coverage, distance and colour at points (`losses.py`); where its frames are exact it
 learns the leaves alone first, then every step by itself, then whole streams.
 
@@ -16,7 +16,7 @@ import copy
 import json
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -68,7 +68,6 @@ class StudyConfig:
         scenes: scenes B of a batch.
         points: points P of a scene, for renderers that answer points.
         grow: train at 4 x 4 first and double; else at the last resolution alone.
-        perceptual: weight of the perceptual loss.
         fixed: train on this many fixed scenes; 0 draws new ones for every batch.
         seed: of parameters and scenes.
         data: distribution of the scenes.
@@ -83,7 +82,6 @@ class StudyConfig:
     scenes: int = 16
     points: int = 64
     grow: bool = True
-    perceptual: float = 0.0
     fixed: int = 0
     seed: int = 1
     data: PictureConfig = field(default_factory=PictureConfig)
@@ -146,7 +144,6 @@ class Study:
         config: what to train.
         folder: gets ``checkpoint.safetensors``; None keeps nothing.
         device: torch device.
-        perceptual: distance of two batches of pictures (B, 3, R, R) in [0, 1], for `config.perceptual`.
     """
 
     def __init__(
@@ -154,12 +151,9 @@ class Study:
         config: StudyConfig,
         folder: Path | None = None,
         device: str = "cpu",
-        perceptual: Callable[[Tensor, Tensor], Tensor] | None = None,
     ) -> None:
-        if config.perceptual and perceptual is None:
-            raise ValueError("a perceptual loss is asked for and none is given")
         torch.manual_seed(config.seed)
-        self.config, self.folder, self.perceptual = config, folder, perceptual
+        self.config, self.folder = config, folder
         self.student: Student = make_student(config.student, grown=config.grow).to(device)
         if isinstance(self.student, StreamingStudent):
             self.student.renderer.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
@@ -229,10 +223,8 @@ class Study:
         target = pictures(scenes, r)
         found = self.student.image(scenes, r, blend)
         sigma = SIGMA[0] * (SIGMA[1] / SIGMA[0]) ** share
-        loss = (found - target).square().mean() / (2 * sigma**2) + math.log(sigma)
-        if self.perceptual is not None and config.perceptual:
-            loss = loss + config.perceptual * self.perceptual(found, target)
-        return loss
+        likelihood: Tensor = (found - target).square().mean() / (2 * sigma**2) + math.log(sigma)
+        return likelihood
 
     def _framed_loss(self, student: FramedStudent, scenes: Scenes, share: float) -> Tensor:
         p = self.config.points

@@ -81,18 +81,6 @@ def _table1(plt: Any, found: Result) -> Any:
     return figure
 
 
-def _seeds(plt: Any, found: Result) -> Any:
-    """Each seed a dot."""
-    figure, axis = plt.subplots(figsize=(6.4, 3.2))
-    names = list(dict.fromkeys(run["name"] for run in found["runs"]))
-    for at, name in enumerate(names):
-        values = [run["psnr"]["mean"] for run in found["runs"] if run["name"] == name]
-        axis.plot([at] * len(values), values, "o", color=INK)
-    axis.set_xticks(range(len(names)), names)
-    axis.set_xlim(-0.5, len(names) - 0.5)
-    return _finish(figure, axis, "", legend=False)
-
-
 def _bars(plt: Any, found: Result) -> Any:
     """A bar a run, the worst scene as a dot."""
     runs = found["runs"]
@@ -109,17 +97,16 @@ def _bars(plt: Any, found: Result) -> Any:
     return figure
 
 
-def _finish(figure: Any, axis: Any, title: str, legend: bool = True) -> Any:
+def _finish(figure: Any, axis: Any, title: str) -> Any:
     axis.set_ylabel("PSNR, dB")
     axis.grid(axis="y", color=FAINT, linewidth=0.5)
     if title:
         axis.set_title(title, fontsize=9, color=INK)
-    if legend:
-        axis.legend(fontsize=7.5, frameon=False)
+    axis.legend(fontsize=7.5, frameon=False)
     return figure
 
 
-_DRAWN = {"compare": _compare, "table1": _table1, "seeds": _seeds}
+_DRAWN = {"compare": _compare, "table1": _table1}
 
 
 def strips(found: Result, folder: Path) -> Image:

@@ -23,9 +23,10 @@ from scenelang.files import write_whole
 from scenelang.image import Image
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, pictures, random_scenes
 from scenelang.lab.designs.students import Student
-from scenelang.lab.designs.studies import Study, StudyConfig
+from scenelang.lab.designs.studies import Study
 from scenelang.lab.experiments.runs import EXPERIMENTS, Run
 from scenelang.measure.metrics import MOST_DB, measure
+from scenelang.measure.scenes import spread
 from scenelang.renderers.field import SMOOTH
 from scenelang.training.loop import revision
 
@@ -101,9 +102,7 @@ def white(side: int, settings: Settings) -> dict[str, Any]:
 def run_one(run: Run, settings: Settings, report: Report | None = None) -> dict[str, Any]:
     """Train one run, or what is left of it, and measure it."""
     config = run.study
-    study = Study(
-        config, settings.folder / "runs" / run.folder, settings.device, _perceptual(config, settings)
-    )
+    study = Study(config, settings.folder / "runs" / run.folder, settings.device)
     finite, due = True, 0.0
     for progress in study.run():
         finite = finite and math.isfinite(progress.loss)
@@ -134,14 +133,6 @@ def run_one(run: Run, settings: Settings, report: Report | None = None) -> dict[
         **figures,
         "strip": _strips(run, shown, exact, settings.folder),
     }
-
-
-def _perceptual(config: StudyConfig, settings: Settings) -> Callable[[Tensor, Tensor], Tensor] | None:
-    if not config.perceptual:
-        return None
-    from scenelang.lab.experiments.lpips import load_lpips
-
-    return load_lpips("alexnet").to(settings.device)
 
 
 def _measured(run: Run, study: Study, count: int, r: int, settings: Settings) -> tuple[Scenes, Tensor]:
@@ -194,15 +185,10 @@ def _figures(shown: Tensor, exact: Tensor) -> dict[str, Any]:
         # a network that came to nothing draws what is not a number; its picture is grey
         a, b = (v.nan_to_num(0.5).permute(1, 2, 0).numpy() for v in (one, other))
         cases.append(measure(a, b))
-    out: dict[str, Any] = {}
-    for metric in ("psnr", "ssim", "flip"):
-        values = np.array([case[metric] for case in cases])
-        tail, worst = (95, values.max()) if metric == "flip" else (5, values.min())
-        out[metric] = {
-            "mean": round(float(values.mean()), 4),
-            f"p{tail}": round(float(np.percentile(values, tail)), 4),
-            "worst": round(float(worst), 4),
-        }
+    out: dict[str, Any] = {
+        metric: spread([case[metric] for case in cases], bad_end)
+        for metric, bad_end in (("psnr", 5), ("ssim", 5), ("flip", 95))
+    }
     out["lpips"] = _lpips(shown, exact)
     return out
 
@@ -227,7 +213,7 @@ def _lpips(shown: Tensor, exact: Tensor) -> dict[str, float] | None:
 def _vgg() -> Lpips:
     from scenelang.lab.experiments.lpips import load_lpips
 
-    return load_lpips("vgg16")
+    return load_lpips()
 
 
 def _strips(run: Run, shown: Tensor, exact: Tensor, folder: Path) -> str:

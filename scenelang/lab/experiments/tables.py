@@ -46,7 +46,7 @@ EFFORT = ("processor time", "steps", "parameters")
 
 
 def plain(found: Result) -> str:
-    """A line a run: overfit, losses, table 3, seeds, parts."""
+    """A line a run."""
     rows = [[run["name"], run["group"], *_effort(run), *figures(run)] for run in found["runs"]]
     if "white" in found and not any(run["config"]["fixed"] for run in found["runs"]):
         rows.append([NOTHING, "", "–", "–", "–", *figures(found["white"])])
