@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from scenelang.diagnostics.cells import LONGEST, Canvas, in_cells, left_out, paint, window
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import SourceFile
@@ -66,7 +68,8 @@ def _inserted(
     start = edits[0].span.start - edits[0].span.locate()[0][1] + 1
     skipped = left_out(old, edits[0].span.start - start)
     start, old = start + skipped, old[skipped : skipped + LONGEST]
-    new, marks = "", []
+    new = ""
+    marks: list[tuple[int, int]] = []
     for edit in edits:
         cut = edit.span.start - start
         if cut > len(old) and marks:
@@ -121,7 +124,7 @@ def _changed(
     return rows
 
 
-def _shown(text: str, at: int, width: int) -> list[str]:
+def _shown(text: str, at: int, width: int) -> Sequence[str]:
     """The beginning of a line, or of a very long one what is near offset ``at``."""
     cut = left_out(text, at)
     line = in_cells(text[cut : cut + LONGEST])
