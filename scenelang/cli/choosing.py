@@ -14,24 +14,8 @@ if TYPE_CHECKING:
 
     from scenelang.backend.render import Samples
     from scenelang.measure.choose import Choice, Offer
-    from scenelang.measure.frontier import Frontier, Point
+    from scenelang.measure.frontier import Frontier, Limits, Point
     from scenelang.program.program import Program
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What a picture may take; None for no limit.
-
-    Args:
-        ms: most milliseconds of a frame.
-        flip: most mean FLIP.
-    """
-
-    ms: float | None
-    flip: float | None
-
-    def __bool__(self) -> bool:
-        return self.ms is not None or self.flip is not None
 
 
 def check_options(ctx: click.Context, limits: Limits, device: str) -> None:
@@ -109,12 +93,12 @@ class Chooser:
 
     def _chosen(self, frontier: Frontier, job: Job, program: Program) -> tuple[Choice, Program]:
         """The best choice whose model draws the scene without further warnings, and its Program."""
-        from scenelang.measure.choose import Wanted, choose
+        from scenelang.measure.choose import choose
 
         refused: dict[str, str] = {}
         found = list(self._offers(frontier, job, program, refused))
         while True:
-            choice = choose(found, Wanted(self.limits.ms, self.limits.flip), refused)
+            choice = choose(found, self.limits, refused)
             point = choice.offer.point
             compiled = _compiled(job, program, point)
             if not isinstance(compiled, str):

@@ -12,8 +12,8 @@ from scenelang.cli.jobs import Job
 
 if TYPE_CHECKING:
     from scenelang.backend.render import Samples
-    from scenelang.cli.choosing import Limits
     from scenelang.image import Image
+    from scenelang.measure.frontier import Limits
 
 Draw = Callable[[Job, Callable[[float], None]], "Image"]
 

@@ -13,6 +13,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic, SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.graph.nodes import Graph, Leaf
 from scenelang.graph.walk import nodes
+from scenelang.models.choose import why_chosen
 from scenelang.program.compile import compile_scene
 
 if TYPE_CHECKING:
@@ -84,19 +85,12 @@ def prepare(
                     model=request.model,
                     after=passes.after if verbose else None,
                 )
-            job.notes = [*program_notes(job.program, _why(found, request)), *passes.lines]
+            why = why_chosen(found.scene, request.model is not None)
+            job.notes = [*program_notes(job.program, why), *passes.lines]
         except SceneError:
             pass  # its diagnostics are the input's
     job.diagnostics = found.diagnostics.items
     return job
-
-
-def _why(found: Input, request: Request) -> str:
-    """Why a scene is drawn with its model."""
-    if request.model is not None:
-        return "by --model"
-    named = found.scene is not None and found.scene.model is not None
-    return "named by the scene" if named else "the smallest that has all it uses"
 
 
 def _stored(name: str, request: Request, clock: Clock) -> Job:

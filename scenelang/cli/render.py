@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from scenelang.animation.targets import Target
     from scenelang.backend.render import Samples
     from scenelang.cli.animation import Wanted
-    from scenelang.cli.choosing import Limits
     from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import Job
     from scenelang.diagnostics.span import SourceFile
     from scenelang.image import Image
+    from scenelang.measure.frontier import Limits
     from scenelang.scene.params import Defines
 
 
@@ -120,13 +120,14 @@ def command(
     says which, why, and what was next.
     """
     from scenelang.cli.animation import Wanted, wanted_target
-    from scenelang.cli.choosing import Limits, check_options
+    from scenelang.cli.choosing import check_options
     from scenelang.cli.clock import Clock
     from scenelang.cli.drawing import chosen, exact, neural
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import PROGRAM
     from scenelang.cli.outputs import targets
     from scenelang.cli.progress import Bar
+    from scenelang.measure.frontier import Limits
 
     clock = Clock()
     wanted = Wanted(frames, fps, jobs, palette, dither)

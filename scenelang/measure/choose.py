@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from scenelang.measure.cost import Load, predicted_ms
-from scenelang.measure.frontier import Frontier, Point
-from scenelang.models.choose import names_used, paints
+from scenelang.measure.frontier import Frontier, Limits, Point
+from scenelang.models.choose import lacking, paints, uses
 from scenelang.models.manifest import Manifest
 from scenelang.scene.schema import Scene
 
@@ -18,19 +18,6 @@ OBJECTS: Final = 4
 
 class NothingFits(Exception):
     """No point draws the scene as fast or as exactly as asked; says which comes nearest."""
-
-
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """What the command line asks for; None for no limit.
-
-    Args:
-        ms: most milliseconds of a frame on this machine.
-        flip: most mean FLIP.
-    """
-
-    ms: float | None
-    flip: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,17 +82,8 @@ def refusal(point: Point, manifest: Manifest | None, scene: Scene | None, compil
         return None if point.model == compiled else f"the program was compiled for `{compiled}`"
     if scene is None or manifest is None:
         return None
-    lacking = [
-        name
-        for used, known in zip(
-            names_used(scene),
-            (manifest.geometries, manifest.materials, manifest.transforms, manifest.material_ops),
-            strict=True,
-        )
-        for name in sorted(used.difference(known))
-    ]
-    if lacking:
-        return f"has no `{lacking[0]}`"
+    if unknown := lacking(manifest, uses(scene)):
+        return f"has no `{unknown[0]}`"
     if not paints(manifest, scene):
         if manifest.sizes and scene.canvas not in manifest.sizes:
             sizes = ", ".join(f"{w} x {h}" for w, h in manifest.sizes)
@@ -132,14 +110,14 @@ def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: 
     return sorted(found, key=lambda o: (o.ms, o.flip))
 
 
-def choose(found: Sequence[Offer], wanted: Wanted, refused: dict[str, str]) -> Choice:
+def choose(found: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> Choice:
     """The fastest offer that keeps the error, or the one of least error that keeps the time.
 
     Of offers that promise nearly the same error, within 2 %, the faster one is better.
 
     Args:
         found: from `offers`.
-        wanted: at least one limit. With both the fastest that keeps both is taken.
+        limits: at least one. With both the fastest that keeps both is taken.
         refused: why other points cannot draw the scene, to be told.
 
     Raises:
@@ -150,11 +128,11 @@ def choose(found: Sequence[Offer], wanted: Wanted, refused: dict[str, str]) -> C
     good = [
         o
         for o in found
-        if (wanted.flip is None or o.flip <= wanted.flip) and (wanted.ms is None or o.ms <= wanted.ms)
+        if (limits.flip is None or o.flip <= limits.flip) and (limits.ms is None or o.ms <= limits.ms)
     ]
     if not good:
-        raise NothingFits(_nearest(found, wanted))
-    if wanted.flip is not None:
+        raise NothingFits(_nearest(found, limits))
+    if limits.flip is not None:
         ranked = sorted(good, key=lambda o: (o.ms, o.flip))
         others = sorted((o for o in found if o is not ranked[0]), key=lambda o: (o not in good, o.ms))
     else:
@@ -165,37 +143,37 @@ def choose(found: Sequence[Offer], wanted: Wanted, refused: dict[str, str]) -> C
         others = sorted((o for o in found if o is not ranked[0]), key=lambda o: (o not in good, o.flip))
     first = ranked[0]
     runner_up = others[0] if others else None
-    return Choice(first, runner_up, refused, tuple(_notes(first, runner_up, wanted, good)))
+    return Choice(first, runner_up, refused, tuple(_notes(first, runner_up, limits, good)))
 
 
-def _notes(first: Offer, runner_up: Offer | None, wanted: Wanted, good: Sequence[Offer]) -> list[str]:
-    if wanted.flip is not None:
-        limit = f"FLIP {wanted.flip:g}" + (f" and {wanted.ms:g} ms" if wanted.ms is not None else "")
+def _notes(first: Offer, runner_up: Offer | None, limits: Limits, good: Sequence[Offer]) -> list[str]:
+    if limits.flip is not None:
+        limit = f"FLIP {limits.flip:g}" + (f" and {limits.ms:g} ms" if limits.ms is not None else "")
         why = f"the fastest of {len(good)} that keep {limit}"
     else:
-        why = f"the most exact of {len(good)} that keep {wanted.ms:g} ms"
+        why = f"the most exact of {len(good)} that keep {limits.ms:g} ms"
     notes = [f"chosen by the frontier: {first.told()}, {why}"]
     if runner_up is not None:
         lacks = []
-        if wanted.ms is not None and runner_up.ms > wanted.ms:
+        if limits.ms is not None and runner_up.ms > limits.ms:
             lacks.append("too slow")
-        if wanted.flip is not None and runner_up.flip > wanted.flip:
+        if limits.flip is not None and runner_up.flip > limits.flip:
             lacks.append("not exact enough")
         if not lacks:
-            lacks.append("slower" if wanted.flip is not None else "no more exact")
+            lacks.append("slower" if limits.flip is not None else "no more exact")
         notes.append(f"runner-up: {runner_up.told()}, {' and '.join(lacks)}")
     return notes
 
 
-def _nearest(found: Sequence[Offer], wanted: Wanted) -> str:
+def _nearest(found: Sequence[Offer], limits: Limits) -> str:
     """What comes nearest to limits that nothing keeps."""
-    asked = [f"{wanted.ms:g} ms"] if wanted.ms is not None else []
-    asked += [f"FLIP {wanted.flip:g}"] if wanted.flip is not None else []
+    asked = [f"{limits.ms:g} ms"] if limits.ms is not None else []
+    asked += [f"FLIP {limits.flip:g}"] if limits.flip is not None else []
     fastest, nearest = min(found, key=lambda o: o.ms), min(found, key=lambda o: (o.flip, o.ms))
-    if wanted.flip is not None and nearest.flip <= wanted.flip and wanted.ms is not None:
-        keeps = min((o for o in found if o.flip <= wanted.flip), key=lambda o: o.ms)
+    if limits.flip is not None and nearest.flip <= limits.flip and limits.ms is not None:
+        keeps = min((o for o in found if o.flip <= limits.flip), key=lambda o: o.ms)
         return f"nothing draws this scene within {' and '.join(asked)}; exact enough is {keeps.told()}"
-    if wanted.flip is not None and nearest.flip > wanted.flip:
+    if limits.flip is not None and nearest.flip > limits.flip:
         return f"nothing draws this scene within {' and '.join(asked)}; the most exact is {nearest.told()}"
     return f"nothing draws this scene within {' and '.join(asked)}; the fastest is {fastest.told()}"
 

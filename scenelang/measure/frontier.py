@@ -9,25 +9,48 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal
+
+from pydantic import ConfigDict, NonNegativeFloat, NonNegativeInt, PositiveInt, TypeAdapter, ValidationError
 
 from scenelang.backend.render import Samples
 from scenelang.files import read_json, read_regular
 from scenelang.models.manifest import ROOT, available, load_manifest
 
+Amount = NonNegativeFloat
+Count = NonNegativeInt
+
 FORMAT: Final = 1
 NAME: Final = "frontier.json"
 MOST_BYTES: Final = 4 << 20
+_STRICT: Final = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a picture may take; None for no limit.
+
+    Args:
+        ms: most milliseconds of a frame on this machine.
+        flip: most mean FLIP.
+    """
+
+    ms: float | None
+    flip: float | None
+
+    def __bool__(self) -> bool:
+        return self.ms is not None or self.flip is not None
 
 
 @dataclass(frozen=True, slots=True)
 class Times:
     """Milliseconds of a warm frame, over scenes."""
 
-    median: float
-    p95: float
+    __pydantic_config__ = _STRICT
+    median: Amount
+    p95: Amount
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,19 +62,21 @@ class Errors:
         bound: what is promised: the 97.5th percentile.
     """
 
-    mean: float
-    p95: float
-    bound: float
-    worst: float
+    __pydantic_config__ = _STRICT
+    mean: Amount
+    p95: Amount
+    bound: Amount
+    worst: Amount
 
 
 @dataclass(frozen=True, slots=True)
 class Quality:
     """PSNR of frames in dB, at most 50 each, over scenes; ``p5`` is the 5th percentile."""
 
-    mean: float
-    p5: float
-    worst: float
+    __pydantic_config__ = _STRICT
+    mean: Amount
+    p5: Amount
+    worst: Amount
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,12 +93,13 @@ class Cost:
         spread: 95 of 100 measured frames took at most so many times what the sum says.
     """
 
-    frame: float
-    thousand_objects: float
-    megapixel: float
-    megameeting: float
-    outline: float
-    spread: float
+    __pydantic_config__ = _STRICT
+    frame: Amount
+    thousand_objects: Amount
+    megapixel: Amount
+    megameeting: Amount
+    outline: Amount
+    spread: Amount
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,24 +126,25 @@ class Point:
         command: what draws a scene this way; None where nothing does.
     """
 
+    __pydantic_config__ = _STRICT
     name: str
     backend: Literal["neural", "reference"]
     model: str | None
     renderer: str
     samples: Samples
     skip: bool
-    spp: int
-    side: int
+    spp: Count
+    side: Count
     offered: bool
     why_not: str | None
-    scenes: int
+    scenes: Count
     ms: Times
-    ratio_to_streaming: float
+    ratio_to_streaming: Amount
     flip: Errors | None
     psnr: Quality | None
     cost: Cost | None
-    parameters: int
-    bytes: int
+    parameters: Count
+    bytes: Count
     on_front: bool
     command: str | None
 
@@ -144,18 +171,19 @@ class Frontier:
         points: in the order of their time.
     """
 
+    __pydantic_config__ = _STRICT
     set: str
-    seed: int
-    scenes: int
-    canvas: tuple[int, int]
-    threads: int
+    seed: Count
+    scenes: Count
+    canvas: tuple[PositiveInt, PositiveInt]
+    threads: Count
     clock: str
     machine: str
     revision: str
     torch: str
-    yardstick_ms: float
-    streaming_ms: float
-    converged: dict[str, float]
+    yardstick_ms: Amount
+    streaming_ms: Amount
+    converged: dict[str, Amount]
     points: tuple[Point, ...]
 
     def to_json(self) -> str:
@@ -174,59 +202,15 @@ class Frontier:
         found = read_json(data)
         if not isinstance(found, dict) or found.pop("format", None) != FORMAT:
             raise ValueError(f"no frontier of format {FORMAT}")
-        points = found.get("points")
-        if not isinstance(points, list) or not all(isinstance(p, dict) for p in points):
-            raise ValueError("a frontier without points")
-        made = tuple(_point(p) for p in points if p.pop("precision", "float32") == "float32")
-        canvas = found.get("canvas")
-        if not isinstance(canvas, list) or len(canvas) != 2:
-            raise ValueError("a frontier without a canvas")
-        frontier: Frontier = _made(Frontier, {**found, "points": made, "canvas": tuple(canvas)})
-        return frontier
-
-
-def _point(told: dict[str, Any]) -> Point:
-    parts = {
-        key: None if told.get(key) is None else _made(kind, told[key])
-        for key, kind in (("ms", Times), ("flip", Errors), ("psnr", Quality), ("cost", Cost))
-    }
-    if parts["ms"] is None:
-        raise ValueError("a point without a time")
-    point: Point = _made(Point, {**told, **parts})
-    return point
-
-
-def _made(kind: Any, told: Any) -> Any:
-    """A dataclass from a dictionary with exactly its fields, each of the type it has to be."""
-    if not isinstance(told, dict) or told.keys() != {f.name for f in fields(kind)}:
-        raise ValueError(f"fields of a {kind.__name__.lower()} are missing or unknown")
-    for field in fields(kind):
-        value = told[field.name]
-        if not _fits(str(field.type), value):
-            raise ValueError(f"`{field.name}` of a {kind.__name__.lower()} does not hold what it should")
-    return kind(**told)
-
-
-def _fits(kind: str, value: Any) -> bool:
-    if value is None:
-        return kind.endswith("| None")
-    kind = kind.removesuffix(" | None")
-    if kind == "float":
-        return type(value) in (int, float) and math.isfinite(value) and value >= 0
-    if kind in ("int", "bool", "str"):
-        return type(value).__name__ == kind and (kind != "int" or value >= 0)
-    known = {
-        "Samples": get_args(Samples),
-        "Literal['neural', 'reference']": ("neural", "reference"),
-    }
-    choices = known.get(kind.replace('"', "'"))
-    if choices is not None:
-        return value in choices
-    if kind == "tuple[int, int]":
-        return all(type(v) is int and v > 0 for v in value)
-    if kind == "dict[str, float]":
-        return isinstance(value, dict) and all(_fits("float", v) for v in value.values())
-    return True  # made before
+        if isinstance(points := found.get("points"), list):
+            found["points"] = [
+                p for p in points if not isinstance(p, dict) or p.pop("precision", "float32") == "float32"
+            ]
+        try:
+            return TypeAdapter(Frontier).validate_json(json.dumps(found))
+        except ValidationError as error:
+            place = ".".join(map(str, error.errors()[0]["loc"]))
+            raise ValueError(f"`{place}` of the frontier does not hold what it should") from None
 
 
 def _short(value: float) -> float:

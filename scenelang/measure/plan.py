@@ -16,7 +16,7 @@ from scenelang.graph.nodes import Fold, Graph, Leaf
 from scenelang.graph.steps import Affine
 from scenelang.graph.walk import nodes
 from scenelang.measure.metrics import MOST_DB, flip, over_white, psnr
-from scenelang.models.choose import WHITE, choose_model, names_used
+from scenelang.models.choose import WHITE, choose_model, lacking, uses, why_chosen
 from scenelang.models.load import Model
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.program.program import TOKENS, Program
@@ -102,27 +102,18 @@ def choice(scene: Scene, chosen: str, asked: bool) -> dict[str, Any]:
     others = [load_manifest(name) for name in available() if name != chosen]
     free = scene.model_copy(update={"model": None})
     runner_up = choose_model(free, others)
-    if asked:
-        why = "by --model"
-    elif scene.model is not None:
-        why = "named by the scene"
-    else:
-        why = "the smallest that has all it uses"
-    lacking = {m.name: missing(free, m) for m in others}
+    unknown = {m.name: missing(free, m) for m in others}
     return {
         "model": chosen,
-        "why": why,
+        "why": why_chosen(scene, asked),
         "runner_up": runner_up.name if runner_up else None,
-        "lacking": {name: names for name, names in lacking.items() if names},
+        "lacking": {name: names for name, names in unknown.items() if names},
     }
 
 
 def missing(scene: Scene, manifest: Manifest) -> list[str]:
     """What a scene needs and a model does not have: names, its canvas, its background."""
-    has = (manifest.geometries, manifest.materials, manifest.transforms, manifest.material_ops)
-    names = sorted(
-        name for used, known in zip(names_used(scene), has, strict=True) for name in used.difference(known)
-    )
+    names = sorted(lacking(manifest, uses(scene)))
     if manifest.sizes and scene.canvas not in manifest.sizes:
         names.append("a canvas of {} × {}".format(*scene.canvas))
     if manifest.white and scene.background != WHITE:

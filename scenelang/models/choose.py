@@ -21,18 +21,19 @@ def choose_model(scene: Scene, models: Iterable[Manifest]) -> Manifest | None:
         The fitting manifest with the fewest geometries, then the fewest other words, then the least measured
         error, then the first by name; None if none fits.
     """
-    geometries, materials, transforms, operations = names_used(scene)
+    used = list(uses(scene))
     fitting = [
-        m
-        for m in models
-        if scene.model in (None, m.name)
-        and geometries.issubset(m.geometries)
-        and materials.issubset(m.materials)
-        and transforms.issubset(m.transforms)
-        and operations.issubset(m.material_ops)
-        and paints(m, scene)
+        m for m in models if scene.model in (None, m.name) and not lacking(m, used) and paints(m, scene)
     ]
     return min(fitting, key=_size, default=None)
+
+
+def why_chosen(scene: Scene | None, asked: bool) -> str:
+    """Why a scene is drawn with its model: ``asked`` says whether the command line named it."""
+    if asked:
+        return "by --model"
+    named = scene is not None and scene.model is not None
+    return "named by the scene" if named else "the smallest that has all it uses"
 
 
 def best_of_sets(models: Iterable[Manifest]) -> list[Manifest]:
@@ -55,30 +56,19 @@ def _size(model: Manifest) -> tuple[int, int, float, str]:
     return len(model.geometries), others, model.flip(), model.name
 
 
-def names_used(scene: Scene) -> tuple[set[str], set[str], set[str], set[str]]:
-    """Names of geometries, materials, transforms and texture operations in a scene."""
-    geometries: set[str] = set()
-    materials: set[str] = set()
-    transforms: set[str] = set()
-    operations: set[str] = set()
-    for node in walk(scene.nodes):
-        if isinstance(node, Object):
-            geometries.add(node.geometry)
-        transforms.update(t.kind for t in node.transforms)
-        if node.material is not None:
-            materials.add(node.material.name)
-            operations.update(op.kind for op in node.material.ops)
-    return geometries, materials, transforms, operations
+def lacking(model: Manifest, used: Iterable[Use]) -> list[str]:
+    """Those of the names that a scene uses which a model does not know, in the order of the scene."""
+    return [name for name, field, _ in used if name not in getattr(model, field)]
 
 
 def apart(scene: Scene, models: Sequence[Manifest]) -> tuple[Use, Use] | None:
     """Two names of a scene that no model has both of, the earlier one first; None where three are needed."""
-    uses = list(_uses(scene))
-    owners = [{m.name for m in models if name in getattr(m, field)} for name, field, _ in uses]
-    for later in range(len(uses)):
+    used = list(uses(scene))
+    owners = [{m.name for m in models if not lacking(m, [use])} for use in used]
+    for later in range(len(used)):
         for earlier in range(later):
             if not owners[earlier] & owners[later]:
-                return uses[earlier], uses[later]
+                return used[earlier], used[later]
     return None
 
 
@@ -86,8 +76,8 @@ Use = tuple[str, str, object]
 """A name, the field of manifests that lists such names, and the node that uses it first."""
 
 
-def _uses(scene: Scene) -> Iterator[Use]:
-    """Each name once, in the order of the scene."""
+def uses(scene: Scene) -> Iterator[Use]:
+    """Each name that a scene uses, once, in its order."""
     seen: set[tuple[str, str]] = set()
     stack: list[SceneNode] = list(reversed(scene.nodes))
     while stack:
@@ -106,15 +96,3 @@ def _uses(scene: Scene) -> Iterator[Use]:
             if use[:2] not in seen:
                 seen.add(use[:2])
                 yield use
-
-
-def walk(nodes: Iterable[SceneNode]) -> Iterator[SceneNode]:
-    """All nodes, without recursion, in no particular order."""
-    stack = list(nodes)
-    while stack:
-        node = stack.pop()
-        yield node
-        if isinstance(node, Chain):
-            stack.extend(link.node for link in node.children)
-        elif not isinstance(node, Object):
-            stack.extend(node.children)

@@ -15,7 +15,6 @@ from scenelang.image import from_samples
 from scenelang.lab.frontier.measure import enlarged, promised
 from scenelang.measure.choose import (
     NothingFits,
-    Wanted,
     choose,
     error_scale,
     machine_scale,
@@ -27,6 +26,7 @@ from scenelang.measure.frontier import (
     Cost,
     Errors,
     Frontier,
+    Limits,
     Point,
     Quality,
     Times,
@@ -50,11 +50,11 @@ def point(name: str, ms: float, flip: float | None, **more: object) -> Point:
         offered=True,
         why_not=None,
         scenes=10,
-        ms=Times(ms, 1.2 * ms),
+        ms=Times(float(ms), 1.2 * ms),
         ratio_to_streaming=1000 / ms,
         flip=None if flip is None else Errors(flip / 2, 0.9 * flip, flip, 1.1 * flip),
         psnr=None if flip is None else Quality(40.0, 35.0, 30.0),
-        cost=Cost(ms, 0.0, 0.0, 0.0, 0.0, 1.0),
+        cost=Cost(float(ms), 0.0, 0.0, 0.0, 0.0, 1.0),
         parameters=100,
         bytes=400,
         on_front=False,
@@ -147,26 +147,26 @@ LOAD = Load(2, 65536, 1e4, 100.0)
 LADDER = [point("fast", 2, 0.05), point("middle", 10, 0.01), point("slow", 50, 0.001), point("bad", 60, 0.02)]
 
 
-def chosen(wanted: Wanted, points: list[Point] = LADDER, scale: float = 1.0, load: Load = LOAD) -> str:
-    return choose(offers(points, load, (256, 256), scale), wanted, {}).offer.point.name
+def chosen(limits: Limits, points: list[Point] = LADDER, scale: float = 1.0, load: Load = LOAD) -> str:
+    return choose(offers(points, load, (256, 256), scale), limits, {}).offer.point.name
 
 
 @pytest.mark.parametrize(
-    ("wanted", "name"),
+    ("limits", "name"),
     [
-        (Wanted(None, 0.06), "fast"),
-        (Wanted(None, 0.05), "fast"),
-        (Wanted(None, 0.03), "middle"),
-        (Wanted(None, 0.005), "slow"),
-        (Wanted(None, 1.0), "fast"),
-        (Wanted(2, None), "fast"),
-        (Wanted(30, None), "middle"),
-        (Wanted(100, None), "slow"),
-        (Wanted(20, 0.02), "middle"),
+        (Limits(None, 0.06), "fast"),
+        (Limits(None, 0.05), "fast"),
+        (Limits(None, 0.03), "middle"),
+        (Limits(None, 0.005), "slow"),
+        (Limits(None, 1.0), "fast"),
+        (Limits(2, None), "fast"),
+        (Limits(30, None), "middle"),
+        (Limits(100, None), "slow"),
+        (Limits(20, 0.02), "middle"),
     ],
 )
-def test_the_choice_is_the_cheapest_that_suffices(wanted: Wanted, name: str) -> None:
-    assert chosen(wanted) == name
+def test_the_choice_is_the_cheapest_that_suffices(limits: Limits, name: str) -> None:
+    assert chosen(limits) == name
 
 
 @given(
@@ -178,59 +178,59 @@ def test_the_choice_is_what_brute_force_finds(
     figures: list[tuple[int, int]], ms: int | None, flip: int | None
 ) -> None:
     points = [point(f"p{i}", t, e / 100) for i, (t, e) in enumerate(figures)]
-    wanted = Wanted(ms, None if flip is None else flip / 100)
+    limits = Limits(ms, None if flip is None else flip / 100)
     good = [(t, e) for t, e in figures if (ms is None or t <= ms) and (flip is None or e <= flip)]
     if ms is None and flip is None:
         return
     if not good:
         with pytest.raises(NothingFits):
-            chosen(wanted, points)
+            chosen(limits, points)
         return
     best = min(good) if flip is not None else min(good, key=lambda g: (g[1], g[0]))
-    assert figures[int(chosen(wanted, points)[1:])] == best
+    assert figures[int(chosen(limits, points)[1:])] == best
 
 
 def test_a_slower_machine_and_a_larger_scene_choose_a_faster_way() -> None:
-    assert chosen(Wanted(30, None), scale=1.0) == "middle"
-    assert chosen(Wanted(30, None), scale=4.0) == "fast"
+    assert chosen(Limits(30, None), scale=1.0) == "middle"
+    assert chosen(Limits(30, None), scale=4.0) == "fast"
     per_object = [replace(p, cost=Cost(0, 1000 * p.ms.median, 0, 0, 0, 1.0)) for p in LADDER]
-    assert chosen(Wanted(30, None), per_object, load=Load(2, 65536, 0, 0)) == "middle"
-    assert chosen(Wanted(30, None), per_object, load=Load(12, 65536, 0, 0)) == "fast"
+    assert chosen(Limits(30, None), per_object, load=Load(2, 65536, 0, 0)) == "middle"
+    assert chosen(Limits(30, None), per_object, load=Load(12, 65536, 0, 0)) == "fast"
 
 
 def test_times_count_with_their_spread() -> None:
     wide = [replace(p, cost=Cost(p.ms.median, 0, 0, 0, 0, 4.0)) for p in LADDER]
-    assert chosen(Wanted(30, None), wide) == "fast"
+    assert chosen(Limits(30, None), wide) == "fast"
 
 
 def test_nearly_equal_errors_leave_it_to_time() -> None:
     points = [point("a", 10, 0.0100), point("b", 40, 0.0099)]
-    assert chosen(Wanted(100, None), points) == "a"
+    assert chosen(Limits(100, None), points) == "a"
 
 
 def test_many_objects_need_a_more_exact_way() -> None:
-    assert chosen(Wanted(None, 0.02)) == "middle"
-    assert chosen(Wanted(None, 0.02), load=Load(16, 65536, 1e4, 100.0)) == "slow"
+    assert chosen(Limits(None, 0.02)) == "middle"
+    assert chosen(Limits(None, 0.02), load=Load(16, 65536, 1e4, 100.0)) == "slow"
 
 
 def test_what_nothing_draws_is_told_with_what_comes_nearest() -> None:
     with pytest.raises(NothingFits, match=r"within 1 ms; the fastest is fast: 2\.0 ms"):
-        chosen(Wanted(1, None))
+        chosen(Limits(1, None))
     with pytest.raises(NothingFits, match=r"within FLIP 0\.0001; the most exact is slow"):
-        chosen(Wanted(None, 0.0001))
+        chosen(Limits(None, 0.0001))
     with pytest.raises(NothingFits, match=r"within 20 ms and FLIP 0\.005; exact enough is slow: 50 ms"):
-        chosen(Wanted(20, 0.005))
+        chosen(Limits(20, 0.005))
     with pytest.raises(NothingFits, match=r"nothing on the frontier draws this scene \(a: has no `x`\)"):
-        choose([], Wanted(1, None), {"a": "has no `x`"})
+        choose([], Limits(1, None), {"a": "has no `x`"})
 
 
 def test_the_choice_tells_why_and_what_was_next() -> None:
-    choice = choose(offers(LADDER, LOAD, (256, 256), 1.0), Wanted(None, 0.03), {})
+    choice = choose(offers(LADDER, LOAD, (256, 256), 1.0), Limits(None, 0.03), {})
     assert choice.runner_up is not None
     assert choice.runner_up.point.name == "slow"
     assert choice.notes[0].endswith("the fastest of 3 that keep FLIP 0.03")
     assert choice.notes[1].endswith("slower")
-    choice = choose(offers(LADDER, LOAD, (256, 256), 1.0), Wanted(30, None), {})
+    choice = choose(offers(LADDER, LOAD, (256, 256), 1.0), Limits(30, None), {})
     assert choice.notes[0].endswith("the most exact of 2 that keep 30 ms")
     assert choice.notes[1].startswith("runner-up: fast")
     assert choice.notes[1].endswith("no more exact")
@@ -284,6 +284,7 @@ def damaged() -> list[tuple[str, object]]:
         ("points", {}),
         ("points", [1]),
         ("canvas", [256]),
+        ("canvas", [0, 256]),
         ("canvas", [256, "256"]),
         ("seed", -1),
         ("seed", True),
