@@ -5,7 +5,7 @@ An experiment is a list of runs, each of which trains a student (`scenelang.lab.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 from scenelang.lab.designs.ablations import ablation_runs
@@ -17,8 +17,11 @@ from scenelang.renderers.streaming import StreamingConfig
 SIDE = 32  # pixels along a side of the pictures: what `streaming` reaches on a processor in minutes
 SIZES_SIDE = 16  # of the thirteen trainings of the size study
 PARTS_SIDE = 128  # where only renderers that answer points are compared
-RENDERERS: tuple[RendererName, ...] = ("framed", "reading", "streaming")
-LIFTINGS: tuple[LiftingName, ...] = ("exact", "learned")
+Pair = tuple[RendererName, LiftingName]
+ALL: tuple[Pair, ...] = tuple(
+    (renderer, lifting) for renderer in ("framed", "reading", "streaming") for lifting in ("exact", "learned")
+)
+BEST: tuple[Pair, ...] = (("streaming", "learned"), ("framed", "exact"))
 SIZES = (1, 2, 4, 8, 16, 32, 64)
 
 
@@ -64,26 +67,23 @@ def plain(renderer: RendererName, lifting: LiftingName, seconds: float, seed: in
     return StudyConfig(student, seconds=seconds, rate=rate, scenes=scenes, seed=seed, warm=warm)
 
 
+def _usual(pairs: Iterable[Pair], seconds: float, seed: int, group: str = "") -> list[Run]:
+    """The usual training of each pair."""
+    return [Run("+".join(pair), group or f"{seconds:g} s", plain(*pair, seconds, seed)) for pair in pairs]
+
+
 def overfit(budget_s: float, seed: int) -> list[Run]:
     """Each renderer on 16 scenes it sees again and again: does it work at all?"""
-    runs = []
-    for renderer in RENDERERS:
-        for lifting in LIFTINGS:
-            if lifting == "exact" and renderer != "framed":
-                continue
-            study = replace(plain(renderer, lifting, budget_s, seed), fixed=16, average=0.98)
-            runs.append(Run(f"{renderer}+{lifting}", "16 scenes", study, seen=True))
-    return runs
+    pairs = [pair for pair in ALL if pair[1] == "learned" or pair[0] == "framed"]
+    return [
+        replace(run, study=replace(run.study, fixed=16, average=0.98), seen=True)
+        for run in _usual(pairs, budget_s, seed, "16 scenes")
+    ]
 
 
 def compare(budget_s: float, seed: int) -> list[Run]:
     """Every renderer with every lifting at a third of the budget and at all of it."""
-    return [
-        Run(f"{renderer}+{lifting}", f"{seconds:g} s", plain(renderer, lifting, seconds, seed))
-        for seconds in (budget_s / 3, budget_s)
-        for renderer in RENDERERS
-        for lifting in LIFTINGS
-    ]
+    return [run for seconds in (budget_s / 3, budget_s) for run in _usual(ALL, seconds, seed)]
 
 
 def table1(budget_s: float, seed: int) -> list[Run]:
@@ -102,12 +102,7 @@ def table1(budget_s: float, seed: int) -> list[Run]:
 
 def table2(budget_s: float, seed: int) -> list[Run]:
     """Deformed shapes: the paper's method, and ours (Table 2, left)."""
-    return [
-        Run(f"{r}+{lifting}", f"{budget_s:g} s", plain(r, lifting, budget_s, seed)) for r, lifting in _PAIRS
-    ]
-
-
-_PAIRS: tuple[tuple[RendererName, LiftingName], ...] = (("streaming", "learned"), ("framed", "exact"))
+    return _usual(BEST, budget_s, seed)
 
 
 def table3(budget_s: float, seed: int) -> list[Run]:
@@ -122,17 +117,17 @@ def table3(budget_s: float, seed: int) -> list[Run]:
 
 def table4(budget_s: float, seed: int) -> list[Run]:
     """The paper's two renderers (Table 4)."""
-    renderers: tuple[RendererName, ...] = ("streaming", "reading")
-    return [Run(f"{r}+learned", f"{budget_s:g} s", plain(r, "learned", budget_s, seed)) for r in renderers]
+    return _usual((("streaming", "learned"), ("reading", "learned")), budget_s, seed)
 
 
 def seeds(budget_s: float, seed: int) -> list[Run]:
     """Three seeds of each renderer: spread and divergence."""
-    pairs: tuple[tuple[RendererName, LiftingName], ...] = (*_PAIRS, ("reading", "learned"))
+    pairs: tuple[Pair, ...] = (*BEST, ("reading", "learned"))
     return [
-        Run(f"{r}+{lifting}", f"seed {s}", plain(r, lifting, budget_s, s))
-        for r, lifting in pairs
+        run
+        for pair in pairs
         for s in range(seed, seed + 3)
+        for run in _usual([pair], budget_s, s, f"seed {s}")
     ]
 
 

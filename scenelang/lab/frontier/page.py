@@ -11,6 +11,7 @@ import html
 import io
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -61,24 +62,10 @@ def frontier_page(frontier: Frontier, pictures: Mapping[str, Sequence[Image]], e
 
 def _facts(point: Point, base: str, images: Sequence[Image]) -> dict[str, Any]:
     return {
+        **asdict(point),
         "name": point.title,
         "label": short_name(point, base),
         "mark": mark_of(point),
-        "renderer": point.renderer,
-        "ms": point.ms.median,
-        "p95": point.ms.p95,
-        "ratio": point.ratio_to_streaming,
-        "flip": point.flip
-        and {"mean": point.flip.mean, "bound": point.flip.bound, "worst": point.flip.worst},
-        "psnr": point.psnr and {"mean": point.psnr.mean, "worst": point.psnr.worst},
-        "parameters": point.parameters,
-        "bytes": point.bytes,
-        "scenes": point.scenes,
-        "offered": point.offered,
-        "why": point.why_not,
-        "enlarged": point.side,
-        "front": point.on_front,
-        "command": point.command,
         "pictures": [picture_uri(image) for image in images],
     }
 
