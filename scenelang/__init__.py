@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from scenelang.diagnostics.diagnostic import SceneError as SceneError
     from scenelang.formatting.format import format_text as format_text
     from scenelang.image import Image as Image
+    from scenelang.measure.metrics import measure as measure
+    from scenelang.program.checking import check as check
+    from scenelang.program.checking import check_text as check_text
+    from scenelang.program.checking import fix_text as fix_text
     from scenelang.program.compile import compile as compile
     from scenelang.program.program import Place as Place
     from scenelang.program.program import Program as Program
@@ -60,6 +64,8 @@ _HOME: Final = {
     "scenelang.diagnostics.diagnostic": ("Diagnostic", "Diagnostics", "SceneError"),
     "scenelang.formatting.format": ("format_text",),
     "scenelang.image": ("Image",),
+    "scenelang.measure.metrics": ("measure",),
+    "scenelang.program.checking": ("check", "check_text", "fix_text"),
     "scenelang.program.compile": ("compile",),
     "scenelang.program.program": ("Place", "Program", "ProgramError"),
     "scenelang.program.store": ("load_program",),
@@ -122,11 +128,15 @@ __all__ = [
     "Twirl",
     "Twist",
     "animate",
+    "check",
+    "check_text",
     "compile",
+    "fix_text",
     "format_text",
     "load",
     "load_program",
     "loads",
+    "measure",
     "render",
     "render_frames",
 ]

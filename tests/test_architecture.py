@@ -17,6 +17,7 @@ PACKAGE = ROOT / "scenelang"
 # A module may import modules of its own line and of the lines above.
 ORDER = (
     "scenelang.files",
+    "scenelang.notebook",
     "scenelang.tensors",
     "scenelang.diagnostics",
     "scenelang.syntax",

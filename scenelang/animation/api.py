@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from scenelang.animation.painting import Painter
 from scenelang.animation.run import Made, Progress, make
 from scenelang.animation.targets import find_target
 from scenelang.animation.timing import FrameRange
+from scenelang.scene.schema import Scene
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
@@ -19,10 +20,11 @@ if TYPE_CHECKING:
     from scenelang.image import Image
 
 Frames = range | str | None
+Source = str | os.PathLike[str] | Scene | Iterable[Scene]
 
 
 def render_frames(
-    path: str | os.PathLike[str],
+    source: Source,
     *,
     frames: Frames = None,
     fps: float | None = None,
@@ -34,18 +36,19 @@ def render_frames(
     device: Device = "auto",
     threads: int | None = None,
 ) -> Iterator[Image]:
-    """Draw a scene file's frames one after another; none is held.
+    """Draw the frames of a scene file, or Scenes, one after another; no picture is held.
 
-    The file is read once, when the first picture is asked for; a frame compiles what it does not share with
+    A file is read once, when the first picture is asked for; a frame compiles what it does not share with
     the one before. Each picture is the one that `scenelang.render` gives for its frame, bit for bit. A scene
     without ``animate(…)`` has one frame.
 
     Args:
-        path: the scene file.
+        source: the scene file, or a Scene or several, each with its own canvas.
         frames: which, as a range or as text (``"0..23"``, ``"12.."``); all by default.
-        fps: frames a second instead of those that ``animate`` names; its seconds stay.
+        fps: frames a second instead of those that ``animate`` names; its seconds stay. Scenes are shown at
+            those of the first one's animation.
         size: canvas in pixels instead of the scene's.
-        params: values for params, as for `scenelang.load`.
+        params: values for a file's params, as for `scenelang.load`.
         model: draw with this model instead of the one that the file names.
         root: folder that imports cannot leave; by default the file's.
         backend, device, threads: as for `scenelang.render`.
@@ -58,8 +61,9 @@ def render_frames(
         FramesError: the animation has no such frames.
         RenderError: as for `scenelang.render`.
         OSError: the file cannot be opened.
+        ValueError: an argument is none of the above, or says something of a file where Scenes are given.
     """
-    clip = _opened(path, fps, size, params, model, root)
+    clip = _opened(source, fps, size, params, model, root)
     painter = Painter(clip, backend, device, threads)
     last: tuple[str, Image] | None = None
     for number in _numbers(clip, frames):
@@ -70,7 +74,7 @@ def render_frames(
 
 
 def animate(
-    path: str | os.PathLike[str],
+    source: Source,
     out: str | os.PathLike[str],
     *,
     frames: Frames = None,
@@ -87,10 +91,10 @@ def animate(
     dither: bool = False,
     progress: Callable[[Progress], None] = lambda _: None,
 ) -> Made:
-    """Draw a scene file to an animation; a call that was interrupted goes on where it stopped.
+    """Draw a scene file or Scenes to an animation; a call that was interrupted goes on where it stopped.
 
     Args:
-        path: the scene file.
+        source: the scene file, or Scenes, one a frame.
         out: a file whose suffix names the format (.gif, .webp, .apng, .mp4, .mov, .mkv, .webm), numbered
             pictures (``frame-%04d.png``), or a folder that ends in a slash or is there.
         frames, fps, size, params, model, root, backend, device, threads: as for `render_frames`.
@@ -103,12 +107,14 @@ def animate(
         What was written.
 
     Raises:
-        ValueError: ``out`` names no format.
+        ValueError: ``out`` names no format, or nothing says how fast Scenes follow each other.
         SceneError, FramesError, RenderError, OSError: as for `render_frames`; nothing is written then.
     """
-    name = os.fspath(out)
-    target = find_target(name, Path(path).stem)
-    clip = _opened(path, fps, size, params, model, root)
+    stem = Path(source).stem if isinstance(source, str | os.PathLike) else "frame"
+    target = find_target(os.fspath(out), stem)
+    clip = _opened(source, fps, size, params, model, root)
+    if target.kind != "sequence":
+        _ = clip.animation  # what is wrong with it is said before anything is drawn
     painter = Painter(clip, backend, device, threads)
     return make(
         painter,
@@ -122,7 +128,7 @@ def animate(
 
 
 def _opened(
-    path: str | os.PathLike[str],
+    source: Source,
     fps: float | None,
     size: tuple[int, int] | None,
     params: Mapping[str, Any] | None,
@@ -131,12 +137,20 @@ def _opened(
 ) -> Clip:
     if fps is not None and not 0 < fps < float("inf"):
         raise ValueError(f"{fps} frames a second, where a number above 0 is needed")
-    folder = None if root is None else Path(root)
-    return open_clip(path, defines=params, model=model, root=folder, size=size, fps=fps)
+    if isinstance(source, str | os.PathLike):
+        folder = None if root is None else Path(root)
+        return open_clip(source, defines=params, model=model, root=folder, size=size, fps=fps)
+    scenes = (source,) if isinstance(source, Scene) else tuple(source)
+    if not scenes or not all(isinstance(scene, Scene) for scene in scenes):
+        raise ValueError("neither a path nor Scenes to draw")
+    if params is not None or root is not None:
+        raise ValueError("params and root are for files; Scenes have their values")
+    sized = scenes if size is None else tuple(scene.sized(size) for scene in scenes)
+    return Clip(sized, model=model, fps=fps)
 
 
 def _numbers(clip: Clip, frames: Frames) -> range:
-    count = clip.animation.frames
+    count = clip.frames
     if isinstance(frames, range):
         for end in (frames[0], frames[-1]) if len(frames) else ():
             FrameRange(end, end).among(count)

@@ -44,11 +44,47 @@ class Shot:
     spans: SpanMap
 
 
-class Clip:
-    """A scene to be evaluated and compiled frame by frame.
+@dataclass(frozen=True, slots=True)
+class Given:
+    """Frames that are Scenes already.
 
     Args:
-        source: its text.
+        scenes: at least one.
+        fps: frames a second; None for those of the first scene's animation.
+    """
+
+    scenes: tuple[Scene, ...]
+    fps: float | None = None
+    wanted: tuple[Path, ...] = ()
+
+    @property
+    def animates(self) -> bool:
+        return len(self.scenes) > 1
+
+    @property
+    def animation(self) -> Animation:
+        """How long they last.
+
+        Raises:
+            ValueError: nothing says how fast they follow each other, or they differ in their canvas.
+        """
+        if len({scene.canvas for scene in self.scenes}) > 1:
+            raise ValueError("scenes with several canvases, where size says one for all")
+        first, count = self.scenes[0].animation, len(self.scenes)
+        fps = self.fps or (first.fps if first is not None else STILL.fps if count == 1 else None)
+        if fps is None:
+            raise ValueError("scenes without an animation, where fps says how fast they follow each other")
+        return Animation(count / fps, fps, first.loop if first is not None else True)
+
+    def run(self, number: int) -> tuple[Scene, SpanMap]:
+        return self.scenes[number], SpanMap()
+
+
+class Clip:
+    """A scene to be evaluated and compiled frame by frame, or Scenes that are its frames.
+
+    Args:
+        source: its text, or the Scenes.
         path: where it was read from.
         diagnostics: collects what is found, in each frame; a mistake in any frame ends the clip.
         defines: values for params.
@@ -62,7 +98,7 @@ class Clip:
 
     def __init__(
         self,
-        source: SourceFile,
+        source: SourceFile | tuple[Scene, ...],
         *,
         path: Path | None = None,
         diagnostics: Diagnostics | None = None,
@@ -75,15 +111,19 @@ class Clip:
     ) -> None:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
         self.model, self.size, self.reuse = model, size, reuse
-        self._evaluation = Evaluation(
-            parse(source, self.diagnostics),
-            diagnostics=self.diagnostics,
-            defines=defines,
-            model=model,
-            root=root,
-            path=path,
-            fps=fps,
-            replays=reuse,
+        self._evaluation: Evaluation | Given = (
+            Given(source, fps)
+            if isinstance(source, tuple)
+            else Evaluation(
+                parse(source, self.diagnostics),
+                diagnostics=self.diagnostics,
+                defines=defines,
+                model=model,
+                root=root,
+                path=path,
+                fps=fps,
+                replays=reuse,
+            )
         )
         self._last: tuple[Shot, Program] | None = None
         self._memory = Memory() if reuse else None
@@ -110,7 +150,15 @@ class Clip:
     @property
     def animation(self) -> Animation:
         """Length, frames a second and whether it is a loop."""
+        if isinstance(self._evaluation, Given):
+            return self._evaluation.animation
         return self.first.scene.animation or STILL
+
+    @property
+    def frames(self) -> int:
+        """Number of frames, at least 1."""
+        given = self._evaluation
+        return len(given.scenes) if isinstance(given, Given) else self.animation.frames
 
     def shot(self, number: int) -> Shot:
         """Evaluate a frame.
@@ -122,7 +170,7 @@ class Clip:
         if scene is None or self.diagnostics.errors:
             raise SceneError(self.diagnostics)
         if self.size is not None:
-            sized = scene.model_copy(update={"canvas": self.size})
+            sized = scene.sized(self.size)
             if spans.span(scene) is not None:
                 spans.copy(scene, sized)
             scene = sized

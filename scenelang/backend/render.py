@@ -20,6 +20,7 @@ Samples = Literal["adaptive", "four", "one"]
 def render(
     program_or_scene: Program | Scene,
     *,
+    size: tuple[int, int] | None = None,
     backend: Backend = "neural",
     device: Device = "auto",
     threads: int | None = None,
@@ -33,6 +34,7 @@ def render(
 
     Args:
         program_or_scene: what to draw.
+        size: canvas in pixels instead of the Scene's; a Program is compiled for its own.
         backend: ``"neural"`` draws with the trained network, ``"reference"`` a Scene by the exact
             definition, which knows no boolean rule and none of a model's limits.
         device: where the network runs; ``"auto"`` is CUDA where there is any.
@@ -54,6 +56,10 @@ def render(
         raise ValueError(f"unknown samples {samples!r}; there are 'adaptive', 'four' and 'one'")
     if threads is not None and threads < 1:
         raise ValueError(f"{threads} threads, where at least 1 is needed")
+    if size is not None:
+        if not isinstance(program_or_scene, Scene):
+            raise ValueError("a size for a program, which is compiled for its canvas: give it with the scene")
+        program_or_scene = program_or_scene.sized(size)
     if backend == "reference":
         from scenelang.backend.exact import draw_exact
 

@@ -7,19 +7,14 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
 from scenelang.cli.clock import Clock
 from scenelang.cli.inputs import STDIN, Request, merged, read_input, read_text, unused_defines
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import Settled, settle
 from scenelang.diagnostics.span import SourceFile
-from scenelang.program.check import check_compiles, check_frames
+from scenelang.program.check import Frames, check_evaluated
 from scenelang.scene.params import Defines
-from scenelang.scene.unused import find_unused
-
-Frames = Literal["one", "some", "all"]
-"""Which frames of an animation are looked at: the one asked for; the first, second, middle and last; all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,21 +116,16 @@ def _place(name: str) -> str:
 
 def _find(name: str, source: SourceFile, request: Request, frames: Frames) -> tuple[list[Diagnostic], int]:
     """What there is to say of one scene, and how many of its frames were to be looked at and were not."""
-    found, left = read_input(name, request, Clock(), source), 0
-    if found.scene is not None:
-        check_compiles(found.scene, found.spans, found.diagnostics, model=request.model)
-    if found.evaluation is not None and frames != "one":
-        looked, wanted = check_frames(
-            found.evaluation,
-            found.diagnostics,
-            first=found.scene,
-            model=request.model,
-            every=frames == "all",
-        )
-        left = wanted - looked
-    if found.tree is not None and not found.diagnostics.errors:
-        # A name that is misspelt where it is used is no second mistake.
-        find_unused(found.tree, found.diagnostics)
+    found = read_input(name, request, Clock(), source)
+    left = check_evaluated(
+        found.tree,
+        found.evaluation,
+        found.scene,
+        found.spans,
+        found.diagnostics,
+        model=request.model,
+        frames=frames,
+    )
     return found.diagnostics.items, left
 
 

@@ -140,7 +140,7 @@ def _with_scene(found: Input, scene: Scene | None, spans: SpanMap, request: Requ
     if scene is None or found.diagnostics.errors:
         return found
     if request.size is not None:
-        sized = scene.model_copy(update={"canvas": request.size})
+        sized = scene.sized(request.size)
         if spans.span(scene) is not None:
             spans.copy(scene, sized)
         scene = sized

@@ -63,9 +63,19 @@ def flip(picture: Array, reference: Array) -> float:
 
 
 def measure(picture: Array, reference: Array) -> dict[str, float]:
-    """All three by name."""
-    return {
-        "psnr": psnr(picture, reference),
-        "ssim": ssim(picture, reference),
-        "flip": flip(picture, reference),
-    }
+    """How near a picture is to another: PSNR in dB (at most `MOST_DB`), SSIM and FLIP by name.
+
+    Args:
+        picture: float (H, W, 3) or, with straight alpha, (H, W, 4), sRGB-encoded in [0, 1]; alpha is put over
+            white first.
+        reference: the like, of the same size.
+
+    Raises:
+        ValueError: they differ in size.
+        ImportError: the packages of the extra ``eval`` are not installed.
+    """
+    a, b = over_white(picture), over_white(reference)
+    if a.shape != b.shape:
+        sizes = [f"{v.shape[1]} × {v.shape[0]}" for v in (a, b)]
+        raise ValueError(f"pictures of {sizes[0]} and {sizes[1]} pixels")
+    return {"psnr": psnr(a, b), "ssim": ssim(a, b), "flip": flip(a, b)}

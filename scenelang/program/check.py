@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import Memory, Spans
@@ -12,6 +13,11 @@ from scenelang.passes import check_scene
 from scenelang.program.compile import find_model
 from scenelang.scene.evaluate import Evaluation, name_frame
 from scenelang.scene.schema import Scene, same_nodes
+from scenelang.scene.unused import find_unused
+from scenelang.syntax import nodes
+
+Frames = Literal["one", "some", "all"]
+"""Which frames of an animation are looked at: the one asked for; the first, second, middle and last; all."""
 
 After = Callable[[str, Graph], None]
 
@@ -84,3 +90,40 @@ def check_frames(
                 diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
     evaluation.warn_of_zeros()
     return looked, len(chosen) + 1
+
+
+def check_evaluated(
+    tree: nodes.File | None,
+    evaluation: Evaluation | None,
+    scene: Scene | None,
+    spans: Spans | None,
+    diagnostics: Diagnostics,
+    *,
+    model: str | None = None,
+    frames: Frames = "some",
+) -> int:
+    """What there is to say of a scene beyond its evaluation.
+
+    Args:
+        tree: its text's; None for JSON.
+        evaluation: has run one frame, the first unless ``frames`` is ``"one"``; None for JSON.
+        scene: what came of it, None if it has errors.
+        spans: where that was written.
+        diagnostics: those of the evaluation; receives the others.
+        model: draw with this model instead of the scene's.
+        frames: which are looked at.
+
+    Returns:
+        How many frames were to be looked at and were not, as they exceed the limits of one scene.
+    """
+    left = 0
+    if scene is not None:
+        check_compiles(scene, spans, diagnostics, model=model)
+    if evaluation is not None and frames != "one":
+        looked, wanted = check_frames(
+            evaluation, diagnostics, first=scene, model=model, every=frames == "all"
+        )
+        left = wanted - looked
+    if tree is not None and not diagnostics.errors:
+        find_unused(tree, diagnostics)  # a name that is misspelt where it is used is no second mistake
+    return left

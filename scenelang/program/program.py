@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.notebook import bundle
+
 MOST_OBJECTS = 100_000
 MOST_PIXELS = 8192
 WIDTH = 64
@@ -79,6 +81,12 @@ class Program:
 
     def __len__(self) -> int:
         return len(self.objects)
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        count = len(self)
+        return bundle(
+            self, self.canvas, f"Program of {count:,} object{'s' * (count != 1)} for `{self.model}`"
+        )
 
     def digest(self) -> str:
         """SHA-256, hex, of all that decides the picture: not of names or places in source text."""

@@ -20,6 +20,7 @@ def load(
     model: str | None = None,
     root: str | os.PathLike[str] | None = None,
     frame: int = 0,
+    size: tuple[int, int] | None = None,
     diagnostics: Diagnostics | None = None,
     **values: Any,
 ) -> Scene:
@@ -32,6 +33,7 @@ def load(
         model: render with this model instead of the one that the file names.
         root: folder that imports cannot leave; by default the file's.
         frame: frame of the animation, from 0.
+        size: canvas in pixels instead of the scene's.
         diagnostics: collects what is found, warnings too.
         **values: values for params: numbers, booleans, sequences, or text as after ``-D NAME=``, which
             is how angles (``"30deg"``) and colours (``"#d33"``) are written.
@@ -41,6 +43,7 @@ def load(
 
     Raises:
         SceneError: the scene has errors; it carries all diagnostics.
+        ValueError: ``size`` is not a canvas.
         OSError: the file cannot be opened.
     """
     found = diagnostics if diagnostics is not None else Diagnostics()
@@ -49,7 +52,7 @@ def load(
     )
     if scene is None:
         raise SceneError(found)
-    return scene
+    return scene if size is None else scene.sized(size)
 
 
 def loads(
@@ -59,6 +62,7 @@ def loads(
     model: str | None = None,
     root: str | os.PathLike[str] | None = None,
     frame: int = 0,
+    size: tuple[int, int] | None = None,
     diagnostics: Diagnostics | None = None,
     name: str = "<text>",
     **values: Any,
@@ -80,4 +84,4 @@ def loads(
     )
     if scene is None:
         raise SceneError(found)
-    return scene
+    return scene if size is None else scene.sized(size)

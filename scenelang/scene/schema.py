@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
 
 from pydantic import Field, field_validator, model_validator
 
+from scenelang.notebook import bundle
 from scenelang.scene.fields import Combine as Combine
 from scenelang.scene.fields import Finite, Frozen, Opaque, Pixels, Version, Word, first_joins_by_union
 from scenelang.scene.modifiers import Bend as Bend
@@ -214,6 +215,19 @@ class Scene(Frozen):
         if args:
             raise TypeError(f"Scene takes its arguments by name: {', '.join(cls._names())}")
         return super()._arranged(args, data)
+
+    def sized(self, size: tuple[int, int]) -> Scene:
+        """The same scene on a canvas of that width and height in pixels.
+
+        Raises:
+            ValueError: not two numbers from 1 to 8192.
+        """
+        canvas = Scene(canvas=size).canvas
+        return self.model_copy(update={"canvas": canvas})
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        count = len(self.nodes)
+        return bundle(self, self.canvas, f"Scene of {count:,} node{'s' * (count != 1)}")
 
     def to_nsg(self) -> str:
         """Canonical text that evaluates back to an equal Scene."""

@@ -1,0 +1,118 @@
+"""The library for embedders beyond one picture: sizes, Scenes as frames, mistakes as values, notebooks."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import scenelang as nsg
+from scenelang import notebook
+
+SMALL = (24, 16)
+MOVING = "animate(1, 6); canvas(48, 48); square { scale(0.5); rotate(15deg * frame); }"
+STAR = nsg.Scene(canvas=SMALL, nodes=nsg.Object("star", nsg.Scale(0.9)))
+
+
+def moving() -> list[nsg.Scene]:
+    return [nsg.loads(MOVING, frame=frame, size=SMALL) for frame in range(6)]
+
+
+def test_size_is_the_canvas_wherever_it_is_given(tmp_path: Path) -> None:
+    (tmp_path / "a.nsg").write_text(MOVING)
+    loaded = nsg.load(tmp_path / "a.nsg", size=SMALL)
+    assert loaded == nsg.loads(MOVING, size=SMALL) == nsg.loads(MOVING).sized(SMALL)
+    assert loaded.canvas == SMALL
+    drawn = nsg.render(loaded, threads=1)
+    assert drawn.shape == (16, 24, 3)
+    assert np.array_equal(nsg.render(nsg.loads(MOVING), size=SMALL, threads=1), drawn)
+    exact = nsg.render(nsg.loads(MOVING), size=SMALL, backend="reference")
+    assert np.abs(drawn - exact).mean() < 0.01
+    with pytest.raises(ValueError, match="compiled for its canvas"):
+        nsg.render(nsg.compile(loaded), size=SMALL)
+    for wrong in ((0, 3), (3, 9000), (2.5, 3), (3,)):
+        with pytest.raises(ValueError, match="canvas"):
+            nsg.loads(MOVING, size=wrong)  # type: ignore[arg-type]
+
+
+def test_scenes_are_frames(tmp_path: Path) -> None:
+    (tmp_path / "a.nsg").write_text(MOVING)
+    given = list(nsg.render_frames(iter(moving()), threads=1))
+    read = list(nsg.render_frames(tmp_path / "a.nsg", size=SMALL, threads=1))
+    assert np.array_equal(given, read)
+    made = nsg.animate(moving(), tmp_path / "given.gif", threads=1)
+    nsg.animate(tmp_path / "a.nsg", tmp_path / "read.gif", size=SMALL, threads=1)
+    assert (tmp_path / "given.gif").read_bytes() == (tmp_path / "read.gif").read_bytes()
+    assert made.frames == 6
+    slow = nsg.animate([STAR, STAR.sized((16, 24))], tmp_path / "b.gif", fps=2, size=SMALL)
+    with Image.open(slow.files[0]) as film:
+        assert film.size == SMALL
+
+
+def test_scenes_of_several_canvases_are_a_batch() -> None:
+    batch = [STAR, nsg.loads(MOVING), STAR.sized((16, 24)), STAR]
+    drawn = list(nsg.render_frames(batch, threads=1))
+    for picture, scene in zip(drawn, batch, strict=True):
+        assert np.array_equal(picture, nsg.render(scene, threads=1))
+    assert np.array_equal(*nsg.render_frames(batch, frames="2..3", size=SMALL, threads=1))
+    (only,) = nsg.render_frames(STAR, threads=1)
+    assert np.array_equal(only, drawn[0])
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda out: nsg.animate([STAR, STAR], out), "fps says how fast"),
+        (lambda out: nsg.animate([STAR, STAR.sized((9, 9))], out, fps=2), "several canvases"),
+        (lambda out: nsg.animate([], out), "neither a path nor Scenes"),
+        (lambda out: list(nsg.render_frames([1, 2])), "neither a path nor Scenes"),  # type: ignore[list-item]
+        (lambda out: list(nsg.render_frames(STAR, params={"k": 1})), "params and root are for files"),
+        (lambda out: list(nsg.render_frames([STAR], frames="3..4")), "frame 3"),
+    ],
+)
+def test_what_scenes_cannot_be(call: Callable[[Path], object], words: str, tmp_path: Path) -> None:
+    with pytest.raises((ValueError, nsg.FramesError), match=words):
+        call(tmp_path / "a.gif")
+    assert not list(tmp_path.iterdir())
+
+
+def test_check_says_what_the_command_says(tmp_path: Path) -> None:
+    text = "nsg 1;\nlet unused = 1;\nsquare { scale(0.5) rotate(45); }\nstar { scale(20); }\n"
+    (tmp_path / "a.nsg").write_text(text)
+    codes = [d.code for d in nsg.check_text(text)]
+    assert codes == [d.code for d in nsg.check(tmp_path / "a.nsg")] == ["E0102"]
+    fixed, left = nsg.fix_text(text)
+    assert fixed == "nsg 1;\nlet _unused = 1;\nsquare { scale(0.5); rotate(45deg); }\nstar { scale(20); }\n"
+    assert [d.code for d in left] == [d.code for d in nsg.check_text(fixed)] == ["W0504"]
+    assert not list(nsg.check_text("star;"))
+    late = "animate(1, 8); let v = [1, 2]; square { translate(v[frame > 5 ? 2 : 0], 0); }"
+    assert [d.code for d in nsg.check_text(late)] == ["E0307"]
+    assert "E0211" in {d.code for d in nsg.check_text("star;", params={"j": 1})}
+    (tmp_path / "b.nsg").write_bytes(b"\xff")
+    assert [d.code for d in nsg.check(tmp_path / "b.nsg")] == ["E0214"]
+    with pytest.raises(OSError, match="none"):
+        nsg.check(tmp_path / "none.nsg")
+
+
+@pytest.mark.parametrize("value", [STAR, nsg.compile(STAR)], ids=["scene", "program"])
+def test_notebooks_show_a_picture(value: Any) -> None:
+    shown = value._repr_mimebundle_()
+    with Image.open(io.BytesIO(shown["image/png"])) as picture:
+        assert picture.size == SMALL
+        assert np.array_equal(np.asarray(picture), nsg.render(value).to_uint8())
+    assert "24 × 16 pixels" in shown["text/plain"]
+
+
+def test_notebooks_show_mistakes_as_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    bad = nsg.Scene(nodes=nsg.Object("circle"))._repr_mimebundle_()
+    assert set(bad) == {"text/plain"}
+    assert "no geometry `circle`" in bad["text/plain"]
+    huge = STAR.sized((8192, 8192))._repr_mimebundle_()
+    assert "too large" in huge["text/plain"]
+    monkeypatch.setattr("scenelang.render", None)
+    assert "text/plain" in notebook.bundle(STAR, SMALL, "Scene")
