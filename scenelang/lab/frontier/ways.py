@@ -18,7 +18,6 @@ from scenelang.image import Image, from_samples
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.models.weights import read_facts
 from scenelang.program.compile import compile_scene
-from scenelang.program.program import Program
 from scenelang.reference.image import reference_image
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 from scenelang.scene.schema import Scene
@@ -76,7 +75,7 @@ def ways_of(base: str, threads: int) -> list[Way]:
     found: list[Way] = []
     for manifest in sorted(manifests, key=lambda m: (m.name != base, m.name)):
         found += _of_model(manifest, base, threads)
-    found += [*_references(load_manifest(base)), *_paper(base, threads)]
+    found += [*_references(load_manifest(base)), *_paper(base)]
     return found
 
 
@@ -152,12 +151,12 @@ def _exact(manifest: Manifest, per_side: int) -> Prepare:
     return prepare
 
 
-def _paper(base: str, threads: int) -> Iterator[Way]:
+def _paper(base: str) -> Iterator[Way]:
     """The paper's streaming renderer at the full size, untrained: what a frame of it takes."""
     for width, title in ((1.0, "the paper's streaming"), (1 / 8, "streaming, 1/8 of the filters")):
         yield Way(
             f"{title}, {FULL}²",
-            _untrained(base, width, threads),
+            _untrained(base, width),
             renderer="streaming",
             why_not="random weights, to take its time",
             drawn=False,
@@ -174,22 +173,13 @@ def _random(width: float) -> Streaming:
     return made
 
 
-def _untrained(base: str, width: float, threads: int) -> Prepare:
+def _untrained(base: str, width: float) -> Prepare:
     def prepare(scene: Scene) -> Draw:
         program = compile_scene(scene, model=base)
-        return lambda: from_samples(_streamed(program, width, threads), None)
+        vectors = torch.from_numpy(program.vectors.copy())[None]
+        tokens = torch.from_numpy(program.tokens.astype(np.int64))[None]
+        return lambda: from_samples(
+            _random(width)(vectors, tokens)[0].permute(1, 2, 0).clamp(0, 1).numpy(), None
+        )
 
     return prepare
-
-
-def _streamed(program: Program, width: float, threads: int) -> np.ndarray:
-    before = torch.get_num_threads()
-    torch.set_num_threads(threads)
-    try:
-        with torch.no_grad():
-            vectors = torch.from_numpy(program.vectors.copy())[None]
-            found = _random(width)(vectors, torch.from_numpy(program.tokens.astype(np.int64))[None])
-    finally:
-        torch.set_num_threads(before)
-    picture: np.ndarray = found[0].permute(1, 2, 0).clamp(0, 1).numpy()
-    return picture
