@@ -36,6 +36,7 @@ ORDER = (
     "scenelang.image",
     "scenelang.reference",
     "scenelang.renderers",
+    "scenelang.models.framed",
     "scenelang.models.load",
     "scenelang.training",
     "scenelang.backend",
@@ -184,6 +185,12 @@ def test_help_loads_nothing_heavy() -> None:
 def test_compile_loads_no_torch(tmp_path: Path) -> None:
     arguments = ("compile", str(ROOT / "examples/chain.nsg"), "-o", str(tmp_path / "chain.safetensors"))
     assert "torch" not in loaded_by(*arguments)
+
+
+def test_a_small_picture_loads_no_torch(tmp_path: Path) -> None:
+    for name in ("hello", "chain"):
+        arguments = ("render", str(ROOT / f"examples/{name}.nsg"), "-o", str(tmp_path / f"{name}.png"))
+        assert "torch" not in loaded_by(*arguments)
 
 
 def test_import_loads_nothing_heavy() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -29,12 +30,14 @@ class Drawable:
         key: digest of all that decides its pixels.
         shot: the frame.
         program: what the network draws; None for the reference.
+        small: whether numpy draws it.
     """
 
     number: int
     key: str
     shot: Shot
     program: Program | None
+    small: bool = False
 
 
 @dataclass(slots=True)
@@ -47,6 +50,7 @@ class Painter:
         device: where the network runs.
         threads: tiles drawn at the same time; by default one for each usable core.
         kept: the picture before, of which what is the same is taken over.
+        load_s: what loading torch took.
     """
 
     clip: Clip
@@ -54,9 +58,14 @@ class Painter:
     device: Device = "auto"
     threads: int | None = None
     kept: Kept | None = field(default=None, repr=False)
+    load_s: float = 0.0
 
-    def prepare(self, shot: Shot) -> Drawable:
+    def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
         """Compile a frame and say what its picture depends on.
+
+        Args:
+            shot: the frame.
+            single: it is a picture by itself, which numpy draws if it is small; torch draws animations.
 
         Raises:
             SceneError: it has errors.
@@ -67,6 +76,12 @@ class Painter:
             key = frame_key("reference", _version("scenelang"), self.clip.model, scene.to_json())
             return Drawable(shot.number, key, shot, None)
         program = self.clip.program(shot)
+        if single:
+            from scenelang.backend.small import choose_drawer
+
+            if choose_drawer(program, self.device).library == "numpy":
+                key = frame_key("numpy", _version("scenelang"), _version("numpy"), program.digest())
+                return Drawable(shot.number, key, shot, program, small=True)
         key = frame_key(
             "neural", _version("scenelang"), _version("torch"), self.place, self.split, program.digest()
         )
@@ -75,8 +90,10 @@ class Painter:
     @property
     def place(self) -> str:
         """The torch device."""
+        started = time.perf_counter()
         from scenelang.backend.neural import choose_device
 
+        self.load_s += time.perf_counter() - started
         return choose_device(self.device)
 
     @property
@@ -89,7 +106,7 @@ class Painter:
         return usable_cores()
 
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
-        """Draw a frame; the same picture as `scenelang.render` gives for it alone, bit for bit.
+        """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit.
 
         Raises:
             SceneError, RenderError: as for `scenelang.render`.
@@ -102,6 +119,10 @@ class Painter:
 
         if self.kept is None and self.clip.reuse:
             self.kept = Kept()
+        if frame.small:
+            from scenelang.backend.small import draw_small
+
+            return draw_small(frame.program, kept=self.kept, progress=progress).image
         return paint(
             frame.program,
             self.place,

@@ -19,6 +19,7 @@ import torch
 
 from scenelang.backend.errors import RenderError
 from scenelang.backend.render import Samples
+from scenelang.backend.small import check_fits
 from scenelang.models.load import Model, ModelError, load_model, place_of
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing, draw
@@ -144,13 +145,7 @@ def draw_program(
     name = model.manifest.name
     if samples != "adaptive" and not isinstance(model.network, Framed):
         raise RenderError(f"model `{name}` samples pixels in one way only, not `{samples}`")
-    if program.model != model.manifest.name:
-        raise RenderError(f"a program for model `{program.model}`, not `{name}`")
-    if program.weights != model.digest:
-        raise RenderError(
-            f"the program was compiled for weights {program.weights[:12]}… of model `{program.model}`, "
-            f"these are {model.digest[:12]}…: compile the scene again"
-        )
+    check_fits(program, name, model.digest)
     threads = usable_cores() if threads is None else threads
     if place_of(model.network).type != "cpu":
         threads, split = 1, 1  # the device is busy with one tile

@@ -29,16 +29,19 @@ def render(
 ) -> Image:
     """Draw a Program, or a Scene, which is compiled first.
 
-    A model is loaded when it is first drawn with and then kept. The same Program, device and number of
-    threads give the same picture bit for bit; other devices and numbers the same within 1/255.
+    A small picture is drawn by numpy, which saves importing torch; how much there is to draw is counted from
+    the Program alone. A model is loaded when it is first drawn with and then kept. The same Program, device
+    and number of threads give the same picture bit for bit; other devices and numbers, and the two
+    libraries, the same within 1/255.
 
     Args:
         program_or_scene: what to draw.
         size: canvas in pixels instead of the Scene's; a Program is compiled for its own.
         backend: ``"neural"`` draws with the trained network, ``"reference"`` a Scene by the exact
             definition, which knows no boolean rule and none of a model's limits.
-        device: where the network runs; ``"auto"`` is CUDA where there is any.
-        threads: tiles drawn at the same time; by default as many as there are usable cores.
+        device: where torch runs the network, whatever the picture's size; with ``"auto"`` numpy draws small
+            pictures, and torch others on CUDA where there is any.
+        threads: tiles that torch draws at the same time; by default as many as there are usable cores.
         samples: of a pixel: ``"four"`` as the language defines, ``"one"``, which is faster and has hard
             edges, or ``"adaptive"``, four near outlines and one elsewhere, which looks the same as four.
         progress: called with the share done, in [0, 1], from any thread.
@@ -79,6 +82,10 @@ def render(
             raise RenderError(f"a model has no weights here: {error.filename}") from None
     else:
         program = program_or_scene
+    from scenelang.backend.small import choose_drawer, draw_small
+
+    if choose_drawer(program, device, samples).library == "numpy":
+        return draw_small(program, samples=samples, progress=progress).image
     from scenelang.backend.neural import choose_device, draw_program, open_model
 
     model = open_model(program.model, choose_device(device))

@@ -110,8 +110,8 @@ class Chooser:
         self, frontier: Frontier, job: Job, program: Program, refused: dict[str, str]
     ) -> Iterator[Offer]:
         from scenelang.measure.choose import offers, refusal
-        from scenelang.measure.cost import load_of
         from scenelang.models.manifest import available, load_manifest
+        from scenelang.program.work import load_of
 
         scene = job.source.scene if job.source is not None else None
         known = available()

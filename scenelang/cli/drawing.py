@@ -11,7 +11,7 @@ from scenelang.cli.inputs import Request
 from scenelang.cli.jobs import Job
 
 if TYPE_CHECKING:
-    from scenelang.backend.render import Samples
+    from scenelang.backend.render import Device, Samples
     from scenelang.image import Image
     from scenelang.measure.frontier import Limits
 
@@ -41,8 +41,6 @@ def chosen(
     from scenelang.cli.choosing import Chooser
     from scenelang.cli.say import say_trouble
 
-    with clock("load torch"):
-        from scenelang.backend.neural import open_model  # noqa: F401
     with clock("choose"):
         chooser = Chooser(limits, request.model)
         ways = {id(job): chooser.choose(job) for job, _ in ready}
@@ -61,27 +59,31 @@ def chosen(
     return draw, [(job, path) for job, path in ready if ways[id(job)] is not None], code
 
 
-def neural(clock: Clock, device: str, threads: int | None, samples: Samples) -> Draw:
+def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) -> Draw:
     """Draw with trained networks."""
-    with clock("load torch"):
-        from scenelang.backend.neural import choose_device, draw_program, open_model
-    place = choose_device(device)
+    from scenelang.backend.small import choose_drawer, draw_small
 
     def draw(job: Job, progress: Callable[[float], None]) -> Image:
         assert job.program is not None
-        with clock("load model"):
-            model = open_model(job.program.model, place)
-        with clock("draw"):
-            drawing = draw_program(
-                job.program,
-                model,
-                threads=threads,
-                samples=samples,
-                progress=progress,
-            )
+        library, why = choose_drawer(job.program, device, samples)
+        if library == "numpy":
+            place = "one core"
+            with clock("draw"):
+                drawing = draw_small(job.program, samples=samples, progress=progress)
+        else:
+            with clock("load torch"):
+                from scenelang.backend.neural import choose_device, draw_program, open_model
+            place = choose_device(device)
+            with clock("load model"):
+                model = open_model(job.program.model, place)
+            with clock("draw"):
+                drawing = draw_program(
+                    job.program, model, threads=threads, samples=samples, progress=progress
+                )
+        job.notes.append(f"drawn by {library} on {place}: {why}")
         width, height = job.program.canvas
         once = width * height - drawing.refined
-        job.notes.append(f"drew {once:,} pixels by one sample and {drawing.refined:,} by four, on {place}")
+        job.notes.append(f"drew {once:,} pixels by one sample and {drawing.refined:,} by four")
         job.notes.append(f"{drawing.pairs:,} meetings of a sample and an object")
         return drawing.image
 

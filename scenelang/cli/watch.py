@@ -95,7 +95,6 @@ def command(
     screen = Screen(show, wants_color(sys.stdout))
     changes = Changes(polls=poll, say=screen.say)
     easel = Easel(wish)
-    easel.warm()
     while True:
         before = stamps(easel.paths)
         try:
@@ -163,8 +162,7 @@ def _told(outcome: Outcome, out: Path) -> str:
     name = str(outcome.files[0])
     if len(outcome.files) > 1:
         name = f"{name} … {outcome.files[-1].name}"
-    total = outcome.compile_s + outcome.draw_s + outcome.save_s
-    return (
-        f"{name}: {1000 * total:.0f} ms (compile {1000 * outcome.compile_s:.0f}, "
-        f"draw {1000 * outcome.draw_s:.0f}, save {1000 * outcome.save_s:.0f})"
-    )
+    stages = {"compile": outcome.compile_s, "load torch": outcome.load_s}
+    stages |= {"draw": outcome.draw_s, "save": outcome.save_s}
+    told = ", ".join(f"{stage} {1000 * s:.0f}" for stage, s in stages.items() if s or stage != "load torch")
+    return f"{name}: {1000 * sum(stages.values()):.0f} ms ({told})"

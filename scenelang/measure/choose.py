@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from scenelang.measure.cost import Load, predicted_ms
+from scenelang.measure.cost import predicted_ms
 from scenelang.measure.frontier import Frontier, Limits, Point
 from scenelang.models.choose import lacking, paints, uses
 from scenelang.models.manifest import Manifest
+from scenelang.program.work import Load
 from scenelang.scene.schema import Scene
 
 OBJECTS: Final = 4

@@ -11,17 +11,16 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from scenelang.models.framed import MOST_WIDTH, framed_config
 from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.models.weights import LIFTING, Codes, codes_of, open_weights, read_weights, weights_path
+from scenelang.models.weights import LIFTING, Codes, codes_of, open_weights, shipped_weights
 from scenelang.models.weights import ModelError as ModelError
 from scenelang.program.program import WIDTH
-from scenelang.renderers.field import FramedConfig
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.reading import Reading, ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 from scenelang.tensors import TensorError
 
-MOST_WIDTH = 1024
 RENDERER = "renderer."
 """In front of the names of a renderer's tensors, where a file holds it beside a lifting's."""
 
@@ -105,18 +104,7 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
 
 
 def _framed(config: dict[str, Any], manifest: Manifest, size: int) -> Framed:
-    sizes = config["network"]
-    if "cell_width" in sizes:
-        raise ModelError("weights of an earlier framed renderer, whose cell was another; train them again")
-    if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes.values()):
-        raise ModelError("a network size is out of range")
-    known = FramedConfig(**sizes)
-    decoder = (known.code + 1) * known.decoder_width * (known.decoder_width + known.features)
-    rows = known.state + known.paint_lines
-    cell = (known.features + known.state) * rows + known.features * known.state
-    if 4 * max(decoder, cell) > size:
-        raise ModelError("a network larger than its file")
-    return Framed(known, len(manifest.geometries), len(manifest.materials))
+    return Framed(framed_config(config, size), len(manifest.geometries), len(manifest.materials))
 
 
 def _streaming(config: dict[str, Any], manifest: Manifest, size: int) -> Streaming:
@@ -152,12 +140,7 @@ def load_model(name: str, device: str = "cpu", path: Path | None = None) -> Mode
         ModelError: its weights are missing or damaged.
     """
     manifest = load_manifest(name)
-    try:
-        data = read_weights(path or weights_path(name))
-    except OSError as error:
-        raise ModelError(
-            f"cannot read the weights of '{name}': {(error.strerror or str(error)).lower()}"
-        ) from None
+    data = shipped_weights(name, path)
     network = load_network(data, manifest, device)
     lifted = None if isinstance(network, Framed) else codes_of(manifest, data)
     return Model(manifest, network, hashlib.sha256(data).hexdigest(), open_weights(data).header, lifted)

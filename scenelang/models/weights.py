@@ -74,6 +74,19 @@ def read_weights(path: Path) -> bytes:
     return read_regular(path, MOST_BYTES)
 
 
+def shipped_weights(name: str, path: Path | None = None) -> bytes:
+    """The bytes of a shipped model's weights file, or of the one at ``path``.
+
+    Raises:
+        ModelError: it cannot be read.
+    """
+    try:
+        return read_weights(path or weights_path(name))
+    except OSError as error:
+        why = (error.strerror or str(error)).lower()
+        raise ModelError(f"cannot read the weights of '{name}': {why}") from None
+
+
 def open_weights(data: bytes) -> TensorFile:
     """What a weights file holds.
 

@@ -14,6 +14,8 @@ import numpy as np
 
 Array = Any
 """A numpy array, or a torch tensor on any device."""
+BLOCK = 256
+"""Points of a product: larger ones are split among cores by OpenBLAS, whose threads wait for each other."""
 Layers = Sequence[tuple[Array, Array]]
 """Weights (…, out, in) and biases (…, out)."""
 
@@ -68,11 +70,17 @@ class Arrays:
         return found
 
     def perceptron(self, x: Array, layers: Layers) -> Array:
-        """Layers with rectified linear units between them; (…, out, M) of (…, in, M)."""
+        """Layers with rectified linear units between: (out, M) of (in, M); torch takes leading axes too."""
+        channels, count = x.shape
+        blocks = max(1, -(-count // BLOCK))
+        each = -(-count // blocks)
+        even = np.zeros((channels, blocks * each), x.dtype)
+        even[:, :count] = x
+        x = even.reshape(channels, blocks, each).swapaxes(0, 1)
         for layer in layers[:-1]:
-            x = self.dense(x, *layer)
+            x = self.dense(x, *layer)  # (blocks, out, each)
             np.maximum(x, 0.0, out=x)
-        return self.dense(x, *layers[-1])
+        return self.dense(x, *layers[-1]).swapaxes(0, 1).reshape(-1, blocks * each)[:, :count]
 
     def take(self, x: Array, index: Array) -> Array:
         """Entries (…, k) of (…, M)."""

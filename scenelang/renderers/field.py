@@ -264,7 +264,8 @@ class Field:
     ) -> None:
         self.network, self.xp = network, network.xp
         self.vectors = vectors
-        self.codes = np.unique(vectors[:, exact.CODE], axis=0)  # of the leaves in use
+        self.codes = np.array(sorted(set(map(tuple, vectors[:, exact.CODE].tolist()))), np.float32)
+        """Of the leaves in use (K, C)."""
         self.frames = dict(_frames(vectors[:, : exact.D_G], frames or {}))
         with self.xp.inference():
             self.cells = [
@@ -280,10 +281,12 @@ class Field:
             return []
         xp = self.xp
         g, m = vectors[:, : exact.D_G], vectors[:, exact.D_G :]
-        codes, index = np.unique(g[:, exact.CODE], axis=0, return_inverse=True)
         like = self.network.codes
-        layers, far = self.network.decoder_weights(xp.array(codes, like))
-        shapes = [Decoder([(xp.packed(w[i]), b[i]) for w, b in layers], far) for i in range(len(codes))]
+        layers, far = self.network.decoder_weights(xp.array(self.codes, like))
+        shapes = {
+            tuple(code): Decoder([(xp.packed(w[i]), b[i]) for w, b in layers], far)
+            for i, code in enumerate(self.codes.tolist())
+        }
         codes_m = xp.array(m[:, exact.MATERIAL_CODE].copy(), like)
         albedo = self.network.object_albedo(codes_m)
         albedo = xp.concat([albedo, xp.full((len(g), 1), 1.0, like)], 1)
@@ -297,7 +300,7 @@ class Field:
                 reach = float("inf")
             else:
                 reach = 1.0 + SLACK + (BLEND_REACH / frame.scale if blends_after[i] else 0.0)
-            rows.append(Row(frame, token, colours[i], shapes[int(index.flat[i])], reach))
+            rows.append(Row(frame, token, colours[i], shapes[tuple(g[i, exact.CODE].tolist())], reach))
         return rows
 
     def empty(self, count: int) -> Array:

@@ -53,7 +53,7 @@ class Kept:
         width, height = canvas
         px = 2 / min(width, height)  # world units
         rows, low, high = _rows(coverage, px)
-        common = repr((canvas, list(tiles))).encode()
+        common = repr((type(coverage.xp).__name__, canvas, list(tiles))).encode()
         keys = []
         for tile in tiles:
             top = (height / 2 - tile.start + _ROOM_PX) * px

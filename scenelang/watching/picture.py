@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import os
+import sys
 import threading
 import time
 from dataclasses import dataclass, field
@@ -72,7 +73,7 @@ class Outcome:
         good: whether the file that was asked for is as the scene says.
         same: nothing had to be drawn: the scene means the same picture as before.
         diagnostics: of the scene.
-        compile_s, draw_s, save_s: where the time went.
+        compile_s, load_s, draw_s, save_s: where the time went; `load_s` is torch's import.
         files: what was written.
     """
 
@@ -81,6 +82,7 @@ class Outcome:
     same: bool = False
     diagnostics: list[Diagnostic] = field(default_factory=list)
     compile_s: float = 0.0
+    load_s: float = 0.0
     draw_s: float = 0.0
     save_s: float = 0.0
     files: list[Path] = field(default_factory=list)
@@ -103,10 +105,10 @@ class Easel:
         self._image: Image | None = None
         self._kept: Kept | None = None
 
-    def warm(self) -> None:
+    def _warm(self) -> None:
         """Load torch in the background, so that a scene that is mended need not wait for it."""
-        if self.wish.backend == "neural":
-            name = "scenelang.backend.neural"
+        name = "scenelang.backend.neural"
+        if self.wish.backend == "neural" and name not in sys.modules:
             threading.Thread(target=importlib.import_module, args=(name,), daemon=True).start()
 
     def draw(self, before: Stamps) -> Outcome:
@@ -125,6 +127,8 @@ class Easel:
         with contextlib.suppress(SceneError):  # its diagnostics are `found`
             self._draw(found, outcome, before)
         outcome.diagnostics = found.items
+        if not outcome.good:
+            self._warm()
         return outcome
 
     def _draw(self, found: Diagnostics, outcome: Outcome, before: Stamps) -> None:
@@ -143,8 +147,9 @@ class Easel:
         if wish.target is not None and (clip.animates or wish.target.kind == "sequence"):
             self._film(painter, wish.target, numbers, outcome, before)
             return
-        frame = painter.prepare(clip.shot(wish.frame))
-        outcome.compile_s = time.perf_counter() - started
+        frame = painter.prepare(clip.shot(wish.frame), single=True)
+        outcome.load_s = painter.load_s
+        outcome.compile_s = time.perf_counter() - started - painter.load_s
         if frame.key == self._key and wish.out.exists():
             outcome.image, outcome.good, outcome.same = self._image, True, True
             return

@@ -149,7 +149,12 @@ def test_verbose(folder: Folder) -> None:
     assert "tokens: 2 union" in said
     assert "model shapes2d (the smallest that has all it uses)" in said
     assert "push_transforms" in said or "fold_affines" in said
-    for stage in ("parse", "evaluate", "compile", "load torch", "load model", "draw", "save"):
+    assert "drawn by numpy on one core: about " in said
+    for stage in ("parse", "evaluate", "compile", "draw", "save"):
+        assert f"{stage} " in said.rpartition("time (ms):")[2]
+    said = folder.run("render", "a.nsg", "-o", "b.png", "-v", "--device", "cpu").stderr
+    assert "drawn by torch on cpu: asked for by device cpu" in said
+    for stage in ("load torch", "load model", "draw"):
         assert f"{stage} " in said.rpartition("time (ms):")[2]
 
 

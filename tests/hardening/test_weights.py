@@ -17,6 +17,7 @@ from safetensors.numpy import load, save
 
 from fuzz.tensors import mutate
 from scenelang.models import manifest as manifests
+from scenelang.models.framed import framed_arrays
 from scenelang.models.load import load_network
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.weights import ModelError, codes_of, open_weights, weights_path
@@ -140,9 +141,10 @@ def test_codes(name: str) -> None:
 
 @pytest.mark.parametrize("name", [*HARM, *OF_THE_NETWORK])
 def test_networks(name: str) -> None:
-    with pytest.raises(ModelError) as caught:
-        load_network({**HARM, **OF_THE_NETWORK}[name], SHAPES)
-    assert str(caught.value)
+    for load_with in (load_network, framed_arrays):
+        with pytest.raises(ModelError) as caught:
+            load_with({**HARM, **OF_THE_NETWORK}[name], SHAPES)
+        assert str(caught.value)
 
 
 def test_weights_of_an_earlier_version_are_called_that() -> None:

@@ -21,7 +21,6 @@ from scenelang.measure.choose import (
     offers,
     refusal,
 )
-from scenelang.measure.cost import Load
 from scenelang.measure.frontier import (
     Cost,
     Errors,
@@ -34,6 +33,7 @@ from scenelang.measure.frontier import (
     front,
 )
 from scenelang.models.manifest import load_manifest
+from scenelang.program.work import Load
 from scenelang.scene.schema import Object, Scale, Scene, Twist
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
@@ -75,9 +76,9 @@ SCENES = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def network():
-    return load_model("shapes2d").framed
+@pytest.fixture(scope="module", params=["torch", "numpy"])
+def network(request: pytest.FixtureRequest):
+    return load_model("shapes2d").framed if request.param == "torch" else load_arrays("shapes2d").network
 
 
 def program(scene: nsg.Scene | str, canvas: tuple[int, int] = (36, 28)) -> Program:

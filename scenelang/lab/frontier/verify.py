@@ -12,12 +12,12 @@ import torch
 from scenelang.backend.neural import open_model
 from scenelang.lab.frontier.ways import ways_of
 from scenelang.measure.choose import error_scale
-from scenelang.measure.cost import load_of
 from scenelang.measure.frontier import Frontier
 from scenelang.measure.metrics import flip
 from scenelang.measure.scenes import reference_of, scenes_of
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
+from scenelang.program.work import load_of
 from scenelang.training.loop import revision
 
 KEPT: Final = 0.95
