@@ -10,6 +10,8 @@ import pytest
 
 import scenelang as nsg
 from scenelang.backend import neural
+from scenelang.backend.render import Device
+from scenelang.models.framed import load_arrays
 from scenelang.renderers.draw import draw
 
 SMALL = "canvas(64, 64);"
@@ -21,6 +23,7 @@ FOUR = """chain {
 }"""
 MANY = "for (i in 0..<200) { star { scale(0.1); translate(2 * rand(i) - 1, 2 * rand(i + 500) - 1); } }"
 STEP = 1 / 255
+BOTH = pytest.mark.parametrize("device", ["auto", "cpu"], ids=["numpy", "torch"])
 
 
 def program(text: str) -> nsg.Program:
@@ -63,15 +66,16 @@ def test_a_scene_and_its_program_are_one_picture() -> None:
     assert np.array_equal(nsg.render(scene), nsg.render(nsg.compile(scene)))
 
 
-def test_pictures_repeat() -> None:
+@BOTH
+def test_pictures_repeat(device: Device) -> None:
     compiled = program(FOUR)
-    first = nsg.render(compiled)
+    first = nsg.render(compiled, device=device)
     nsg.render(program(MANY))
-    assert np.array_equal(nsg.render(compiled), first)
+    assert np.array_equal(nsg.render(compiled, device=device), first)
     for threads in (1, 2, 3, 8):
-        image = nsg.render(compiled, threads=threads)
+        image = nsg.render(compiled, device=device, threads=threads)
         assert np.abs(image - first).max() <= STEP
-        assert np.array_equal(nsg.render(compiled, threads=threads), image)
+        assert np.array_equal(nsg.render(compiled, device=device, threads=threads), image)
 
 
 def test_tiles_do_not_show() -> None:
@@ -88,21 +92,22 @@ def test_torch_keeps_its_number_of_threads() -> None:
     before = torch.get_num_threads()
     try:
         torch.set_num_threads(3)
-        nsg.render(program(SMALL + FOUR), threads=2)
+        nsg.render(program(SMALL + FOUR), device="cpu", threads=2)
         assert torch.get_num_threads() == 3
     finally:
         torch.set_num_threads(before)
 
 
-def test_progress_ends_at_1() -> None:
+@BOTH
+def test_progress_ends_at_1(device: Device) -> None:
     shares: list[float] = []
-    nsg.render(program(FOUR), threads=2, progress=shares.append)
+    nsg.render(program(FOUR), device=device, threads=2, progress=shares.append)
     assert shares
     assert max(shares) == 1.0
 
 
 def test_models_are_loaded_once() -> None:
-    nsg.render(program(SMALL))
+    nsg.render(program(SMALL), device="cpu")
     model = neural.open_model("shapes2d")
     nsg.render(program(SMALL + FOUR), device="cpu")
     assert neural.open_model("shapes2d") is model
@@ -120,19 +125,22 @@ def test_numbers_that_are_none() -> None:
         dataclasses.replace(good, tokens=tokens)
 
 
-def test_other_weights() -> None:
+@BOTH
+def test_other_weights(device: Device) -> None:
     with pytest.raises(nsg.RenderError, match="compile the scene again"):
-        nsg.render(dataclasses.replace(program(SMALL), weights="0" * 64))
+        nsg.render(dataclasses.replace(program(SMALL), weights="0" * 64), device=device)
     with pytest.raises(nsg.RenderError, match="unknown model `other`"):
-        nsg.render(dataclasses.replace(program(SMALL), model="other"))
+        nsg.render(dataclasses.replace(program(SMALL), model="other"), device=device)
 
 
-def test_missing_weights(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+@BOTH
+def test_missing_weights(device: Device, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     compiled = program(SMALL)
     neural._load.cache_clear()
-    monkeypatch.setattr("scenelang.models.load.weights_path", lambda name: tmp_path / "none")
+    load_arrays.cache_clear()
+    monkeypatch.setattr("scenelang.models.weights.weights_path", lambda name: tmp_path / "none")
     with pytest.raises(nsg.RenderError, match="cannot read the weights"):
-        nsg.render(compiled)
+        nsg.render(compiled, device=device)
 
 
 def test_what_is_refused() -> None:

@@ -95,7 +95,7 @@ device = click.option(
     type=click.Choice(["auto", "cpu", "cuda"]),
     default="auto",
     show_default=True,
-    help="Where the network runs; auto is CUDA where there is any.",
+    help="Where torch draws; auto is CUDA where there is any, and numpy for a small picture.",
 )
 threads = click.option("--threads", type=click.IntRange(1), metavar="N", help="Threads on the CPU.")
 verbose = click.option("-v", "--verbose", is_flag=True, help="Say what was compiled and where the time went.")
