@@ -12,9 +12,10 @@ from scenelang.cli import options
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from scenelang.cli.checking import Frames, Scenes
+    from scenelang.cli.checking import Scenes
     from scenelang.diagnostics.diagnostic import Diagnostic
     from scenelang.diagnostics.fixes import Settled
+    from scenelang.program.check import Frames
     from scenelang.scene.params import Defines
 
 Format = Literal["human", "json", "sarif", "github", "concise"]

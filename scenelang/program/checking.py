@@ -10,7 +10,7 @@ from typing import Any
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import settle
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.program.check import check_evaluated
+from scenelang.program.check import Frames, check_evaluated
 from scenelang.scene.evaluate import Evaluation, in_file_order
 from scenelang.scene.imports import Unreadable, read_source
 from scenelang.syntax import parse
@@ -106,7 +106,7 @@ def _look(
         tree, diagnostics=found, defines=params, model=model, root=folder, path=path, replays=True
     )
     scene, spans = evaluation.run(0)
-    frames = "all" if all_frames else "some"
+    frames: Frames = "all" if all_frames else "some"
     check_evaluated(
         tree, evaluation, None if found.errors else scene, spans, found, model=model, frames=frames
     )
