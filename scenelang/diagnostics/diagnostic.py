@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Final, Literal
 
 from scenelang.diagnostics.span import Span
 
 Severity = Literal["error", "warning"]
-MOST_CHARS = 1000
+MOST_CHARS: Final = 1000
+MOST: Final = 1000
+"""So many errors of a file, and so many warnings, are kept."""
+_BEYOND: Final = {"E": ("E0121", "mistakes"), "W": ("W0102", "warnings")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +64,17 @@ class Diagnostic:
         return "warning" if self.code.startswith("W") else "error"
 
 
+def _cut(text: str) -> str:
+    return text if len(text) <= MOST_CHARS else f"{text[:MOST_CHARS]}…"
+
+
 @dataclass(slots=True)
 class Diagnostics:
-    """An ordered collector; the same code at the same place is kept once."""
+    """An ordered collector; the same code at the same place is kept once, and of a file at most `MOST`."""
 
     items: list[Diagnostic] = field(default_factory=list)
     _seen: set[tuple[str, str, int, int]] = field(default_factory=set, repr=False)
+    _counts: dict[tuple[str, str], int] = field(default_factory=dict, repr=False)
 
     def add(
         self,
@@ -77,16 +85,28 @@ class Diagnostics:
         labels: Iterable[Label] = (),
         help: str | None = None,
         fix: Fix | None = None,
-    ) -> None:
-        """Record one diagnostic; a message that quotes half a file is cut."""
-        if len(message) > MOST_CHARS:
-            message = f"{message[:MOST_CHARS]}…"
+    ) -> bool:
+        """Record one diagnostic; a message that quotes half a file is cut.
+
+        Returns:
+            Whether there is room for it.
+        """
         if span is not None:
             key = (code, span.source.name, span.start, span.end)
             if key in self._seen:
-                return
+                return True
             self._seen.add(key)
-        self.items.append(Diagnostic(code, message, span, tuple(labels), help, fix))
+        kind = (code[0], "" if span is None else span.source.name)
+        beyond, noun = _BEYOND[code[0]]
+        if code != beyond:
+            count = self._counts[kind] = self._counts.get(kind, 0) + 1
+            if count > MOST:
+                if count == MOST + 1:
+                    self.add(beyond, f"more than {MOST:,} {noun}", span, help="others are not reported")
+                return False
+        given = tuple([Label(label.span, _cut(label.message)) for label in labels])
+        self.items.append(Diagnostic(code, _cut(message), span, given, _cut(help) if help else help, fix))
+        return True
 
     @property
     def errors(self) -> list[Diagnostic]:

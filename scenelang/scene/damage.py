@@ -7,7 +7,8 @@ inside it, is known when it reads again; until then both are passed over in sile
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from scenelang.diagnostics.diagnostic import Diagnostic
@@ -18,7 +19,7 @@ from scenelang.syntax.tables import tables
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _DEFINITION = re.compile(
     r"(?:let|param|fn|module)\b(?P<name>[ \t]+[A-Za-z_]\w*)?"
-    r"|(?:import|include|use|require)\b(?P<alias>.*\bas\s+\w+)?"
+    r"|(?:import|include|use|require)\b(?P<alias>.{0,200}?\bas[ \t]{1,20}\w+)?"
 )
 _NAMES = frozenset(("E0201", "E0202", "E0203", "E0204", "E0206", "E0207", "E0208", "E0212", "E0213"))
 _PLACES = frozenset(("E0330", "E0331", "E0332", "E0333", "E0334", "E0335"))
@@ -29,7 +30,8 @@ class Damage:
     """The damage of one file.
 
     Args:
-        parts: what cannot be trusted: simple statements, and the heads of those with a block.
+        parts: what cannot be trusted: simple statements, and the heads of those with a block; in the order
+            of the text, none within another.
         blocks: blocks whose head is damaged; names that it defines may be used in them.
         words: words in damaged parts: a definition may have been among them.
         nameless: some damaged definition does not say what it defines.
@@ -51,7 +53,8 @@ class Damage:
 
     def holds(self, span: Span) -> bool:
         """Whether a place lies in a damaged part."""
-        return any(part.start <= span.start and span.end <= part.end for part in self.parts)
+        at = bisect_right(self.parts, span.start, key=lambda part: part.start)
+        return at > 0 and span.end <= self.parts[at - 1].end
 
     def explains(self, code: str, span: Span) -> bool:
         """Whether a diagnostic may follow from a syntax mistake."""
@@ -80,22 +83,32 @@ def find_damage(file: nodes.File, found: Iterable[Diagnostic]) -> Damage:
     ]
     if not marks:
         return NONE
-    parts = [stmt.span for stmt in _bad(file.statements)]
+    found_parts = [stmt.span for stmt in _bad(file.statements)]
     blocks: list[Span] = []
     for _, span in marks:
-        parts.append(_lines(span))
+        found_parts.append(_lines(span))
         for part, block in _touched(file.statements, span):
-            parts.append(part)
+            found_parts.append(part)
             blocks += [block] if block else []
+    parts = _outermost(found_parts)
     texts = [part.text for part in parts]
     nameless = any(_is_nameless(match) for text in texts for match in _DEFINITION.finditer(text))
     return Damage(
-        tuple(dict.fromkeys(parts)),
+        parts,
         tuple(dict.fromkeys(blocks)),
         frozenset(word for text in texts for word in _WORD.findall(text)),
         nameless,
         any(_is_about_braces(code, span) for code, span in marks),
     )
+
+
+def _outermost(spans: Iterable[Span]) -> tuple[Span, ...]:
+    """Those of some spans that lie within no other, in the order of the text."""
+    found: list[Span] = []
+    for span in sorted(spans, key=lambda span: (span.start, -span.end)):
+        if not found or span.end > found[-1].end:
+            found.append(span)
+    return tuple(found)
 
 
 def _is_nameless(definition: re.Match[str]) -> bool:
@@ -157,16 +170,20 @@ def _bad(statements: tuple[nodes.Stmt, ...]) -> Iterator[nodes.BadStmt]:
 
 def _touched(statements: tuple[nodes.Stmt, ...], mark: Span) -> Iterator[tuple[Span, Span | None]]:
     """The innermost statements at a mistake: what is damaged of each, and the block that follows."""
-    stack: list[nodes.Stmt] = list(statements)
+    stack: list[nodes.Stmt] = list(_near(statements, mark))
     while stack:
         stmt = stack.pop()
-        if stmt.span.start > mark.end or stmt.span.end < mark.start:
-            continue
         blocks = list(_inside(stmt))
         within = next((block for block in blocks if _holds_mark(block, mark)), None)
         if within is not None:
-            stack.extend(within.statements)
+            stack.extend(_near(within.statements, mark))
         elif blocks:
             yield Span(stmt.span.source, stmt.span.start, blocks[0].span.start), blocks[0].span
         else:
             yield stmt.span, None
+
+
+def _near(statements: Sequence[nodes.Stmt], mark: Span) -> Sequence[nodes.Stmt]:
+    """The statements of a block that reach or touch a place."""
+    first = bisect_left(statements, mark.start, key=lambda stmt: stmt.span.end)
+    return statements[first : bisect_right(statements, mark.end, lo=first, key=lambda stmt: stmt.span.start)]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -135,7 +136,8 @@ class Evaluation:
                     inputs.report_unused(diagnostics)
             except Halt:
                 pass
-            report_misfits(session)
+            with suppress(Halt):
+                report_misfits(session)
         self.wanted = tuple(loader.wanted)
         """All files that it imports, also those that are not there."""
         self.sources = (file.span.source, *(imported.span.source for imported in loader.parsed.values()))

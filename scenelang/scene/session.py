@@ -209,7 +209,8 @@ class Session:
         if self.reported.setdefault(place, code) != code or self.follows(code, span):
             return  # one place, one mistake: what else is wrong there most likely comes of it
         around = self.call_labels() if site is None else []
-        self.diagnostics.add(code, message, span, labels=[*labels, *around], help=help, fix=fix)
+        if not self.diagnostics.add(code, message, span, labels=(*labels, *around), help=help, fix=fix):
+            raise Halt
 
     def model_label(self) -> tuple[Label, ...]:
         """Where the scene names its model, if it does."""

@@ -35,4 +35,5 @@ CODES: dict[str, str] = {
     "E0132": "misspelt keyword",
     "E0133": "written as in another language",
     "W0101": "stray semicolon",
+    "W0102": "too many warnings",
 }
