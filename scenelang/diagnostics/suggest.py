@@ -3,15 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from heapq import nsmallest
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 
 _CLEAR = 0.5  # by so much a name has to be nearer than the next for a fix to be safe
 _SWAPPED, _CASE, _JOINT, _FIRST = 0.9, 0.05, 0.3, 0.15
+_LONGEST = 64  # letters of a name that others are compared with
+_MOST_SLIPS = 8
 
 
-def ranked(name: str, known: Iterable[str], slips: int | None = None) -> list[tuple[float, str]]:
+@dataclass(slots=True)
+class Effort:
+    """What looking for similar names may still cost, over all of a scene: it may hold thousands of both.
+
+    Args:
+        left: pairs of letters that may still be compared.
+    """
+
+    left: int = 2_000_000
+
+    @property
+    def spent(self) -> bool:
+        return self.left <= 0
+
+
+def ranked(
+    name: str, known: Iterable[str], slips: int | None = None, effort: Effort | None = None
+) -> list[tuple[float, str]]:
     """The names that may have been meant, nearest first, each with its distance.
 
     The distance counts slips: a letter more, less or other is one, two neighbours swapped a little less,
@@ -22,18 +43,30 @@ def ranked(name: str, known: Iterable[str], slips: int | None = None) -> list[tu
         name: what was written.
         known: the names there are.
         slips: how many slips are forgiven; by default one in three letters.
+        effort: what this takes its work from; the names that are left when it is spent are not looked at.
     """
-    if len(name) < 2 and not slips:
+    if (len(name) < 2 and not slips) or len(name) > _LONGEST:
         return []
-    limit = len(name) // 3 if slips is None else slips
-    plain = _plain(name)
+    limit = min(len(name) // 3 if slips is None else slips, _MOST_SLIPS)
+    plain, letters = _plain(name), set(name.lower())
+    effort = effort or Effort()
     found = []
-    for candidate in set(known):
+    for candidate in sorted(set(known)):
+        if effort.spent:
+            break
+        effort.left -= 8
+        if abs(len(candidate) - len(name)) > limit + 2:  # an underscore and a final s make no slip
+            continue
         other = _plain(candidate)
         if other == plain:
             distance = _CASE if candidate.lower() == name.lower() else _JOINT
         else:
-            distance = _slips(name.lower(), candidate.lower(), limit)
+            lower = candidate.lower()
+            own = set(lower)
+            if max(len(letters - own), len(own - letters)) > limit:
+                continue  # one slip takes at most one of them away
+            effort.left -= len(name) * (2 * limit + 1)
+            distance = _slips(name.lower(), lower, limit)
             distance += _FIRST * (name[:1].lower() != candidate[:1].lower())
             if distance > limit + _FIRST or distance >= max(len(name), len(candidate)):
                 continue
@@ -57,28 +90,31 @@ def _slips(a: str, b: str, limit: int) -> float:
     """Optimal string alignment distance; anything above ``limit`` once it is sure to exceed it."""
     if abs(len(a) - len(b)) > limit:
         return limit + 1
+    far = limit + 1.0
     older: list[float] = []
     row: list[float] = list(range(len(b) + 1))
     for i, letter in enumerate(a, 1):
-        older, last, row = row, older, [float(i)]
-        for j, other in enumerate(b, 1):
+        older, last, row = row, older, [far] * (len(b) + 1)
+        row[0] = i
+        for j in range(max(1, i - limit), min(len(b), i + limit) + 1):  # further off it costs too much
+            other = b[j - 1]
             cost = min(older[j] + 1, row[j - 1] + 1, older[j - 1] + (letter != other))
             if i > 1 and j > 1 and letter == b[j - 2] and a[i - 2] == other:
                 cost = min(cost, last[j - 2] + _SWAPPED)
-            row.append(cost)
+            row[j] = cost
         if min(row) > limit and (not last or min(older) > limit):
             return limit + 1
     return row[-1]
 
 
 def did_you_mean(
-    name: str, known: Iterable[str], span: Span, *, slips: int | None = None
+    name: str, known: Iterable[str], span: Span, *, slips: int | None = None, effort: Effort | None = None
 ) -> tuple[str | None, Fix | None]:
     """Help text and fix for a misspelt ``name`` at ``span``; both None where nothing is close.
 
     Where several names are equally near there is no fix, and the help names the first three.
     """
-    found = ranked(name, known, slips)
+    found = ranked(name, known, slips, effort)
     if not found:
         return None, None
     best = found[0][0]
@@ -101,6 +137,6 @@ def instead(
 
 def listing(known: Iterable[str], limit: int = 12) -> str:
     """Names for a help text, sorted, cut off after ``limit``."""
-    names = sorted(known)
+    names = nsmallest(limit + 1, known)
     shown = ", ".join(names[:limit])
     return shown + (", …" if len(names) > limit else "")

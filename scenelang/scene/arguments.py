@@ -88,7 +88,7 @@ def bind(
             good = False
             continue
         else:
-            hint, fix = did_you_mean(arg.name.text, params, arg.name.span)
+            hint, fix = did_you_mean(arg.name.text, params, arg.name.span, effort=session.effort)
             hint = hint or (f"its arguments are {listing(params)}" if params else "it takes no arguments")
             foreign = Misfit(
                 "E0206",

@@ -16,7 +16,14 @@ from scenelang.scene.settings import prepare_setting
 from scenelang.scene.shapes import in_library
 from scenelang.scene.statements import Action, Place, inner, prepare_block, states
 from scenelang.scene.transforms import GEOMETRY, TEXTURE
-from scenelang.scene.unknown import VALUES, report_unknown, unknown, unknown_member
+from scenelang.scene.unknown import (
+    VALUES,
+    Advice,
+    report_unknown,
+    unknown,
+    unknown_member,
+    within_effort,
+)
 from scenelang.scene.vocabulary import SETTINGS
 from scenelang.syntax import nodes
 
@@ -92,7 +99,7 @@ def _lacks_module(stmt: nodes.Call, place: Place) -> bool:
     written = ", ".join(arg.span.text for arg in stmt.args)
     help = f"to define it write module {name.text}({written}) {{ … }}"
     message = f"unknown geometry or module '{name.text}'"
-    report_unknown(name, unit, scope, "E0204", message, help=help, kinds=("module",))
+    report_unknown(name, unit, scope, "E0204", message, advise=lambda: (help, None), kinds=("module",))
     return True
 
 
@@ -134,32 +141,38 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         session.error("E0213", message, name.span)
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
-    candidates = _candidates(stmt, place, scope)
-    hint, fix = did_you_mean(name.text, candidates, name.span)
-    if hint is None and place.kind in HOLDERS:
-        hint, fix = in_library(stmt, unit, scope)
-    if hint is None:
-        hint, fix = instead(name.text, elsewhere.WORDS, candidates, name.span)
-    if hint is None and elsewhere.STATEMENTS.get(name.text):
-        hint = elsewhere.STATEMENTS[name.text]
-    if hint is None and place.kind in ("file", "group", "chain") and words.geometries:
-        hint = f"the model draws {listing(words.geometries)}"
+
+    def advise() -> Advice:
+        candidates = _candidates(stmt, place, scope)
+        hint, fix = did_you_mean(name.text, candidates, name.span, effort=session.effort)
+        if hint is None and place.kind in HOLDERS:
+            hint, fix = in_library(stmt, unit, scope)
+        if hint is None:
+            hint, fix = instead(name.text, elsewhere.WORDS, candidates, name.span)
+        if hint is None and elsewhere.STATEMENTS.get(name.text):
+            hint = elsewhere.STATEMENTS[name.text]
+        if hint is None and place.kind in ("file", "group", "chain") and words.geometries:
+            hint = f"the model draws {listing(words.geometries)}"
+        return hint, fix
+
     message = f"unknown {what} '{name.text}'"
-    report_unknown(name, unit, scope, "E0204", message, help=hint, fix=fix, kinds=("module", *VALUES))
+    report_unknown(name, unit, scope, "E0204", message, advise=advise, kinds=("module", *VALUES))
 
 
 def _candidates(stmt: nodes.Call, place: Place, scope: Scope) -> set[str]:
     """Names that could have been meant, given where the statement stands and how it looks."""
     words = place.unit.session.vocabulary
-    before = stmt.span.source.text[: stmt.span.start].rstrip()
+    before = stmt.span.source.text[max(0, stmt.span.start - 1000) : stmt.span.start].rstrip()
     otherwise = {"else", "else if"} if before.endswith("}") and stmt.body is not None else set()
-    modules = {n for n, b in scope.visible() if b.kind == "module"}
-    values = {n for n, b in scope.visible() if b.kind in VALUES}
     if place.kind == "material":
         return words.material_ops
+    if place.kind == "object" and stmt.args is not None:
+        return words.transforms
+    near = within_effort(place.unit.session, scope, VALUES if place.kind == "object" else ("module",))
+    names = {n for n, _ in near}
     if place.kind == "object":
-        return words.transforms if stmt.args is not None else {*values, "material"}
-    found = words.geometries | modules
+        return {*names, "material"}
+    found = words.geometries | names
     if stmt.args is None and stmt.body is not None:
         found.update((*NODE_WORDS, *(otherwise - {"else if"})))
     if stmt.args is not None and stmt.body is None:

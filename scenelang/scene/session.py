@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Fix, Label
 from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.suggest import Effort
 from scenelang.scene import library
 from scenelang.scene.damage import NONE, Damage
 from scenelang.scene.schema import Animation
@@ -131,11 +132,14 @@ class Session:
     reported: dict[tuple[int, int, int], str] = field(default_factory=dict)
     blamed: dict[tuple[int, int, str], Shared] = field(default_factory=dict)
     """Reports of values of the wrong kind, by the definitions they may come from and what is said."""
-    unknown: dict[tuple[str, str, int], tuple[int, tuple[Label, ...], list[Span]]] = field(
+    unknown: dict[tuple[str, str, int], tuple[int, tuple[Label, ...], dict[Span, None]]] = field(
         default_factory=dict
     )
     """Reports of unknown names: index, labels of their own, further places."""
-    shared: dict[tuple[str | int, ...], tuple[int, list[Span]]] = field(default_factory=dict)
+    told: set[tuple[str, str, int]] = field(default_factory=set)
+    """Unknown names that were reported where a definition has the slip."""
+    effort: Effort = field(default_factory=Effort)
+    shared: dict[tuple[str | int, ...], tuple[int, dict[Span, None]]] = field(default_factory=dict)
     """Other reports that several places share, by what they have in common: index, further places."""
     blocks: list[Any] = field(default_factory=list)
     """The blocks with such reports."""

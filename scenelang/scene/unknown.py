@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
@@ -21,6 +22,8 @@ from scenelang.syntax.tokens import Report
 
 VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of bindings that are values."""
+
+Advice = tuple[str | None, Fix | None]
 
 _SHOWN: Final = 3  # places of one report
 _CODES: Final = {"module": "E0204", "fn": "E0207"}
@@ -45,7 +48,7 @@ def is_unused(session: Session, name: str, span: Span | None) -> bool:
     return span is not None and len(uses(session, span.source).get(name, ())) == 1
 
 
-def shown_places(places: Sequence[Span], words: str | Sequence[str], rest: str = "") -> tuple[Label, ...]:
+def shown_places(places: Collection[Span], words: str | Sequence[str], rest: str = "") -> tuple[Label, ...]:
     """Labels for the places that share one report: the first few, and how many there are beyond.
 
     Args:
@@ -53,11 +56,11 @@ def shown_places(places: Sequence[Span], words: str | Sequence[str], rest: str =
         words: what is said at each place, or at all.
         rest: how the number of the others is put: "in" for "and in 2 more".
     """
-    each = [words] * len(places) if isinstance(words, str) else words
-    labels = [Label(place, text) for place, text in zip(places[:_SHOWN], each, strict=False)]
+    each = [words] * _SHOWN if isinstance(words, str) else words
+    labels = [Label(place, text) for place, text in zip(islice(places, _SHOWN), each, strict=False)]
     if len(places) > _SHOWN:
         more = f"{rest} {len(places) - _SHOWN} more".strip()
-        labels[-1] = Label(places[_SHOWN - 1], f"{each[_SHOWN - 1]}, and {more}")
+        labels[-1] = replace(labels[-1], message=f"{labels[-1].message}, and {more}")
     return tuple(labels)
 
 
@@ -76,13 +79,13 @@ def report_shared(
     if known is not None:
         index, again = known
         if span != items[index].span and span not in again and not session.follows(code, span):
-            again.append(span)
+            again[span] = None
             items[index] = replace(items[index], labels=(*labels, *shown_places(again, "also here")))
         return
     before = len(items)
     session.error(code, message, span, help=help, labels=labels)
     if len(items) > before:
-        session.shared[key] = before, []
+        session.shared[key] = before, {}
 
 
 def told_at_definition(
@@ -97,10 +100,10 @@ def told_at_definition(
         defined: names that are defined around it, each with its place and the kind of its binding.
     """
     places = uses(session, source).get(text, [])
-    if len(places) < 2 or "." in text:
+    if len(places) < 2 or "." in text or session.effort.spent:
         return False
     spans = {name: (span, kind) for name, span, kind in defined if is_unused(session, name, span)}
-    near = ranked(text, spans, max(1, len(text) // 3))
+    near = ranked(text, spans, max(1, len(text) // 3), session.effort)
     if not near or (near[1:] and near[1][0] - near[0][0] < 0.5):
         return False
     name = near[0][1]
@@ -125,8 +128,7 @@ def report_unknown(
     code: str,
     message: str,
     *,
-    help: str | None,
-    fix: Fix | None = None,
+    advise: Callable[[], Advice],
     kinds: tuple[str, ...] = (),
 ) -> None:
     """Report a name that stands for nothing; again only as a further place of the first report.
@@ -137,8 +139,7 @@ def report_unknown(
         scope: where it is used.
         code: code of the diagnostic.
         message: the fact.
-        help: advice; by default an unused name nearby is suggested.
-        fix: a safe change.
+        advise: makes advice and a safe change; where there is neither an unused name nearby is suggested.
         kinds: kinds of bindings that it could have stood for.
     """
     session = unit.session
@@ -148,24 +149,37 @@ def report_unknown(
     if known is not None and known[0] < len(items) and items[known[0]].code == code:
         first, own, again = known
         if name.span != items[first].span and name.span not in again:
-            again.append(name.span)
+            again[name.span] = None
             items[first] = replace(items[first], labels=(*own, *shown_places(again, "also here")))
         return
-    around = [(n, b) for n, b in scope.visible() if b.kind in kinds]
+    if key in session.told or session.follows(code, name.span):
+        return
+    around = within_effort(session, scope, kinds)
     defined = [(n, b.span, b.kind) for n, b in around]
     if told_at_definition(session, name.text, unit.source, defined):
+        session.told.add(key)
         return
     labels: tuple[Label, ...] = ()
+    help, fix = advise()
     if help is None:
         unused = [n for n, b in around if is_unused(session, n, b.span)]
-        help, _ = did_you_mean(name.text, unused, name.span, slips=1)
+        help, _ = did_you_mean(name.text, unused, name.span, slips=1, effort=session.effort)
     suggested = _suggested(help, around)
     if suggested is not None and suggested.span is not None:
         labels = (Label(suggested.span, "defined here"),)
     before = len(items)
     session.error(code, message, name.span, help=help, fix=fix, labels=labels)
     if len(items) > before:
-        session.unknown[key] = before, items[before].labels, []
+        session.unknown[key] = before, items[before].labels, {}
+
+
+def within_effort(session: Session, scope: Scope, kinds: Sequence[str]) -> list[tuple[str, Binding]]:
+    """The names in sight of some kinds; none any more where looking through them has taken too long."""
+    if session.effort.spent:
+        return []
+    seen = list(scope.visible())
+    session.effort.left -= 2 * len(seen)
+    return [(n, b) for n, b in seen if b.kind in kinds]
 
 
 def _suggested(help: str | None, around: list[tuple[str, Binding]]) -> Binding | None:
@@ -178,12 +192,15 @@ def unknown_member(name: nodes.Name, unit: Unit, exported: Unit) -> None:
     alias, _, rest = name.text.partition(".")
     if exported.damage and exported.damage.loses(rest):
         return
-    known = [n for n, b in exported.scope.names.items() if b.kind != "import"]
     last = Span(name.span.source, name.span.end - len(rest), name.span.end)
-    help, fix = did_you_mean(rest, known, last)
-    help = help or (f"it has {listing(known)}" if known else "it defines nothing")
+
+    def advise() -> Advice:
+        known = [n for n, b in exported.scope.names.items() if b.kind != "import"]
+        help, fix = did_you_mean(rest, known, last, effort=unit.session.effort)
+        return help or (f"it has {listing(known)}" if known else "it defines nothing"), fix
+
     end = nodes.Name(rest, last)
-    report_unknown(end, unit, Scope(unit.frame), "E0212", f"'{alias}' has no '{rest}'", help=help, fix=fix)
+    report_unknown(end, unit, Scope(unit.frame), "E0212", f"'{alias}' has no '{rest}'", advise=advise)
 
 
 def unknown(name: nodes.Name, unit: Unit, scope: Scope, *, called: bool = False) -> None:
@@ -206,20 +223,21 @@ def unknown(name: nodes.Name, unit: Unit, scope: Scope, *, called: bool = False)
         session.error("E0203", message, name.span, labels=labels, help=advice)
         return
     kinds = ("fn",) if called else (*VALUES, "import")
-    visible = {n for n, b in scope.visible() if b.kind in kinds}
-    if called:
-        help, fix = did_you_mean(text, visible | set(FUNCTIONS), name.span)
-        help, fix = (elsewhere.FUNCTIONS[text], None) if text in elsewhere.FUNCTIONS else (help, fix)
-        report_unknown(
-            name, unit, scope, "E0207", f"unknown function '{text}'", help=help, fix=fix, kinds=kinds
-        )
-        return
-    help, fix = did_you_mean(text, visible | {*CONSTANTS, *ANIMATED, "true", "false"}, name.span)
-    here = elsewhere.NAMES.get(text.lower())
-    colour = elsewhere.COLOURS.get(text.lower())
-    if here is not None and here.lower() != text.lower():
-        help, fix = f"it is called '{here}' here", Fix(f"write '{here}'", (Edit(name.span, here),))
-    elif help is None and colour is not None:
-        help = f"colours have no names; {text.lower()} is {colour}"
-        fix = Fix(f"write '{colour}'", (Edit(name.span, colour),))
-    report_unknown(name, unit, scope, "E0201", f"unknown name '{text}'", help=help, fix=fix, kinds=kinds)
+    own = FUNCTIONS if called else (*CONSTANTS, *ANIMATED, "true", "false")
+
+    def advise() -> Advice:
+        if called and text in elsewhere.FUNCTIONS:
+            return elsewhere.FUNCTIONS[text], None
+        visible = (n for n, _ in within_effort(session, scope, kinds))
+        help, fix = did_you_mean(text, {*visible, *own}, name.span, effort=session.effort)
+        here = None if called else elsewhere.NAMES.get(text.lower())
+        colour = None if called else elsewhere.COLOURS.get(text.lower())
+        if here is not None and here.lower() != text.lower():
+            help, fix = f"it is called '{here}' here", Fix(f"write '{here}'", (Edit(name.span, here),))
+        elif help is None and colour is not None:
+            help = f"colours have no names; {text.lower()} is {colour}"
+            fix = Fix(f"write '{colour}'", (Edit(name.span, colour),))
+        return help, fix
+
+    code, what = ("E0207", "function") if called else ("E0201", "name")
+    report_unknown(name, unit, scope, code, f"unknown {what} '{text}'", advise=advise, kinds=kinds)
