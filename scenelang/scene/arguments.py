@@ -55,6 +55,7 @@ def bind(
         One entry a parameter, or None if a mistake was reported.
     """
     bound: Bound = [None] * len(params)
+    indices = {param: at for at, param in enumerate(params)}
     shown = help or f"it is called {signature(name, params, optional)}"
     labels: tuple[Label, ...] = (Label(definition.name.span, "defined here"),) if definition else ()
     good, position = True, 0
@@ -77,8 +78,8 @@ def bind(
                 return None
             index = position
             position += 1
-        elif arg.name.text in params:
-            index = list(params).index(arg.name.text)
+        elif arg.name.text in indices:
+            index = indices[arg.name.text]
         elif told_at_definition(
             session,
             arg.name.text,
@@ -128,7 +129,7 @@ def bind(
     missing = [p for p, may, arg in zip(params, optional, bound, strict=True) if not may and arg is None]
     if missing:
         names = " and ".join(f"'{p}'" for p in missing)
-        needy = [places[list(params).index(p)] for p in missing] if places else []
+        needy = [places[indices[p]] for p in missing] if places else []
         if needy:
             labels = tuple([Label(place, "needs a value") for place in needy])
         lacking = Misfit(

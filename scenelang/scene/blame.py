@@ -41,7 +41,7 @@ class Shared:
 
     index: int
     own: tuple[Label, ...]
-    again: list[Span] = field(default_factory=list)
+    again: dict[Span, None] = field(default_factory=dict)
 
 
 _FOUND: Final = re.compile(r"found (?!a number$)(.*)$|of (.*), which is no vector$")
@@ -135,7 +135,7 @@ def _add(session: Session, shared: Shared, definition: Span, place: Span) -> Non
     """Show a further place of a report, and what it has in common with the others."""
     if place in shared.again:
         return
-    shared.again.append(place)
+    shared.again[place] = None
     if len(shared.again) + 1 >= _OFTEN:
         session.blamed.setdefault((id(definition.source), definition.start, ""), shared)
     items = session.diagnostics.items

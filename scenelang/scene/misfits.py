@@ -58,14 +58,14 @@ def report_misfit(session: Session, misfit: Misfit, definition: nodes.Fn | nodes
     if definition is None:
         _error(session, misfit)
     elif not session.follows(misfit.code, misfit.span):
-        _, calls = session.misfits.setdefault(id(definition), (definition, []))
-        if all(call.span != misfit.span for call in calls):
-            calls.append(misfit)
+        _, calls = session.misfits.setdefault(id(definition), (definition, {}))
+        calls.setdefault(misfit.span, misfit)
 
 
 def report_misfits(session: Session) -> None:
     """Report the calls that were kept, when everything has been prepared."""
-    for definition, calls in session.misfits.values():
+    for definition, found in session.misfits.values():
+        calls = list(found.values())
         lost = _lost_parameter(session, definition, calls)
         if lost is not None or _all_fail(session, definition, calls):
             _report_definition(session, definition, calls, lost)

@@ -143,8 +143,8 @@ class Session:
     """Other reports that several places share, by what they have in common: index, further places."""
     blocks: list[Any] = field(default_factory=list)
     """The blocks with such reports."""
-    misfits: dict[int, tuple[nodes.Fn | nodes.Module, list[Misfit]]] = field(default_factory=dict)
-    """Calls that do not fit by what they call, until they are reported."""
+    misfits: dict[int, tuple[nodes.Fn | nodes.Module, dict[Span, Misfit]]] = field(default_factory=dict)
+    """Calls that do not fit by what they call and where, until they are reported."""
     names_in: dict[int, dict[str, list[Span]]] = field(default_factory=dict)
     replays: bool = False
     roots: list[list[Any]] = field(default_factory=list)
