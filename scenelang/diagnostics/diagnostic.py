@@ -12,6 +12,8 @@ Severity = Literal["error", "warning"]
 MOST_CHARS: Final = 1000
 MOST: Final = 1000
 """So many errors of a file, and so many warnings, are kept."""
+MOST_EDITS: Final = 10_000
+"""A fix that would take more is left out."""
 _BEYOND: Final = {"E": ("E0121", "mistakes"), "W": ("W0102", "warnings")}
 
 
@@ -104,6 +106,8 @@ class Diagnostics:
                 if count == MOST + 1:
                     self.add(beyond, f"more than {MOST:,} {noun}", span, help="others are not reported")
                 return False
+        if fix is not None and len(fix.edits) > MOST_EDITS:
+            fix = None
         given = tuple([Label(label.span, _cut(label.message)) for label in labels])
         self.items.append(Diagnostic(code, _cut(message), span, given, _cut(help) if help else help, fix))
         return True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import chain
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
@@ -170,8 +171,12 @@ class Slips:
         gaps = [tokens.ends[index - 1] for index in range(at, stop)]
         edits = tuple(Edit(Span(tokens.source, gap, gap), ",") for gap in gaps)
         self.report.add("E0112", "missing `,`", gaps[0], gaps[-1], fix=Fix("insert `,` between them", edits))
-        for index in reversed(range(at, stop)):
-            self._insert(index, ",")
+        for column, new in (
+            (tokens.kinds, [self.literals[","]] * len(gaps)),
+            (tokens.starts, gaps),
+            (tokens.ends, gaps),
+        ):
+            column[at:stop] = chain.from_iterable(zip(new, column[at:stop], strict=True))
         return True
 
     def _grouped_digits(self, at: int) -> bool:
