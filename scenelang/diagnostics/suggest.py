@@ -23,7 +23,7 @@ class Effort:
         left: pairs of letters that may still be compared.
     """
 
-    left: int = 2_000_000
+    left: int = 500_000
 
     @property
     def spent(self) -> bool:

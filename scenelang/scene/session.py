@@ -33,6 +33,7 @@ MAX_NODE_DEPTH: Final = 400  # scene nodes within scene nodes
 MAX_NESTING: Final = 250  # tree levels; text never has as many, trees made by hand can
 MAX_STEPS: Final = 10_000_000
 MAX_BYTES: Final = 10_000_000
+MAX_COMPARED: Final = 500_000  # letters of names, to suggest one
 
 _STACK_FRAMES: Final = 200_000  # calls x nesting x frames per level, with room
 _lock = threading.Lock()
@@ -138,7 +139,7 @@ class Session:
     """Reports of unknown names: index, labels of their own, further places."""
     told: set[tuple[str, str, int]] = field(default_factory=set)
     """Unknown names that were reported where a definition has the slip."""
-    effort: Effort = field(default_factory=Effort)
+    effort: Effort = field(default_factory=lambda: Effort(MAX_COMPARED))
     shared: dict[tuple[str | int, ...], tuple[int, dict[Span, None]]] = field(default_factory=dict)
     """Other reports that several places share, by what they have in common: index, further places."""
     blocks: list[Any] = field(default_factory=list)

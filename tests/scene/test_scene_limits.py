@@ -8,12 +8,14 @@ import threading
 import pytest
 from scene_cases import Outcome, run_text
 
-from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.diagnostic import MOST, Diagnostics
+from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.scene import session
 from scenelang.scene.evaluate import evaluate
 from scenelang.scene.session import MAX_DEPTH, MAX_OBJECTS
-from scenelang.syntax import nodes
+from scenelang.scene.unused import find_unused
+from scenelang.syntax import nodes, parse
 from tests.work import lines_run
 
 
@@ -131,3 +133,52 @@ def test_trees_made_by_hand_can_be_too_deep() -> None:
 def test_ten_thousand_flat_objects() -> None:
     line = "square { scale(0.1); translate(0.5, -0.5); material flat { color(#d33); } }\n"
     assert len(run_text(line * 10_000).good().nodes) == 10_000
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [
+        "let a¤ = b¤;\n",  # as many unknown names as known ones
+        "let name¤ = nane¤; ",
+        "squar; ",
+        "let a¤ = lib.x¤; ",
+        "let b¤ = a¤; let c¤ = b¤ + 1;\n",
+        "f(1, 2); ",
+        "f(b¤ = 1); ",
+        "square { translate(f, 0); } ",
+        "fn f( ",
+        "\\q",
+        "@a ",
+        "import import as as ",
+        "(1 2 3); ",
+        "for (i in 0..0) ",
+    ],
+)
+def test_mistakes_cost_the_same_however_many_there_are(unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four times the text takes at most four times the work, and less where the limit on reports is met."""
+    monkeypatch.setattr(session, "MAX_COMPARED", 5_000)
+
+    def check(count: int) -> None:
+        text = "module f(a) {} " + "".join(unit.replace("¤", str(n)) for n in range(count))
+        found = run_text(text).diagnostics
+        assert found
+        render_text(found)
+
+    check(2)
+    count = 2000 // len(unit)
+    less, more = (lines_run(lambda: check(n)) for n in (count, 4 * count))
+    assert more < 5 * less
+
+
+def test_a_thousand_mistakes_are_enough() -> None:
+    for text, code, last in (
+        ("let a¤ = b¤; ", "E0201", "E0121"),
+        ("param a¤ = 1; square { rotate(30deg); }", "W0201", "W0102"),
+    ):
+        source = SourceFile("long.nsg", "".join(text.replace("¤", str(n)) for n in range(1500)))
+        found = Diagnostics()
+        tree = parse(source, found)
+        evaluate(tree, diagnostics=found)
+        find_unused(tree, found) if code == "W0201" else None
+        codes = [d.code for d in found]
+        assert codes.count(code) == MOST and codes.count(last) == 1
