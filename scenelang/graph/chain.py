@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from scenelang.graph import affine
 from scenelang.graph.nodes import Move
+from scenelang.graph.space import Space
 from scenelang.graph.steps import IDENTITY, Affine, Rows, Warp
 
 Moves = tuple[Move, ...]
@@ -31,16 +32,7 @@ def merged(moves: Iterable[Move]) -> Moves:
     return tuple(out)
 
 
-def composed(moves: Iterable[Move]) -> Rows:
-    """All affine maps of a chain composed in order, deformations left out."""
-    rows = IDENTITY
-    for move in moves:
-        if isinstance(move.step, Affine):
-            rows = move.step.rows if rows is IDENTITY else affine.compose(move.step.rows, rows)
-    return rows
-
-
-def normal(moves: Iterable[Move], dimension: int) -> Moves:
+def normal(moves: Iterable[Move], space: Space) -> Moves:
     """The chain with its deformations as near to the leaf, and as few steps, as the three rules allow.
 
     - A warp without a bend and the warp after it are one warp, because a warp keeps every point's length:
@@ -53,12 +45,12 @@ def normal(moves: Iterable[Move], dimension: int) -> Moves:
 
     Args:
         moves: nearest the leaf first.
-        dimension: the model's; the second rule holds in the plane only.
+        space: the model's; the second rule is the plane's.
     """
     out: list[Move] = []
     for move in moves:
         if isinstance(move.step, Warp):
-            _append_warp(out, move.step, move, dimension)
+            _append_warp(out, move.step, move, space)
         else:
             _append_affine(out, move.step.rows, move)
     return tuple(out)
@@ -72,12 +64,12 @@ def _append_affine(out: list[Move], rows: Rows, move: Move) -> None:
         out.append(Move(Affine(rows), move.span))
 
 
-def _append_warp(out: list[Move], warp: Warp, move: Move, dimension: int) -> None:
+def _append_warp(out: list[Move], warp: Warp, move: Move, space: Space) -> None:
     held: Move | None = None
-    if dimension == 2 and out and isinstance(last := out[-1].step, Affine):
-        alike = affine.similarity(last.rows)
-        if alike is not None:
-            warp = _carried_in(warp, last.rows, *alike)
+    if out and isinstance(last := out[-1].step, Affine):
+        before = space.before(last.rows, warp)
+        if before is not None:
+            warp = before
             held = out.pop()
     if out and isinstance(inner := out[-1].step, Warp) and inner.bend == (0.0, 0.0):
         move = out.pop()
@@ -86,10 +78,3 @@ def _append_warp(out: list[Move], warp: Warp, move: Move, dimension: int) -> Non
         out.append(Move(warp, move.span))
     if held is not None and isinstance(held.step, Affine):
         _append_affine(out, held.step.rows, held)
-
-
-def _carried_in(warp: Warp, rows: Rows, scale: float, sign: float) -> Warp:
-    """The warp that stands before the similarity ``rows`` and does what ``warp`` did after it."""
-    x, y = warp.bend
-    bend = (sign * (rows[0] * x + rows[4] * y), sign * (rows[1] * x + rows[5] * y))
-    return Warp(sign * scale * warp.twirl, bend)

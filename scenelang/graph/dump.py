@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
+from scenelang.graph.space import Space
 from scenelang.graph.steps import IDENTITY, Affine
 
 
@@ -23,8 +24,11 @@ def dump(graph: Graph) -> str:
         link, depth, first = stack.pop()
         word = "" if first or link.op == "union" else f"{link.op} "
         node = link.node
-        name = f"{node.geometry} {hex_text(node.rgb)}" if isinstance(node, Leaf) else f"({node.kind})"
-        moves = " ".join(move_text(move, graph.dimension) for move in node.moves)
+        if isinstance(node, Leaf):
+            name = f"{node.geometry} {hex_text(node.look.colour())}"
+        else:
+            name = f"({node.kind})"
+        moves = " ".join(move_text(move, graph.space) for move in node.moves)
         lines.append(f"{'  ' * depth}{word}{name}" + (f"  {moves}" if moves else ""))
         if isinstance(node, Fold):
             _push(stack, node, depth + 1)
@@ -35,15 +39,14 @@ def _push(stack: list[tuple[Link, int, bool]], fold: Fold, depth: int) -> None:
     stack.extend((fold.links[at], depth, at == 0) for at in range(len(fold.links) - 1, -1, -1))
 
 
-def move_text(move: Move, dimension: int) -> str:
+def move_text(move: Move, space: Space) -> str:
     """``warp(twirl; bend)``, or the rows of a matrix."""
     step = move.step
     if not isinstance(step, Affine):
         return f"warp({step.twirl:.6g}; {step.bend[0]:.6g} {step.bend[1]:.6g})"
     if step.rows == IDENTITY:
         return "[identity]"
-    chosen = ((0, 1, 3), (4, 5, 7)) if dimension == 2 else ((0, 1, 2, 3), (4, 5, 6, 7), (8, 9, 10, 11))
-    rows = (" ".join(f"{step.rows[i] + 0.0:.6g}" for i in row) for row in chosen)
+    rows = (" ".join(f"{step.rows[i] + 0.0:.6g}" for i in row) for row in space.shown)
     return f"[{'; '.join(rows)}]"
 
 

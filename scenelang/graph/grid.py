@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import defaultdict
 from math import floor, frexp, inf
 
-from scenelang.graph.bounds import Box, join, meet, overlap
+from scenelang.graph.bounds import join, meet, overlap
 from scenelang.graph.nodes import Leaf
+from scenelang.graph.space import Box
 
 Entry = tuple[Box, Leaf]
 Cell = tuple[int, int]

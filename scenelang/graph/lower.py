@@ -9,9 +9,11 @@ from typing import Any, Protocol
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import Span
 from scenelang.graph import affine
-from scenelang.graph.colour import WHITE, Triple, flat_colour
+from scenelang.graph.looks import WHITE, Look
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
-from scenelang.graph.transforms import Refusal, step_of
+from scenelang.graph.space import Refusal, Space
+from scenelang.graph.spaces import PLANE, SPACES
+from scenelang.graph.transforms import step_of
 from scenelang.models.manifest import Manifest
 from scenelang.scene import schema
 
@@ -82,12 +84,13 @@ def lower(
             spans.span(scene) if spans else None,
             help="leave `background` out, or draw with another model",
         )
+    space = SPACES[manifest.dimension]
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
-    lowering = _Lowering(manifest, spans, diagnostics, old, None if memory is None else {})
+    lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {})
     root = lowering.run(scene)
     if memory is not None and lowering.kept is not None:
         memory.leaves, memory.model = lowering.kept, manifest.name
-    return Graph(root, scene.canvas, scene.background, manifest.dimension)
+    return Graph(root, scene.canvas, scene.background, space)
 
 
 @dataclass(slots=True)
@@ -105,12 +108,13 @@ class _Open:
 @dataclass(slots=True)
 class _Lowering:
     manifest: Manifest
+    space: Space
     spans: Spans | None
     diagnostics: Diagnostics
     old: Leaves
     kept: Leaves | None
     objects: int = 0
-    colours: dict[int, tuple[str, Triple]] = field(default_factory=dict)
+    looks: dict[int, Look] = field(default_factory=dict)
     said: set[tuple[str, str]] = field(default_factory=set)
 
     def run(self, scene: schema.Scene) -> Fold:
@@ -166,8 +170,8 @@ class _Lowering:
     ) -> Leaf:
         if node.geometry not in self.manifest.geometries:
             self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
-        name, rgb = (self.manifest.default_material, WHITE) if material is None else self.colour(material)
-        return Leaf(node.geometry, name, rgb, self.moves(node), self.place(node), notes)
+        look = Look(self.manifest.default_material) if material is None else self.look(material)
+        return Leaf(node.geometry, look, self.moves(node), self.place(node), notes)
 
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
         found = []
@@ -175,15 +179,15 @@ class _Lowering:
             if transform.kind not in self.manifest.transforms:
                 self.refuse("E0503", "transform", transform.kind, self.manifest.transforms, transform)
                 continue
-            step = step_of(transform, self.manifest.dimension)
+            step = step_of(transform, self.space)
             if isinstance(step, Refusal):
                 self.say(step.code, step.message, transform, step.help)
             else:
                 found.append(Move(step, self.place(transform)))
         return tuple(found)
 
-    def colour(self, material: schema.Material) -> tuple[str, Triple]:
-        known = self.colours.get(id(material))
+    def look(self, material: schema.Material) -> Look:
+        known = self.looks.get(id(material))
         if known is not None:
             return known
         if material.name not in self.manifest.materials:
@@ -191,10 +195,10 @@ class _Lowering:
         for op in material.ops:
             if op.kind not in self.manifest.material_ops:
                 self.refuse("E0504", "material operation", op.kind, self.manifest.material_ops, op)
-            elif isinstance(op, schema.Scale) and not affine.usable(affine.scaling(op.x, op.y), 2):
+            elif isinstance(op, schema.Scale) and not PLANE.usable(affine.scaling(op.x, op.y)):
                 self.say("E0312", "`scale` of a texture is singular", op, "use factors other than 0")
-        self.colours[id(material)] = material.name, flat_colour(material.ops)
-        return self.colours[id(material)]
+        look = self.looks[id(material)] = Look.of(material.name, material.ops)
+        return look
 
     def refuse(self, code: str, what: str, name: str, known: Sequence[str], node: object) -> None:
         from difflib import get_close_matches

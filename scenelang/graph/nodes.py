@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from scenelang.diagnostics.span import Span
+from scenelang.graph.looks import Look
+from scenelang.graph.space import Space
 from scenelang.graph.steps import Step
 from scenelang.scene.schema import Combine
 
@@ -25,12 +27,11 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """One object: a leaf geometry of a model, its constant colour and its moves.
+    """One object: a leaf geometry of a model, its look and its moves.
 
     Args:
         geometry: name in the model's manifest.
-        material: name in the model's manifest.
-        rgb: the colour after the material's whole chain, in [0, 1], as written (sRGB in 2D).
+        look: material and what is done to its texture and colour.
         moves: steps into the parent's space, nearest the leaf first.
         span: where the object was written.
         notes: what was worked out about a leaf that stays from frame to frame of an animation, by what it
@@ -38,8 +39,7 @@ class Leaf:
     """
 
     geometry: str
-    material: str
-    rgb: tuple[float, float, float]
+    look: Look
     moves: tuple[Move, ...] = ()
     span: Span | None = None
     notes: dict[Any, Any] | None = field(default=None, compare=False, repr=False)
@@ -47,7 +47,17 @@ class Leaf:
     def moved(self, moves: tuple[Move, ...]) -> Leaf:
         """The same object with other moves."""
         notes: dict[Any, Any] | None = None if self.notes is None else {}
-        return Leaf(self.geometry, self.material, self.rgb, moves, self.span, notes)
+        return Leaf(self.geometry, self.look, moves, self.span, notes)
+
+    def wearing(self, look: Look) -> Leaf:
+        """The same object with another look."""
+        notes: dict[Any, Any] | None = None if self.notes is None else {}
+        return Leaf(self.geometry, look, self.moves, self.span, notes)
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The steps of its moves."""
+        return tuple([move.step for move in self.moves])
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,13 +96,17 @@ class Graph:
         root: the top level, a fold of kind ``scene``; after `linearise` all its children are leaves.
         canvas: width and height in pixels.
         background: colour in [0, 1] as written, or None for transparency.
-        dimension: 2 or 3, the model's.
+        space: the model's.
     """
 
     root: Fold
     canvas: tuple[int, int]
     background: tuple[float, float, float] | None
-    dimension: int
+    space: Space
+
+    def rooted(self, root: Fold) -> Graph:
+        """The same scene with another root."""
+        return Graph(root, self.canvas, self.background, self.space)
 
     def window(self) -> tuple[float, float, float, float]:
         """The part of the 2D world that the canvas shows: (xmin, ymin, xmax, ymax)."""

@@ -26,6 +26,7 @@ from dataclasses import dataclass, field
 from scenelang.graph.bounds import BLEND, leaf_box
 from scenelang.graph.grid import Grid
 from scenelang.graph.nodes import Leaf
+from scenelang.graph.space import Space
 from scenelang.scene.schema import Combine
 
 Row = tuple[Combine, Leaf]
@@ -39,10 +40,10 @@ class Stream:
     """Rows in order; the first one is a union.
 
     Args:
-        dimension: the model's.
+        space: the model's.
     """
 
-    dimension: int
+    space: Space
     rows: deque[Row] = field(default_factory=deque)
     cuts: list[Leaf] = field(default_factory=list)
     smooths: int = 0
@@ -82,9 +83,9 @@ class Stream:
 
     def _index(self, grid: Grid, level: float, op: Combine, leaf: Leaf) -> None:
         if op == "intersect":
-            grid.clip(leaf_box(leaf, level, self.dimension), leaf)
+            grid.clip(leaf_box(leaf, level, self.space), leaf)
         elif op != "subtract":
-            grid.add(leaf_box(leaf, level, self.dimension), leaf)
+            grid.add(leaf_box(leaf, level, self.space), leaf)
 
     def attach(self, other: Stream) -> tuple[Leaf, Leaf] | None:
         """Join a composite by union, after this stream or before it.
@@ -117,7 +118,7 @@ class Stream:
             return self.rows[0][1], next(leaf for op, leaf in other.rows if op == "intersect")
         near = self.grid(self.slack)
         for leaf in other.cuts:
-            hit = near.touched(leaf_box(leaf, 0.0, self.dimension))
+            hit = near.touched(leaf_box(leaf, 0.0, self.space))
             if hit is not None:
                 return hit, leaf
         if other.smooths:
@@ -132,7 +133,7 @@ class Stream:
         if self.smooths or other.smooths or self.clipped or len(self.cuts) > _MOST_CUTS:
             return False
         solid = other.grid(0.0)
-        return all(solid.touched(leaf_box(leaf, 0.0, self.dimension)) is None for leaf in self.cuts)
+        return all(solid.touched(leaf_box(leaf, 0.0, self.space)) is None for leaf in self.cuts)
 
     def append(self, other: Stream) -> None:
         """Join a composite by union after this stream, unproved."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from scenelang.graph.nodes import Fold, Graph, Move
+from scenelang.graph.space import Space
 from scenelang.graph.steps import IDENTITY, Affine
 
 
@@ -15,6 +16,7 @@ class Invariant(Enum):
 
     NO_IDENTITIES = "no move leaves every point where it is"
     COMPOSITE = "every fold below the root has at least two links"
+    LOOKS = "the look of a constant material is one colour"
     MERGED = "no two affine maps are neighbours"
     AT_LEAVES = "no fold has moves"
     STREAM = "every child of the root is a leaf"
@@ -41,7 +43,7 @@ def verify(graph: Graph, stage: str, holds: Collection[Invariant] = ()) -> Graph
     fault = None
     if graph.root.kind != "scene" or graph.root.moves:
         fault = "the root is a scene without moves"
-    check = _Check(graph.dimension == 2, Invariant.NO_IDENTITIES in holds, Invariant.MERGED in holds)
+    check = _Check(graph.space, Invariant.NO_IDENTITIES in holds, Invariant.MERGED in holds)
     folds = [graph.root]
     while folds and fault is None:
         fold = folds.pop()
@@ -55,9 +57,11 @@ def verify(graph: Graph, stage: str, holds: Collection[Invariant] = ()) -> Graph
                 if check in node.notes:
                     continue
                 node.notes[check] = True
-            r, g, b = node.rgb
+            r, g, b = node.look.rgb
             if not (0.0 <= r <= 1.0 and 0.0 <= g <= 1.0 and 0.0 <= b <= 1.0):
                 fault = "colours lie in [0, 1]"
+            elif Invariant.LOOKS in holds and node.look.folded() is not node.look:
+                fault = Invariant.LOOKS.value
             elif node.moves:
                 fault = fault or check.moves_fault(node.moves)
     if fault is not None:
@@ -81,9 +85,9 @@ def _fold_fault(fold: Fold, root: bool, holds: Collection[Invariant]) -> str | N
 
 @dataclass(frozen=True, slots=True)
 class _Check:
-    """What must hold of each chain: 2D maps keep the plane, no identities, no neighbouring maps."""
+    """What must hold of each chain: maps stay within the space, no identities, no neighbouring maps."""
 
-    flat: bool
+    space: Space
     tidy: bool
     merged: bool
 
@@ -93,8 +97,8 @@ class _Check:
             step = move.step
             if isinstance(step, Affine):
                 rows = step.rows
-                if self.flat and (rows[2] or rows[6] or rows[8:] != _PLANE):
-                    return "a map of a 2D model keeps the plane"
+                if not self.space.holds(rows):
+                    return "a map stays within the space of its model"
                 if self.merged and after_map:
                     return Invariant.MERGED.value
                 still = self.tidy and rows == IDENTITY
@@ -105,6 +109,3 @@ class _Check:
             if still:
                 return Invariant.NO_IDENTITIES.value
         return None
-
-
-_PLANE = (0.0, 0.0, 1.0, 0.0)

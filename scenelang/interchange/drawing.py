@@ -10,9 +10,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from scenelang.graph.colour import flat_colour
 from scenelang.graph.dump import hex_text, move_text
+from scenelang.graph.looks import coloured
 from scenelang.graph.nodes import Fold, Graph, Leaf, Node
+from scenelang.graph.space import Space
 from scenelang.scene import schema
 from scenelang.scene.to_nsg import material, transform
 
@@ -89,7 +90,7 @@ def _scene_box(node: schema.SceneNode, inner: schema.Material | None) -> Box:
     steps = [transform(t).rstrip(";") for t in node.transforms]
     own = [] if node.material is None else [material(node.material).rstrip(";")]
     if isinstance(node, schema.Object):
-        fill = None if inner is None else hex_text(flat_colour(inner.ops))
+        fill = None if inner is None else hex_text(coloured(inner.ops))
         return Box((node.geometry, *_short([*own, *steps])), fill, leaf=True)
     name = node.op if isinstance(node, schema.Boolean) else node.kind
     return Box((name, *_short([*own, *steps])))
@@ -105,16 +106,16 @@ def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:
         parent, fold = todo.popleft()
         links = [("" if at == 0 else link.op, link.node) for at, link in enumerate(fold.links)]
         for word, node in _some(drawn, parent, links, most):
-            number = drawn.add(_graph_box(node, graph.dimension), parent, word)
+            number = drawn.add(_graph_box(node, graph.space), parent, word)
             if isinstance(node, Fold):
                 todo.append((number, node))
     return drawn
 
 
-def _graph_box(node: Node, dimension: int) -> Box:
-    moves = _short([move_text(move, dimension) for move in node.moves])
+def _graph_box(node: Node, space: Space) -> Box:
+    moves = _short([move_text(move, space) for move in node.moves])
     if isinstance(node, Leaf):
-        return Box((node.geometry, *moves), hex_text(node.rgb), leaf=True)
+        return Box((node.geometry, *moves), hex_text(node.look.colour()), leaf=True)
     return Box((node.kind, *moves))
 
 

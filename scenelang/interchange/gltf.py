@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from scenelang.graph import affine
+from scenelang.graph.plane import flattened
+from scenelang.graph.spaces import SPACES
 from scenelang.graph.steps import IDENTITY, Rows
 from scenelang.interchange.gltf_file import Gltf, GltfError, Node, read_gltf
 from scenelang.models.manifest import Manifest, available, load_manifest
@@ -159,7 +161,7 @@ class _Import:
         if depth > MOST_DEPTH:
             raise GltfError(f"{path[:200]}: nodes nested deeper than {MOST_DEPTH}")
         local = self.local(node, path)
-        if not affine.usable(local.rows, 2 if self.flat and _keeps_plane(local.rows) else 3):
+        if not SPACES[2 if self.flat and _keeps_plane(local.rows) else 3].usable(local.rows):
             self.left_out.append(f"{path}: a scale of 0, or one that float32 cannot undo")
             self._met.update(self.below(index))
             return None
@@ -288,10 +290,10 @@ class _Import:
     def matrix(self, rows: Rows) -> tuple[schema.Transform, ...]:
         """A map as the simplest transforms that are exactly it, in the plane for a 2D model."""
         if self.flat:
-            rows = affine.flattened(rows)
+            rows = flattened(rows)
         linear = (rows[1], rows[2], rows[4], rows[6], rows[8], rows[9])
         if any(linear) or not all((rows[0], rows[5], rows[10])):
-            if not affine.usable(rows, 3):
+            if not SPACES[3].usable(rows):
                 return ()  # left out by whoever asks for it
             return (schema.Matrix(rows=(rows[0:4], rows[4:8], rows[8:12], (0.0, 0.0, 0.0, 1.0))),)
         scale = (rows[0], rows[5], rows[10])

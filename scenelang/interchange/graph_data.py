@@ -22,7 +22,7 @@ def graph_data(graph: Graph) -> dict[str, Any]:
     return {
         "canvas": list(graph.canvas),
         "background": None if graph.background is None else list(graph.background),
-        "dimension": graph.dimension,
+        "dimension": graph.space.dimension,
         "root": root,
     }
 
@@ -30,7 +30,7 @@ def graph_data(graph: Graph) -> dict[str, Any]:
 def _node(node: Node) -> dict[str, Any]:
     moves = [_move(move) for move in node.moves]
     if isinstance(node, Leaf):
-        look = {"geometry": node.geometry, "material": node.material, "rgb": list(node.rgb)}
+        look = {"geometry": node.geometry, "material": node.look.material, "rgb": list(node.look.colour())}
         return {"kind": "leaf", **look, "moves": moves}
     links = [{"op": link.op, "node": _node(link.node)} for link in node.links]
     return {"kind": node.kind, "moves": moves, "links": links}

@@ -12,7 +12,7 @@ from scenelang.lsp.check import Seen
 from scenelang.lsp.signatures import describe_symbol
 from scenelang.lsp.symbols import Symbol, Use
 from scenelang.lsp.tree import path_to
-from scenelang.lsp.vocabulary import dimension_of, vocabulary_of
+from scenelang.lsp.vocabulary import space_of, vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.models.manifest import Manifest
 from scenelang.scene import to_nsg
@@ -221,7 +221,7 @@ def _transform_facts(document: Document, use: Use) -> str:
     made = _nodes_of(document, node)
     parts = []
     for item in made[:2]:
-        shown = values.show_transform(item, dimension_of(document))
+        shown = values.show_transform(item, space_of(document))
         if shown is not None:
             called = to_nsg.transform(item)
             parts.append(f"`{called}`\n\n```text\n{shown}\n```")
@@ -237,11 +237,11 @@ def _node_facts(document: Document, node: Any) -> str:
     made = [item for item in (seen.values if seen else ()) if getattr(item, "transforms", None)]
     if seen is None or not made:
         return ""
-    dimension = dimension_of(document)
+    space = space_of(document)
     item = made[0]
-    steps = values.show_chain(item.transforms, dimension)
+    steps = values.show_chain(item.transforms, space)
     chain = "\n".join(to_nsg.transform(t) for t in item.transforms)
     times = f" (the first of {seen.count})" if seen.count > 1 else ""
     composed = "\n\nthen\n\n".join(f"```text\n{step}\n```" for step in steps)
-    stretch = values.show_stretch(item.transforms, dimension)
+    stretch = values.show_stretch(item.transforms, space)
     return f"\n\n---\n\ntransforms{times}:\n{_code(chain)}\ncomposed:\n\n{composed}\n\nscales by {stretch}"

@@ -8,6 +8,7 @@ from typing import Any
 from scenelang.graph import affine
 from scenelang.graph.chain import merged
 from scenelang.graph.nodes import Move
+from scenelang.graph.space import Space
 from scenelang.graph.steps import Affine, Rows, Warp
 from scenelang.graph.transforms import step_of
 from scenelang.scene import schema, to_nsg
@@ -49,12 +50,10 @@ def _angle(rad: float) -> str:
     return f"{show(round(math.degrees(rad), 6))}deg"
 
 
-def show_matrix(rows: Rows, dimension: int) -> str:
+def show_matrix(rows: Rows, space: Space) -> str:
     """The 3 × 3 matrix of a map of the plane, or the 4 × 4 one of space."""
-    if dimension == 2:
-        table = [[rows[0], rows[1], rows[3]], [rows[4], rows[5], rows[7]], [0.0, 0.0, 1.0]]
-    else:
-        table = [list(rows[0:4]), list(rows[4:8]), list(rows[8:12]), [0.0, 0.0, 0.0, 1.0]]
+    table = [[rows[at] for at in row] for row in space.shown]
+    table.append([0.0] * space.dimension + [1.0])
     cells = [[f"{value + 0.0:.4g}" for value in row] for row in table]
     width = max(len(cell) for row in cells for cell in row)
     return "\n".join("[ " + "  ".join(cell.rjust(width) for cell in row) + " ]" for row in cells)
@@ -72,13 +71,13 @@ def show_warp(warp: Warp) -> str:
     return f"p → R({angle}) p"
 
 
-def show_transform(node: Any, dimension: int) -> str | None:
+def show_transform(node: Any, space: Space) -> str | None:
     """The matrix or the formula of a geometry transform; None for what is neither."""
     if not isinstance(node, Transform):
         return None
-    step = step_of(node, dimension)
+    step = step_of(node, space)
     if isinstance(step, Affine):
-        return show_matrix(step.rows, dimension)
+        return show_matrix(step.rows, space)
     return show_warp(step) if isinstance(step, Warp) else None
 
 
@@ -95,25 +94,25 @@ Transform = (
 )
 
 
-def show_chain(transforms: tuple[Any, ...], dimension: int) -> list[str]:
+def show_chain(transforms: tuple[Any, ...], space: Space) -> list[str]:
     """A chain of transforms after composing its neighbouring affine maps: matrices and formulas in order."""
     moves = []
     for transform in transforms:
-        step = step_of(transform, dimension)
+        step = step_of(transform, space)
         if isinstance(step, Affine | Warp):
             moves.append(Move(step))
     return [
-        show_matrix(move.step.rows, dimension) if isinstance(move.step, Affine) else show_warp(move.step)
+        show_matrix(move.step.rows, space) if isinstance(move.step, Affine) else show_warp(move.step)
         for move in merged(moves)
     ]
 
 
-def show_stretch(transforms: tuple[Any, ...], dimension: int) -> str:
+def show_stretch(transforms: tuple[Any, ...], space: Space) -> str:
     """How much the affine maps of a chain scale, at least and at most."""
     rows = affine.translation(0.0, 0.0)
     for transform in transforms:
-        step = step_of(transform, dimension)
+        step = step_of(transform, space)
         if isinstance(step, Affine):
             rows = affine.compose(step.rows, rows)
-    low, high = affine.stretches(rows, dimension)
+    low, high = space.stretches(rows)
     return show(low) if abs(low - high) < 1e-9 * max(high, 1.0) else f"{show(low)} to {show(high)}"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
+from scenelang.graph.space import Space
+from scenelang.graph.spaces import SPACES
 from scenelang.scene.vocabulary import Vocabulary, vocabulary
 from scenelang.syntax import nodes
 
@@ -25,8 +27,8 @@ def vocabulary_of(document: Document, docs: Workspace | None = None) -> Vocabula
     return _all()
 
 
-def dimension_of(document: Document) -> int:
-    """2 or 3: that of the model which draws a document."""
+def space_of(document: Document) -> Space:
+    """The space of the model which draws a document."""
     if document.checked is not None and document.checked.manifest is not None:
-        return document.checked.manifest.dimension
-    return vocabulary_of(document).dimension or 2
+        return SPACES[document.checked.manifest.dimension]
+    return SPACES[vocabulary_of(document).dimension or 2]

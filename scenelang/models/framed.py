@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+from scenelang.lifting.layout import LAYOUTS
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.weights import ModelError, open_weights, shipped_weights
 from scenelang.renderers.field import FramedArrays, FramedConfig, parameter_shapes
@@ -72,7 +73,9 @@ def framed_arrays(data: bytes, manifest: Manifest) -> FramedArrays:
             held = "is missing" if found is None else f"is {found.dtype} {list(found.shape)}"
             wanted = f"float32 {list(shapes[name])} is needed" if name in shapes else "none is known"
             raise ModelError(f"damaged weights: tensor `{name}` {held}, where {wanted}")
-    return FramedArrays(config, arrays)
+    made = FramedArrays(config, arrays)
+    made.layout = LAYOUTS[manifest.layout]
+    return made
 
 
 @lru_cache(maxsize=8)

@@ -11,11 +11,11 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from scenelang.lifting.layout import LAYOUTS, WIDTH
 from scenelang.models.framed import MOST_WIDTH, framed_config
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.weights import LIFTING, Codes, codes_of, open_weights, shipped_weights
 from scenelang.models.weights import ModelError as ModelError
-from scenelang.program.program import WIDTH
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.reading import Reading, ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
@@ -104,7 +104,9 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
 
 
 def _framed(config: dict[str, Any], manifest: Manifest, size: int) -> Framed:
-    return Framed(framed_config(config, size), len(manifest.geometries), len(manifest.materials))
+    made = Framed(framed_config(config, size), len(manifest.geometries), len(manifest.materials))
+    made.layout = LAYOUTS[manifest.layout]
+    return made
 
 
 def _streaming(config: dict[str, Any], manifest: Manifest, size: int) -> Streaming:

@@ -28,6 +28,7 @@ class Manifest:
         dimension: 2 or 3.
         renderer: name of the renderer.
         lifting: name of the lifting.
+        layout: of an exact lifting, where its numbers lie: a name in `scenelang.lifting.layout`.
         geometries: leaf geometries it draws.
         materials: materials it knows.
         default_material: what an object without a material gets.
@@ -58,6 +59,7 @@ class Manifest:
     set: str = ""
     sizes: tuple[tuple[int, int], ...] = ()
     white: bool = False
+    layout: str = "plane"
 
     @staticmethod
     def from_json(text: str | bytes) -> Manifest:
@@ -72,7 +74,7 @@ class Manifest:
         data = read_json(text)
         if not isinstance(data, dict) or data.pop("format", None) != 1:
             raise ValueError("not a model manifest of format 1")
-        data = {"set": data.get("name"), "sizes": [], "white": False, **data}
+        data = {"set": data.get("name"), "layout": "plane", "sizes": [], "white": False, **data}
         if data.keys() != _KINDS.keys():
             raise ValueError(f"fields missing or unknown: {', '.join(sorted(data.keys() ^ _KINDS.keys()))}")
         for key, fits in _KINDS.items():
@@ -151,6 +153,7 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "dimension": lambda value: type(value) is int and value in (2, 3),
     "renderer": _is_word,
     "lifting": _is_word,
+    "layout": _is_word,
     "geometries": _are_words,
     "materials": lambda value: _are_words(value) and len(value) > 0,
     "default_material": _is_word,

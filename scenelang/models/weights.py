@@ -130,7 +130,7 @@ def codes_of(manifest: Manifest, data: bytes) -> Codes:
     Raises:
         ModelError: it is damaged, or not of this model.
     """
-    from scenelang.lifting.exact import CODE, D_G, D_M, MATERIAL_CODE
+    from scenelang.lifting.layout import LAYOUTS, WIDTH
 
     try:
         tensors = open_weights(data).arrays()
@@ -138,7 +138,10 @@ def codes_of(manifest: Manifest, data: bytes) -> Codes:
         raise ModelError(f"damaged weights: {error}") from None
     prefix = "" if manifest.renderer == "framed" else LIFTING
     learned = manifest.lifting == "learned"
-    sides = (D_G, D_M) if learned else (CODE.stop - CODE.start, MATERIAL_CODE.stop - MATERIAL_CODE.start)
+    layout = LAYOUTS.get(manifest.layout)
+    if layout is None:
+        raise ModelError(f"model `{manifest.name}` has the layout `{manifest.layout}`, which is not known")
+    sides = (WIDTH // 2, WIDTH // 2) if learned else (layout.code, layout.material)
     geometry = _rows(manifest.geometries, tensors, f"{prefix}codes", sides[0])
     material = _rows(manifest.materials, tensors, f"{prefix}material_codes", sides[1])
     lifting = None

@@ -24,6 +24,7 @@ from scenelang.passes.drop_hidden import drop_hidden
 from scenelang.passes.drop_identities import drop_identities
 from scenelang.passes.drop_unseen import drop_unseen
 from scenelang.passes.fold_affines import fold_affines
+from scenelang.passes.fold_looks import fold_looks
 from scenelang.passes.fold_warps import fold_warps
 from scenelang.passes.linearise import linearise
 from scenelang.passes.push_transforms import push_transforms
@@ -44,6 +45,7 @@ class Pass(NamedTuple):
 
 PASSES: tuple[Pass, ...] = (
     Pass(drop_empty, frozenset({Invariant.COMPOSITE})),
+    Pass(fold_looks, frozenset({Invariant.LOOKS})),
     Pass(drop_identities),
     Pass(fold_affines),
     Pass(push_transforms, frozenset({Invariant.AT_LEAVES, Invariant.MERGED})),

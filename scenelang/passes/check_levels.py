@@ -7,9 +7,9 @@ from math import hypot
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.graph import affine
-from scenelang.graph.chain import composed
 from scenelang.graph.levels import LevelsError, split_levels
 from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.space import REACH, Space
 from scenelang.graph.steps import Affine, Warp
 from scenelang.graph.walk import leaves
 from scenelang.passes.context import Context
@@ -22,19 +22,19 @@ def check_levels(graph: Graph, context: Context) -> Graph:
     """
     for leaf in leaves(graph.root):
         if leaf.notes is None:
-            _check(leaf, graph.dimension, context)
+            _check(leaf, graph.space, context)
         elif "check_levels" not in leaf.notes:
             leaf.notes["check_levels"] = True
-            _check(leaf, graph.dimension, context)
+            _check(leaf, graph.space, context)
     return graph
 
 
-def _check(leaf: Leaf, dimension: int, context: Context) -> None:
+def _check(leaf: Leaf, space: Space, context: Context) -> None:
     limits = context.manifest.limits
     levels = context.manifest.lifting == "exact"  # others take any chain
     if levels and any(isinstance(move.step, Warp) for move in leaf.moves):
         try:
-            split_levels([move.step for move in leaf.moves], limits)
+            split_levels(leaf.steps, limits)
         except LevelsError as error:
             inner, outer = limits.get("inner_warps", 0), limits.get("outer_warps", 0)
             context.diagnostics.add(
@@ -48,10 +48,10 @@ def _check(leaf: Leaf, dimension: int, context: Context) -> None:
             )
             return
     # Each map is lifted by itself, so each needs an inverse, and so does what they compose to.
-    maps = [composed(leaf.moves), *(m.step.rows for m in leaf.moves if isinstance(m.step, Affine))]
-    bad = next((rows for rows in maps if not affine.usable(rows, dimension)), None)
+    maps = [affine.composed(leaf.steps), *(m.step.rows for m in leaf.moves if isinstance(m.step, Affine))]
+    bad = next((rows for rows in maps if not space.usable(rows)), None)
     if bad is not None:
-        smallest, largest = affine.stretches(bad, dimension)
+        smallest, largest = space.stretches(bad)
         context.diagnostics.add(
             "E0406",
             f"the transforms of `{leaf.geometry}` compose to a singular one, "
@@ -71,7 +71,7 @@ def _check(leaf: Leaf, dimension: int, context: Context) -> None:
 
 
 def _mild(warp: Warp) -> bool:
-    return abs(warp.twirl) < affine.REACH and hypot(*warp.bend) < affine.REACH
+    return abs(warp.twirl) < REACH and hypot(*warp.bend) < REACH
 
 
 def _places(leaf: Leaf) -> list[Label]:

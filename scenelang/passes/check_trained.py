@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from math import hypot
 
 from scenelang.graph import affine
-from scenelang.graph.chain import composed
 from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.space import Space
 from scenelang.graph.steps import Warp
 from scenelang.graph.walk import leaves
 from scenelang.models.manifest import Manifest
@@ -52,7 +52,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     manifest, worst, count = context.manifest, dict[str, _Worst](), 0
     for leaf in leaves(graph.root):
         count += 1
-        for quantity, value in _noted(leaf, graph.dimension):
+        for quantity, value in _noted(leaf, graph.space):
             _note(worst, quantity, value, leaf, manifest)
     for quantity, subject in _SUBJECTS.items():
         if (found := worst.get(quantity)) is not None:
@@ -70,17 +70,17 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     return graph
 
 
-def _noted(leaf: Leaf, dimension: int) -> list[tuple[str, float]]:
+def _noted(leaf: Leaf, space: Space) -> list[tuple[str, float]]:
     if leaf.notes is None:
-        return _measures(leaf, dimension)
+        return _measures(leaf, space)
     found: list[tuple[str, float]] | None = leaf.notes.get("measures")
     if found is None:
-        found = leaf.notes["measures"] = _measures(leaf, dimension)
+        found = leaf.notes["measures"] = _measures(leaf, space)
     return found
 
 
-def _measures(leaf: Leaf, dimension: int) -> list[tuple[str, float]]:
-    smallest, largest = affine.stretches(composed(leaf.moves), dimension)
+def _measures(leaf: Leaf, space: Space) -> list[tuple[str, float]]:
+    smallest, largest = space.stretches(affine.composed(leaf.steps))
     found = [("scale", smallest), ("scale", largest)]
     if smallest > 0:
         found.append(("thin", largest / smallest))

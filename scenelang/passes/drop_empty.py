@@ -29,12 +29,12 @@ def drop_empty(graph: Graph, context: Context) -> Graph:
             return only
         moves = only.moves + node.moves
         if isinstance(only, Leaf):
-            return Leaf(only.geometry, only.material, only.rgb, moves, only.span)
+            return Leaf(only.geometry, only.look, moves, only.span)
         return Fold(only.kind, only.links, moves, only.span)
 
     children = [bottom_up(link.node, _same, fold) for link in graph.root.links]
     root = Fold("scene", tuple(_linked(graph.root, children, context)))
-    return Graph(root, graph.canvas, graph.background, graph.dimension)
+    return graph.rooted(root)
 
 
 def _same(leaf: Leaf) -> Node | None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from scenelang.graph import affine
-from scenelang.graph.bounds import Box, leaf_box
-from scenelang.graph.chain import composed
+from scenelang.graph.affine import composed
+from scenelang.graph.bounds import leaf_box
 from scenelang.graph.nodes import Graph, Leaf
-from scenelang.graph.outlines import INNER_RADII
-from scenelang.graph.steps import Affine, Rows, Step
+from scenelang.graph.space import Box, Space
+from scenelang.graph.steps import Rows, Step
 from scenelang.passes.context import Context
 from scenelang.passes.drop_unseen import begun
 
@@ -30,9 +29,7 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
 
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
     """
-    if graph.dimension != 2:
-        return graph
-    links = graph.root.links
+    space, links = graph.space, graph.root.links
     keep = [True] * len(links)
     covers: list[Cover] = []
     drawn: set[tuple[str, tuple[Step, ...]]] = set()
@@ -43,35 +40,32 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
             break
         if op == "intersect":
             continue
-        key = (leaf.geometry, tuple(move.step for move in leaf.moves))
-        if key in drawn or (covers and _covered(leaf_box(leaf, 0.0, 2), covers)):
+        key = leaf.geometry, leaf.steps
+        if key in drawn or (covers and _covered(leaf_box(leaf, 0.0, space), covers)):
             keep[index] = False
         elif op == "union":
             drawn.add(key)
-            cover = _noted(leaf)
+            cover = _noted(leaf, space)
             if cover is not None and (len(covers) < _MOST or cover > covers[-1]):
                 covers = sorted([*covers, cover], reverse=True)[:_MOST]
-    return Graph(begun(links, keep), graph.canvas, graph.background, graph.dimension)
+    return graph.rooted(begun(links, keep))
 
 
-def _noted(leaf: Leaf) -> Cover | None:
+def _noted(leaf: Leaf, space: Space) -> Cover | None:
     if leaf.notes is None:
-        return _cover(leaf)
+        return _cover(leaf, space)
     if "cover" not in leaf.notes:
-        leaf.notes["cover"] = _cover(leaf)
+        leaf.notes["cover"] = _cover(leaf, space)
     cover: Cover | None = leaf.notes["cover"]
     return cover
 
 
-def _cover(leaf: Leaf) -> Cover | None:
-    """The disc that `leaf` certainly fills: warps before its first affine map leave it in place."""
-    radius = INNER_RADII.get(leaf.geometry)
-    if radius is None or not all(isinstance(move.step, Affine) for move in leaf.moves[-1:]):
+def _cover(leaf: Leaf, space: Space) -> Cover | None:
+    disc = space.disc(leaf.geometry, leaf.steps)
+    if disc is None:
         return None
-    if any(isinstance(move.step, Affine) for move in leaf.moves[:-1]):
-        return None
-    rows = composed(leaf.moves)
-    return radius * affine.stretches(rows, 2)[0], affine.inverted(rows), radius * _INSIDE
+    radius, inward = disc
+    return radius * space.stretches(composed(leaf.steps))[0], inward, radius * _INSIDE
 
 
 def _covered(box: Box, covers: list[Cover]) -> bool:

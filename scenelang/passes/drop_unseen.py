@@ -14,8 +14,6 @@ def drop_unseen(graph: Graph, context: Context) -> Graph:
 
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
     """
-    if graph.dimension != 2:
-        return graph
     window = graph.window()
     links = graph.root.links
     keep = [False] * len(links)
@@ -24,12 +22,12 @@ def drop_unseen(graph: Graph, context: Context) -> Graph:
         op, leaf = links[index].op, links[index].node
         assert isinstance(leaf, Leaf)
         level = felt_level(op, smooths)
-        if level is None or overlap(leaf_box(leaf, level, graph.dimension), window):
+        if level is None or overlap(leaf_box(leaf, level, graph.space), window):
             keep[index] = True
             smooths += op == "smooth"
         elif op == "intersect":
             break  # what comes before is cut down to nothing on the canvas
-    return Graph(begun(links, keep), graph.canvas, graph.background, graph.dimension)
+    return graph.rooted(begun(links, keep))
 
 
 def begun(links: Sequence[Link], keep: Sequence[bool]) -> Fold:

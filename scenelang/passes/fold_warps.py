@@ -22,6 +22,6 @@ def fold_warps(graph: Graph, context: Context) -> Graph:
         return drop_identities(graph, context)
 
     def change(moves: Moves) -> Moves:
-        return normal(moves, graph.dimension)
+        return normal(moves, graph.space)
 
     return map_moves(graph, change, "fold_warps")

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node
+from scenelang.graph.space import Space
 from scenelang.graph.stream import Stream
 from scenelang.passes.context import Context
 from scenelang.scene.schema import Combine
@@ -54,7 +55,7 @@ def linearise(graph: Graph, context: Context) -> Graph:
     Before: COMPOSITE, AT_LEAVES. After: STREAM, with the same picture (samples on an edge aside). What
     cannot be streamed is reported as E0401 to E0404 and left out.
     """
-    stack = [_frame(graph.root, graph.dimension)]
+    stack = [_frame(graph.root, graph.space)]
     while True:
         here = stack[-1]
         if here.todo:
@@ -65,13 +66,13 @@ def linearise(graph: Graph, context: Context) -> Graph:
         stack.pop()
         if not stack:
             links = tuple(Link(op, leaf) for op, leaf in here.stream.rows)
-            return Graph(Fold("scene", links), graph.canvas, graph.background, graph.dimension)
+            return graph.rooted(Fold("scene", links))
         if not here.refused:
             _attach(stack[-1], here, context)
 
 
-def _frame(fold: Fold, dimension: int, refused: bool = False) -> _Frame:
-    frame = _Frame(fold, Stream(dimension), refused)
+def _frame(fold: Fold, space: Space, refused: bool = False) -> _Frame:
+    frame = _Frame(fold, Stream(space), refused)
     if fold.links:
         frame.put(fold.links, fold.links[0].node)
     return frame
@@ -98,7 +99,7 @@ def _advance(here: _Frame, context: Context) -> _Frame | None:
     refused = op != "union" or here.smooths > 0
     if refused:
         _refuse(op, rest, before, context)
-    return _frame(rest, here.stream.dimension, refused)
+    return _frame(rest, here.stream.space, refused)
 
 
 def _core(op: Combine, node: Fold) -> int:

@@ -43,6 +43,6 @@ def push_transforms(graph: Graph, context: Context) -> Graph:
         stack.pop()
         fold = Fold(here.fold.kind, tuple(here.links), (), here.fold.span)
         if not stack:
-            return Graph(fold, graph.canvas, graph.background, graph.dimension)
+            return graph.rooted(fold)
         above = stack[-1]
         above.links.append(Link(above.fold.links[len(above.links)].op, fold))

@@ -6,14 +6,16 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.diagnostics.span import Span
-from scenelang.graph.bounds import Box, felt_level, leaf_box
+from scenelang.graph.bounds import felt_level, leaf_box
 from scenelang.graph.levels import split_levels
 from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.space import Box
 from scenelang.lifting.exact import lift_colours, lift_many
+from scenelang.lifting.layout import LAYOUTS, WIDTH
 from scenelang.lifting.learned import lift_geometry, lift_material
 from scenelang.models.manifest import Manifest
 from scenelang.models.weights import Codes
-from scenelang.program.program import TOKENS, WIDTH, Place, Program, ProgramError
+from scenelang.program.program import TOKENS, Place, Program, ProgramError
 from scenelang.scene.schema import Combine
 
 Rows = list[tuple[Combine, Leaf]]
@@ -70,22 +72,24 @@ def _lifted(rows: Rows, manifest: Manifest, codes: Codes) -> npt.NDArray[np.floa
         lifting = codes.lifting
         geometry = lift_geometry(
             lifting,
-            [[move.step for move in leaf.moves] for _, leaf in rows],
+            [leaf.steps for _, leaf in rows],
             [manifest.geometries.index(leaf.geometry) for _, leaf in rows],
         )
-        materials = [manifest.materials.index(leaf.material) for _, leaf in rows]
-        made = [geometry, lift_material(lifting, [leaf.rgb for _, leaf in rows], materials)]
+        materials = [manifest.materials.index(leaf.look.material) for _, leaf in rows]
+        made = [geometry, lift_material(lifting, [leaf.look.rgb for _, leaf in rows], materials)]
         if (width := sum(v.shape[1] for v in made)) != WIDTH:
             raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")
         vectors[:] = np.concatenate(made, 1)
     elif rows:
-        levels = [split_levels([move.step for move in leaf.moves], manifest.limits) for _, leaf in rows]
-        geometry = lift_many(levels, [codes.geometry[leaf.geometry] for _, leaf in rows])
+        levels = [split_levels(leaf.steps, manifest.limits) for _, leaf in rows]
+        layout = LAYOUTS[manifest.layout]
+        geometry = lift_many(levels, [codes.geometry[leaf.geometry] for _, leaf in rows], layout)
         material = lift_colours(
-            [leaf.rgb for _, leaf in rows], [codes.material[leaf.material] for _, leaf in rows]
+            [leaf.look.rgb for _, leaf in rows],
+            [codes.material[leaf.look.material] for _, leaf in rows],
+            layout,
         )
-        vectors[:, : WIDTH // 2] = geometry
-        vectors[:, WIDTH // 2 :] = material
+        vectors[:] = np.concatenate([geometry, material], 1)
     vectors += 0.0  # one zero only, so that equal scenes give equal bytes
     return vectors
 
@@ -96,8 +100,8 @@ def _bounds(rows: Rows, graph: Graph) -> npt.NDArray[np.float32]:
     smooths = 0
     for op, leaf in reversed(rows):
         level = felt_level(op, smooths)
-        everywhere = level is None or op == "intersect" or graph.dimension != 2
-        boxes.append(window if everywhere else leaf_box(leaf, level or 0.0, graph.dimension))
+        everywhere = level is None or op == "intersect"
+        boxes.append(window if everywhere else leaf_box(leaf, level or 0.0, graph.space))
         smooths += op == "smooth"
     exact = np.array(boxes[::-1], dtype=np.float64).reshape(len(rows), 4)
     most = np.finfo(np.float32).max

@@ -57,7 +57,7 @@ def evaluate(node: Node, x: Array, y: Array, outer: tuple[Step, ...] = ()) -> tu
     if isinstance(node, Leaf):
         qx, qy = carry_back(steps, x, y)
         d = leaf_distance(node.geometry, qx, qy) * distance_scale(steps)
-        return d, np.broadcast_to(np.asarray(node.rgb, np.float64), (*d.shape, 3))
+        return d, np.broadcast_to(np.asarray(node.look.colour(), np.float64), (*d.shape, 3))
     big_d = np.full(x.shape, np.inf)
     big_c = np.zeros((*x.shape, 3))
     for index, link in enumerate(node.links):

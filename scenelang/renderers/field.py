@@ -26,7 +26,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from scenelang.lifting import exact
+from scenelang.lifting.layout import PLANE_LAYOUT, Layout
 from scenelang.program.program import TOKENS as WORDS
 from scenelang.renderers.arrays import NUMPY, Array, Arrays, Layers
 from scenelang.renderers.frames import FAR, ObjectFrame, local_points, read_frame
@@ -86,6 +86,7 @@ class FramedNetwork:
     """
 
     config: FramedConfig
+    layout: Layout = PLANE_LAYOUT
     xp: ClassVar[Arrays]
     codes: Any  # (geometries, C)
     material_codes: Any  # (materials, material_code)
@@ -264,9 +265,10 @@ class Field:
     ) -> None:
         self.network, self.xp = network, network.xp
         self.vectors = vectors
-        self.codes = np.array(sorted(set(map(tuple, vectors[:, exact.CODE].tolist()))), np.float32)
+        self.layout = layout = network.layout
+        self.codes = np.array(sorted(set(map(tuple, vectors[:, : layout.code].tolist()))), np.float32)
         """Of the leaves in use (K, C)."""
-        self.frames = dict(_frames(vectors[:, : exact.D_G], frames or {}))
+        self.frames = dict(_frames(vectors[:, : layout.geometry], layout, frames or {}))
         with self.xp.inference():
             self.cells = [
                 Cell(*map(self.xp.packed, cell)) for cell in zip(*network.cell_weights(), strict=True)
@@ -279,18 +281,18 @@ class Field:
     def _rows(self, vectors: np.ndarray, tokens: np.ndarray) -> list[Row]:
         if not len(vectors):
             return []
-        xp = self.xp
-        g, m = vectors[:, : exact.D_G], vectors[:, exact.D_G :]
+        xp, layout = self.xp, self.layout
+        g, m = vectors[:, : layout.geometry], vectors[:, layout.geometry :]
         like = self.network.codes
         layers, far = self.network.decoder_weights(xp.array(self.codes, like))
         shapes = {
             tuple(code): Decoder([(xp.packed(w[i]), b[i]) for w, b in layers], far)
             for i, code in enumerate(self.codes.tolist())
         }
-        codes_m = xp.array(m[:, exact.MATERIAL_CODE].copy(), like)
+        codes_m = xp.array(m[:, layout.material_code].copy(), like)
         albedo = self.network.object_albedo(codes_m)
         albedo = xp.concat([albedo, xp.full((len(g), 1), 1.0, like)], 1)
-        matrix = xp.array(m[:, exact.COLOUR].reshape(-1, 3, 4).copy(), like)
+        matrix = xp.array(m[:, layout.colour].reshape(-1, 3, 4).copy(), like)
         colours = (matrix @ albedo[:, :, None]).clip(0.0, 1.0)  # (N, 3, 1)
         blends_after = np.cumsum((tokens == SMOOTH)[::-1])[::-1]  # smooth unions from this row on
         rows = []
@@ -300,7 +302,7 @@ class Field:
                 reach = float("inf")
             else:
                 reach = 1.0 + SLACK + (BLEND_REACH / frame.scale if blends_after[i] else 0.0)
-            rows.append(Row(frame, token, colours[i], shapes[tuple(g[i, exact.CODE].tolist())], reach))
+            rows.append(Row(frame, token, colours[i], shapes[tuple(g[i, : layout.code].tolist())], reach))
         return rows
 
     def empty(self, count: int) -> Array:
@@ -345,8 +347,10 @@ class Field:
         return abs(memory[0]) / self.unit
 
 
-def _frames(g: np.ndarray, known: Mapping[bytes, ObjectFrame]) -> Iterator[tuple[bytes, ObjectFrame]]:
+def _frames(
+    g: np.ndarray, layout: Layout, known: Mapping[bytes, ObjectFrame]
+) -> Iterator[tuple[bytes, ObjectFrame]]:
     """The frame of each geometry vector (N, 32), by its bytes; most of the work of a stream of many."""
     for vector in g:
         key = vector.tobytes()
-        yield key, known.get(key) or read_frame(vector)
+        yield key, known.get(key) or read_frame(vector, layout)

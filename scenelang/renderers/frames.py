@@ -1,6 +1,6 @@
 """From geometry vectors to frames: where a world point lies in each object's own space.
 
-The inverse reading of `scenelang.lifting.exact`'s layout. All of it is linear algebra and turns by an
+The inverse reading of a `scenelang.lifting.layout`. All of it is linear algebra and turns by an
 angle; nothing here is learned. Points are one array (d, M), and d is whatever the frames are made for.
 """
 
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenelang.lifting import exact
+from scenelang.lifting.layout import PLANE_LAYOUT, Layout
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
 
@@ -92,16 +92,18 @@ class ObjectFrame:
         return x - dx, y - dy, x + dx, y + dy
 
 
-def read_frame(g: np.ndarray) -> ObjectFrame:
-    """The frame of one geometry vector (32,).
+def read_frame(g: np.ndarray, layout: Layout = PLANE_LAYOUT) -> ObjectFrame:
+    """The frame of one geometry vector.
 
     Raises:
         ProgramError: it leads from the world to no leaf, which no compiled scene has.
     """
     g = g.astype(np.float64)
-    largest = float(np.abs(g[exact.FRAME.start :]).max())
-    last, middle = g[exact.FRAME], g[exact.MIDDLE]
-    outer, inner = g[exact.OUTER].reshape(-1, 3), g[exact.INNER].reshape(-1, 3)
+    largest = float(np.abs(g[layout.frame.start :]).max())
+    last, middle = g[layout.frame], g[layout.middle]
+    outer, inner = (
+        g[group].reshape(-1, layout.strengths) for group in (layout.outer_warps, layout.inner_warps)
+    )
     # from the leaf through the middle map, and on into the world; warps keep the distance to the origin
     middle_linear, middle_shift = _invert(middle)
     last_linear, last_shift = _invert(last)
@@ -109,7 +111,7 @@ def read_frame(g: np.ndarray) -> ObjectFrame:
     steps: list[Affine | Warp] = []
     stretch = 1.0
     for frame, warps, radius in ((last, outer, reach + moved), (middle, inner, 1.0)):
-        if not np.array_equal(frame, (1, 0, 0, 0, 1, 0)):
+        if not np.array_equal(frame, layout.identity):
             steps.append(Affine(tuple(map(tuple, frame.reshape(2, 3).tolist()))))
         for twirl, x, y in warps.tolist():
             if twirl or x or y:

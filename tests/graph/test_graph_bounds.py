@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 from test_graph_chain import random_step
 
-from scenelang.graph.bounds import EVERYWHERE, leaf_box, overlap
-from scenelang.graph.chain import composed, normal
+from scenelang.graph.affine import composed
+from scenelang.graph.bounds import leaf_box, overlap
+from scenelang.graph.chain import normal
 from scenelang.graph.grid import Grid
+from scenelang.graph.looks import Look
 from scenelang.graph.nodes import Leaf, Move
+from scenelang.graph.space import EVERYWHERE
+from scenelang.graph.spaces import PLANE, SPACES
 from scenelang.graph.steps import Affine, Warp
 
 CORNERS = {
@@ -56,10 +60,10 @@ def test_boxes_contain_the_leaf(name: str, level: float) -> None:
     shares = []
     for _ in range(150):
         chain = [random_step(rng) for _ in range(rng.randrange(6))]
-        moves = normal(map(Move, chain), 2)
-        block = np.array(composed(moves)).reshape(3, 4)[:2, :2]
+        moves = normal(map(Move, chain), PLANE)
+        block = np.array(composed(move.step for move in moves)).reshape(3, 4)[:2, :2]
         reach = level / np.linalg.svd(block, compute_uv=False)[-1]
-        box = leaf_box(Leaf(name, "flat", (1, 1, 1), moves), level, 2)
+        box = leaf_box(Leaf(name, Look("flat"), moves), level, PLANE)
         points = forward(hull_points(name, reach * (1 - 1e-9), draw), [move.step for move in moves])
         assert (points >= np.array(box[:2])).all()
         assert (points <= np.array(box[2:])).all()
@@ -69,35 +73,32 @@ def test_boxes_contain_the_leaf(name: str, level: float) -> None:
 
 
 def test_boxes_of_straight_leaves_are_tight() -> None:
-    leaf = Leaf("square", "flat", (1, 1, 1), (Move(Affine((0.5, 0, 0, 0.2, 0, 0.25, 0, 0, 0, 0, 1, 0))),))
+    leaf = Leaf("square", Look("flat"), (Move(Affine((0.5, 0, 0, 0.2, 0, 0.25, 0, 0, 0, 0, 1, 0))),))
     half = 2**-0.5
     expected = (0.2 - half / 2, -half / 4, 0.2 + half / 2, half / 4)
-    assert leaf_box(leaf, 0.0, 2) == pytest.approx(expected, abs=1e-8)
+    assert leaf_box(leaf, 0.0, PLANE) == pytest.approx(expected, abs=1e-8)
     # the distance scale is 0.25, so a level of 0.1 reaches 0.4 in the leaf, 0.2 and 0.1 in the world
     wider = (expected[0] - 0.2, expected[1] - 0.1, expected[2] + 0.2, expected[3] + 0.1)
-    assert leaf_box(leaf, 0.1, 2) == pytest.approx(wider, abs=1e-8)
+    assert leaf_box(leaf, 0.1, PLANE) == pytest.approx(wider, abs=1e-8)
 
 
 def test_boxes_that_cannot_be_known() -> None:
-    huge = Leaf(
-        "square", "flat", (1, 1, 1), (Move(Affine((1e308, 1e308, 0, 1e308, 0, 1, 0, 0, 0, 0, 1, 0))),)
-    )
-    flat = Leaf("square", "flat", (1, 1, 1), (Move(Affine((0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0))),))
+    huge = Leaf("square", Look("flat"), (Move(Affine((1e308, 1e308, 0, 1e308, 0, 1, 0, 0, 0, 0, 1, 0))),))
+    flat = Leaf("square", Look("flat"), (Move(Affine((0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0))),))
     far = Leaf(
         "star",
-        "flat",
-        (1, 1, 1),
+        Look("flat"),
         (Move(Affine((1, 0, 0, 1e308, 0, 1, 0, 1e308, 0, 0, 1, 0))), Move(Warp(1e300, (1e300, 0)))),
     )
-    assert leaf_box(huge, 1.0, 2) == EVERYWHERE
-    assert leaf_box(flat, 1.0, 2) == EVERYWHERE
-    assert leaf_box(flat, 0.0, 3) == EVERYWHERE
-    assert not any(np.isnan(leaf_box(far, 0.1, 2)))
+    assert leaf_box(huge, 1.0, PLANE) == EVERYWHERE
+    assert leaf_box(flat, 1.0, PLANE) == EVERYWHERE
+    assert leaf_box(flat, 0.0, SPACES[3]) == EVERYWHERE
+    assert not any(np.isnan(leaf_box(far, 0.1, PLANE)))
 
 
 def test_the_grid_finds_what_a_loop_finds() -> None:
     rng = random.Random(8)
-    leaf = Leaf("square", "flat", (1, 1, 1))
+    leaf = Leaf("square", Look("flat"))
 
     def box():
         x, y = rng.uniform(-3, 3), rng.uniform(-3, 3)

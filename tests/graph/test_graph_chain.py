@@ -12,6 +12,7 @@ from scenelang.graph import affine
 from scenelang.graph.chain import merged, normal
 from scenelang.graph.levels import Levels, LevelsError, split_levels
 from scenelang.graph.nodes import Move
+from scenelang.graph.spaces import PLANE, SPACES
 from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Warp
 
 
@@ -59,14 +60,14 @@ def steps_of(moves: tuple[Move, ...]) -> list[Step]:
 def test_a_warp_without_bend_merges_with_the_one_after_it() -> None:
     rng = random.Random(1)
     inner, outer = Warp(0.7, (0.0, 0.0)), Warp(-1.1, (0.4, 0.2))
-    together = steps_of(normal([Move(inner), Move(outer)], 2))
+    together = steps_of(normal([Move(inner), Move(outer)], PLANE))
     assert together == [Warp(0.7 - 1.1, (0.4, 0.2))]
     same([inner, outer], together, rng)
 
 
 def test_bends_do_not_merge() -> None:
     bends = [Move(Warp(0.0, (0.5, 0.0))), Move(Warp(0.0, (0.5, 0.0)))]
-    assert len(normal(bends, 2)) == 2
+    assert len(normal(bends, PLANE)) == 2
 
 
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
@@ -74,7 +75,7 @@ def test_similarities_trade_places_with_warps(mirror: float) -> None:
     rng = random.Random(2)
     rows = affine.compose(affine.rotation(0.8), affine.scaling(0.4 * mirror, 0.4))
     chain: list[Step] = [Affine(rows), Warp(0.9, (0.5, -0.3))]
-    carried = steps_of(normal(map(Move, chain), 2))
+    carried = steps_of(normal(map(Move, chain), PLANE))
     assert isinstance(carried[0], Warp)
     assert carried[0].twirl == pytest.approx(mirror * 0.4 * 0.9)
     same(chain, carried, rng)
@@ -84,10 +85,10 @@ def test_normal_form_keeps_the_map_and_is_one() -> None:
     rng = random.Random(3)
     for _ in range(400):
         chain = [random_step(rng) for _ in range(rng.randrange(9))]
-        short = normal(map(Move, chain), 2)
+        short = normal(map(Move, chain), PLANE)
         same(chain, steps_of(short), rng)
         same(chain, steps_of(merged(map(Move, chain))), rng)
-        assert normal(short, 2) == short
+        assert normal(short, PLANE) == short
         assert len(short) <= len(chain)
 
 
@@ -95,8 +96,8 @@ def test_zero_and_opposite_warps_vanish() -> None:
     zero = Move(Warp(0.0, (0.0, 0.0)))
     there, again = Move(Warp(0.5, (0.0, 0.0))), Move(Warp(-0.5, (0.0, 0.0)))
     grow, shrink = Move(Affine(affine.scaling(2, 2))), Move(Affine(affine.scaling(0.5, 0.5)))
-    assert normal([zero], 2) == ()
-    assert normal([grow, there, again, shrink], 2) == ()
+    assert normal([zero], PLANE) == ()
+    assert normal([grow, there, again, shrink], PLANE) == ()
 
 
 LIMITS = {"inner_warps": 2, "outer_warps": 3}
@@ -138,7 +139,7 @@ def test_levels_keep_the_map() -> None:
     while kept < 60:
         chain = [random_step(rng) for _ in range(rng.randrange(7))]
         try:
-            levels = split_levels(steps_of(normal(map(Move, chain), 2)), LIMITS)
+            levels = split_levels(steps_of(normal(map(Move, chain), PLANE)), LIMITS)
         except LevelsError:
             continue
         kept += 1
@@ -155,8 +156,8 @@ def test_stretches_agree_with_numpy() -> None:
         rows: Rows = tuple(matrix.ravel().tolist())
         for size in (2, 3):
             values = np.linalg.svd(matrix[:size, :size], compute_uv=False)
-            assert affine.stretches(rows, size) == pytest.approx((values[-1], values[0]), rel=1e-9)
-    assert affine.stretches(affine.scaling(3, 3, 3), 3) == pytest.approx((3, 3))
+            assert SPACES[size].stretches(rows) == pytest.approx((values[-1], values[0]), rel=1e-9)
+    assert SPACES[3].stretches(affine.scaling(3, 3, 3)) == pytest.approx((3, 3))
 
 
 def test_rotation_about_any_axis_fixes_it() -> None:
@@ -185,4 +186,4 @@ def test_rotation_about_any_axis_fixes_it() -> None:
     ],
 )
 def test_what_is_singular(rows: Rows, usable: bool) -> None:
-    assert affine.usable(rows, 2) is usable
+    assert PLANE.usable(rows) is usable

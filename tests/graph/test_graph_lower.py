@@ -10,8 +10,8 @@ from math import pi
 import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.colour import flat_colour
 from scenelang.graph.dump import dump
+from scenelang.graph.looks import Look, coloured
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Fold, Leaf, Link, Move
 from scenelang.graph.steps import Affine, Warp
@@ -145,11 +145,11 @@ def test_materials_are_inherited_from_the_innermost() -> None:
 def test_colours_in_order_and_clamped() -> None:
     color, grey, hue = schema.Color, schema.Grayscale, schema.Hue
     move = schema.Translate(x=1, y=1)
-    assert flat_colour(()) == (1, 1, 1)
-    assert flat_colour((color(rgb=(2.0, 0.5, -1.0)), color(rgb=(0.5, 1, 1)), move)) == (0.5, 0.5, 0)
-    assert flat_colour((color(rgb=(1, 0, 0)), grey(amount=1))) == pytest.approx((0.2126,) * 3)
-    assert flat_colour((color(rgb=(1, 0, 0)), hue(angle=2 * pi / 3))) == pytest.approx((0, 1, 0))
-    assert flat_colour((grey(amount=5), hue(angle=1))) == pytest.approx((1, 1, 1))
+    assert coloured(()) == (1, 1, 1)
+    assert coloured((color(rgb=(2.0, 0.5, -1.0)), color(rgb=(0.5, 1, 1)), move)) == (0.5, 0.5, 0)
+    assert coloured((color(rgb=(1, 0, 0)), grey(amount=1))) == pytest.approx((0.2126,) * 3)
+    assert coloured((color(rgb=(1, 0, 0)), hue(angle=2 * pi / 3))) == pytest.approx((0, 1, 0))
+    assert coloured((grey(amount=5), hue(angle=1))) == pytest.approx((1, 1, 1))
 
 
 def test_hue_agrees_with_colorsys() -> None:
@@ -158,18 +158,19 @@ def test_hue_agrees_with_colorsys() -> None:
         rgb = (rng.random(), rng.random(), rng.choice([0.0, rng.random(), 1.0]))
         turns = rng.uniform(-3, 3)
         h, s, v = colorsys.rgb_to_hsv(*rgb)
-        ours = flat_colour((schema.Color(rgb=rgb), schema.Hue(angle=turns * 2 * pi)))
+        ours = coloured((schema.Color(rgb=rgb), schema.Hue(angle=turns * 2 * pi)))
         assert ours == pytest.approx(colorsys.hsv_to_rgb((h + turns) % 1, s, v), abs=1e-9)
 
 
 def test_verify_names_the_pass() -> None:
     graph = lower(schema.Scene(nodes=(schema.Object(geometry="star"),)), SHAPES, None, Diagnostics())
-    leaf = Leaf("star", "flat", (1, 1, 1))
+    leaf = Leaf("star", Look("flat"))
     group = Fold("group", (Link("union", leaf),))
+    grey = Look("flat", colours=(schema.Grayscale(amount=1),))
     tilted = Move(Affine((1, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0)))
     cases = [
         (Fold("scene", (Link("subtract", leaf),)), ()),
-        (Fold("scene", (Link("union", replace(leaf, rgb=(2, 0, 0))),)), ()),
+        (Fold("scene", (Link("union", replace(leaf, look=Look("flat", rgb=(2, 0, 0)))),)), ()),
         (Fold("scene", (Link("union", replace(leaf, moves=(tilted,))),)), ()),
         (Fold("scene", (Link("union", group),)), {Invariant.COMPOSITE}),
         (Fold("scene", (Link("union", group),)), {Invariant.STREAM}),
@@ -181,8 +182,21 @@ def test_verify_names_the_pass() -> None:
             Fold("scene", (Link("union", replace(leaf, moves=(Move(Warp(0, (0, 0))),))),)),
             {Invariant.NO_IDENTITIES},
         ),
+        (Fold("scene", (Link("union", replace(leaf, look=grey)),)), {Invariant.LOOKS}),
         (Fold("group", ()), ()),
     ]
     for root, holds in cases:
         with pytest.raises(InternalError, match="`linearise`"):
             verify(replace(graph, root=root), "linearise", holds)
+
+
+def test_a_constant_look_folds_to_its_colour() -> None:
+    ops = (schema.Flip(), schema.Color(rgb=(1, 0, 0)), schema.Grayscale(amount=0.5), schema.Hue(angle=1.0))
+    look = Look.of("flat", ops)
+    assert (look.texture, look.colours) == (ops[:1], ops[1:])
+    folded = look.folded()
+    assert folded == Look("flat", rgb=coloured(ops))
+    assert folded.colour() == look.colour()
+    assert folded.folded() is folded
+    bark = Look.of("bark", ops)  # a texture is not one colour
+    assert bark.folded() is bark

@@ -11,6 +11,7 @@ import numpy as np
 
 import scenelang as nsg
 from scenelang.graph.affine import compose
+from scenelang.graph.spaces import SPACES
 from scenelang.graph.steps import IDENTITY, Affine, Rows
 from scenelang.graph.transforms import step_of
 from scenelang.interchange.gltf import Imported, import_gltf
@@ -52,7 +53,7 @@ def world(node: Any, dimension: int, outer: Rows = IDENTITY) -> list[tuple[str, 
     """Geometry and world matrix of every object, in order, through the compiler's own steps."""
     rows = IDENTITY
     for transform in node.transforms:
-        step = step_of(transform, dimension)
+        step = step_of(transform, SPACES[dimension])
         assert isinstance(step, Affine), step
         rows = compose(step.rows, rows)
     rows = compose(outer, rows)

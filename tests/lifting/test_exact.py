@@ -8,7 +8,8 @@ import torch
 
 from scenelang.graph.levels import Levels
 from scenelang.graph.steps import Affine, Rows, Step, Warp
-from scenelang.lifting.exact import INNER_WARPS, OUTER_WARPS, leaf_vector, lift_colours, lift_many, matrices
+from scenelang.lifting.exact import leaf_vector, lift_colours, lift_many, matrices
+from scenelang.lifting.layout import PLANE_LAYOUT, Layout
 from scenelang.reference.image import carry_back, distance_scale
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.arrays_torch import TORCH
@@ -37,7 +38,7 @@ def steps_of(levels: Levels) -> tuple[Step, ...]:
     return (*levels.inner, Affine(levels.middle), *levels.outer, Affine(levels.affine))
 
 
-SIZES = [(i, o) for i in range(INNER_WARPS + 1) for o in range(OUTER_WARPS + 1)]
+SIZES = [(i, o) for i in range(PLANE_LAYOUT.inner + 1) for o in range(PLANE_LAYOUT.outer + 1)]
 
 
 @pytest.mark.parametrize(("inner", "outer"), SIZES)
@@ -110,3 +111,18 @@ def test_material_vector_multiplies_the_albedo() -> None:
     m = lift_colours([(0.2, 0.4, 0.6)], [np.arange(12.0)])[0]
     np.testing.assert_allclose(m[8:20].reshape(3, 4) @ [1, 1, 1, 1], (0.2, 0.4, 0.6))
     np.testing.assert_allclose(m[20:32], np.arange(12.0))
+
+
+def test_a_layout_of_space_lifts_as_its_matrices_do() -> None:
+    """Frames of three rows of four numbers: the same code, another layout."""
+    layout = Layout(dimension=3, code=4, strengths=3, outer=2, inner=2, texture=6, material=3)
+    assert layout.geometry == 4 + 1 + 12 + 6 + 12 + 6
+    assert layout.geometry + layout.material_code.stop == 62
+    levels = random_levels(np.random.default_rng(3), 2, 2)
+    g = leaf_vector(CODE, layout)
+    for matrix in matrices(levels, layout):
+        g = matrix @ g
+    np.testing.assert_allclose(lift_many([levels], [CODE], layout)[0], g, rtol=1e-12, atol=1e-12)
+    for rows, slot in ((levels.affine, layout.frame), (levels.middle, layout.middle)):
+        map_ = np.vstack([np.reshape(rows, (3, 4)), [0, 0, 0, 1]])
+        np.testing.assert_allclose(g[slot].reshape(3, 4) @ map_, np.eye(4)[:3], atol=1e-12)

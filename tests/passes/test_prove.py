@@ -56,13 +56,13 @@ def test_the_recorded_run_is_whole() -> None:
 def without_last(graph: Graph, context: Context) -> Graph:
     """A wrong pass: the last row goes, seen or not."""
     links = graph.root.links[:-1]
-    return Graph(Fold("scene", links), graph.canvas, graph.background, graph.dimension)
+    return graph.rooted(Fold("scene", links))
 
 
 def in_reverse(graph: Graph, context: Context) -> Graph:
     """Another: rows trade places, and with them what is drawn on top."""
     links = [Link("union", link.node) for link in reversed(graph.root.links)]
-    return Graph(Fold("scene", tuple(links)), graph.canvas, graph.background, graph.dimension)
+    return graph.rooted(Fold("scene", tuple(links)))
 
 
 @pytest.mark.parametrize("wrong", [without_last, in_reverse])

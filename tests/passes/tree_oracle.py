@@ -172,7 +172,8 @@ def stream_picture(graph: Graph, points: np.ndarray) -> tuple[np.ndarray, np.nda
     state = np.full(len(points), np.inf), np.ones((len(points), 3))
     for index, link in enumerate(graph.root.links):
         leaf = link.node
-        value = moved_distance(points, leaf.geometry, leaf.moves), np.tile(leaf.rgb, (len(points), 1))
+        colours = np.tile(leaf.look.colour(), (len(points), 1))
+        value = moved_distance(points, leaf.geometry, leaf.moves), colours
         state = value if index == 0 else combine(link.op, *state, *value)
     return state
 
@@ -184,7 +185,7 @@ def graph_picture(graph: Graph, points: np.ndarray) -> tuple[np.ndarray, np.ndar
     def visit(node, outward):
         moves = node.moves + outward
         if isinstance(node, Leaf):
-            return moved_distance(points, node.geometry, moves), np.tile(node.rgb, (len(points), 1))
+            return moved_distance(points, node.geometry, moves), np.tile(node.look.colour(), (len(points), 1))
         state = np.full(len(points), np.inf), np.ones((len(points), 3))
         for index, link in enumerate(node.links):
             value = visit(link.node, moves)

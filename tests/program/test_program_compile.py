@@ -11,7 +11,8 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.lifting.exact import FRAME, affine_matrix
+from scenelang.lifting.exact import affine_matrix
+from scenelang.lifting.layout import PLANE_LAYOUT
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import load_codes
 from scenelang.passes import check_scene
@@ -46,7 +47,7 @@ def test_a_chain_is_four_rows() -> None:
     assert (program.canvas, program.background, program.model) == ((256, 256), (1, 1, 1), "shapes2d")
     assert program.weights == load_codes("shapes2d").digest
     assert program.places[1] == Place("a.nsg", 3, 10, 3, 18)
-    frame = program.vectors[0, FRAME].reshape(2, 3)
+    frame = program.vectors[0, PLANE_LAYOUT.frame].reshape(2, 3)
     assert frame == pytest.approx(np.array([[1.25, 0, 0.25], [0, 1.25, 0]]))
 
 

@@ -20,7 +20,7 @@ from torch import Tensor, nn
 from scenelang.lab.designs.pictures import Scenes, stretch
 from scenelang.lab.designs.students import FramedStudent, StudentConfig
 from scenelang.lab.designs.studies import RATES, StudyConfig
-from scenelang.lifting import exact
+from scenelang.lifting.layout import PLANE_LAYOUT
 from scenelang.renderers.field import TOKENS, FramedConfig
 from scenelang.renderers.framed import Framed, Trace
 from scenelang.training.scenes import GEOMETRIES
@@ -163,7 +163,7 @@ class NoFrame(FramedStudent):
     """
 
     def __init__(self, config: StudentConfig) -> None:
-        super().__init__(replace(config, framed=replace(config.framed, code=exact.D_G)))
+        super().__init__(replace(config, framed=replace(config.framed, code=PLANE_LAYOUT.geometry)))
 
     @property
     def leaves_first(self) -> bool:

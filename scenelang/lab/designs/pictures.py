@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from scenelang.lifting import exact
+from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH
 from scenelang.reference.distance import carry_back_affine, carry_back_warp, sector_distance
 from scenelang.reference.fold import fold
 from scenelang.training.scenes import sectors
@@ -164,16 +164,16 @@ def exact_vectors(scenes: Scenes, codes: Tensor, material_codes: Tensor) -> Tens
         material_codes: (K, 12); all objects have the first.
     """
     b, n = scenes.leaf.shape
-    g = torch.zeros(b, n, exact.D_G, device=codes.device)
-    g[..., exact.ONE] = 1.0
-    g[..., exact.FRAME] = frames(scenes).flatten(-2)
-    g[..., exact.MIDDLE] = torch.tensor([1.0, 0, 0, 0, 1, 0], device=codes.device)
-    g[..., exact.INNER.start] = scenes.twirl
-    g[..., exact.INNER.start + 1] = scenes.bend
-    m = torch.zeros(b, n, exact.D_M, device=codes.device)
-    m[..., exact.TEXTURE] = torch.tensor([1.0, 0, 0, 0, 1, 0], device=codes.device)
+    g = torch.zeros(b, n, PLANE_LAYOUT.geometry, device=codes.device)
+    g[..., PLANE_LAYOUT.one] = 1.0
+    g[..., PLANE_LAYOUT.frame] = frames(scenes).flatten(-2)
+    g[..., PLANE_LAYOUT.middle] = torch.tensor([1.0, 0, 0, 0, 1, 0], device=codes.device)
+    g[..., PLANE_LAYOUT.inner_warps.start] = scenes.twirl
+    g[..., PLANE_LAYOUT.inner_warps.start + 1] = scenes.bend
+    m = torch.zeros(b, n, WIDTH - PLANE_LAYOUT.geometry, device=codes.device)
+    m[..., :6] = torch.tensor([1.0, 0, 0, 0, 1, 0], device=codes.device)
     for channel in range(3):
-        m[..., exact.COLOUR.start + 5 * channel] = scenes.rgb[..., channel]
-    code = torch.nn.functional.pad(codes[scenes.leaf], (0, exact.D_G - 4))
-    material = torch.nn.functional.pad(material_codes[0], (exact.D_M - 12, 0))
+        m[..., PLANE_LAYOUT.colour.start + 5 * channel] = scenes.rgb[..., channel]
+    code = torch.nn.functional.pad(codes[scenes.leaf], (0, PLANE_LAYOUT.geometry - 4))
+    material = torch.nn.functional.pad(material_codes[0], (WIDTH - PLANE_LAYOUT.geometry - 12, 0))
     return torch.cat([g + code, m + material], -1)

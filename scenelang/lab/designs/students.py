@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from scenelang.lab.designs.encoders import Encoders, LiftingConfig
 from scenelang.lab.designs.pictures import Scenes, exact_vectors, pixel_centres
-from scenelang.lifting import exact
+from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH
 from scenelang.renderers.arrays_torch import TORCH
 from scenelang.renderers.field import FramedConfig
 from scenelang.renderers.framed import Framed, Trace
@@ -93,7 +93,7 @@ class Student(nn.Module, ABC):
         """Numbers D of an object."""
         if isinstance(self.lifting, LearnedLifting):
             return self.lifting.config.geometry + self.lifting.config.material
-        return exact.D_G + exact.D_M
+        return WIDTH
 
     @abstractmethod
     def image(self, scenes: Scenes, r: int) -> Tensor:
@@ -154,13 +154,14 @@ class FramedStudent(PointStudent):
 
     def __init__(self, config: StudentConfig) -> None:
         super().__init__(config)
-        if self.vector != exact.D_G + exact.D_M:
+        if self.vector != WIDTH:
             raise ValueError("the framed renderer reads vectors of 32 + 32 numbers")
         if isinstance(self.lifting, LearnedLifting):
             with torch.no_grad():  # start from frames that are frames, not from noise
                 codes = self.lifting.codes
-                codes[:, exact.CODE.stop :] = 0.0
-                codes[:, exact.FRAME] = codes[:, exact.MIDDLE] = torch.tensor([1.0, 0, 0, 0, 1, 0])
+                codes[:, PLANE_LAYOUT.code :] = 0.0
+                for frame in (PLANE_LAYOUT.frame, PLANE_LAYOUT.middle):
+                    codes[:, frame] = torch.tensor(PLANE_LAYOUT.identity)
         self.renderer = self.network(config.framed, len(GEOMETRIES), 1)
         # the codes are the lifting's
         self.renderer.codes.requires_grad_(False)
@@ -174,7 +175,7 @@ class FramedStudent(PointStudent):
     @property
     def leaf_codes(self) -> Tensor:
         """Codes (G, C) of the leaves as the decoder takes them."""
-        return self.lifting.codes[:, exact.CODE]
+        return self.lifting.codes[:, : PLANE_LAYOUT.code]
 
     def read(self, g: Tensor, scenes: Scenes, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """What the decoder is shown at world points (B, P) of geometry vectors (B, N, 32).
@@ -183,19 +184,19 @@ class FramedStudent(PointStudent):
             Points (B, N, 2, P), distance scales (B, N), codes (B, N, C).
         """
         q, scale = read_points(g, x, y)
-        return q, scale, g[..., exact.CODE]
+        return q, scale, g[..., : PLANE_LAYOUT.code]
 
     def trace(
         self, scenes: Scenes, x: Tensor, y: Tensor, given: tuple[Tensor, Tensor] | None = None
     ) -> Trace:
         """What the network answers along the streams at world points (B, P); see `Framed.trace`."""
         vectors = self.lifting.lift(scenes)
-        g, m = vectors[..., : exact.D_G], vectors[..., exact.D_G :]
+        g, m = vectors[..., : PLANE_LAYOUT.geometry], vectors[..., PLANE_LAYOUT.geometry :]
         q, scale, code = self.read(g, scenes, x, y)
         b, n = scenes.leaf.shape
-        material = m[..., exact.MATERIAL_CODE].reshape(b * n, -1)
+        material = m[..., PLANE_LAYOUT.material_code].reshape(b * n, -1)
         albedo = self.renderer.object_albedo(material).view(b, n, 3)
-        mix = m[..., exact.COLOUR].reshape(b, n, 3, 4)
+        mix = m[..., PLANE_LAYOUT.colour].reshape(b, n, 3, 4)
         colours = (mix[..., :3] @ albedo[..., None])[..., 0] + mix[..., 3]
         return self.renderer.trace(q, scale, code, colours, scenes.tokens, given)
 
@@ -218,14 +219,15 @@ def read_points(g: Tensor, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
         (B, N, 2, P) and (B, N), differentiable in g.
     """
     steps: list[Affine | Warp] = []
-    for frame, group in ((exact.FRAME, exact.OUTER), (exact.MIDDLE, exact.INNER)):
+    layout = PLANE_LAYOUT
+    for frame, group in ((layout.frame, layout.outer_warps), (layout.middle, layout.inner_warps)):
         numbers = g[..., frame, None].unbind(-2)  # each (B, N, 1)
         steps.append(Affine((numbers[:3], numbers[3:])))
         for start in range(group.start, group.stop, 3):
             twirl, *bend = g[..., start : start + 3, None].unbind(-2)
             steps.append(Warp(twirl, tuple(bend)))
     q = torch.stack(list(way_back(TORCH, steps, (x[:, None], y[:, None]))), 2)
-    last, middle = (g[..., s].reshape(*g.shape[:-1], 2, 3)[..., :2] for s in (exact.FRAME, exact.MIDDLE))
+    last, middle = (g[..., s].reshape(*g.shape[:-1], 2, 3)[..., :2] for s in (layout.frame, layout.middle))
     return q, 1 / largest_stretch(middle @ last).clamp_min(1e-3)
 
 

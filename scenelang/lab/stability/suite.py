@@ -22,11 +22,13 @@ import numpy.typing as npt
 from scenelang.backend.neural import draw_program
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
+from scenelang.graph.spaces import PLANE
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.graph.transforms import step_of
 from scenelang.image import Image
 from scenelang.lab.stability.probes import PROBES, Probe, animated, apart, rng_of, union_of
 from scenelang.lifting import exact
+from scenelang.lifting.layout import PLANE_LAYOUT
 from scenelang.lifting.learned import lift_geometry
 from scenelang.measure.metrics import flip, psnr
 from scenelang.measure.scenes import coverage, sized, spread
@@ -121,22 +123,22 @@ def unfolded(scene: Scene, program: Program, model: Model) -> Program:
     lifting = model.codes().lifting
     if lifting is not None:
         nodes = [link.node for link in chain.children if isinstance(link.node, Object)]
-        steps = [[step_of(t, 2) for t in node.transforms] for node in nodes]
+        steps = [[step_of(t, PLANE) for t in node.transforms] for node in nodes]
         leaves = [model.manifest.geometries.index(node.geometry) for node in nodes]
         chains: list[list[Step]] = [[s for s in chain if isinstance(s, Affine | Warp)] for chain in steps]
         vectors[:, : lifting.codes.shape[1]] = lift_geometry(lifting, chains, leaves)
         return dataclasses.replace(program, vectors=vectors)
     for row, link in zip(vectors, chain.children, strict=True):
         assert isinstance(link.node, Object)
-        g = exact.leaf_vector(row[exact.CODE].tolist()).astype(np.float32)
+        g = exact.leaf_vector(row[: PLANE_LAYOUT.code].tolist()).astype(np.float32)
         for transform in link.node.transforms:
-            step = step_of(transform, 2)
+            step = step_of(transform, PLANE)
             if isinstance(step, Affine):
                 matrix = exact.affine_matrix(step.rows)
             else:
-                matrix = exact.warp_matrix(step, exact.INNER)  # type: ignore[arg-type]
+                matrix = exact.warp_matrix(step, PLANE_LAYOUT.inner_warps)  # type: ignore[arg-type]
             g = matrix.astype(np.float32) @ g
-        row[: exact.D_G] = g
+        row[: PLANE_LAYOUT.geometry] = g
     return dataclasses.replace(program, vectors=vectors)
 
 

@@ -1,0 +1,91 @@
+"""A space: what the compiler has to know of the plane or the solid world, and all that differs between them.
+
+A model's manifest states its dimension; `SPACES` has the space, which is handed down from there. Nothing
+else in the compiler asks whether a scene is flat.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from math import inf
+from typing import ClassVar, Final, NamedTuple
+
+from scenelang.graph.steps import Rows, Step, Warp
+from scenelang.scene import schema
+
+Box = tuple[float, float, float, float]
+"""xmin, ymin, xmax, ymax in the world."""
+
+EVERYWHERE: Final[Box] = (-inf, -inf, inf, inf)
+
+SINGULAR: Final = 1e-12
+"""Smallest to largest stretch at which a map counts as singular.
+
+The determinant of a 2 x 2 block carries a rounding error of about 1e-16 of the squared largest stretch,
+so that ratio is still known to four digits here, while nothing that thin can be seen at 8192 pixels.
+"""
+
+REACH: Final = 1e30
+"""Stretches outside ``1/REACH .. REACH`` leave the range of float32 when inverted, as do far offsets."""
+
+AffineTransform = schema.Translate | schema.Rotate | schema.Scale | schema.Shear | schema.Matrix
+
+
+class Refusal(NamedTuple):
+    """Why a transform has no step: a code, the fact and advice."""
+
+    code: str
+    message: str
+    help: str
+
+
+class Space(ABC):
+    """The geometry of one dimension."""
+
+    dimension: ClassVar[int]
+    shown: ClassVar[tuple[tuple[int, ...], ...]]
+    """Entries of `Rows` that say all of a map of this space, row by row."""
+    thinner: ClassVar[str]
+    """What a singular map flattens everything to."""
+
+    @abstractmethod
+    def fitted(self, transform: AffineTransform, rows: Rows) -> Rows | Refusal:
+        """The map as this space has it, or why the transform leaves the space."""
+
+    @abstractmethod
+    def holds(self, rows: Rows) -> bool:
+        """Whether a map is one that `fitted` gives."""
+
+    @abstractmethod
+    def stretches(self, rows: Rows) -> tuple[float, float]:
+        """The smallest and largest singular value of the linear block."""
+
+    @abstractmethod
+    def before(self, rows: Rows, warp: Warp) -> Warp | None:
+        """The warp that does before the map ``rows`` what ``warp`` does after it; None where none does."""
+
+    @abstractmethod
+    def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
+        """A box around all points of the world whose distance to a leaf is below ``level``.
+
+        Args:
+            geometry: name of the leaf.
+            steps: all its steps into the world, nearest the leaf first.
+            level: world distance, at least 0; 0 for the leaf itself.
+        """
+
+    @abstractmethod
+    def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
+        """A disc that a leaf certainly fills, where one is known.
+
+        Returns:
+            Its radius in the leaf's own space, about the origin, and the map from the world to there.
+        """
+
+    def usable(self, rows: Rows) -> bool:
+        """Whether the map can be inverted in float64 and its inverse kept in float32."""
+        smallest, largest = self.stretches(rows)
+        offset = max(abs(rows[3]), abs(rows[7]), abs(rows[11]), 1.0)
+        # Written so that NaN and infinity fail.
+        return smallest > SINGULAR * largest and offset < REACH * smallest and largest < REACH
