@@ -80,6 +80,7 @@ def manifest_schema() -> dict[str, Any]:
             "dimension": {"enum": [2, 3]},
             "renderer": word,
             "lifting": word,
+            "layout": word,
             "geometries": {**words, "minItems": 1, "description": "in the order of the learned codes"},
             "materials": {**words, "minItems": 1},
             "default_material": {**word, "description": "one of the materials"},
@@ -100,7 +101,7 @@ def manifest_schema() -> dict[str, Any]:
             },
             "white": {"description": "whether it draws over white alone", "type": "boolean"},
         },
-        optional=("set", "sizes", "white"),
+        optional=("layout", "set", "sizes", "white"),
         title="Manifest",
         description="What a model states about itself.",
     )
