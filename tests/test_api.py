@@ -10,6 +10,7 @@ import pytest
 
 import scenelang as nsg
 from scenelang.backend import neural
+from scenelang.backend.memory import keep_memory
 from scenelang.backend.render import Device
 from scenelang.models.framed import load_arrays
 from scenelang.renderers.draw import draw
@@ -178,4 +179,4 @@ def test_images_save_and_show_themselves(tmp_path: Path) -> None:
 
 
 def test_memory_is_kept_where_the_library_is_glibc() -> None:
-    assert neural.keep_memory() in (True, False)
+    assert keep_memory() in (True, False)

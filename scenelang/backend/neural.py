@@ -7,9 +7,7 @@ busy process took up to thirty times as long, as they wait for each other after 
 
 from __future__ import annotations
 
-import ctypes
 import os
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,6 +16,7 @@ from functools import lru_cache
 import torch
 
 from scenelang.backend.errors import RenderError
+from scenelang.backend.memory import keep_memory
 from scenelang.backend.render import Samples
 from scenelang.backend.small import check_fits
 from scenelang.models.load import Model, ModelError, load_model, place_of
@@ -27,28 +26,8 @@ from scenelang.renderers.framed import Framed
 from scenelang.renderers.kept import Kept
 from scenelang.renderers.whole import draw_whole
 
-KEEP_BYTES = 256 << 20
-_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
-
 _loading = threading.Lock()
 _drawing = threading.Lock()
-
-
-def keep_memory() -> bool:
-    """Have glibc reuse blocks up to `KEEP_BYTES` instead of giving each back to the kernel.
-
-    Otherwise every operation on a large array pays a page fault for every 4 KB of its result.
-
-    Returns:
-        Whether the C library is glibc and took it.
-    """
-    try:
-        if not sys.platform.startswith("linux") or not (os.confstr("CS_GNU_LIBC_VERSION") or ""):
-            return False
-        mallopt = ctypes.CDLL(None).mallopt
-    except (AttributeError, OSError, ValueError):
-        return False  # musl has neither the name nor the function
-    return all(mallopt(option, KEEP_BYTES) == 1 for option in (_M_MMAP_THRESHOLD, _M_TRIM_THRESHOLD))
 
 
 def choose_device(device: str) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Final, Literal, NamedTuple
 
 from scenelang.backend.errors import RenderError
+from scenelang.backend.memory import keep_memory
 from scenelang.backend.render import Device, Samples
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
@@ -84,6 +85,7 @@ def draw_small(
     Raises:
         RenderError: its model's weights are missing, or it was compiled for others or by no compiler.
     """
+    keep_memory()
     try:
         model = load_arrays(program.model)
     except ModelError as error:

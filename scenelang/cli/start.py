@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from types import FrameType
 
 _INTERRUPTED = 130  # 128 and the signal's number, as shells report it
 _TERMINATED = 143
+_UNLESS_SET = {
+    "OPENBLAS_NUM_THREADS": "1",  # numpy's products are too small to split, and threads are slow to start
+    "PYDANTIC_DISABLE_PLUGINS": "__all__",  # looking for them reads the metadata of all that is installed
+}
 
 
 def main() -> None:
@@ -16,6 +21,8 @@ def main() -> None:
     """
     try:
         signal.signal(signal.SIGTERM, _terminate)
+        for name, value in _UNLESS_SET.items():
+            os.environ.setdefault(name, value)
         from scenelang.cli.main import main as run
 
         run()

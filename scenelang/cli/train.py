@@ -76,7 +76,8 @@ def command(
     import torch
     from pydantic import ValidationError
 
-    from scenelang.backend.neural import choose_device, keep_memory
+    from scenelang.backend.memory import keep_memory
+    from scenelang.backend.neural import choose_device
     from scenelang.training.config import config_data, is_study, read_config
     from scenelang.training.loop import train
 

@@ -55,7 +55,8 @@ def command(
     need_metrics()
     import torch
 
-    from scenelang.backend.neural import choose_device, keep_memory
+    from scenelang.backend.memory import keep_memory
+    from scenelang.backend.neural import choose_device
     from scenelang.lab.experiments.experiment import Settings, run_experiment
     from scenelang.lab.experiments.runs import EXPERIMENTS
 

@@ -34,7 +34,8 @@ def command(
     import torch
     from pydantic import ValidationError
 
-    from scenelang.backend.neural import choose_device, keep_memory
+    from scenelang.backend.memory import keep_memory
+    from scenelang.backend.neural import choose_device
     from scenelang.lab.designs.config import read_student
 
     try:

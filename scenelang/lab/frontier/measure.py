@@ -19,7 +19,8 @@ import numpy as np
 import PIL.Image
 import torch
 
-from scenelang.backend.neural import keep_memory, open_model
+from scenelang.backend.memory import keep_memory
+from scenelang.backend.neural import open_model
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.image import Image, from_samples

@@ -1,0 +1,27 @@
+"""How the C library gives memory back."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+
+KEEP_BYTES = 256 << 20
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
+
+
+def keep_memory() -> bool:
+    """Have glibc reuse blocks up to `KEEP_BYTES` instead of giving each back to the kernel.
+
+    Otherwise every operation on a large array pays a page fault for every 4 KB of its result.
+
+    Returns:
+        Whether the C library is glibc and took it.
+    """
+    try:
+        if not sys.platform.startswith("linux") or not (os.confstr("CS_GNU_LIBC_VERSION") or ""):
+            return False
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError, ValueError):
+        return False  # musl has neither the name nor the function
+    return all(mallopt(option, KEEP_BYTES) == 1 for option in (_M_MMAP_THRESHOLD, _M_TRIM_THRESHOLD))
