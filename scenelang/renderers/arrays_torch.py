@@ -16,7 +16,7 @@ from scenelang.renderers.arrays import Array, Arrays, Layers
 
 def _where(mask: Tensor) -> Tensor:
     if mask.device.type == "cpu":
-        return torch.from_numpy(np.flatnonzero(mask.numpy()))  # several times as fast as torch's
+        return torch.from_numpy(mask.numpy().nonzero()[0])  # several times as fast as torch's
     return mask.nonzero()[:, 0]
 
 

@@ -201,9 +201,10 @@ class Coverage:
         q = field.local(row, xp.take(p, index))
         radius = xp.length(list(q))
         near = radius <= reach
-        if row.draws:
-            touched[index[near]] = True
-        else:
+        if not row.draws:
             near &= xp.take(touched, index)
         kept = xp.where(near)
-        return xp.take(index, kept), xp.take(q, kept), xp.take(radius, kept) if reach > RADIUS else None
+        index = xp.take(index, kept)
+        if row.draws:
+            touched[index] = True
+        return index, xp.take(q, kept), xp.take(radius, kept) if reach > RADIUS else None
