@@ -39,6 +39,11 @@ class Progress:
     done: float
     total: float
 
+    @property
+    def told(self) -> str:
+        """The stage in words, with the frame if it counts any."""
+        return f"drawing {self.done:.0f}/{self.total:.0f}" if self.stage == "drawing" else self.stage
+
 
 @dataclass(slots=True)
 class Made:

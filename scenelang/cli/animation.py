@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -18,8 +17,7 @@ from scenelang.diagnostics.span import SourceFile
 from scenelang.diagnostics.suggest import listing
 
 if TYPE_CHECKING:
-    from scenelang.animation.run import Made, Progress
-    from scenelang.cli.progress import Bar
+    from scenelang.animation.run import Made
 
 SIZES = ("B", "kB", "MB", "GB")
 
@@ -115,32 +113,6 @@ def still_picture(clip: Clip, target: Target, wanted: Wanted, out: str) -> bool:
     raise click.UsageError(
         f"'{out}' is for animations, and the scene has no animate(…); {suffixes} hold a picture too."
     )
-
-
-class Meter:
-    """A bar for each stage of an animation, in frames, with the time that is left."""
-
-    def __init__(self) -> None:
-        self._bar: Bar | None = None
-        self._stage = ""
-        self._lock = threading.Lock()
-
-    def __call__(self, progress: Progress) -> None:
-        """Show how far it is; from any thread."""
-        from scenelang.cli.progress import Bar
-
-        with self._lock:
-            if progress.stage != self._stage or self._bar is None:
-                self.close()
-                self._stage = progress.stage
-                self._bar = Bar(progress.stage, progress.total, count=progress.stage == "drawing")
-            self._bar.to(progress.done)
-
-    def close(self) -> None:
-        """Take the bar away."""
-        if self._bar is not None:
-            self._bar.__exit__(None, None, None)
-            self._bar = None
 
 
 def frames_of(clip: Clip, wanted: Wanted) -> range | None:

@@ -15,20 +15,14 @@ PATIENCE_S = 1.0
 
 
 class Bar:
-    """Shows how far something is, once it has taken longer than `PATIENCE_S`.
+    """Shows how far something is and how long it will take, once it has taken longer than `PATIENCE_S`."""
 
-    Args:
-        what: a word or two in front of the bar.
-        total: what `to` counts up to.
-        count: show how many of them are done, too.
-    """
-
-    def __init__(self, what: str, total: float, *, count: bool = False) -> None:
-        self.what, self.total, self.count = what, total, count
+    def __init__(self) -> None:
         self._wanted = sys.stderr.isatty()
         self._started = time.perf_counter()
         self._lock = threading.Lock()
         self._shown: Progress | None = None
+        self._done = 0.0
 
     def __enter__(self) -> Bar:
         return self
@@ -39,27 +33,27 @@ class Bar:
         if self._shown is not None:
             self._shown.stop()
 
-    def to(self, done: float) -> None:
-        """Say that ``done`` of the total is done; from any thread."""
+    def __call__(self, what: str, done: float, total: float) -> None:
+        """Say how much of the total is done, from any thread; less than before begins the next stage."""
         if not self._wanted:
             return
         with self._lock:
             if self._shown is None:
                 if time.perf_counter() - self._started < PATIENCE_S:
                     return
-                self._shown = self._show()
-            self._shown.update(self._shown.task_ids[0], completed=done)
+                self._shown = _show()
+            task = self._shown.task_ids[0]
+            if done < self._done:
+                self._shown.reset(task)
+            self._done = done
+            self._shown.update(task, description=what, completed=done, total=total)
 
-    def part(self, index: int, share: float) -> None:
-        """Say that ``share`` of item ``index`` is done; for items of length 1."""
-        self.to(index + share)
 
-    def _show(self) -> Progress:
-        from rich.console import Console
-        from rich.progress import MofNCompleteColumn, Progress
+def _show() -> Progress:
+    from rich.console import Console
+    from rich.progress import Progress
 
-        columns = (*Progress.get_default_columns(), *([MofNCompleteColumn()] if self.count else []))
-        shown = Progress(*columns, console=Console(stderr=True), transient=True)
-        shown.add_task(self.what, total=self.total)
-        shown.start()
-        return shown
+    shown = Progress(console=Console(stderr=True), transient=True)
+    shown.add_task("")
+    shown.start()
+    return shown

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import Job
+    from scenelang.cli.progress import Bar
     from scenelang.diagnostics.span import SourceFile
-    from scenelang.image import Image
     from scenelang.measure.frontier import Limits
     from scenelang.scene.params import Defines
 
@@ -161,14 +161,13 @@ def command(
         draw = exact(request, clock)
     else:
         draw = neural(clock, device, threads, samples)
-    with Bar("drawing", len(ready)) as bar:
+    with Bar() as bar:
         for index, (job, path) in enumerate(ready):
-            image = draw(job, partial(bar.part, index))
+            image = draw(job, partial(_part, bar, index, len(ready)))
             with clock("save"):
-                _save(image, path)
+                image.save(path)
             if verbose:
                 _tell(job, path)
-            bar.to(index + 1)
     if verbose:
         click.echo(clock.report(), err=True)
     ctx.exit(code)
@@ -192,9 +191,10 @@ def _animate(
 
     from scenelang.animation.painting import Painter
     from scenelang.animation.run import make, ready
-    from scenelang.cli.animation import Meter, frames_of, open_input, still_picture, strays, summary
+    from scenelang.cli.animation import frames_of, open_input, still_picture, strays, summary
     from scenelang.cli.inputs import unused_defines
-    from scenelang.cli.main import describe
+    from scenelang.cli.main import Trouble, describe
+    from scenelang.cli.progress import Bar
     from scenelang.cli.say import say_diagnostics
     from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 
@@ -211,36 +211,29 @@ def _animate(
         return 1, None
     ready(target)
     painter = Painter(clip, painting.backend, painting.device, painting.threads)
-    meter = Meter()
     try:
-        made = make(
-            painter,
-            target,
-            numbers,
-            jobs=wanted.jobs,
-            palette=wanted.palette,
-            dither=wanted.dither,
-            strict=painting.strict,
-            progress=meter,
-        )
+        with Bar() as bar:
+            made = make(
+                painter,
+                target,
+                numbers,
+                jobs=wanted.jobs,
+                palette=wanted.palette,
+                dither=wanted.dither,
+                strict=painting.strict,
+                progress=lambda now: bar(now.told, now.done, now.total),
+            )
     except SceneError:
-        meter.close()
         say_diagnostics(found)
         return 1, None
     except KeyboardInterrupt:
-        meter.close()
         if target.work.exists():
             click.echo(
                 f"\nframes are kept in '{target.work}'; the same command goes on with the rest", err=True
             )
         raise
     except OSError as error:
-        meter.close()
-        from scenelang.cli.main import Trouble
-
         raise Trouble(f"cannot write '{out}': {describe(error)}") from None
-    finally:
-        meter.close()
     say_diagnostics(found)
     click.echo(summary(made, target, clip, started), err=True)
     if (others := strays(target, made)) is not None:
@@ -289,6 +282,10 @@ def _prepared(
     return jobs, max(code, int(any(job.failed(strict) for job in read)))
 
 
+def _part(bar: Bar, index: int, count: int, share: float) -> None:
+    bar("drawing", index + share, count)
+
+
 def _only_stills(limits: Limits, samples: str) -> None:
     """Refuse for animations what chooses or changes how one picture is drawn."""
     if limits or samples != "adaptive":
@@ -299,15 +296,6 @@ def _only_stills(limits: Limits, samples: str) -> None:
 def _only_network(samples: str) -> None:
     if samples != "adaptive":
         raise click.UsageError("--samples is for the network, not for the reference.")
-
-
-def _save(image: Image, path: Path) -> None:
-    from scenelang.cli.main import Trouble
-
-    try:
-        image.save(path)
-    except OSError as error:  # it names the temporary file
-        raise Trouble(f"cannot write '{path}': {(error.strerror or str(error)).lower()}") from None
 
 
 def _tell(job: Job, path: Path) -> None:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,8 +14,6 @@ from scenelang.cli import options
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
-
-Report = Callable[[int, int, float, dict[str, float]], None]
 
 
 def training(made: Callable[..., None]) -> Callable[..., None]:
@@ -78,6 +75,7 @@ def command(
 
     from scenelang.backend.memory import keep_memory
     from scenelang.backend.neural import choose_device
+    from scenelang.cli.progress import Bar
     from scenelang.training.config import config_data, is_study, read_config
     from scenelang.training.loop import train
 
@@ -92,7 +90,7 @@ def command(
     place = choose_device(device)
     last: dict[str, float] = {}
     try:
-        with _reporter() as report:
+        with Bar() as bar:
 
             def note(done: int, total: int, seconds: float, parts: dict[str, float]) -> None:
                 if not parts:
@@ -100,7 +98,11 @@ def command(
                     return
                 last.clear()
                 last.update(parts)
-                report(done, total, seconds, parts)
+                if sys.stderr.isatty():
+                    bar(_losses(parts), done, total)
+                else:
+                    told = f"{done:,} of {total:,} steps, {seconds:.0f} s, {_losses(parts)}"
+                    click.echo(told, err=True)
 
             finished = train(
                 wanted,
@@ -133,25 +135,6 @@ def begin(model: str, reached: str, done: int, device: str, out: Path) -> None:
     """Say whether a training starts or goes on."""
     what = "going on with" if done else "starting"
     click.echo(f"{what} the training of {model} at {reached}, on {device}, in {out}", err=True)
-
-
-@contextmanager
-def _reporter() -> Iterator[Report]:
-    """A bar on a terminal, plain lines elsewhere."""
-    if not sys.stderr.isatty():
-        yield lambda done, total, seconds, parts: click.echo(
-            f"{done:,} of {total:,} steps, {seconds:.0f} s, {_losses(parts)}", err=True
-        )
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=Console(stderr=True)) as shown:
-        task = shown.add_task("starting", total=None)
-        yield lambda done, total, seconds, parts: shown.update(
-            task, completed=done, total=total, description=_losses(parts)
-        )
 
 
 def _losses(parts: dict[str, float]) -> str:
