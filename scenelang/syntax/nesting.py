@@ -16,9 +16,6 @@ MAX_DEPTH = 200
 _OTHER, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range(8)
 
 
-_OPERANDS = {"NAME", "NUMBER", "STRING", "COLOR", ")", "]", "true", "false", "step", "as"}
-
-
 @cache
 def _classes() -> tuple[int, ...]:
     """What each kind does to the depth."""
@@ -30,41 +27,25 @@ def _classes() -> tuple[int, ...]:
 
 
 def limit_nesting(tokens: Tokens, report: Report) -> None:
-    """Report what is nested deeper than `MAX_DEPTH` and take it out of the token list."""
+    """Report what is nested deeper than `MAX_DEPTH`; its statement and all that follows are given up."""
     kinds = tokens.kinds
     classes = _classes()
     else_kind, round_ = tables().literals["else"], tables().literals[")"]
-    cuts: list[tuple[int, int, list[int]]] = []
+    first = 0  # of the statement at top level
     depth = floor = ground = 0  # now; where this list item began; where this block's statements begin
-    brackets: list[tuple[int, int]] = []  # open in this block: their kind and the floor outside
-    blocks: list[tuple[int, int, int, list[tuple[int, int]]]] = []  # the state outside each open block
-    resume = 0
-    told = False  # one report until the depth has gone well down again
+    brackets: list[int] = []  # the floors outside those open in this block
+    blocks: list[tuple[int, int, int, list[int]]] = []  # the state outside each open block
     for at, kind in enumerate(kinds):
         c = classes[kind]
-        if c == _OTHER or at < resume:
+        if c == _OTHER:
             continue
         if c <= _BRACE:
             if depth == MAX_DEPTH:
-                if c == _BRACE:
-                    first, resume = at + 1, _end_of_block(kinds, at + 1)
-                    cuts.append((first, resume, []))
-                elif _goes_on(kinds, at):
-                    first, resume = at, _end_of_part(kinds, at, True)
-                    cuts.append((first, resume, _stand_in(kinds, at, [])))
-                else:
-                    first, resume = at + 1, _end_of_part(kinds, at + 1, False)
-                    closed = classes[kinds[resume]] == _CLOSE
-                    unclosed = [] if closed else [*(open_ for open_, _ in brackets), kind]
-                    cuts.append((first, resume, _stand_in(kinds, at, unclosed)))
-                resume += first > at and classes[kinds[resume]] in (_CLOSE, _END_BRACE)
-                if not told:
-                    _report(tokens, report, at)
-                told = True
-                continue
+                _give_up(tokens, report, first, at)
+                return
             depth += 1
             if c == _OPEN:
-                brackets.append((kind, floor))
+                brackets.append(floor)
                 floor = depth
             elif c == _BRACE:
                 blocks.append((depth - 1, floor, ground, brackets))
@@ -73,91 +54,26 @@ def limit_nesting(tokens: Tokens, report: Report) -> None:
         elif c == _CLOSE:
             if brackets:
                 depth = floor - (kind == round_)  # `v[0]` makes the tree deeper by what it goes on
-                floor = brackets.pop()[1]
+                floor = brackets.pop()
         elif c == _COMMA:
             depth = floor
-        elif c == _SEMICOLON:
-            brackets.clear()
-            depth = floor = ground
-            told = told and depth > MAX_DEPTH // 2
-        elif blocks:
-            depth, floor, ground, brackets = blocks.pop()
-            if not brackets and kinds[at + 1] != else_kind:
+        else:
+            if c == _END_BRACE and blocks:
+                depth, floor, ground, brackets = blocks.pop()
+            if c == _SEMICOLON or (not brackets and kinds[at + 1] != else_kind):
+                brackets.clear()
                 depth = floor = ground
-            told = told and depth > MAX_DEPTH // 2
-    for first, stop, kept in reversed(cuts):
-        tokens.replace(first, stop - first, kept)
+                first = first if blocks else at + 1
 
 
-def _report(tokens: Tokens, report: Report, at: int) -> None:
+def _give_up(tokens: Tokens, report: Report, first: int, at: int) -> None:
     report.add(
         "E0120",
         f"nested deeper than {MAX_DEPTH} levels",
         tokens.starts[at],
         tokens.ends[at],
-        help="give a part of it a name with `let`, `fn` or `module`",
+        help="give a part of it a name with `let`, `fn` or `module`; the rest is skipped",
     )
-
-
-def _follows_operand(kinds: list[int], at: int) -> bool:
-    """Whether an expression can end right before a token."""
-    return tables().kinds[kinds[at - 1]] in _OPERANDS
-
-
-def _goes_on(kinds: list[int], at: int) -> bool:
-    """Whether a token goes on with what is before it: an operator, or the bracket of an index."""
-    indexes = kinds[at] == tables().literals["["] and _follows_operand(kinds, at)
-    return indexes or _classes()[kinds[at]] == _OPERATOR
-
-
-def _end_of_block(kinds: list[int], first: int) -> int:
-    """Index of the `}` that closes the block whose first token this is."""
-    classes = _classes()
-    depth = 0
-    for at in range(first, len(kinds)):
-        depth += (classes[kinds[at]] == _BRACE) - (classes[kinds[at]] == _END_BRACE)
-        if depth < 0:
-            return at
-    return len(kinds) - 1
-
-
-def _end_of_part(kinds: list[int], first: int, within_list: bool) -> int:
-    """Index of the token that ends a part of a statement: the closing bracket or a separator."""
-    classes = _classes()
-    question, colon, otherwise, end_brace = (tables().literals[text] for text in ("?", ":", "else", "}"))
-    chain = within_list and kinds[first] == otherwise
-    open_brackets = open_braces = open_questions = 0
-    for at in range(first, len(kinds) - 1):
-        kind = kinds[at]
-        c = classes[kind]
-        if open_braces:
-            open_braces += (c == _BRACE) - (c == _END_BRACE)
-        elif (
-            c in (_END_BRACE, _SEMICOLON)
-            or (c == _CLOSE and not open_brackets)
-            or (chain and at > first and kinds[at - 1] == end_brace and kind != otherwise)
-        ):
-            return at
-        elif c == _BRACE:
-            open_braces += 1
-        elif c == _OPEN:
-            open_brackets += 1
-        elif c == _CLOSE:
-            open_brackets -= 1
-        elif within_list and not open_brackets:
-            if c == _COMMA or (kind == colon and not open_questions):
-                return at
-            open_questions += (kind == question) - (kind == colon)
-    return len(kinds) - 1
-
-
-def _stand_in(kinds: list[int], at: int, unclosed: list[int]) -> list[int]:
-    """The kinds that stand for what is cut behind a bracket or from an operator on."""
-    language = tables()
-    literals = language.literals
-    if kinds[at] == literals["else"]:
-        return []
-    if _goes_on(kinds, at) and _follows_operand(kinds, at):
-        return []
-    closing = [literals[")"] if open_ == literals["("] else literals["]"] for open_ in reversed(unclosed)]
-    return [language.kind("BAD_EXPRESSION"), *closing]
+    start, last = tokens.starts[first], len(tokens.kinds) - 1
+    tokens.replace(first, last - first, [tables().kind("BAD_STATEMENT")])
+    tokens.starts[first], tokens.ends[first] = start, tokens.ends[-1]

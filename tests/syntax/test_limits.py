@@ -53,6 +53,14 @@ def test_deep_nesting_is_one_mistake(text: str) -> None:
     assert depth(tree) <= 3 * MAX_DEPTH + 10
 
 
+def test_only_what_stands_before_deep_nesting_is_checked() -> None:
+    tree, diagnostics = read(
+        "let a = 1 2; group { let b = " + "(" * 300 + "1" + ")" * 300 + "; } let c = 3 4;"
+    )
+    assert [d.code for d in diagnostics] == ["E0101", "E0120"]
+    assert [type(statement).__name__ for statement in tree.statements] == ["Let", "BadStmt"]
+
+
 @pytest.mark.parametrize("opening", ["(", "[", "{", "f(", "group {", "let a = (", "if (a) {", "-", "a ? "])
 def test_deep_and_unclosed(opening: str) -> None:
     tree, diagnostics = read(opening * MANY)
