@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from scenelang.formatting.documents import (
     LINE,
@@ -158,22 +159,14 @@ class ExpressionLayout:
             else:
                 items[-1] = Item(item, "".join(f" {text}" for text in texts_of(note.trailing)))
 
-    def empty(self, opening: int, closing: int) -> Part:
-        return self._bracketed(Choose, opening, [], (closing,))
+    def enclosed(self, opening: int, *rest: Any) -> Part:
+        return self._bracketed(Choose, opening, rest)
 
-    def filled(self, opening: int, items: list[Item], *closing: int) -> Part:
-        return self._bracketed(Choose, opening, items, closing)
-
-    def _bracketed(
-        self,
-        form: type[Choose],
-        opening: int,
-        items: list[Item],
-        closing: Sequence[int],
-    ) -> Part:
-        left, right = self.word(opening), self.word(closing[-1])
-        if len(closing) > 1:
-            self._comma(items, closing[0])
+    def _bracketed(self, form: type[Choose], opening: int, rest: Sequence[Any]) -> Part:
+        items: list[Item] = rest[0] if rest[1:] else []
+        left, right = self.word(opening), self.word(rest[-1])
+        if rest[2:]:
+            self._comma(items, rest[1])
         flat: str | None = None
         if not (after_of(left) or before_of(right)):
             flat = joined([left, *inline(items), right])
@@ -204,10 +197,11 @@ class ExpressionLayout:
 
     # ------------------------------------------------------------ expressions
 
-    def argument(self, value: Part) -> Part:
-        return value
-
-    def argument_named(self, name: Part, equal: int, value: Part) -> Part:
+    def argument(self, *parts: Any) -> Part:
+        value: Part = parts[-1]
+        if not parts[1:]:
+            return value
+        name, equal = parts[:2]
         named = sequence([name, " ", self.word(equal), " ", value])
         if isinstance(value, Bracketed) and isinstance(named, Concat):
             # Keeps being told apart as something that opens on the line of a call it is alone in.
@@ -216,20 +210,12 @@ class ExpressionLayout:
             return hugging
         return named
 
-    def _range(self, start: Part, dots: int, stop: Part) -> list[Part]:
+    def range(self, start: Part, dots: int, stop: Part, *rest: Any) -> Part:
         loose = isinstance(start, (Operation, Choice)) or isinstance(stop, (Operation, Choice))
         left = flat_of(start)
         space = " " if loose or (left is not None and left.endswith(".")) else ""
-        return [start, space, self.word(dots), " " if loose else "", stop]
-
-    def range(self, start: Part, dots: int, stop: Part) -> Part:
-        return sequence(self._range(start, dots, stop))
-
-    def range_step(self, start: Part, dots: int, stop: Part, word: int, step: Part) -> Part:
-        return sequence([*self._range(start, dots, stop), " ", self.word(word), " ", step])
-
-    range_open = range
-    range_open_step = range_step
+        step = [" ", self.word(rest[0]), " ", rest[1]] if rest else []
+        return sequence([start, space, self.word(dots), " " if loose else "", stop, *step])
 
     def conditional(self, condition: Part, mark: int, then: Part, colon: int, otherwise: Part) -> Part:
         head = (condition, self.word(mark), then, self.word(colon))
@@ -251,9 +237,6 @@ class ExpressionLayout:
 
     def unary(self, op: int, operand: Part) -> Part:
         return self._glued(self.word(op), operand)
-
-    def material(self, word: int, name: Part) -> Part:
-        return sequence([self.word(word), " ", name])
 
     def index(self, value: Part, opening: int, index: Part, closing: int) -> Part:
         left, right = self.word(opening), self.word(closing)
@@ -282,11 +265,8 @@ class ExpressionLayout:
         doc = Choose(joined([left, value, right]), lambda: broken(left, inside, right, comma=""))
         return ends_of(doc, left, right)
 
-    def vector_empty(self, opening: int, closing: int) -> Part:
-        return self._bracketed(Bracketed, opening, [], (closing,))
-
-    def vector(self, opening: int, items: list[Item], *closing: int) -> Part:
-        return self._bracketed(Bracketed, opening, items, closing)
+    def vector(self, opening: int, *rest: Any) -> Part:
+        return self._bracketed(Bracketed, opening, rest)
 
     def name_ref(self, name: Part) -> Part:
         return name

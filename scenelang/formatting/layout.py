@@ -178,17 +178,14 @@ class Layout(ExpressionLayout):
     def model(self, word: int, name: Part, last: int) -> Part:
         return self._ended([self.word(word), " ", name], last)
 
-    def param(self, word: int, name: Part, equal: int, default: Part, last: int) -> Part:
-        return self.let(word, name, equal, default, last)
-
-    def param_in(
-        self, word: int, name: Part, equal: int, default: Part, within: int, range: Part, last: int
-    ) -> Part:
+    def param(self, word: int, name: Part, equal: int, default: Part, *rest: Any) -> Part:
         head = [self.word(word), " ", name, *self._assigned(equal, default)]
-        limits = sequence([self.word(within), " ", range])
-        flat = flat_of(limits)
-        tail = Choose(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, limits])))
-        return self._ended([*head, ends_of(tail, limits, limits)], last)
+        if rest[1:]:
+            limits = sequence([self.word(rest[0]), " ", rest[1]])
+            flat = flat_of(limits)
+            tail = Choose(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, limits])))
+            head.append(ends_of(tail, limits, limits))
+        return self._ended(head, rest[-1])
 
     def let(self, word: int, name: Part, equal: int, value: Part, last: int) -> Part:
         return self._ended([self.word(word), " ", name, *self._assigned(equal, value)], last)
@@ -199,28 +196,22 @@ class Layout(ExpressionLayout):
     def import_(self, word: int, path: int, as_: int, alias: Part, last: int) -> Part:
         return self._ended([self.word(word), " ", self.string(path), " ", self.word(as_), " ", alias], last)
 
-    def material_use(self, word: int, name: Part, last: int) -> Part:
-        return self._ended([self.word(word), " ", name], last, simple=True)
+    def material_use(self, word: int, name: Part, last: int | Block) -> Part:
+        return self._use([self.word(word), " ", name], last)
 
-    def call_bare(self, name: Part, last: int) -> Part:
-        return self._ended([name], last, simple=True)
+    def call(self, name: Part, *rest: Any) -> Part:
+        return self._use([name, *rest[:-1]], rest[-1])
 
-    def call_args(self, name: Part, args: Part, last: int) -> Part:
-        return self._ended([name, args], last, simple=True)
+    def _use(self, head: list[Part], last: int | Block) -> Part:
+        return self._object(head, last) if isinstance(last, Block) else self._ended(head, last, simple=True)
 
-    def parameter(self, name: Part) -> Part:
-        return name
-
-    def parameter_default(self, name: Part, equal: int, default: Part) -> Part:
-        return sequence([name, " ", self.word(equal), " ", default])
+    def parameter(self, name: Part, *default: Any) -> Part:
+        return sequence([name, " ", self.word(default[0]), " ", default[1]]) if default else name
 
     # ------------------------------------------------------------ statements with a block
 
-    def block_empty(self, opening: int, closing: int) -> Block:
-        return Block(self.word(opening), [], self.word(closing))
-
-    def block(self, opening: int, statements: list[Item], closing: int) -> Block:
-        return Block(self.word(opening), statements, self.word(closing))
+    def block(self, opening: int, *rest: Any) -> Block:
+        return Block(self.word(opening), rest[0] if rest[1:] else [], self.word(rest[-1]))
 
     def _blocked(self, head: Sequence[Part], body: Block, one_line: str | None, simple: bool) -> Statement:
         """A statement that ends with a block."""
@@ -249,27 +240,18 @@ class Layout(ExpressionLayout):
         inside = sequence([variable, " ", self.word(within), " ", iterable])
         return self._structure([self.word(word), " ", self.parenthesised(opening, inside, closing)], body)
 
-    def if_then(self, word: int, opening: int, condition: Part, closing: int, then: Block) -> Statement:
-        return self._structure([self.word(word), " ", self.parenthesised(opening, condition, closing)], then)
-
-    def if_else(
-        self,
-        word: int,
-        opening: int,
-        condition: Part,
-        closing: int,
-        then: Block,
-        else_: int,
-        otherwise: Block | Statement,
-    ) -> Part:
-        begun = self.if_then(word, opening, condition, closing, then)
-        turn = self.word(else_)
+    def if_(self, word: int, opening: int, condition: Part, closing: int, then: Block, *rest: Any) -> Part:
+        begun = self._structure([self.word(word), " ", self.parenthesised(opening, condition, closing)], then)
+        if not rest:
+            return begun
+        otherwise: Block | Statement = rest[1]
+        turn = self.word(rest[0])
         between = [*after_of(then.closing), *before_of(turn)]
         first = otherwise.opening if isinstance(otherwise, Block) else otherwise
-        rest = otherwise.structural() if isinstance(otherwise, Block) else otherwise.flat
+        inline = otherwise.structural() if isinstance(otherwise, Block) else otherwise.flat
         flat = None
-        if rest is not None and not (between or after_of(turn) or before_of(first)):
-            flat = joined([begun, " ", turn, " ", rest])
+        if inline is not None and not (between or after_of(turn) or before_of(first)):
+            flat = joined([begun, " ", turn, " ", inline])
 
         def broken() -> Part:
             parts = [begun.broken(), *([Comments(own_after_first(between)), LINE] if between else [" "])]
@@ -289,15 +271,9 @@ class Layout(ExpressionLayout):
         stmt = Statement(joined(parts), lambda: sequence(parts), child.depth, child.simple)
         return ends_of(stmt, op, child)
 
-    def material_use_block(self, word: int, name: Part, body: Block) -> Part:
-        return self._object([self.word(word), " ", name], body)
-
-    def call_block(self, name: Part, body: Block) -> Part:
-        return self._object([name], body)
-
-    def call_args_block(self, name: Part, args: Part, body: Block) -> Part:
-        return self._object([name, args], body)
-
-    def material_block(self, word: int, name: Part, body: Block) -> Part:
-        stmt = self._object([self.word(word), " ", name], body)
+    def material(self, word: int, name: Part, *body: Block) -> Part:
+        head = [self.word(word), " ", name]
+        if not body:
+            return sequence(head)
+        stmt = self._object(head, body[0])
         return ends_of(Bracketed(stmt.flat, stmt.maker), stmt, stmt)

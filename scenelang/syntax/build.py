@@ -39,21 +39,9 @@ class Builder(ExpressionBuilder):
     def model(self, word: int, name: nodes.Expr, semicolon: int) -> nodes.Stmt:
         return nodes.Model(name, self._span(word, semicolon))
 
-    def param(self, word: int, name: nodes.Name, equal: int, default: nodes.Expr, last: int) -> nodes.Stmt:
-        span = self._span(word, last)
-        return nodes.Param(name, default, None, span) if name.text else nodes.BadStmt(span)
-
-    def param_in(
-        self,
-        word: int,
-        name: nodes.Name,
-        equal: int,
-        default: nodes.Expr,
-        within: int,
-        range: nodes.Expr,
-        last: int,
-    ) -> nodes.Stmt:
-        span = self._span(word, last)
+    def param(self, word: int, name: nodes.Name, equal: int, default: nodes.Expr, *rest: Any) -> nodes.Stmt:
+        span = self._span(word, rest[-1])
+        range = rest[1] if rest[1:] else None
         return nodes.Param(name, default, range, span) if name.text else nodes.BadStmt(span)
 
     def let(self, word: int, name: nodes.Name, equal: int, value: nodes.Expr, last: int) -> nodes.Stmt:
@@ -67,14 +55,12 @@ class Builder(ExpressionBuilder):
         return nodes.Fn(name, params[0], body, span) if name.text else nodes.BadStmt(span)
 
     def module(self, word: int, name: nodes.Name, params: Parameters, body: nodes.Block) -> nodes.Stmt:
-        span = Span(self.source, self.starts[word], body.span.end)
+        span = self._to(word, body)
         return nodes.Module(name, params[0], body, span) if name.text else nodes.BadStmt(span)
 
-    def parameter(self, name: nodes.Name) -> nodes.Parameter:
-        return nodes.Parameter(name, None, name.span)
-
-    def parameter_default(self, name: nodes.Name, equal: int, default: nodes.Expr) -> nodes.Parameter:
-        return nodes.Parameter(name, default, name.span.to(default.span))
+    def parameter(self, name: nodes.Name, *default: Any) -> nodes.Parameter:
+        value = default[1] if default else None
+        return nodes.Parameter(name, value, name.span.to((value or name).span))
 
     def import_(self, word: int, path: int, as_: int, alias: nodes.Name, last: int) -> nodes.Stmt:
         span = self._span(word, last)
@@ -92,25 +78,14 @@ class Builder(ExpressionBuilder):
         closing: int,
         body: nodes.Block,
     ) -> nodes.Stmt:
-        span = Span(self.source, self.starts[word], body.span.end)
+        span = self._to(word, body)
         return nodes.For(variable, iterable, body, span) if variable.text else nodes.BadStmt(span)
 
-    def if_then(
-        self, word: int, opening: int, condition: nodes.Expr, closing: int, then: nodes.Block
+    def if_(
+        self, word: int, opening: int, condition: nodes.Expr, closing: int, then: nodes.Block, *rest: Any
     ) -> nodes.Stmt:
-        return nodes.If(condition, then, None, Span(self.source, self.starts[word], then.span.end))
-
-    def if_else(
-        self,
-        word: int,
-        opening: int,
-        condition: nodes.Expr,
-        closing: int,
-        then: nodes.Block,
-        else_: int,
-        otherwise: nodes.Block | nodes.If,
-    ) -> nodes.Stmt:
-        return nodes.If(condition, then, otherwise, Span(self.source, self.starts[word], otherwise.span.end))
+        otherwise = rest[1] if rest else None
+        return nodes.If(condition, then, otherwise, self._to(word, otherwise or then))
 
     def node(self, kind: Keyword, body: nodes.Block) -> nodes.Stmt:
         return nodes.Node(kind[0], body, kind[1].to(body.span), kind[1])
@@ -118,40 +93,28 @@ class Builder(ExpressionBuilder):
     def combined(self, op: Keyword, child: nodes.Stmt) -> nodes.Stmt:
         return nodes.Combined(op[0], child, op[1].to(child.span), op[1])
 
-    def material_use(self, word: int, name: nodes.Name, last: int) -> nodes.Stmt:
-        span = self._span(word, last)
-        return nodes.MaterialUse(name, None, span) if name.text else nodes.BadStmt(span)
+    def material_use(self, word: int, name: nodes.Name, last: Any) -> nodes.Stmt:
+        span = self._to(word, last)
+        return nodes.MaterialUse(name, _block(last), span) if name.text else nodes.BadStmt(span)
 
-    def material_use_block(self, word: int, name: nodes.Name, body: nodes.Block) -> nodes.Stmt:
-        span = Span(self.source, self.starts[word], body.span.end)
-        return nodes.MaterialUse(name, body, span) if name.text else nodes.BadStmt(span)
-
-    def _call(
-        self, name: nodes.Name, args: tuple[nodes.Argument, ...] | None, body: nodes.Block | None, end: int
-    ) -> nodes.Stmt:
+    def call(self, name: nodes.Name, *rest: Any) -> nodes.Stmt:
+        args: Arguments | None = rest[0] if rest[1:] else None
+        end = self._to(0, rest[-1]).end
         span = Span(self.source, name.span.start, end)
-        return nodes.Call(name, args, body, span) if name.text else nodes.BadStmt(span)
-
-    def call_bare(self, name: nodes.Name, last: int) -> nodes.Stmt:
-        return self._call(name, None, None, self.ends[last])
-
-    def call_block(self, name: nodes.Name, body: nodes.Block) -> nodes.Stmt:
-        return self._call(name, None, body, body.span.end)
-
-    def call_args(self, name: nodes.Name, args: Arguments, last: int) -> nodes.Stmt:
-        return self._call(name, args[0], None, self.ends[last])
-
-    def call_args_block(self, name: nodes.Name, args: Arguments, body: nodes.Block) -> nodes.Stmt:
-        return self._call(name, args[0], body, body.span.end)
+        if not name.text:
+            return nodes.BadStmt(span)
+        return nodes.Call(name, args[0] if args else None, _block(rest[-1]), span)
 
     def bad_statement(self, token: int) -> nodes.Stmt:
         return nodes.BadStmt(self._span(token, token))
 
     def bad_block(self, head: int, body: nodes.Block) -> nodes.Stmt:
-        return nodes.BadStmt(Span(self.source, self.starts[head], body.span.end))
+        return nodes.BadStmt(self._to(head, body))
 
-    def block_empty(self, opening: int, closing: int) -> nodes.Block:
-        return nodes.Block((), self._span(opening, closing))
+    def block(self, opening: int, *rest: Any) -> nodes.Block:
+        return nodes.Block(tuple(rest[0]) if rest[1:] else (), self._span(opening, rest[-1]))
 
-    def block(self, opening: int, statements: list[nodes.Stmt], closing: int) -> nodes.Block:
-        return nodes.Block(tuple(statements), self._span(opening, closing))
+
+def _block(last: Any) -> nodes.Block | None:
+    """The block that a statement ends with, None where that is a `;`."""
+    return last if isinstance(last, nodes.Block) else None

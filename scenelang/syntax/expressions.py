@@ -42,6 +42,11 @@ class ExpressionBuilder:
     def _span(self, first: int, last: int) -> Span:
         return Span(self.source, self.starts[first], self.ends[last])
 
+    def _to(self, first: int, last: Any) -> Span:
+        """From a token to the last of a node, or to another token."""
+        end = self.ends[last] if isinstance(last, int) else last.span.end
+        return Span(self.source, self.starts[first], end)
+
     def sign(self, token: int) -> Any:
         """What a literal token stands for; recovery may have read it from other text."""
         return self.signs[self.tokens.kinds[token]]
@@ -59,11 +64,8 @@ class ExpressionBuilder:
         items.append(item)
         return items
 
-    def empty(self, opening: int, closing: int) -> tuple[tuple[Any, ...], int]:
-        return (), self.ends[closing]
-
-    def filled(self, opening: int, items: list[Any], *closing: int) -> tuple[tuple[Any, ...], int]:
-        return tuple(items), self.ends[closing[-1]]
+    def enclosed(self, opening: int, *rest: Any) -> tuple[tuple[Any, ...], int]:
+        return _items(rest), self.ends[rest[-1]]
 
     # ------------------------------------------------------------ names
 
@@ -77,32 +79,14 @@ class ExpressionBuilder:
 
     # ------------------------------------------------------------ expressions
 
-    def argument(self, value: nodes.Expr) -> nodes.Argument:
-        return nodes.Argument(None, value, value.span)
+    def argument(self, *parts: Any) -> nodes.Argument:
+        name, value = (parts[0] if parts[1:] else None), parts[-1]
+        return nodes.Argument(name, value, (name or value).span.to(value.span))
 
-    def argument_named(self, name: nodes.Name, equal: int, value: nodes.Expr) -> nodes.Argument:
-        return nodes.Argument(name, value, name.span.to(value.span))
-
-    def _range(
-        self, start: nodes.Expr, stop: nodes.Expr, exclusive: bool, step: nodes.Expr | None
-    ) -> nodes.Expr:
-        return nodes.Range(start, stop, exclusive, step, start.span.to((step or stop).span))
-
-    def range(self, start: nodes.Expr, dots: int, stop: nodes.Expr) -> nodes.Expr:
-        return self._range(start, stop, False, None)
-
-    def range_step(
-        self, start: nodes.Expr, dots: int, stop: nodes.Expr, word: int, step: nodes.Expr
-    ) -> nodes.Expr:
-        return self._range(start, stop, False, step)
-
-    def range_open(self, start: nodes.Expr, dots: int, stop: nodes.Expr) -> nodes.Expr:
-        return self._range(start, stop, True, None)
-
-    def range_open_step(
-        self, start: nodes.Expr, dots: int, stop: nodes.Expr, word: int, step: nodes.Expr
-    ) -> nodes.Expr:
-        return self._range(start, stop, True, step)
+    def range(self, start: nodes.Expr, dots: int, stop: nodes.Expr, *rest: Any) -> nodes.Expr:
+        step = rest[1] if rest else None
+        span = start.span.to((step or stop).span)
+        return nodes.Range(start, stop, self.sign(dots) == "..<", step, span)
 
     def conditional(
         self, condition: nodes.Expr, mark: int, then: nodes.Expr, colon: int, otherwise: nodes.Expr
@@ -119,13 +103,10 @@ class ExpressionBuilder:
     def unary(self, op: int, operand: nodes.Expr) -> nodes.Expr:
         return nodes.Unary(self.sign(op), operand, Span(self.source, self.starts[op], operand.span.end))
 
-    def material(self, word: int, name: nodes.Name) -> nodes.Expr:
-        span = Span(self.source, self.starts[word], name.span.end)
-        return nodes.MaterialExpr(name, None, span) if name.text else nodes.BadExpr(span)
-
-    def material_block(self, word: int, name: nodes.Name, body: nodes.Block) -> nodes.Expr:
-        span = Span(self.source, self.starts[word], body.span.end)
-        return nodes.MaterialExpr(name, body, span) if name.text else nodes.BadExpr(span)
+    def material(self, word: int, name: nodes.Name, *body: nodes.Block) -> nodes.Expr:
+        block = body[0] if body else None
+        span = self._to(word, block or name)
+        return nodes.MaterialExpr(name, block, span) if name.text else nodes.BadExpr(span)
 
     def index(self, value: nodes.Expr, opening: int, index: nodes.Expr, closing: int) -> nodes.Expr:
         return nodes.Index(value, index, Span(self.source, value.span.start, self.ends[closing]))
@@ -160,11 +141,8 @@ class ExpressionBuilder:
             return value
         return replace(value, span=self._span(opening, closing))
 
-    def vector_empty(self, opening: int, closing: int) -> nodes.Expr:
-        return nodes.Vector((), self._span(opening, closing))
-
-    def vector(self, opening: int, items: list[nodes.Expr], *closing: int) -> nodes.Expr:
-        return nodes.Vector(tuple(items), self._span(opening, closing[-1]))
+    def vector(self, opening: int, *rest: Any) -> nodes.Expr:
+        return nodes.Vector(_items(rest), self._span(opening, rest[-1]))
 
     def name_ref(self, name: nodes.Name) -> nodes.Expr:
         return nodes.NameRef(name, name.span) if name.text else nodes.BadExpr(name.span)
@@ -235,3 +213,8 @@ class ExpressionBuilder:
             digits = "".join(digit * 2 for digit in digits)
         red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
         return nodes.Color((red, green, blue), span)
+
+
+def _items(rest: tuple[Any, ...]) -> tuple[Any, ...]:
+    """What stands between an opening bracket and the closing one, which is the last."""
+    return tuple(rest[0]) if rest[1:] else ()
