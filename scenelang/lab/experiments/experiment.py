@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -28,6 +28,9 @@ from scenelang.lab.experiments.runs import EXPERIMENTS, Run
 from scenelang.measure.metrics import MOST_DB, measure
 from scenelang.measure.scenes import spread
 from scenelang.renderers.field import SMOOTH
+
+if TYPE_CHECKING:
+    from scenelang.lab.experiments.lpips import Lpips
 
 UNSEEN = 2021  # seed of the scenes that are measured; trainings use small ones
 STRIP = 8  # scenes of a strip
@@ -178,8 +181,35 @@ def _figures(shown: Tensor, exact: Tensor) -> dict[str, Any]:
         # a network that came to nothing draws what is not a number; its picture is grey
         a, b = (v.nan_to_num(0.5).permute(1, 2, 0).numpy() for v in (one, other))
         cases.append(measure(a, b))
-    bad_ends = (("psnr", 5), ("ssim", 5), ("flip", 95))
-    return {metric: spread([case[metric] for case in cases], bad_end) for metric, bad_end in bad_ends}
+    out: dict[str, Any] = {
+        metric: spread([case[metric] for case in cases], bad_end)
+        for metric, bad_end in (("psnr", 5), ("ssim", 5), ("flip", 95))
+    }
+    out["lpips"] = _lpips(shown, exact)
+    return out
+
+
+def _lpips(shown: Tensor, exact: Tensor) -> dict[str, float] | None:
+    """LPIPS of VGG16 features, mean; None where its weights are not installed."""
+    from scenelang.lab.experiments.lpips import LpipsError
+
+    try:
+        distance = _vgg()
+    except LpipsError:
+        return None
+    with torch.no_grad():
+        found = [
+            float(distance(a.nan_to_num(0.5), b)) * len(a)
+            for a, b in zip(torch.split(shown, CHUNK), torch.split(exact, CHUNK), strict=True)
+        ]
+    return {"mean": round(sum(found) / len(shown), 4)}
+
+
+@lru_cache(maxsize=1)
+def _vgg() -> Lpips:
+    from scenelang.lab.experiments.lpips import load_lpips
+
+    return load_lpips()
 
 
 def _strips(run: Run, shown: Tensor, exact: Tensor, folder: Path) -> str:
