@@ -112,8 +112,8 @@ def networks_of_any_size_load_as_they_were_saved(data: st.DataObject) -> None:
     import torch
     from safetensors.torch import save
 
-    from scenelang.renderers.field import FramedConfig
     from scenelang.renderers.framed import Framed
+    from scenelang.renderers.network import FramedConfig
 
     sizes = {
         name: data.draw(st.integers(1, 6), name)

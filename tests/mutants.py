@@ -58,6 +58,7 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/renderers/kept.py": DRAWING,
     "scenelang/renderers/coverage.py": DRAWING,
     "scenelang/renderers/field.py": DRAWING,
+    "scenelang/renderers/network.py": DRAWING,
     "scenelang/lifting/exact.py": ("tests/lifting/test_exact.py", *DRAWING),
     "scenelang/lifting/learned.py": (
         "tests/lifting/test_learned.py",

@@ -123,8 +123,8 @@ def _manifest() -> bytes:
 @cache
 def _small() -> bytes:
     """A network of the smallest sizes, so that most of a file is header."""
-    from scenelang.renderers.field import FramedConfig
     from scenelang.renderers.framed import Framed
+    from scenelang.renderers.network import FramedConfig
 
     config = FramedConfig(decoder_width=2)
     with torch.random.fork_rng(devices=[]):

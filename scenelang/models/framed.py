@@ -10,7 +10,7 @@ from typing import Any
 from scenelang.lifting.layout import LAYOUTS
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.weights import ModelError, open_weights, shipped_weights
-from scenelang.renderers.field import FramedArrays, FramedConfig, parameter_shapes
+from scenelang.renderers.network import FramedArrays, FramedConfig, parameter_shapes
 from scenelang.tensors import TensorError
 
 MOST_WIDTH = 1024

@@ -27,9 +27,7 @@ class Arrays:
     concat: ClassVar[Any] = staticmethod(np.concatenate)  # (parts, axis)
     stack: ClassVar[Any] = staticmethod(np.stack)  # (parts, axis)
     packed: ClassVar[Any] = staticmethod(np.ascontiguousarray)  # the same entries, contiguous in memory
-    where: ClassVar[Any] = staticmethod(
-        lambda mask: mask.nonzero()[0]
-    )  # indices (k,) of the true entries of a mask (M,)
+    where: ClassVar[Any] = staticmethod(lambda mask: mask.nonzero()[0])  # indices (k,) of a mask (M,)
     exp: ClassVar[Any] = np.exp
     cos: ClassVar[Any] = np.cos
     sin: ClassVar[Any] = np.sin

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenelang.renderers.arrays import Array
-from scenelang.renderers.field import RADIUS, Field, Row
+from scenelang.renderers.field import Field, Row
+from scenelang.renderers.network import RADIUS
 
 CHUNK = 4096  # points that go through the network at once; their activations stay in the L2 cache
 NEAR = 0.85  # pixels: farther from an outline a pixel has one colour

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from scenelang.image import Image, from_samples
 from scenelang.program.program import ProgramError
 from scenelang.renderers.coverage import Coverage, Tile
-from scenelang.renderers.field import Field, FramedNetwork
+from scenelang.renderers.field import Field
 from scenelang.renderers.kept import Kept
+from scenelang.renderers.network import FramedNetwork
 
 TILE = 1 << 15  # pixels that are drawn at a time
 

@@ -1,6 +1,6 @@
 """The framed renderer's network in torch: its parameters, and its answers along streams for training.
 
-What it computes is `scenelang.renderers.field`, whose letters are used here. P is its M in training.
+What it computes is `scenelang.renderers.network`, whose letters are used here. P is its M in training.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from scenelang.renderers.arrays_torch import TORCH
-from scenelang.renderers.field import EMPTY, TOKENS, FramedConfig, FramedNetwork
+from scenelang.renderers.network import EMPTY, TOKENS, FramedConfig, FramedNetwork
 
 
 class Framed(nn.Module, FramedNetwork):

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass as checked
 
 from scenelang.files import read_regular
-from scenelang.renderers.field import FramedConfig
+from scenelang.renderers.network import FramedConfig
 from scenelang.training.scenes import SceneConfig
 
 CONFIGS = Path(__file__).parent / "configs"

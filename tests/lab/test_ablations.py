@@ -16,7 +16,7 @@ from scenelang.lab.designs.ablations import SEEDS, SIZES, VARIANTS, ablation_run
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, random_scenes
 from scenelang.lab.designs.students import FramedStudent, StudentConfig, make_student
 from scenelang.lab.designs.studies import Study, StudyConfig
-from scenelang.renderers.field import FramedConfig
+from scenelang.renderers.network import FramedConfig
 from scenelang.training.losses import leaf_loss, trace_loss
 from scenelang.training.scenes import SceneConfig, leaf_batch, random_batch
 

@@ -24,7 +24,7 @@ from scenelang.lab.parsimony import (
     verdict,
     whole_psnr,
 )
-from scenelang.renderers.field import FramedConfig
+from scenelang.renderers.network import FramedConfig
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"

@@ -6,8 +6,8 @@ import torch
 from torch import Tensor
 
 from scenelang.reference.fold import BLEND, fold
-from scenelang.renderers.field import TOKENS, FramedConfig
 from scenelang.renderers.framed import Framed
+from scenelang.renderers.network import TOKENS, FramedConfig
 
 STEEP = 1e7
 

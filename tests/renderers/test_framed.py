@@ -14,8 +14,9 @@ from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
 from scenelang.renderers.coverage import Coverage
 from scenelang.renderers.draw import draw
-from scenelang.renderers.field import Field, FramedConfig
+from scenelang.renderers.field import Field
 from scenelang.renderers.framed import Framed
+from scenelang.renderers.network import FramedConfig
 from scenelang.scene.schema import Object, Scale, Scene, Translate
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from scenelang.models.load import load_model
-from scenelang.renderers.field import FramedConfig
+from scenelang.renderers.network import FramedConfig
 from scenelang.training.checkpoint import load_tensors
 from scenelang.training.config import Phase, TrainConfig, read_config
 from scenelang.training.loop import train

@@ -5,7 +5,7 @@ shipped renderer knows nothing of them. `ablation_runs` lists the study: the sam
 seed for all.
 
 Letters: B streams, N objects, P points, F features, S state, L lines of the paint gate, as in
-`renderers/field.py`.
+`renderers/network.py`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from scenelang.lab.designs.pictures import Scenes, stretch
 from scenelang.lab.designs.students import FramedStudent, StudentConfig
 from scenelang.lab.designs.studies import RATES, StudyConfig
 from scenelang.lifting.layout import PLANE_LAYOUT
-from scenelang.renderers.field import TOKENS, FramedConfig
 from scenelang.renderers.framed import Framed, Trace
+from scenelang.renderers.network import TOKENS, FramedConfig
 from scenelang.training.scenes import GEOMETRIES
 
 HIDDEN = 16  # units of the hidden layer that the cell had

@@ -16,9 +16,9 @@ from scenelang.lab.designs.encoders import Encoders, LiftingConfig
 from scenelang.lab.designs.pictures import Scenes, exact_vectors, pixel_centres
 from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH
 from scenelang.renderers.arrays_torch import TORCH
-from scenelang.renderers.field import FramedConfig
 from scenelang.renderers.framed import Framed, Trace
 from scenelang.renderers.frames import Affine, Warp, way_back
+from scenelang.renderers.network import FramedConfig
 from scenelang.renderers.reading import Reading, ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 from scenelang.training.scenes import GEOMETRIES
