@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from fuzz.drawn import drawn
 from fuzz.target import Failure, hold, load_target
 from fuzz.targets.parse import BEYOND
+from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.scene.load import loads
-from scenelang.scene.session import deep_stack
 from scenelang.syntax import parse
 from scenelang.syntax.incremental import parse_whole
 

@@ -16,6 +16,7 @@ PACKAGE = ROOT / "scenelang"
 
 # A module may import modules of its own line and of the lines above.
 ORDER = (
+    "scenelang.deep",
     "scenelang.files",
     "scenelang.notebook",
     "scenelang.tensors",

@@ -21,6 +21,7 @@ from typing import Any, Final
 from fuzz import text
 from fuzz.oracles import check_compiling, check_diagnostics, same
 from fuzz.target import Target, hold, sampled
+from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.render import render_json
 from scenelang.diagnostics.span import SourceFile
@@ -28,7 +29,6 @@ from scenelang.program.compile import compile_scene
 from scenelang.program.store import program_bytes
 from scenelang.scene import evaluate as evaluating
 from scenelang.scene.schema import Scene
-from scenelang.scene.session import deep_stack
 
 SMALL: Final = {
     "MAX_STEPS": 50_000,

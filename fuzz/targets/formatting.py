@@ -9,10 +9,10 @@ from typing import Any
 from fuzz import text
 from fuzz.oracles import check_diagnostics
 from fuzz.target import Target, hold
+from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.formatting import format_text
-from scenelang.scene.session import deep_stack
 from scenelang.syntax import parse
 
 _LEXEMES = re.compile(r'"(?:\\.|[^"\\\n])*"|(//[^\n]*|/\*[\s\S]*?\*/)')

@@ -9,13 +9,13 @@ from typing import Any
 
 from fuzz import trees
 from fuzz.target import Target, hold
+from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import SceneError
 from scenelang.interchange.gltf import import_gltf
 from scenelang.interchange.gltf_file import GltfError, parse_gltf
 from scenelang.program.compile import compile_scene
 from scenelang.scene.load import loads
 from scenelang.scene.schema import Scene
-from scenelang.scene.session import deep_stack
 
 
 def check(data: bytes) -> None:

@@ -8,8 +8,8 @@ from random import Random
 from fuzz import text
 from fuzz.oracles import check_tree
 from fuzz.target import Target, hold
+from scenelang.deep import deep_stack
 from scenelang.diagnostics.span import SourceFile
-from scenelang.scene.session import deep_stack
 from scenelang.syntax.incremental import Edit, Parsed, parse_edited, parse_whole
 
 EDITS = 4

@@ -10,9 +10,9 @@ from lark.exceptions import LarkError
 from fuzz import text
 from fuzz.oracles import check_diagnostics, check_tree, same
 from fuzz.target import Target, hold, sampled
+from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.scene.session import deep_stack
 from scenelang.syntax import parse
 from scenelang.syntax.tables import grammar_path
 from scenelang.syntax.tokens import MAX_MISTAKES

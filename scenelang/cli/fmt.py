@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Final
 
 import click
@@ -14,6 +11,7 @@ from scenelang.cli.diffs import show_difference
 from scenelang.cli.folders import SUFFIX, scenes
 from scenelang.cli.main import describe
 from scenelang.cli.say import say_diagnostics, say_trouble
+from scenelang.deep import deep_stack
 from scenelang.files import followed, read_regular, write_whole
 
 STDIN: Final = "-"
@@ -36,7 +34,7 @@ def command(ctx: click.Context, paths: tuple[str, ...], check: bool, diff: bool)
     change, and 2 where a file cannot be read or written.
     """
     run = _Run(check, diff)
-    with _no_search_for_circles():
+    with deep_stack():
         for path in paths:
             try:
                 for name in [path] if path == STDIN else scenes(path):
@@ -47,18 +45,6 @@ def command(ctx: click.Context, paths: tuple[str, ...], check: bool, diff: bool)
     run.summarise()
     wrong = run.mistaken or (run.changed and (check or diff))
     ctx.exit(2 if run.unreadable else int(bool(wrong)))
-
-
-@contextmanager
-def _no_search_for_circles() -> Iterator[None]:
-    """Layouts are many small objects and hold no circles; looking for some takes as long as all the rest."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 class _Run:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from scenelang.deep import deep_stack
 from scenelang.graph.nodes import Graph, Leaf, Move, Node
 from scenelang.graph.steps import Affine
-from scenelang.scene.session import deep_stack
 
 if TYPE_CHECKING:
     from scenelang.program.program import Program

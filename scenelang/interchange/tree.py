@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any
 
+from scenelang.deep import deep_stack
 from scenelang.diagnostics.span import Span
-from scenelang.scene.session import deep_stack
 from scenelang.syntax import nodes
 
 

@@ -14,13 +14,13 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticSerializationError
 
+from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.files import depth_of_json
 from scenelang.scene import schema, wording
 from scenelang.scene.json_places import Key, Value, deeper_than, follow, read_places, record_places
-from scenelang.scene.schema import Link, Object, Scene, SceneNode
-from scenelang.scene.session import MAX_NODE_DEPTH, deep_stack
+from scenelang.scene.schema import MAX_NODE_DEPTH, Link, Object, Scene, SceneNode
 from scenelang.scene.spans import SpanMap
 
 MAX_CHARS: Final = 200_000_000

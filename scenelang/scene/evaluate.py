@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import listing
@@ -23,15 +24,7 @@ from scenelang.scene.imports import Loader, Unreadable, prepare_file, read_sourc
 from scenelang.scene.misfits import report_misfits
 from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
-from scenelang.scene.session import (
-    MAX_OBJECTS,
-    MAX_STEPS,
-    UNBOUND,
-    Halt,
-    Session,
-    Watch,
-    deep_stack,
-)
+from scenelang.scene.session import MAX_OBJECTS, MAX_STEPS, UNBOUND, Halt, Session, Watch
 from scenelang.scene.spans import Place, SpanMap
 from scenelang.scene.statements import Body
 from scenelang.scene.unit import Unit

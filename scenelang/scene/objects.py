@@ -10,9 +10,9 @@ from scenelang.scene import library, spans
 from scenelang.scene.build import Builder, ChainBuilder, make
 from scenelang.scene.expressions import prepare
 from scenelang.scene.references import entering, lookup
-from scenelang.scene.schema import Boolean, Chain, Group, Material, Object
+from scenelang.scene.schema import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object
 from scenelang.scene.scope import Definition, Env
-from scenelang.scene.session import MAX_NODE_DEPTH, Session
+from scenelang.scene.session import Session
 from scenelang.scene.statements import (
     Action,
     Body,

@@ -32,6 +32,7 @@ from scenelang.scene.modifiers import Twirl as Twirl
 from scenelang.scene.modifiers import Twist as Twist
 
 MAX_FRAMES = 1_000_000
+MAX_NODE_DEPTH = 400  # nodes within nodes
 
 
 class Material(Frozen):

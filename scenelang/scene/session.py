@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-import sys
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -29,17 +25,10 @@ if TYPE_CHECKING:
 MAX_OBJECTS: Final = 100_000
 MAX_PARTS: Final = 1_000_000  # nodes, transforms and texture operations together; bounds memory
 MAX_DEPTH: Final = 200  # calls within calls
-MAX_NODE_DEPTH: Final = 400  # scene nodes within scene nodes
 MAX_NESTING: Final = 250  # tree levels; text never has as many, trees made by hand can
 MAX_STEPS: Final = 10_000_000
 MAX_BYTES: Final = 10_000_000
 MAX_COMPARED: Final = 500_000  # letters of names, to suggest one
-
-_STACK_FRAMES: Final = 200_000  # calls x nesting x frames per level, with room
-_lock = threading.Lock()
-_users = 0
-_before = (0, False)  # the interpreter's recursion limit, and whether it collected cycles
-
 
 Watch = Callable[[Span, Any], None]
 """What an editor looks on with; it may raise `Halt` to end the evaluation."""
@@ -56,32 +45,6 @@ class Unbound:
 
 
 UNBOUND: Final = Unbound()
-
-
-@contextmanager
-def deep_stack() -> Iterator[None]:
-    """Allow deep recursion of Python code, and stop looking for cycles meanwhile.
-
-    Such recursion costs no C stack from Python 3.11 on. Evaluation makes many lasting objects and no
-    cycles: looking for some takes four times as long as the rest. Both switches are the interpreter's,
-    one for all threads: the last user puts them back.
-    """
-    global _users, _before
-    with _lock:
-        if _users == 0:
-            _before = (sys.getrecursionlimit(), gc.isenabled())
-            sys.setrecursionlimit(max(_before[0], _STACK_FRAMES))
-            gc.disable()
-        _users += 1
-    try:
-        yield
-    finally:
-        with _lock:
-            _users -= 1
-            if _users == 0:
-                sys.setrecursionlimit(_before[0])
-                if _before[1]:
-                    gc.enable()
 
 
 @dataclass(slots=True)

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
+from scenelang.deep import deep_stack
 from scenelang.scene.fields import Rgb
 from scenelang.scene.schema import Link, Material, MaterialOp, Object, Scene, SceneNode, Transform
-from scenelang.scene.session import deep_stack
 from scenelang.scene.to_nsg import degrees, hex_colour, number
 
 _WIDTH: Final = 88

@@ -15,7 +15,7 @@ from scenelang.diagnostics.span import SourceFile
 from scenelang.graph import lower
 from scenelang.models.manifest import available, load_manifest
 from scenelang.program.check import check_compiles, check_frames
-from scenelang.scene import functions, imports, session, settings, values
+from scenelang.scene import functions, imports, schema, session, settings, values
 from scenelang.scene.data import from_json
 from scenelang.scene.evaluate import Evaluation, load_source
 from scenelang.scene.params import Defines
@@ -143,7 +143,7 @@ def test_pages_state_the_lists_and_limits_of_the_code() -> None:
         "E0121": f"more than {tokens.MAX_MISTAKES} syntax",
         "E0311": f"above {settings.MAX_SIDE_PX}",
         "E0320": f"{session.MAX_OBJECTS:,} objects",
-        "E0321": f"{session.MAX_DEPTH} deep, or groups more than {session.MAX_NODE_DEPTH}",
+        "E0321": f"{session.MAX_DEPTH} deep, or groups more than {schema.MAX_NODE_DEPTH}",
         "E0322": f"{session.MAX_STEPS // 1_000_000} million steps",
         "E0323": f"nest more than {values.MAX_VECTOR_DEPTH} deep",
         "E0324": f"{session.MAX_BYTES // 1_000_000} MB, or imports nest more than {imports.MAX_IMPORT_DEPTH}",

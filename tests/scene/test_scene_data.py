@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from scene_cases import run_text
 
 import scenelang as nsg
-from scenelang.scene.session import MAX_NODE_DEPTH, deep_stack
+from scenelang.deep import deep_stack
+from scenelang.scene.schema import MAX_NODE_DEPTH
 from tests.strategies import scenes
 
 
