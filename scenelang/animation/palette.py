@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -89,11 +88,6 @@ def _selected(colours: npt.NDArray[np.uint32], counts: npt.NDArray[np.int64], mo
     used = len(reduced.getcolors(256) or ())
     table = np.array(reduced.getpalette() or [], np.uint8).reshape(-1, 3)
     return np.unique(table[: max(used, 1)], axis=0)
-
-
-def union(palettes: Iterable[Colours]) -> Colours:
-    """All colours of several palettes."""
-    return np.unique(np.concatenate(list(palettes)), axis=0)
 
 
 class Mapper:

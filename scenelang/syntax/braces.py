@@ -15,7 +15,7 @@ from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
 from scenelang.syntax.automaton import advance, fits, reach
 from scenelang.syntax.completion import completion
-from scenelang.syntax.layout import Slip, find_hidden_slips, find_slips
+from scenelang.syntax.layout import Slip, find_slips
 from scenelang.syntax.mistakes import report_broken_off, report_instead
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
@@ -34,21 +34,6 @@ def balance(tokens: Tokens, report: Report) -> None:
     for slip in reversed(find_slips(tokens)):  # from the last on, so that indices hold
         mender.mend(slip)
     mender.match_the_rest()
-
-
-def balance_hidden(tokens: Tokens, report: Report) -> bool:
-    """Mend braces that match by number only; False where nothing speaks for it.
-
-    For texts that have other mistakes: the layout of a sound text is its author's business.
-    """
-    slips = find_hidden_slips(tokens)
-    mender = _Mender(tokens, report)
-    if not slips or not all(mender.is_plausible(slip) for slip in slips):
-        return False
-    for slip in reversed(slips):
-        mender.mend(slip)
-    mender.match_the_rest()
-    return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,12 +108,6 @@ class _Mender:
             if mend.at < stop:
                 stop += len(mend.insert) - mend.delete
             self._apply(mend)
-
-    def is_plausible(self, slip: Slip) -> bool:
-        """Whether a slip makes sense of its line, and does not just undo a block that stands flush left."""
-        if slip.shift < 0:
-            return self.tokens.kinds[slip.stop - 1] != self.opening
-        return self._best(slip, slip.stop, 1)[1]
 
     def _best(self, slip: Slip, stop: int, count: int) -> tuple[_Mend, bool]:
         """How to mend a line, and whether all fits then.

@@ -113,8 +113,7 @@ class Parsed:
         found = self.diagnostics
         if len(found) > _MOST_MISTAKES or any(d.code in _GLOBAL for d in found):
             return False
-        kinds = self.tokens.kinds
-        return not self.tokens.cut and _settled(kinds) and not (found and _mended_by_layout(self.tokens))
+        return not self.tokens.cut and _settled(self.tokens.kinds)
 
 
 def parse_whole(source: SourceFile) -> Parsed:
@@ -327,10 +326,3 @@ def _settled(kinds: list[int]) -> bool:
             elif kind == semicolon:
                 brackets = 0
     return depth == 0 and brackets == 0
-
-
-def _mended_by_layout(tokens: Tokens) -> bool:
-    """Whether the parser would take the layout's word against that of the braces."""
-    from scenelang.syntax.braces import balance_hidden
-
-    return balance_hidden(_copy(tokens), Report(tokens.source))

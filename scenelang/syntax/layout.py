@@ -18,7 +18,6 @@ _SLIP = 1.4  # a slip costs as much as so many lines at the wrong depth
 _WIDEST = 12  # further off than this is not searched
 _NEVER = 1e9
 _FAR = 200  # tokens in which a statement shows whether it is one
-_ASTRAY = 4  # so many lines at the wrong depth make hidden slips likely
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,29 +54,6 @@ def _unbalanced_line(lines: list[_Line]) -> list[Slip]:
     pairs = [(line, after, after.depth - line.depth) for line, after in pairwise(lines)]
     wrong = [Slip(line.first, after.first, -more, line.depth) for line, after, more in pairs if more]
     return wrong if len(wrong) == 1 and len(lines) > 2 else []
-
-
-def find_hidden_slips(tokens: Tokens) -> list[Slip]:
-    """Slips in braces that match by number: a `}` is missing here and one too many there.
-
-    Only what the layout says loudly counts: several lines stand too far left, and a few single slips
-    explain nearly all that is amiss. Lines too far right are taken for taste.
-    """
-    lines = _lines(tokens)
-    unit = _unit(lines)
-    if sum(line.indent != unit * line.depth for line in lines[:-1]) < _ASTRAY:
-        return []  # the search is not worth its time
-    slips = _slips(lines)
-    if not slips or any(abs(slip.shift) > 1 for slip in slips):
-        return []
-    astray = left = 0
-    for line in lines[:-1]:
-        offset = sum(slip.shift for slip in slips if slip.stop <= line.first)
-        if offset > 0:
-            return []
-        astray += line.indent != unit * line.depth
-        left += line.indent != unit * (line.depth + offset)
-    return slips if astray >= _ASTRAY and 4 * left <= astray else []
 
 
 def _slips(lines: list[_Line]) -> list[Slip]:

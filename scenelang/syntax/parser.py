@@ -30,20 +30,12 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> nodes.File:
     """
     report = Report(source)
     tokens = scan(source, report)
-    matching = not _unbalanced(tokens)
-    if not matching:
+    if _unbalanced(tokens):
         # What only mistakes need is loaded at the first one: most runs start and end without any.
         from scenelang.syntax.braces import balance
 
         balance(tokens, report)
     file = parse_tokens(tokens, report)
-    if report.found and matching and not report.full:
-        from scenelang.syntax.braces import balance_hidden
-
-        again = Report(source)
-        tokens = scan(source, again)
-        if balance_hidden(tokens, again):
-            file, report = parse_tokens(tokens, again), again
     report.flush(diagnostics)
     return file
 
