@@ -129,29 +129,21 @@ def command(
 def _read(paths: tuple[str, ...], scenes: Scenes) -> bool:
     """Take in all scenes, folders' too; False where something cannot be read."""
     from scenelang.cli import folders
-    from scenelang.cli.inputs import STDIN
     from scenelang.cli.main import describe
     from scenelang.cli.say import say_trouble
 
-    good, count = True, 0
-    for path in paths:
+    lost: list[OSError] = []
+    names = list(folders.named(paths, lost.append))
+    for name in names:
         try:
-            names = [path] if path == STDIN else list(folders.scenes(path))
+            scenes.read(name)
         except OSError as error:
-            say_trouble(describe(error))
-            good = False
-            continue
-        count += len(names)
-        for name in names:
-            try:
-                scenes.read(name)
-            except OSError as error:
-                say_trouble(describe(error))
-                good = False
-    if good and not count:
+            lost.append(error)
+    for trouble in lost:
+        say_trouble(describe(trouble))
+    if not lost and not names:
         say_trouble(f"no scenes (*{folders.SUFFIX}) there")
-        return False
-    return good
+    return bool(names) and not lost
 
 
 def _wrong(left: Sequence[Diagnostic], strict: bool) -> bool:

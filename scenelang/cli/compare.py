@@ -32,18 +32,15 @@ def command(
 
     Prints PSNR (at most 50 dB), SSIM and FLIP. Transparent pictures are compared over white.
     """
-    from scenelang.cli.clock import Clock
-    from scenelang.cli.inputs import read_input, unused_defines
-    from scenelang.cli.needs import need_metrics
+    from scenelang.cli.inputs import read_scene
     from scenelang.cli.outputs import composed
-    from scenelang.cli.say import say_diagnostics
+    from scenelang.cli.say import need_metrics, say_diagnostics
     from scenelang.diagnostics.diagnostic import SceneError
 
     need_metrics()
     stem = "stdin" if scene == "-" else Path(scene).stem
     target = out if out is not None else composed(Path(f"{stem}-compare.png"))
-    found = read_input(scene, request, Clock())
-    found.diagnostics.items += unused_defines(request)
+    found = read_scene(scene, request)
     if found.scene is None or found.diagnostics.errors:
         say_diagnostics(found.diagnostics)
         ctx.exit(1)

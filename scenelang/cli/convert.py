@@ -40,20 +40,17 @@ def command(
     FILE is a scene, as text or JSON (.json), or - for standard input. What is written has no params,
     loops or imports left, only objects and numbers, which are kept exactly: it reads back as the same scene.
     """
-    from scenelang.cli.clock import Clock
-    from scenelang.cli.inputs import read_input, unused_defines
-    from scenelang.cli.say import say_diagnostics
-    from scenelang.cli.texts import put_text
+    from scenelang.cli.inputs import read_scene
+    from scenelang.cli.say import put_out, say_diagnostics
 
     wanted = kind or SUFFIXES.get(Path(out or "").suffix.lower())
     if wanted is None:
         raise click.UsageError("Say what to write: --to nsg, json or python, or -o with such a suffix.")
-    found = read_input(file, request, Clock())
-    found.diagnostics.items += unused_defines(request)
+    found = read_scene(file, request)
     say_diagnostics(found.diagnostics)
     if found.scene is None or found.diagnostics.errors:
         ctx.exit(1)
-    put_text(_written(found.scene, wanted), out)
+    put_out(_written(found.scene, wanted), out)
 
 
 def _written(scene: Scene, kind: Kind) -> str:

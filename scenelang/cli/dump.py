@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
@@ -44,9 +44,8 @@ def command(
     written), the passes in their order (`--after help` lists them) and program. A scene with mistakes is
     shown as far as it goes; then the exit code is 1.
     """
-    from scenelang.cli.say import say_diagnostics
+    from scenelang.cli.say import put_out, say_diagnostics
     from scenelang.cli.stages import known_stages, run_stages, stage_names
-    from scenelang.cli.texts import put_text
 
     if stages == ("help",):
         click.echo("\n".join(stage_names()))
@@ -56,11 +55,11 @@ def command(
     say_diagnostics(made.diagnostics)
     shown = list(_changes(made, wanted) if diff else _whole(made, wanted or ("program",), kind))
     if kind == "json":
-        put_text(json.dumps({"version": 1, "stages": shown}, indent=2, ensure_ascii=False) + "\n", out)
+        put_out(json.dumps({"version": 1, "stages": shown}, indent=2, ensure_ascii=False) + "\n", out)
     else:
         titled = len(shown) > 1 or diff
         parts = [(f"after {each['stage']}:\n" if titled else "") + each["text"] for each in shown]
-        put_text("\n".join(parts), out)
+        put_out("\n".join(parts), out)
     ctx.exit(int(bool(made.diagnostics.errors)))
 
 
@@ -88,26 +87,14 @@ def _whole(made: Stages, wanted: tuple[str, ...], kind: str) -> Iterator[dict[st
     from scenelang.interchange.graph_data import graph_data, program_data, program_table
     from scenelang.interchange.tree import tree_data, tree_text
 
-    tree, scene, program = made.source.tree, made.source.scene, made.program
+    source = made.source
+    known: dict[str, tuple[str, Any, Callable[[Any], Any], Callable[[Any], str]]] = {
+        name: ("graph", graph, graph_data, dump) for name, graph in made.graphs.items()
+    }
+    known["syntax"] = ("tree", source.tree, tree_data, tree_text)
+    known["scene"] = ("scene", source.scene, lambda s: json.loads(s.to_json()), lambda s: str(s.to_nsg()))
+    known["program"] = ("program", made.program, program_data, program_table)
     for name in wanted:
-        if name == "syntax" and tree is not None:
-            yield {"stage": name, "tree": tree_data(tree)} if kind == "json" else _text(name, tree_text(tree))
-        elif name == "scene" and scene is not None:
-            yield (
-                {"stage": name, "scene": json.loads(scene.to_json())}
-                if kind == "json"
-                else _text(name, scene.to_nsg())
-            )
-        elif name == "program" and program is not None:
-            yield (
-                {"stage": name, "program": program_data(program)}
-                if kind == "json"
-                else _text(name, program_table(program))
-            )
-        elif name in made.graphs:
-            graph = made.graphs[name]
-            yield {"stage": name, "graph": graph_data(graph)} if kind == "json" else _text(name, dump(graph))
-
-
-def _text(stage: str, text: str) -> dict[str, Any]:
-    return {"stage": stage, "text": text}
+        key, value, data, text = known.get(name, ("", None, str, str))
+        if value is not None:
+            yield {"stage": name, **({key: data(value)} if kind == "json" else {"text": text(value)})}

@@ -8,7 +8,7 @@ from typing import Final
 import click
 
 from scenelang.cli.diffs import show_difference
-from scenelang.cli.folders import SUFFIX, scenes
+from scenelang.cli.folders import SUFFIX, named
 from scenelang.cli.main import describe
 from scenelang.cli.say import say_diagnostics, say_trouble
 from scenelang.deep import deep_stack
@@ -35,13 +35,8 @@ def command(ctx: click.Context, paths: tuple[str, ...], check: bool, diff: bool)
     """
     run = _Run(check, diff)
     with deep_stack():
-        for path in paths:
-            try:
-                for name in [path] if path == STDIN else scenes(path):
-                    run.take(name)
-            except OSError as error:
-                say_trouble(describe(error))
-                run.unreadable += 1
+        for name in named(paths, run.lose):
+            run.take(name)
     run.summarise()
     wrong = run.mistaken or (run.changed and (check or diff))
     ctx.exit(2 if run.unreadable else int(bool(wrong)))
@@ -62,6 +57,11 @@ class _Run:
         self.changed = self.same = self.mistaken = self.unreadable = 0
         self.stdin = False
 
+    def lose(self, error: OSError) -> None:
+        """Report what cannot be read or written."""
+        say_trouble(describe(error))
+        self.unreadable += 1
+
     def take(self, name: str) -> None:
         """Format one file."""
         from scenelang.diagnostics.diagnostic import SceneError
@@ -77,8 +77,7 @@ class _Run:
             self.mistaken += 1
             return
         except OSError as error:
-            say_trouble(describe(error))
-            self.unreadable += 1
+            self.lose(error)
             return
         if result == text:
             self.same += 1
@@ -117,8 +116,7 @@ class _Run:
             try:
                 write_whole(followed(name), result.encode("utf-8"))
             except OSError as error:
-                say_trouble(describe(error))
-                self.unreadable += 1
+                self.lose(error)
                 self.changed -= 1
 
     def summarise(self) -> None:

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
 SUFFIX: Final = ".nsg"
 
 
+def named(paths: Iterable[str], lost: Callable[[OSError], None]) -> Iterator[str]:
+    """The scenes of a command line; ``lost`` is told of folders that cannot be listed."""
+    for path in paths:
+        try:
+            yield from scenes(path)
+        except OSError as error:
+            lost(error)
+
+
 def scenes(path: str) -> Iterator[str]:
-    """A file itself, or the scenes of a folder in order of their names; hidden ones and links are left out.
+    """A file itself, ``-`` too, or the scenes of a folder by name; hidden ones and links are left out.
 
     Raises:
         OSError: a folder cannot be listed.

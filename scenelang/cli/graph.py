@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -57,9 +56,8 @@ def command(
     FILE is a scene, or - for standard input. Mermaid and DOT are text; .svg and .png need the program `dot`
     of Graphviz. Large scenes are cut, and a box says how many nodes are left out.
     """
-    from scenelang.cli.say import say_diagnostics
+    from scenelang.cli.say import put_out, say_diagnostics
     from scenelang.cli.stages import known_stages, run_stages
-    from scenelang.cli.texts import put_text
     from scenelang.interchange.drawing import to_dot, to_mermaid
 
     wanted = _kind(out, kind)
@@ -71,11 +69,11 @@ def command(
     if drawing is None or made.diagnostics.errors:
         ctx.exit(1)
     if wanted == "mmd":
-        put_text(to_mermaid(drawing), out)
+        put_out(to_mermaid(drawing), out)
     elif dot is None:
-        put_text(to_dot(drawing), out)
+        put_out(to_dot(drawing), out)
     else:
-        _put_picture(_picture(dot, wanted, to_dot(drawing)), out)
+        put_out(_picture(dot, wanted, to_dot(drawing)), out)
 
 
 def _kind(out: str | None, kind: str | None) -> str:
@@ -125,12 +123,3 @@ def _picture(dot: str, kind: str, text: str) -> bytes:
         said = done.stderr.decode(errors="replace").strip().splitlines()
         raise Trouble(f"dot failed{f': {said[0]}' if said else ''}")
     return done.stdout
-
-
-def _put_picture(data: bytes, out: str | None) -> None:
-    from scenelang.files import write_output
-
-    if out is None or out == "-":
-        sys.stdout.buffer.write(data)
-    else:
-        write_output(out, data)

@@ -43,8 +43,7 @@ def command(
     its material. What is left out is said, with the path of its node.
     """
     from scenelang.cli.main import Trouble
-    from scenelang.cli.say import say_diagnostics
-    from scenelang.cli.texts import put_text
+    from scenelang.cli.say import put_out, say_diagnostics
     from scenelang.diagnostics.diagnostic import Diagnostics
     from scenelang.interchange.gltf import load_gltf
     from scenelang.interchange.gltf_file import GltfError
@@ -65,7 +64,7 @@ def command(
     found = Diagnostics()
     check_scene(made.scene, None, found, load_manifest(made.scene.model or ""))
     say_diagnostics(found)
-    put_text(_written(made, out), out)
+    put_out(_written(made, out), out)
     ctx.exit(int(bool(found.errors)))
 
 

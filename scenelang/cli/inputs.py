@@ -123,6 +123,17 @@ def read_input(name: str, request: Request, clock: Clock, source: SourceFile | N
     return _with_scene(found, scene, spans, request)
 
 
+def read_scene(name: str, request: Request, clock: Clock | None = None) -> Input:
+    """Read the one scene of a command; a param that it does not have is reported too.
+
+    Raises:
+        OSError: it cannot be opened.
+    """
+    found = read_input(name, request, clock or Clock())
+    found.diagnostics.items += unused_defines(request)
+    return found
+
+
 def _from_json(
     source: SourceFile, request: Request, diagnostics: Diagnostics
 ) -> tuple[Scene | None, SpanMap]:

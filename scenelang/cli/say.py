@@ -1,7 +1,8 @@
-"""What commands print."""
+"""What commands print and write."""
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import shutil
 import sys
@@ -47,3 +48,24 @@ def say_diagnostics(diagnostics: Iterable[Diagnostic]) -> None:
 def say_trouble(message: str) -> None:
     """Print one error that belongs to no place in a scene to standard error."""
     click.echo(f"Error: {message}", err=True)
+
+
+def put_out(made: str | bytes, out: str | None) -> None:
+    """Write what a command made to a file, whole or not at all; ``-`` or none is standard output.
+
+    Raises:
+        OSError: the file cannot be written; nothing is left behind.
+    """
+    if out is None or out == "-":
+        click.echo(made, nl=False)
+        return
+    from scenelang.files import write_output
+
+    write_output(out, made.encode() if isinstance(made, str) else made)
+
+
+def need_metrics() -> None:
+    """Stop with advice where the packages that measure pictures are not installed."""
+    for name in ("flip_evaluator", "pytorch_msssim"):
+        if importlib.util.find_spec(name) is None:
+            raise click.UsageError(f"{name} is missing; pip install 'scenelang[eval]'")

@@ -24,7 +24,7 @@ def command(kind: str, out: str | None) -> None:
     Editors complete and check by it; validators refuse by it what scenelang refuses, as far as a schema
     can say.
     """
-    from scenelang.cli.texts import put_text
+    from scenelang.cli.say import put_out
     from scenelang.interchange.schemas import SCHEMAS
 
-    put_text(json.dumps(SCHEMAS[kind](), indent=2, ensure_ascii=False) + "\n", out)
+    put_out(json.dumps(SCHEMAS[kind](), indent=2, ensure_ascii=False) + "\n", out)

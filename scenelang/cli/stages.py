@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli.clock import Clock
-from scenelang.cli.inputs import Input, Request, read_input, unused_defines
+from scenelang.cli.inputs import Input, Request, read_scene
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.graph.nodes import Graph
 
@@ -69,8 +68,7 @@ def run_stages(file: str, request: Request) -> Stages:
     """
     from scenelang.program.compile import compile_scene
 
-    made = Stages(read_input(file, request, Clock()))
-    made.diagnostics.items += unused_defines(request)
+    made = Stages(read_scene(file, request))
     scene = made.source.scene
     if scene is not None:
         with suppress(SceneError):  # its diagnostics are the input's

@@ -116,18 +116,12 @@ def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] 
     wish = easel.wish
     try:
         outcome = easel.draw(before)
-    except FileNotFoundError as error:
+    except (OSError, RenderError) as error:
         screen.clear()
-        gone = error.filename is not None and Path(error.filename) == wish.file
-        screen.say(f"{clock} {wish.file} is gone; waiting for it" if gone else f"Error: {describe(error)}")
-        return
-    except OSError as error:
-        screen.clear()
-        screen.say(f"{clock} Error: {describe(error)}")
-        return
-    except RenderError as error:
-        screen.clear()
-        screen.say(f"{clock} Error: {error}")
+        if isinstance(error, FileNotFoundError) and error.filename and Path(error.filename) == wish.file:
+            screen.say(f"{clock} {wish.file} is gone; waiting for it")
+        else:
+            screen.say(f"{clock} Error: {describe(error) if isinstance(error, OSError) else error}")
         return
     screen.clear()
     if outcome.diagnostics:

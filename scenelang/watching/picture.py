@@ -12,13 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenelang.animation.clip import Clip
+from scenelang.animation.clip import Clip, open_clip
 from scenelang.animation.painting import Painter
 from scenelang.animation.run import make
 from scenelang.animation.timing import FrameRange, FramesError
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
-from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.scene.imports import Unreadable, read_source
 from scenelang.scene.params import Defines
 from scenelang.watching.changes import Stamps, stamps
 
@@ -164,16 +162,9 @@ class Easel:
 
     def _open(self, found: Diagnostics) -> Clip:
         wish = self.wish
-        try:
-            source = read_source(wish.file, os.fspath(wish.file))
-        except Unreadable as error:
-            empty = Span(SourceFile(os.fspath(wish.file), ""), 0, 0)
-            found.add(error.code, f"cannot read '{wish.file.name}': {error}", empty)
-            raise SceneError(found) from None
         defines = Defines(dict(wish.defines))
-        clip = Clip(
-            source,
-            path=wish.file,
+        clip = open_clip(
+            wish.file,
             diagnostics=found,
             defines=defines,
             model=wish.model,

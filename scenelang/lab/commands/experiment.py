@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from scenelang.cli import options
-from scenelang.cli.needs import need_metrics
+from scenelang.cli.say import need_metrics
 from scenelang.lab.commands.common import write_json
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli.needs import need_metrics
+from scenelang.cli.say import need_metrics
 from scenelang.lab.commands import common
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from scenelang.cli.needs import need_metrics
+from scenelang.cli.say import need_metrics
 from scenelang.lab.commands import common
 
 
