@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from scenelang.diagnostics.diagnostic import SceneError as SceneError
     from scenelang.formatting.format import format_text as format_text
     from scenelang.image import Image as Image
-    from scenelang.measure.metrics import measure as measure
+    from scenelang.measure.metrics import compare as compare
     from scenelang.program.checking import check as check
     from scenelang.program.checking import check_text as check_text
     from scenelang.program.checking import fix_text as fix_text
@@ -64,7 +64,7 @@ _HOME: Final = {
     "scenelang.diagnostics.diagnostic": ("Diagnostic", "Diagnostics", "SceneError"),
     "scenelang.formatting.format": ("format_text",),
     "scenelang.image": ("Image",),
-    "scenelang.measure.metrics": ("measure",),
+    "scenelang.measure.metrics": ("compare",),
     "scenelang.program.checking": ("check", "check_text", "fix_text"),
     "scenelang.program.compile": ("compile",),
     "scenelang.program.program": ("Place", "Program", "ProgramError"),
@@ -130,13 +130,13 @@ __all__ = [
     "animate",
     "check",
     "check_text",
+    "compare",
     "compile",
     "fix_text",
     "format_text",
     "load",
     "load_program",
     "loads",
-    "measure",
     "render",
     "render_frames",
 ]

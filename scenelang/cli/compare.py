@@ -46,7 +46,7 @@ def command(
         ctx.exit(1)
     from scenelang.backend.exact import draw_exact
     from scenelang.backend.neural import choose_device, draw_program, open_model
-    from scenelang.measure.metrics import measure, over_white
+    from scenelang.measure.metrics import compare, over_white
     from scenelang.measure.sheet import side_by_side
     from scenelang.program.compile import compile_scene
 
@@ -61,7 +61,7 @@ def command(
     opened = open_model(program.model, choose_device(device))
     picture = over_white(draw_program(program, opened, threads=threads).image)
     exact = over_white(draw_exact(found.scene, spans=found.spans, model=request.model))
-    figures = measure(picture, exact)
+    figures = compare(picture, exact)
     text = f"PSNR {figures['psnr']:.2f} dB  SSIM {figures['ssim']:.4f}  FLIP {figures['flip']:.4f}"
     side_by_side(picture, exact, text).save(target)
     click.echo(f"{text}  {target}")

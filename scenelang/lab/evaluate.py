@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.image import Image
-from scenelang.measure.metrics import MOST_DB, measure
+from scenelang.measure.metrics import MOST_DB, compare
 from scenelang.measure.scenes import draw_scene, reference_of, scenes_of, spread
 from scenelang.measure.sheet import contact_sheet, side_by_side
 from scenelang.models.load import Model
@@ -79,7 +79,7 @@ def evaluate_set(
     for index in range(count):
         scene = scene_at(index)
         program, picture = draw_scene(model, scene, threads)
-        figures = measure(picture, reference_of(scene, model.manifest))
+        figures = compare(picture, reference_of(scene, model.manifest))
         cases.append(Case(index, _last_word(program.tokens), len(program), figures))
         if report is not None:
             report(name, index + 1, count)

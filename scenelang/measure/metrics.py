@@ -62,7 +62,7 @@ def flip(picture: Array, reference: Array) -> float:
     return float(flip_map(picture, reference).mean())
 
 
-def measure(picture: Array, reference: Array) -> dict[str, float]:
+def compare(picture: Array, reference: Array) -> dict[str, float]:
     """How near a picture is to another: PSNR in dB (at most `MOST_DB`), SSIM and FLIP by name.
 
     Args:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from scenelang.measure.metrics import flip, flip_map, measure, psnr, ssim
+from scenelang.measure.metrics import compare, flip, flip_map, psnr, ssim
 from scenelang.measure.sets import SETS, random_scene
 from scenelang.program.compile import compile_scene
 
@@ -30,9 +30,9 @@ def test_ssim_and_flip_of_equal_pictures() -> None:
 
 def test_alpha_is_put_over_white_and_sizes_are_compared() -> None:
     clear = np.concatenate([GREY, np.full((32, 48, 1), 0.5, np.float32)], axis=2)
-    assert measure(clear, GREY * 0.5 + 0.5) == pytest.approx({"psnr": 50.0, "ssim": 1.0, "flip": 0.0})
+    assert compare(clear, GREY * 0.5 + 0.5) == pytest.approx({"psnr": 50.0, "ssim": 1.0, "flip": 0.0})
     with pytest.raises(ValueError, match="48 × 32 and 32 × 48 pixels"):
-        measure(GREY, GREY.swapaxes(0, 1))
+        compare(GREY, GREY.swapaxes(0, 1))
 
 
 def test_ssim_of_two_constants_is_the_luminance_term() -> None:

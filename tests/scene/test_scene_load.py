@@ -56,6 +56,7 @@ def test_public_names() -> None:
     assert nsg.__all__ == sorted(nsg.__all__)
     assert set(nsg.__all__) <= set(dir(nsg))
     for name in nsg.__all__:
+        assert not Path(str(nsg.__file__)).with_name(name).is_dir()  # importing a package would hide it
         assert getattr(nsg, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'lode'"):
         nsg.lode  # noqa: B018

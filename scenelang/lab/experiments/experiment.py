@@ -25,7 +25,7 @@ from scenelang.lab.designs.pictures import PictureConfig, Scenes, pictures, rand
 from scenelang.lab.designs.students import Student
 from scenelang.lab.designs.studies import Study
 from scenelang.lab.experiments.runs import EXPERIMENTS, Run
-from scenelang.measure.metrics import MOST_DB, measure
+from scenelang.measure.metrics import MOST_DB, compare
 from scenelang.measure.scenes import spread
 from scenelang.renderers.field import SMOOTH
 
@@ -180,7 +180,7 @@ def _figures(shown: Tensor, exact: Tensor) -> dict[str, Any]:
     for one, other in zip(shown, exact, strict=True):
         # a network that came to nothing draws what is not a number; its picture is grey
         a, b = (v.nan_to_num(0.5).permute(1, 2, 0).numpy() for v in (one, other))
-        cases.append(measure(a, b))
+        cases.append(compare(a, b))
     out: dict[str, Any] = {
         metric: spread([case[metric] for case in cases], bad_end)
         for metric, bad_end in (("psnr", 5), ("ssim", 5), ("flip", 95))
