@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import threading
 
 import numpy as np
@@ -11,7 +12,7 @@ import scenelang as nsg
 from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
 from scenelang.program.compile import compile_scene
-from scenelang.program.program import Program
+from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing, draw
 from scenelang.renderers.kept import Kept
 from tests.passes.random_scenes import blob_scene, random_scene
@@ -240,6 +241,9 @@ def test_what_stays_is_taken_over(network) -> None:
         np.testing.assert_array_equal(again, alone)
         costs.append(drawing.pairs)
         met.append((drawing.met, drawing.refined))
+    last = np.array(frames[-1].canvas)  # what draws otherwise takes nothing over and leaves what is kept
+    assert drawn(network, frames[-1], split=8, kept=kept, adaptive=False)[1].refined == last.prod()
+    assert drawn(network, frames[-1], split=8, kept=kept)[1].pairs == 0
     assert costs[:2] == [whole[0], 0]
     assert met[1] == (0, 0)
     assert 0 < costs[2] < 0.75 * whole[1]  # the square's tiles are those of before
@@ -256,3 +260,33 @@ def test_a_tile_is_drawn_again_when_something_comes_near(network, shift: float) 
         np.testing.assert_array_equal(
             drawn(network, p, split=20, kept=kept)[0], drawn(network, p, split=20)[0]
         )
+
+
+@pytest.mark.parametrize(
+    ("at", "numbers"),
+    [
+        (slice(5, 11), 0.0),  # a frame without an inverse
+        (slice(5, 11), (1, 0, 0, 2, 0, 0)),
+        (slice(20, 26), (1, 0, 0, 2, 0, 0)),
+        (slice(5, 11), (3e31, 0, 0, 0, 3e31, 0)),  # one that float32 cannot follow
+        (slice(5, 11), (3e-32, 0, 0, 0, 3e-32, 0)),
+        (slice(5, 11), (3e-32, 0, 0, 0, 1, 0)),
+        (slice(11, 12), 2e31),
+        (slice(44, 45), np.nan),  # a colour that is not a number, of one object among others
+        (slice(5, 6), np.nan),
+    ],
+)
+def test_vectors_that_nobody_can_draw(network, at: slice, numbers: object) -> None:
+    p = program(SCENES["unions"])
+    vectors = p.vectors.copy()
+    vectors[1, at] = numbers
+    with pytest.raises(ProgramError):
+        draw(network, vectors, p.tokens, p.canvas, None)
+
+
+def test_vectors_at_the_edge_of_what_can_be_drawn(network) -> None:
+    p = program(LEAVES[0])
+    for frame in ((1e30, 0, 0, 0, 1e30, 0), (1e-30, 0, 0, 0, 1e-30, 0), (1e-30, 0, 0, 0, 1e30, 0)):
+        vectors = p.vectors.copy()
+        vectors[0, 5:11] = frame
+        assert np.isfinite(drawn(network, dataclasses.replace(p, vectors=vectors))[0]).all()

@@ -99,6 +99,8 @@ def test_streaming_equals_the_network_it_was_trained_as(model: Model) -> None:
         field = Field(network, program.vectors, program.tokens)
         p = torch.from_numpy(np.random.default_rng(0).uniform(-1, 1, (2, 500)).astype(np.float32))
         shade = Coverage(field, skip=False).shade(p)
+        skipping = Coverage(field).shade(p)
+        torch.testing.assert_close(skipping.coverage, shade.coverage, atol=2e-3, rtol=0)
         q = torch.stack([field.local(r, p) for r in field.rows])
         scale = torch.tensor([r.frame.scale for r in field.rows])
         codes = torch.from_numpy(program.vectors[:, :4].copy())
