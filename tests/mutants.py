@@ -49,7 +49,7 @@ DRAWING = (
 )  # fmt: skip
 COMPILING = (
     "tests/graph", "tests/program/test_program_compile.py", "tests/passes/test_linearise.py",
-"tests/passes/test_without.py", "tests/passes/test_pass_picture.py",
+    "tests/passes/test_without.py", "tests/passes/test_pass_picture.py",
     "tests/conformance",
 )  # fmt: skip
 TARGETS: dict[str, tuple[str, ...]] = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,9 +12,7 @@ from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.lifting.exact import affine_matrix
 from scenelang.lifting.layout import PLANE_LAYOUT
-from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import load_codes
-from scenelang.passes import check_scene
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Place, Program, ProgramError
 from scenelang.scene import schema
@@ -119,34 +116,6 @@ def test_the_same_scene_gives_the_same_program() -> None:
     assert compiled("// moved\n" + CHAIN)[0].digest() == first.digest()
     nested = compiled(f"group {{ group {{ {CHAIN} }} }}")[0]
     assert nested.digest() == first.digest()
-
-
-@pytest.mark.parametrize(
-    ("text", "code", "words"),
-    [
-        ("for (i in 0..<7) { star { scale(0.1); translate(0.2 * i - 0.6, 0); } }", "W0501", "7 objects"),
-        ("star { twirl(3); scale(0.5); }", "W0502", "`twirl` of 3"),
-        ("star { bend(-2); scale(0.5); }", "W0503", "`bend` of 2"),
-        ("star { scale(0.01); }", "W0504", "scale of 0.01"),
-        ("star { scale(1.5); }", "W0504", "scale of 1.5"),
-    ],
-)
-def test_outside_of_what_was_trained(text: str, code: str, words: str) -> None:
-    from scenelang.models.manifest import Manifest
-
-    manifest: Manifest = replace(
-        load_manifest("shapes2d"),
-        trained={"objects": (1, 6), "twirl": (-1.2, 1.2), "bend": (-1.2, 1.2), "scale": (0.02, 1.0)},
-    )
-    diagnostics = Diagnostics()
-    scene, spans = load_source(SourceFile("a.nsg", text), diagnostics=diagnostics)
-    assert scene is not None
-    check_scene(scene, spans, diagnostics, manifest)
-    (warning,) = diagnostics
-    assert warning.code == code
-    assert words in warning.message
-    assert "model `shapes2d`" in warning.message
-    assert warning.span is not None
 
 
 def test_a_group_deformed_and_scaled_too_often() -> None:

@@ -1,0 +1,90 @@
+"""Warnings of what lies outside the measured ranges: where they begin, and what they name."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+import scenelang as nsg
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.span import SourceFile
+from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.passes import check_scene
+from scenelang.scene.load import load_source
+
+MANIFEST = dataclasses.replace(
+    load_manifest("shapes2d"),
+    trained={
+        "objects": (1, 3), "smooth": (0, 1), "twirl": (-1, 2), "bend": (-1, 1), "scale": (0.1, 1.5),
+        "thin": (1, 5), "blend": (0, 0.5),
+    },
+    measured={"stability": {"thin": "9: 12.3 dB"}},
+)  # fmt: skip
+DARK = "material flat { color([0.5, 0.2, 1]); } "
+
+
+def warned(text: str, manifest: Manifest = MANIFEST) -> list[str]:
+    found = Diagnostics()
+    scene, spans = load_source(SourceFile("a.nsg", text), diagnostics=found)
+    assert scene is not None
+    check_scene(scene, spans, found, manifest)
+    assert all(d.span is not None for d in found), [*found]
+    return [f"{d.code} {d.message}" for d in found]
+
+
+def stars(count: int) -> str:
+    return " ".join(f"star {{ rotate({i}rad); }}" for i in range(count))
+
+
+def blend(first: str, second: str) -> str:
+    return f"smooth {{ star {{ {first} }} square {{ {second} }} }}"
+
+
+@pytest.mark.parametrize(
+    ("inside", "outside", "words"),
+    [
+        ("star { twirl(2); }", "star { twirl(2.01); }",
+            "W0502 a `twirl` of 2.01 on `star` is outside the measured range -1 to 2 of model `shapes2d`"),
+        ("star { twirl(-1); }", "star { twirl(-1.1); }", "W0502 a `twirl` of -1.1 on `star`"),
+        ("star { scale(0.5); twirl(2); }", "star { scale(0.5); twirl(4.1); }", "W0502 a `twirl` of 2.05"),
+        ("star { bend(-1); }", "star { bend(-1.1); }", "W0503 a `bend` of 1.1"),
+        ("star { scale(0.1); }", "star { scale(0.2, 0.09); }", "W0504 a scale of 0.09 of `star`"),
+        ("star { scale(1.5); }", "star { scale(1.6, 1); }", "W0504 a scale of 1.6 of `star`"),
+        ("star { scale(1, 0.2); }", "star { scale(1, 0.19); }", "W0506 `star`, 5.26 times as long as wide,"),
+        (stars(3), stars(4), "W0501 4 objects are outside the measured range 1 to 3"),
+        (blend("", ""), "smooth { star { } square { } pentagon { } }", "W0505 2 smooth unions are outside"),
+        (blend(DARK, "material flat { color([0.7, 0.7, 1]); }"), blend(DARK, "scale(0.9);"),
+            "W0507 a `smooth` of colours 0.8 apart at a scale of 1: the product 0.8 is outside the measured"),
+        (blend(DARK + "scale(0.6);", "scale(0.5);"), blend(DARK + "scale(0.6);", "scale(1.5, 0.8);"),
+            "W0507 a `smooth` of colours 0.8 apart at a scale of 0.8: the product 0.64"),
+        (f"subtract {{ {blend('', '')} pentagon {{ {DARK} }} }}", blend("", DARK), "W0507"),
+        (f"star {{ {DARK} }} square {{ }}",
+            f"smooth {{ union {{ star {{ {DARK} }} square {{ rotate(0.1rad); }} }} pentagon {{ }} }}",
+            "W0507 a `smooth` of colours 0.8 apart"),
+    ],
+)  # fmt: skip
+def test_on_both_sides_of_a_bound(inside: str, outside: str, words: str) -> None:
+    assert warned(inside) == []
+    (found,) = warned(outside)
+    assert found.startswith(words)
+
+
+def test_the_furthest_out_is_named_and_the_others_are_counted() -> None:
+    text = "star { twirl(3); } square { twirl(9); } pentagon { twirl(-4); }"
+    assert warned(text)[0].startswith("W0502 a `twirl` of 9 on `square`")
+    assert warned(text)[0].endswith("of model `shapes2d`, as 2 more are")
+
+
+def test_help_says_what_was_measured() -> None:
+    found = Diagnostics()
+    check_scene(nsg.loads("star { scale(1, 0.1); twirl(3); }"), None, found, MANIFEST)
+    assert {d.code: d.help for d in found} == {
+        "W0506": "measured there: 9: 12.3 dB",
+        "W0502": "the picture may be less exact than the model's figures",
+    }
+
+
+def test_what_a_model_does_not_state_is_not_looked_at() -> None:
+    bare = dataclasses.replace(MANIFEST, trained={})
+    assert warned(f"smooth {{ star {{ twirl(99); }} square {{ {DARK} scale(90, 1); }} }}", bare) == []
