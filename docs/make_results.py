@@ -16,6 +16,7 @@ from pathlib import Path
 
 from scenelang.lab.experiments.runs import EXPERIMENTS as RUNNABLE
 from scenelang.lab.experiments.tables import markdown, table_of
+from scenelang.lab.stability.probes import LARGE
 
 HERE = Path(__file__).parent
 WHAT = {
@@ -93,9 +94,35 @@ def stability() -> str:
     return markdown(("model", "what", "healthy, dB", "value: mean PSNR, dB"), rows)
 
 
+def blends() -> str:
+    """What blends of bright and dark cost, by contrast and by size, with the command."""
+    found = json.loads((HERE / "results" / "stability.json").read_text())
+    rows, scenes = [], {found["probes"][name]["scenes"] for name in ("contrast", "deep")}
+    for name in ("contrast", "deep"):
+        probe = found["probes"][name]
+        for row in probe["rows"]:
+            p, f = row["psnr"], row["flip"]
+            contrast, size = (row["value"], LARGE) if name == "contrast" else (1, row["value"])
+            mean = f"{p['mean']:.1f} ± {p['interval']:.1f}"
+            rows.append(
+                [
+                    f"{contrast:g}",
+                    f"{size:g}",
+                    mean,
+                    f"{p['p5']:.1f}",
+                    f"{p['worst']:.1f}",
+                    f"{f['mean']:.4f}",
+                ]
+            )
+    heads = ("difference", "size", "mean PSNR, dB", "5th percentile", "worst", "FLIP")
+    said = f"`scenelang lab stability shapes2d --only contrast --only deep --scenes {max(scenes)}`"
+    return f"{markdown(heads, rows)}\n\n{said}, seed {found['seed']}; ± is the 95 % interval of the mean."
+
+
 BLOCKS: dict[str, Callable[[], str]] = {
     "accuracy": accuracy,
     "stability": stability,
+    "blends": blends,
     **{name: experiment(name) for name in EXPERIMENTS},
 }
 """What stands between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``."""

@@ -49,7 +49,8 @@ DRAWING = (
 )  # fmt: skip
 COMPILING = (
     "tests/graph", "tests/program/test_program_compile.py", "tests/passes/test_linearise.py",
-    "tests/passes/test_without.py", "tests/passes/test_pass_picture.py",
+    "tests/passes/test_check_trained.py", "tests/passes/test_without.py",
+    "tests/passes/test_pass_picture.py",
     "tests/conformance",
 )  # fmt: skip
 TARGETS: dict[str, tuple[str, ...]] = {
@@ -288,6 +289,7 @@ def main() -> int:
         wanted = [f"*{p.removeprefix('scenelang/')}" for p in options.paths]
         paths = [p for p in paths if any(fnmatchcase(str(p), w) for w in wanted)]
     found = [mutant for path in paths for mutant in mutants(path)]
+    paths = list(dict.fromkeys(mutant.path for mutant in found))
     known = reasons()
     rng = random.Random(options.seed)
     chosen = [m for m in found if rng.random() < options.share]

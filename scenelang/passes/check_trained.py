@@ -20,6 +20,7 @@ _CODES = {
     "scale": "W0504",
     "smooth": "W0505",
     "thin": "W0506",
+    "blend": "W0507",
 }
 _SUBJECTS = {
     "twirl": "a `twirl` of {value} on {name}",
@@ -63,11 +64,38 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     if "smooth" in manifest.trained and len(smooth) > manifest.trained["smooth"][1]:
         last = next((node for node in reversed(smooth) if isinstance(node, Leaf)), None)
         _warn(context, "smooth", f"{len(smooth):,} smooth unions are outside the measured range {{}}", last)
+    if "blend" in manifest.trained:
+        _check_blends(graph, context)
     limits = manifest.trained.get("objects")
     if limits is not None and count > limits[1]:
         last = next((link.node for link in reversed(graph.root.links) if isinstance(link.node, Leaf)), None)
         _warn(context, "objects", f"{count:,} objects are outside the measured range {{}}", last)
     return graph
+
+
+def _check_blends(graph: Graph, context: Context) -> None:
+    """Warn at the `smooth` whose colours lie furthest apart for its size.
+
+    Where a blend's distances are off, by a share of the objects' scale, its colour is off by that share of
+    what the colours differ by: the product of both tells the error.
+    """
+    low, high, largest = [1.0] * 3, [0.0] * 3, 0.0
+    worst: tuple[float, float, float, Leaf] | None = None
+    for link in graph.root.links:
+        leaf = link.node
+        if not isinstance(leaf, Leaf) or link.op not in ("union", "smooth"):
+            continue
+        largest = max(largest, _noted(leaf, graph.space)[0][1])
+        rgb = leaf.look.colour()
+        low, high = list(map(min, low, rgb)), list(map(max, high, rgb))
+        if link.op == "smooth":
+            contrast = max(max(c - a, b - c) for a, b, c in zip(low, high, rgb, strict=True))
+            if worst is None or contrast * largest > worst[0]:
+                worst = contrast * largest, contrast, largest, leaf
+    if worst is not None and worst[0] > context.manifest.trained["blend"][1]:
+        product, contrast, scale, leaf = worst
+        said = f"a `smooth` of colours {contrast:.2g} apart at a scale of {scale:.3g}"
+        _warn(context, "blend", f"{said}: the product {product:.3g} is outside the measured range {{}}", leaf)
 
 
 def _noted(leaf: Leaf, space: Space) -> list[tuple[str, float]]:

@@ -17,4 +17,5 @@ CODES: dict[str, str] = {
     "W0504": "an object outside the measured range of scales",
     "W0505": "more smooth unions than the model was measured with",
     "W0506": "an object thinner than the model was measured with",
+    "W0507": "a blend of bright and dark larger than the model was measured with",
 }

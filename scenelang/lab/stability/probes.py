@@ -16,8 +16,10 @@ from scenelang.measure.sets import SETS, Rng, SetConfig, random_object, random_s
 from scenelang.scene.schema import (
     Bend,
     Chain,
+    Color,
     Combine,
     Link,
+    Material,
     Object,
     Rotate,
     Scale,
@@ -29,6 +31,7 @@ from scenelang.scene.schema import (
 )
 
 BASE = SETS["shapes2d"]
+LARGE = 3.0  # times the size of the base set's objects
 Make = Callable[[Rng, float], Scene]
 
 
@@ -72,6 +75,24 @@ def _operators(rng: Rng, count: float) -> Scene:
 
 def _blends(rng: Rng, count: float) -> Scene:
     return _joined(_with(objects=(int(count) + 1,) * 2)(rng), lambda i: "smooth" if i else "union", 1.0)
+
+
+def _contrast(rng: Rng, contrast: float, size: float = LARGE) -> Scene:
+    """One `smooth` of three objects, a white one and two that are darker."""
+    scene = _joined(_with(objects=(3, 3))(rng), lambda i: "smooth" if i else "union", size)
+    white = int(rng.integers(3))
+
+    def grey(i: int) -> Material:
+        level = 1.0 if i == white else 1.0 - contrast
+        return Material(name="flat", ops=(Color(rgb=(level, level, level)),))
+
+    (chain,) = scene.nodes
+    assert isinstance(chain, Chain)
+    links = [
+        link.model_copy(update={"node": link.node.model_copy(update={"material": grey(i)})})
+        for i, link in enumerate(chain.children)
+    ]
+    return scene.model_copy(update={"nodes": (Chain(children=tuple(links)),)})
 
 
 def _rebuilt(
@@ -159,6 +180,14 @@ PROBES: dict[str, Probe] = {
         _operators,
     ),
     "blends": Probe("smooth unions in a row", "smooth unions", (1, 2, 4, 8, 16, 32, 64), 4, _blends),
+    "contrast": Probe(
+        "blends of white and darker, three times the base set's size", "difference of the colours",
+        (0, 0.125, 0.25, 0.5, 0.75, 1), 0.25, _contrast,
+    ),
+    "deep": Probe(
+        "blends of white and black", "times the size", (0.3, 1, 1.5, 2, 3, 4), 1,
+        lambda rng, size: _contrast(rng, 1.0, size),
+    ),
     "affine": Probe(
         "affine maps of each object, each lifted by itself",
         "affine maps",

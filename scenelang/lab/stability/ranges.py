@@ -22,8 +22,9 @@ QUANTITIES: dict[str, tuple[str, float, float]] = {
     "bend": ("warp", WARP, WARP),
     "scale": ("size", *SCALES),
     "thin": ("thin", 1.0, 1.0),
+    "blend": ("deep", SCALES[1], SCALES[1]),
 }
-FROM_NOTHING = {"smooth": 0.0}  # what the least value is where the probe starts later
+FROM_NOTHING = {"smooth": 0.0, "blend": 0.0}  # what the least value is where the probe starts later
 BOTH_WAYS = {"twirl", "bend"}  # the range is the same on either side of 0
 
 

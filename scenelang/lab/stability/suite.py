@@ -12,7 +12,7 @@ import itertools
 import math
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -186,7 +186,7 @@ def run_probe(
         rows.append(
             {
                 "value": value,
-                "psnr": spread([e.psnr for e in found], 5),
+                "psnr": spread([e.psnr for e in found], 5) | {"interval": interval([e.psnr for e in found])},
                 "flip": spread([e.flip for e in found], 95),
                 "db": round(-10 * math.log10(max(1e-12, float(np.mean([e.square for e in found])))), 3),
                 "per_edge": round(float(np.mean([e.per_edge for e in found])), 6),
@@ -197,7 +197,18 @@ def run_probe(
             rows[-1]["per_edge_ideal"] = round(float(np.mean(ideal)), 6)
         if report is not None:
             report(name, at + 1, len(probe.values))
-    return {"title": probe.title, "quantity": probe.quantity, "healthy": probe.healthy, "rows": rows}
+    return {
+        "title": probe.title,
+        "quantity": probe.quantity,
+        "healthy": probe.healthy,
+        "scenes": scenes,
+        "rows": rows,
+    }
+
+
+def interval(values: Sequence[float]) -> float:
+    """Half the width of the 95 % interval of a mean, by its normal approximation."""
+    return round(1.96 * float(np.std(values, ddof=1)) / math.sqrt(len(values)), 3) if len(values) > 1 else 0.0
 
 
 def order_of_disjoint(model: Model, scenes: int, seed: int) -> dict[str, float]:
