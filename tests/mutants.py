@@ -60,16 +60,13 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/renderers/coverage.py": DRAWING,
     "scenelang/renderers/field.py": DRAWING,
     "scenelang/renderers/network.py": DRAWING,
-    "scenelang/lifting/exact.py": ("tests/lifting/test_exact.py", *DRAWING),
     "scenelang/lifting/learned.py": (
         "tests/lifting/test_learned.py",
         "tests/program/test_program_compile.py",
     ),
+    "scenelang/lifting/[el]*.py": ("tests/lifting/test_exact.py", *DRAWING),
     "scenelang/passes/[c-p]*.py": COMPILING,
-    "scenelang/graph/[acglo]*.py": COMPILING,
-    "scenelang/graph/b*.py": COMPILING,
-    "scenelang/graph/st*.py": COMPILING,
-    "scenelang/graph/transforms.py": COMPILING,
+    "scenelang/graph/[a-cglopst]*.py": COMPILING,
 }
 """Files, and the tests that are to notice a change in them, the quickest first."""
 SWAPS = {

@@ -8,24 +8,41 @@ import numpy as np
 import pytest
 
 from scenelang.graph import affine
+from scenelang.graph.plane import flattened
+from scenelang.graph.spaces import PLANE, SPACES
+from scenelang.graph.steps import Affine, Rows, Warp
 
 RNG = np.random.default_rng(11)
 MAPS = [tuple(RNG.normal(size=12).tolist()) for _ in range(20)]
+SOLID = SPACES[3]
 
 
-def matrix(rows: affine.Rows) -> np.ndarray:
+def matrix(rows: Rows) -> np.ndarray:
     return np.vstack([np.array(rows).reshape(3, 4), [0, 0, 0, 1]])
+
+
+def turned(plane: bool = False) -> Rows:
+    """A rotation by a random angle, about a random axis or about z."""
+    axis = (0.0, 0.0, 1.0) if plane else tuple(RNG.normal(size=3).tolist())
+    return affine.rotation(float(RNG.uniform(-4, 4)), axis)
+
+
+def similarity(rows: Rows) -> tuple[float, float] | None:
+    """Scale, and -1 where it mirrors, as they show in what a twirl of 1 becomes before the map."""
+    found = PLANE.before(rows, Warp(1.0, (0.0, 0.0)))
+    return None if found is None else (abs(found.twirl), 1.0 if found.twirl > 0 else -1.0)
 
 
 def test_maps_compose_and_invert_as_matrices_do() -> None:
     for outer, inner in itertools.pairwise(MAPS):
         np.testing.assert_allclose(matrix(affine.compose(outer, inner)), matrix(outer) @ matrix(inner))
-        flat = matrix(affine.flattened(outer))
+        flat = matrix(flattened(outer))
         np.testing.assert_array_equal(flat[:2][:, [0, 1, 3]], matrix(outer)[:2][:, [0, 1, 3]])
         np.testing.assert_array_equal(flat[2], [0, 0, 1, 0])
         np.testing.assert_array_equal(flat[:2, 2], [0, 0])
-        back = matrix(affine.inverted(affine.flattened(outer)))
-        np.testing.assert_allclose(back, np.linalg.inv(flat), rtol=1e-9, atol=1e-12)
+        disc = PLANE.disc("square", (Affine(flattened(outer)),))
+        assert disc is not None
+        np.testing.assert_allclose(matrix(disc[1]), np.linalg.inv(flat), rtol=1e-9, atol=1e-12)
 
 
 def test_a_rotation_is_the_exponential_of_its_axis() -> None:
@@ -54,31 +71,27 @@ def test_scales_shifts_and_shears() -> None:
 
 @pytest.mark.parametrize("ratio", [1.0, 1e-3, 1e-6])
 def test_stretches_of_maps_made_of_known_ones(ratio: float) -> None:
-    """Turned about known axes, from the largest to the smallest stretch, in the plane and in space."""
     for _ in range(20):
-        u, v = (
-            affine.rotation(float(RNG.uniform(-4, 4)), tuple(RNG.normal(size=3).tolist())) for _ in range(2)
-        )
-        rows = affine.compose(u, affine.compose(affine.scaling(2.0, 2.0 * ratio, 2.0 * ratio**0.5), v))
-        assert affine.stretches(rows, 3) == pytest.approx((2.0 * ratio, 2.0), rel=1e-6, abs=1e-15)
-        u, v = affine.rotation(float(RNG.uniform(-4, 4))), affine.rotation(float(RNG.uniform(-4, 4)))
-        rows = affine.compose(u, affine.compose(affine.scaling(-2.0, 2.0 * ratio, 9.0), v))
-        assert affine.stretches(rows, 2) == pytest.approx((2.0 * ratio, 2.0), rel=1e-6, abs=1e-15)
-    assert (
-        affine.stretches(affine.scaling(0, 0, 0), 3) == affine.stretches(affine.scaling(0, 0, 0), 2) == (0, 0)
-    )
+        scales = affine.scaling(2.0, 2.0 * ratio, 2.0 * ratio**0.5)
+        rows = affine.compose(turned(), affine.compose(scales, turned()))
+        assert SOLID.stretches(rows) == pytest.approx((2.0 * ratio, 2.0), rel=1e-6)
+        scales = affine.scaling(-2.0, 2.0 * ratio, 9.0)
+        rows = affine.compose(turned(True), affine.compose(scales, turned(True)))
+        assert PLANE.stretches(rows) == pytest.approx((2.0 * ratio, 2.0), rel=1e-6)
+    for space in (PLANE, SOLID):
+        assert space.stretches(affine.scaling(0, 0, 0)) == (0, 0)
 
 
 def test_what_is_a_similarity() -> None:
-    for angle in RNG.uniform(-4, 4, 20).tolist():
-        turned = affine.compose(affine.rotation(angle), affine.scaling(0.3, 0.3))
-        assert affine.similarity(turned) == (pytest.approx(0.3), 1.0)
-        assert affine.similarity(affine.compose(turned, affine.scaling(-1, 1))) == (pytest.approx(0.3), -1.0)
+    for _ in range(20):
+        rows = affine.compose(turned(True), affine.scaling(0.3, 0.3))
+        assert similarity(rows) == (pytest.approx(0.3), 1.0)
+        assert similarity(affine.compose(rows, affine.scaling(-1, 1))) == (pytest.approx(0.3), -1.0)
         for other in (
-            affine.translation(1e-3, 0), affine.translation(0, 1e-3), affine.scaling(1, 1.001),
-            affine.scaling(1.001, 1),
-            affine.shearing("xy", 1e-3), affine.shearing("yx", 1e-3), affine.translation(0, -1e-11),
-        ):  # fmt: skip
-            assert affine.similarity(affine.compose(other, turned)) is None
-        rounded = affine.compose(affine.translation(1e-14, -1e-14), turned)
-        assert affine.similarity(rounded) == (pytest.approx(0.3), 1.0)
+            *(affine.translation(x, y) for x, y in ((1e-3, 0), (0, 1e-3), (-1e-3, 0), (0, -1e-11))),
+            *(affine.scaling(x, y) for x, y in ((1, 1.001), (1.001, 1), (-1, 1.001))),
+            *(affine.shearing(axes, 1e-3) for axes in ("xy", "yx")),
+        ):
+            assert similarity(affine.compose(other, rows)) is None
+        rounded = affine.compose(affine.translation(1e-14, -1e-14), rows)
+        assert similarity(rounded) == (pytest.approx(0.3), 1.0)
