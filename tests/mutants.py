@@ -266,10 +266,9 @@ def reasons() -> list[tuple[str, str]]:
 
 
 def excused(mutant: Mutant, known: list[tuple[str, str]]) -> str | None:
-    """The pattern that says why a mutant may survive: its name, or how that begins and a star."""
-    return next(
-        (p for p, _ in known if mutant.name == p or (p[-1] == "*" and mutant.name.startswith(p[:-1]))), None
-    )
+    """The reason a mutant may survive: its name without the file, or how that begins and a star."""
+    name = mutant.name.partition(" ")[2]
+    return next((p for p, _ in known if name == p or (p[-1] == "*" and name.startswith(p[:-1]))), None)
 
 
 def main() -> int:

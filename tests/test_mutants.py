@@ -1,4 +1,4 @@
-"""The list of mutants: what is changed, and that nothing in its tables is stale."""
+"""The list of mutants: what is changed, and that its files and tests are there."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests import mutants
-from tests.mutants import ROOT, TARGETS, excused, reasons
+from tests.mutants import ROOT, TARGETS
 
 TEXT = '''
 NEAR = 0.85
@@ -57,6 +57,3 @@ def test_tables_name_what_there_is() -> None:
     for pattern, tests in TARGETS.items():
         assert list(ROOT.glob(pattern)), pattern
         assert all((ROOT / test).exists() for test in tests), pattern
-    found = [m for pattern in TARGETS for path in ROOT.glob(pattern) for m in mutants.mutants(path)]
-    known = reasons()
-    assert {p for p, _ in known} == {excused(m, known) for m in found} - {None}
