@@ -20,8 +20,8 @@ from typing import TypeVar
 from scenelang.animation.clip import open_clip
 from scenelang.animation.painting import Painter
 from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.evaluate.evaluation import load_scene
 from scenelang.program.compile import compile_scene
-from scenelang.scene.evaluate import load_scene
 
 T = TypeVar("T")
 

@@ -12,7 +12,7 @@ import time
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.scene.evaluate import evaluate
+from scenelang.evaluate.evaluation import evaluate
 from scenelang.syntax import parse
 
 BODY = (

@@ -18,7 +18,7 @@ from fuzz.targets.parse import BEYOND
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.scene.load import loads
+from scenelang.evaluate.api import loads
 from scenelang.syntax import parse
 from scenelang.syntax.incremental import parse_whole
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from random import Random
 from typing import Final
 
-from scenelang.scene.functions import ANIMATED, CONSTANTS, FUNCTIONS
-from scenelang.scene.vocabulary import LANGUAGE
+from scenelang.evaluate.values.functions import ANIMATED, CONSTANTS, FUNCTIONS
+from scenelang.evaluate.vocabulary import LANGUAGE
 from scenelang.syntax.lexer import FOREIGN, UNIT_ALIASES
 from scenelang.syntax.tables import tables
 

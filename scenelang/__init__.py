@@ -1,6 +1,6 @@
 """A language for scene graphs and a compiler from it to neural render calls.
 
-The pipeline, in order: ``syntax`` reads text into a tree, ``scene`` evaluates it to concrete nodes,
+The pipeline, in order: ``syntax`` reads text into a tree, ``evaluate`` runs that to concrete nodes,
 ``graph`` lowers those, ``passes`` rewrite them, ``program`` makes vectors and tokens, ``renderers`` draw.
 
 Importing this package imports nothing else; each name below is fetched when it is first used.
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
     from scenelang.diagnostics.diagnostic import Diagnostics as Diagnostics
     from scenelang.diagnostics.diagnostic import SceneError as SceneError
+    from scenelang.evaluate.api import load as load
+    from scenelang.evaluate.api import loads as loads
     from scenelang.formatting.format import format_text as format_text
     from scenelang.image import Image as Image
     from scenelang.measure.metrics import compare as compare
@@ -31,8 +33,6 @@ if TYPE_CHECKING:
     from scenelang.program.program import Program as Program
     from scenelang.program.program import ProgramError as ProgramError
     from scenelang.program.store import load_program as load_program
-    from scenelang.scene.load import load as load
-    from scenelang.scene.load import loads as loads
     from scenelang.scene.schema import Animation as Animation
     from scenelang.scene.schema import Bend as Bend
     from scenelang.scene.schema import Boolean as Boolean
@@ -69,7 +69,7 @@ _HOME: Final = {
     "scenelang.program.compile": ("compile",),
     "scenelang.program.program": ("Place", "Program", "ProgramError"),
     "scenelang.program.store": ("load_program",),
-    "scenelang.scene.load": ("load", "loads"),
+    "scenelang.evaluate.api": ("load", "loads"),
     "scenelang.scene.schema": (
         "Animation",
         "Bend",

@@ -26,6 +26,8 @@ ORDER = (
     "scenelang.highlighting",
     "scenelang.models.manifest",
     "scenelang.scene",
+    "scenelang.evaluate",
+    "scenelang.resolve",
     "scenelang.models.choose",
     "scenelang.graph",
     "scenelang.passes",
@@ -151,7 +153,7 @@ def test_nothing_imports_a_facade() -> None:
 
 def test_docstring_and_architecture_tell_the_order() -> None:
     """The stages named in the package's docstring, in docs/architecture.md and in ORDER agree."""
-    stages = ["syntax", "scene", "graph", "passes", "program", "renderers"]
+    stages = ["syntax", "evaluate", "graph", "passes", "program", "renderers"]
     docstring = ast.get_docstring(ast.parse((PACKAGE / "__init__.py").read_text("utf-8"))) or ""
     page = (ROOT / "docs/architecture.md").read_text("utf-8")
     headings = re.findall(r"^## \d+\. `(\w+)/`", page, re.MULTILINE)

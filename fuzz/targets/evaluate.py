@@ -25,9 +25,9 @@ from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.render import render_json
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate import evaluation as evaluating
 from scenelang.program.compile import compile_scene
 from scenelang.program.store import program_bytes
-from scenelang.scene import evaluate as evaluating
 from scenelang.scene.schema import Scene
 
 SMALL: Final = {
@@ -53,7 +53,7 @@ def small_limits() -> Iterator[None]:
     """The evaluator's limits made `SMALL`, in every module that took them."""
     changed: list[tuple[Any, str, Any]] = []
     for name, module in list(sys.modules.items()):
-        if name.startswith("scenelang.scene"):
+        if name.startswith("scenelang.evaluate"):
             for limit, value in SMALL.items():
                 if hasattr(module, limit):
                     changed.append((module, limit, getattr(module, limit)))

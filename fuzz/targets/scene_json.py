@@ -12,12 +12,12 @@ from fuzz.oracles import check_compiling, check_diagnostics
 from fuzz.target import Failure, Target, hold, sampled
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.evaluate.api import loads
+from scenelang.evaluate.vocabulary import MATERIAL_OPS, TRANSFORMS
 from scenelang.models.manifest import available, load_manifest
-from scenelang.scene.data import to_readable_json
-from scenelang.scene.load import loads
+from scenelang.scene.json import to_readable_json
+from scenelang.scene.python import to_python
 from scenelang.scene.schema import Scene
-from scenelang.scene.to_python import to_python
-from scenelang.scene.vocabulary import MATERIAL_OPS, TRANSFORMS
 
 _PLAIN = (
     *(

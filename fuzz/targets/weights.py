@@ -23,6 +23,8 @@ from scenelang.backend.errors import RenderError
 from scenelang.backend.neural import draw_program
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.api import loads
+from scenelang.evaluate.evaluation import load_source
 from scenelang.models import weights
 from scenelang.models.load import Model, load_network
 from scenelang.models.manifest import ROOT, Manifest, load_manifest
@@ -30,8 +32,6 @@ from scenelang.models.weights import ModelError, codes_of, open_weights, read_fa
 from scenelang.passes import check_scene
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import ProgramError
-from scenelang.scene.evaluate import load_source
-from scenelang.scene.load import loads
 
 MODEL = "shapes2d"
 SCENE = """canvas(8, 6);

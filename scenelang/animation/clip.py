@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.evaluate.evaluation import Evaluation
+from scenelang.evaluate.prepare.imports import Unreadable, read_source
+from scenelang.evaluate.prepare.params import Defines
 from scenelang.graph.lower import Memory
-from scenelang.scene.evaluate import Evaluation
-from scenelang.scene.imports import Unreadable, read_source
-from scenelang.scene.params import Defines
 from scenelang.scene.schema import Animation, Scene, same_nodes
 from scenelang.scene.spans import SpanMap
 from scenelang.syntax import parse

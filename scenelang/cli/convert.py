@@ -55,7 +55,7 @@ def command(
 
 def _written(scene: Scene, kind: Kind) -> str:
     if kind == "json":
-        from scenelang.scene.data import to_readable_json
+        from scenelang.scene.json import to_readable_json
 
         return to_readable_json(scene)
     if kind == "python":

@@ -69,8 +69,8 @@ def command(
 
 
 def _written(made: Imported, out: str | None) -> str:
-    from scenelang.scene.data import to_readable_json
-    from scenelang.scene.to_nsg import to_nsg
+    from scenelang.scene.json import to_readable_json
+    from scenelang.scene.text import to_nsg
 
     if out is not None and out.endswith(".json"):
         return to_readable_json(made.scene)

@@ -10,12 +10,12 @@ from pathlib import Path
 from scenelang.cli.clock import Clock
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.evaluate.evaluation import Evaluation
+from scenelang.evaluate.prepare.imports import Unreadable, decode_source, read_source
+from scenelang.evaluate.prepare.params import Defines
+from scenelang.evaluate.session import MAX_BYTES
 from scenelang.files import note_input
-from scenelang.scene.evaluate import Evaluation
-from scenelang.scene.imports import Unreadable, decode_source, read_source
-from scenelang.scene.params import Defines
 from scenelang.scene.schema import Scene
-from scenelang.scene.session import MAX_BYTES
 from scenelang.scene.spans import SpanMap
 from scenelang.syntax import nodes, parse
 
@@ -138,7 +138,7 @@ def _from_json(
     source: SourceFile, request: Request, diagnostics: Diagnostics
 ) -> tuple[Scene | None, SpanMap]:
     """The scene of JSON text, which has one frame and no params."""
-    from scenelang.scene.data import load_json
+    from scenelang.scene.json import load_json
 
     if request.frame:
         fact = f"frame {request.frame} of a scene from JSON, which is one frame"

@@ -15,7 +15,7 @@ from scenelang.graph.looks import coloured
 from scenelang.graph.nodes import Fold, Graph, Leaf, Node
 from scenelang.graph.space import Space
 from scenelang.scene import schema
-from scenelang.scene.to_nsg import material, transform
+from scenelang.scene.text import material, transform
 
 if TYPE_CHECKING:
     from scenelang.program.program import Program

@@ -13,6 +13,7 @@ import torch
 
 from scenelang.backend.neural import open_model
 from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.evaluate.api import load
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
 from scenelang.lab.about import about
@@ -24,7 +25,6 @@ from scenelang.passes import OPTIONAL
 from scenelang.program.compile import compile_scene
 from scenelang.reference.image import reference_image
 from scenelang.renderers.draw import draw
-from scenelang.scene.load import load
 from scenelang.scene.schema import Scene
 
 REPEATS = 2

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 from scenelang.lsp import words
 from scenelang.lsp.context import Cursor
-from scenelang.lsp.names import Names
 from scenelang.lsp.sight import sight_at
-from scenelang.lsp.symbols import Symbol
 from scenelang.lsp.workspace import Document, Workspace
+from scenelang.resolve.names import Names
+from scenelang.resolve.symbols import Symbol
 from scenelang.syntax import nodes
 
 

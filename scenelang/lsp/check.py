@@ -14,13 +14,13 @@ from typing import Any, Final
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.evaluate.evaluation import Evaluation, in_file_order
+from scenelang.evaluate.session import Halt
 from scenelang.graph.nodes import Graph
 from scenelang.models.manifest import Manifest
 from scenelang.program.check import check_compiles, check_frames
-from scenelang.scene.evaluate import Evaluation, in_file_order
+from scenelang.resolve.unused import find_unused
 from scenelang.scene.schema import Scene
-from scenelang.scene.session import Halt
-from scenelang.scene.unused import find_unused
 from scenelang.syntax import nodes
 
 MAX_SEEN: Final = 4  # values and nodes kept of one place

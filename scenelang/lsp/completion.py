@@ -8,17 +8,17 @@ from typing import Final
 
 from lsprotocol import types
 
+from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.lsp import words
 from scenelang.lsp.callees import Callee, find_callee
 from scenelang.lsp.completion_items import Item, strings, units
 from scenelang.lsp.context import COMBINE, Cursor, cursor_at
-from scenelang.lsp.names import Names
 from scenelang.lsp.sight import sight_at
 from scenelang.lsp.signatures import describe_symbol
-from scenelang.lsp.symbols import Symbol
 from scenelang.lsp.vocabulary import vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace
-from scenelang.scene.vocabulary import Vocabulary
+from scenelang.resolve.names import Names
+from scenelang.resolve.symbols import Symbol
 from scenelang.syntax import nodes
 
 Kind = types.CompletionItemKind

@@ -10,9 +10,9 @@ from typing import Final
 
 from lsprotocol import types
 
+from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.scene import library
-from scenelang.scene.vocabulary import Vocabulary
 from scenelang.syntax.lexer import UNITS
 
 Kind = types.CompletionItemKind

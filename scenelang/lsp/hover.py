@@ -10,12 +10,12 @@ from lsprotocol import types
 from scenelang.lsp import values, words
 from scenelang.lsp.check import Seen
 from scenelang.lsp.signatures import describe_symbol
-from scenelang.lsp.symbols import Symbol, Use
 from scenelang.lsp.tree import path_to
 from scenelang.lsp.vocabulary import space_of, vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.models.manifest import Manifest
-from scenelang.scene import to_nsg
+from scenelang.resolve.symbols import Symbol, Use
+from scenelang.scene import text as to_nsg
 from scenelang.syntax import nodes
 
 

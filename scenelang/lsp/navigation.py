@@ -7,10 +7,10 @@ from typing import Final
 
 from lsprotocol import types
 
-from scenelang.lsp.symbols import Symbol, Use
+from scenelang.evaluate.vocabulary import LANGUAGE
 from scenelang.lsp.workspace import Document, Workspace, uri_of
+from scenelang.resolve.symbols import Symbol, Use
 from scenelang.scene import library
-from scenelang.scene.vocabulary import LANGUAGE
 from scenelang.syntax import nodes
 from scenelang.syntax.tables import tables
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from scenelang.diagnostics.span import Span
-from scenelang.lsp.names import Names
-from scenelang.lsp.symbols import Kind, Symbol
+from scenelang.resolve.names import Names
+from scenelang.resolve.symbols import Kind, Symbol
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Parsed
 

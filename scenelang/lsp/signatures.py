@@ -9,9 +9,9 @@ from lsprotocol import types
 
 from scenelang.lsp.callees import find_callee
 from scenelang.lsp.context import cursor_at
-from scenelang.lsp.symbols import Symbol
 from scenelang.lsp.text import width
 from scenelang.lsp.workspace import Document, Workspace
+from scenelang.resolve.symbols import Symbol
 from scenelang.syntax import nodes
 
 _LINE: Final = re.compile(r"^[ \t]*//(.*)$")

@@ -7,9 +7,9 @@ from typing import Final
 
 from lsprotocol import types
 
-from scenelang.lsp.symbols import Symbol, Use
 from scenelang.lsp.text import width
 from scenelang.lsp.workspace import Document, Workspace
+from scenelang.resolve.symbols import Symbol, Use
 from scenelang.syntax.tables import tables
 
 TYPES: Final = (

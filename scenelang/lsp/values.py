@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from scenelang.evaluate.values.value import POISON, Angle, MaterialValue, RangeValue, Time, Vec, pack, show
 from scenelang.graph import affine
 from scenelang.graph.chain import merged
 from scenelang.graph.nodes import Move
 from scenelang.graph.space import Space
 from scenelang.graph.steps import Affine, Rows, Warp
 from scenelang.graph.transforms import step_of
-from scenelang.scene import schema, to_nsg
-from scenelang.scene.values import POISON, Angle, MaterialValue, RangeValue, Time, Vec, pack, show
+from scenelang.scene import schema
+from scenelang.scene import text as to_nsg
 
 _MOST_ITEMS = 8
 

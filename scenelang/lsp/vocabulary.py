@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
+from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.graph.space import Space
 from scenelang.graph.spaces import SPACES
-from scenelang.scene.vocabulary import Vocabulary, vocabulary
 from scenelang.syntax import nodes
 
 if TYPE_CHECKING:

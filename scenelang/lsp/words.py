@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from scenelang.scene.functions import FUNCTIONS
+from scenelang.evaluate.values.functions import FUNCTIONS
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,11 +18,11 @@ from pygls.uris import from_fs_path, to_fs_path
 from scenelang.diagnostics.diagnostic import Diagnostic, Fix, Label
 from scenelang.diagnostics.diagnostic import Edit as Change
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.lsp.names import Names
-from scenelang.lsp.symbols import Symbol, Use
+from scenelang.evaluate.prepare.imports import Unreadable, read_source
 from scenelang.lsp.text import Encoding, Lines, applied
+from scenelang.resolve.names import Names
+from scenelang.resolve.symbols import Symbol, Use
 from scenelang.scene import library
-from scenelang.scene.imports import Unreadable, read_source
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Edit, Parsed, parse_edited, parse_whole
 from scenelang.syntax.tables import END

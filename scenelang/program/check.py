@@ -6,14 +6,14 @@ from collections.abc import Callable
 from typing import Literal
 
 from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.evaluate.evaluation import Evaluation, name_frame
 from scenelang.graph.lower import Memory, Spans
 from scenelang.graph.nodes import Graph
 from scenelang.models.manifest import Manifest
 from scenelang.passes import check_scene
 from scenelang.program.compile import find_model
-from scenelang.scene.evaluate import Evaluation, name_frame
+from scenelang.resolve.unused import find_unused
 from scenelang.scene.schema import Scene, same_nodes
-from scenelang.scene.unused import find_unused
 from scenelang.syntax import nodes
 
 Frames = Literal["one", "some", "all"]

@@ -10,9 +10,9 @@ from typing import Any
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import settle
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.evaluate.evaluation import Evaluation, in_file_order
+from scenelang.evaluate.prepare.imports import Unreadable, read_source
 from scenelang.program.check import Frames, check_evaluated
-from scenelang.scene.evaluate import Evaluation, in_file_order
-from scenelang.scene.imports import Unreadable, read_source
 from scenelang.syntax import parse
 
 

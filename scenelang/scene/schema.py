@@ -232,19 +232,19 @@ class Scene(Frozen):
 
     def to_nsg(self) -> str:
         """Canonical text that evaluates back to an equal Scene."""
-        from scenelang.scene.to_nsg import to_nsg
+        from scenelang.scene.text import to_nsg
 
         return to_nsg(self)
 
     def to_python(self) -> str:
         """Python code that makes an equal Scene and calls it ``scene``."""
-        from scenelang.scene.to_python import to_python
+        from scenelang.scene.python import to_python
 
         return to_python(self)
 
     def to_json(self) -> str:
         """JSON that `from_json` reads back; like `model_dump_json`, and for scenes of any depth."""
-        from scenelang.scene.data import to_json
+        from scenelang.scene.json import to_json
 
         return to_json(self)
 
@@ -255,7 +255,7 @@ class Scene(Frozen):
         Raises:
             SceneError: text that is no JSON, or no Scene; it names each place.
         """
-        from scenelang.scene.data import from_json
+        from scenelang.scene.json import from_json
 
         return from_json(text)
 

@@ -17,7 +17,7 @@ from scenelang.animation.painting import Painter
 from scenelang.animation.run import make
 from scenelang.animation.timing import FrameRange, FramesError
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
-from scenelang.scene.params import Defines
+from scenelang.evaluate.prepare.params import Defines
 from scenelang.watching.changes import Stamps, stamps
 
 if TYPE_CHECKING:

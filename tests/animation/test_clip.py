@@ -10,8 +10,8 @@ import scenelang as nsg
 from scenelang.animation.clip import Clip, open_clip
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import load_source
 from scenelang.program.program import Program
-from scenelang.scene.evaluate import load_source
 from tests.animation.scenes import HEAD, TRICKY, examples, tricky
 
 
@@ -114,7 +114,7 @@ def test_replays_see_the_place_they_stand_in(text: str) -> None:
 
 
 def test_limits_hold_in_every_frame(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("scenelang.scene.session.MAX_OBJECTS", 25)
+    monkeypatch.setattr("scenelang.evaluate.session.MAX_OBJECTS", 25)
     text = "for (i in 0..<20) { star { scale(0.1); } } for (i in 0..<3 * frame) { square { scale(0.1); } }"
     clip = Clip(SourceFile("a.nsg", HEAD + text))
     clip.shot(1)

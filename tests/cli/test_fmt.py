@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from scenelang.cli import fmt
-from scenelang.scene import session
+from scenelang.evaluate import session
 from tests.cli.conftest import Folder
 
 ROUGH = "square   { scale( 0.5 ); }\n"

@@ -13,13 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.evaluate.evaluation import load_scene
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
 from scenelang.reference.image import evaluate, reference_image, sample_points
-from scenelang.scene.evaluate import load_scene
 
 FOLDER = Path(__file__).parent / "cases"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.nsg"))

@@ -13,8 +13,8 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import apply_fixes, settle
 from scenelang.diagnostics.pages import read_page
 from scenelang.diagnostics.span import SourceFile
-from scenelang.scene.evaluate import load_source
-from scenelang.scene.unused import find_unused
+from scenelang.evaluate.evaluation import load_source
+from scenelang.resolve.unused import find_unused
 from scenelang.syntax import parse
 from scenelang.syntax.lexer import scan
 from scenelang.syntax.tokens import Report, Tokens

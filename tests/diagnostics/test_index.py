@@ -10,7 +10,7 @@ from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.render import render_text
 from scenelang.diagnostics.span import SourceFile
-from scenelang.scene.evaluate import load_source
+from scenelang.evaluate.evaluation import load_source
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "errors.md").read_text("utf-8")

@@ -12,15 +12,19 @@ from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
 from scenelang.diagnostics.pages import AREAS, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate import session
+from scenelang.evaluate.evaluation import Evaluation, load_source
+from scenelang.evaluate.prepare import imports, settings
+from scenelang.evaluate.prepare.params import Defines
+from scenelang.evaluate.values import functions
+from scenelang.evaluate.values import value as values
 from scenelang.graph import lower
 from scenelang.models.manifest import available, load_manifest
 from scenelang.program.check import check_compiles, check_frames
-from scenelang.scene import functions, imports, schema, session, settings, values
-from scenelang.scene.data import from_json
-from scenelang.scene.evaluate import Evaluation, load_source
-from scenelang.scene.params import Defines
+from scenelang.resolve.unused import find_unused
+from scenelang.scene import schema
+from scenelang.scene.json import from_json
 from scenelang.scene.schema import Scene
-from scenelang.scene.unused import find_unused
 from scenelang.syntax import nesting, parse, tokens
 from scenelang.syntax.tables import tables
 from tests.models import SOLIDS

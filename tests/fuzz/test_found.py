@@ -15,13 +15,13 @@ from scenelang.backend.render import render
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
 from scenelang.diagnostics.render import render_sarif, render_text
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.api import loads
 from scenelang.formatting import format_text
 from scenelang.models.manifest import ROOT, Manifest
 from scenelang.models.weights import ModelError, read_facts
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import ProgramError
 from scenelang.scene.fields import RESERVED
-from scenelang.scene.load import loads
 from scenelang.scene.schema import Scene
 from scenelang.syntax import parse
 from scenelang.syntax.tables import tables
@@ -152,7 +152,7 @@ def test_pictures_are_numbers_however_large_the_moves(moves: str, after: str) ->
 
 def test_a_step_of_a_call_is_no_more_work_than_one_of_a_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     """Doubling functions took half a minute to ten million steps, where a loop took two seconds."""
-    monkeypatch.setattr("scenelang.scene.session.MAX_STEPS", 50_000)
+    monkeypatch.setattr("scenelang.evaluate.session.MAX_STEPS", 50_000)
 
     def stopped(text: str) -> None:
         with pytest.raises(SceneError, match="E0322"):

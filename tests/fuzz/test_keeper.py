@@ -10,8 +10,8 @@ import pytest
 
 from fuzz.keeper import Keeper, minimise, shows_signature, signature_of
 from fuzz.target import Failure, Target, hold, load_target
-from scenelang.scene.operators import divide
-from scenelang.scene.values import Problem
+from scenelang.evaluate.values.operators import divide
+from scenelang.evaluate.values.value import Problem
 
 
 def check(data: bytes) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from scenelang.evaluate import vocabulary
+from scenelang.evaluate.values import functions
 from scenelang.highlighting import words
-from scenelang.scene import functions, vocabulary
 from scenelang.syntax.tables import tables
 
 

@@ -19,7 +19,7 @@ import scenelang as nsg
 from scenelang.diagnostics.render_machine import render_json
 from scenelang.interchange.schemas import SCHEMAS, scene_schema
 from scenelang.models.manifest import ROOT, Manifest
-from scenelang.scene.data import to_readable_json
+from scenelang.scene.json import to_readable_json
 from tests.strategies import scenes
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))

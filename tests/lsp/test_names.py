@@ -8,13 +8,13 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.evaluate.evaluation import evaluate
+from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.names import Binding
+from scenelang.evaluate.prepare import references
 from scenelang.lsp.context import cursor_at
-from scenelang.lsp.names import Names
 from scenelang.lsp.sight import sight_at
-from scenelang.scene import references
-from scenelang.scene.evaluate import evaluate
-from scenelang.scene.scope import Binding
-from scenelang.scene.unit import Unit
+from scenelang.resolve.names import Names
 from scenelang.syntax import nodes, parse
 from scenelang.syntax.incremental import parse_whole
 

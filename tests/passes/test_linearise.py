@@ -6,9 +6,9 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import load_source
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import check_scene
-from scenelang.scene.evaluate import load_source
 
 SHORT = {"union": "", "smooth": "~", "subtract": "-", "intersect": "&"}
 LEAVES = {

@@ -6,9 +6,9 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate import evaluation as evaluate
+from scenelang.evaluate.evaluation import Evaluation
 from scenelang.program import check
-from scenelang.scene import evaluate
-from scenelang.scene.evaluate import Evaluation
 from scenelang.syntax import parse
 
 SECOND = "animate(seconds = 1, fps = 40, loop = false);\n"

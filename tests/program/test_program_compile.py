@@ -10,13 +10,13 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import load_source
 from scenelang.lifting.exact import affine_matrix
 from scenelang.lifting.layout import PLANE_LAYOUT
 from scenelang.models.weights import load_codes
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Place, Program, ProgramError
 from scenelang.scene import schema
-from scenelang.scene.evaluate import load_source
 
 CHAIN = """chain {
   square { scale(0.8); translate(-0.2, 0); material flat { color(#d33); } }

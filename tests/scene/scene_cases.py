@@ -9,8 +9,8 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import load_source
 from scenelang.models.manifest import load_manifest
-from scenelang.scene.evaluate import load_source
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap
 from tests.models import SOLIDS

@@ -11,7 +11,7 @@ from scene_cases import MODELS, Outcome, transform
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.scene.evaluate import evaluate, load_scene
+from scenelang.evaluate.evaluation import evaluate, load_scene
 from scenelang.syntax import parse
 
 

@@ -15,10 +15,10 @@ import pytest
 import scenelang as nsg
 from scenelang.diagnostics.fixes import apply_fixes
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.report.shapes import SHAPES
 from scenelang.program.compile import compile_scene
 from scenelang.scene import library
-from scenelang.scene.evaluate import load_source
-from scenelang.scene.shapes import SHAPES
 from tests.reference import oracle
 
 Field = Callable[[float, float], float]

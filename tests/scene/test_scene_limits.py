@@ -12,10 +12,10 @@ from scene_cases import Outcome, run_text
 from scenelang.diagnostics.diagnostic import MOST, Diagnostics
 from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.scene import session
-from scenelang.scene.evaluate import evaluate
-from scenelang.scene.session import MAX_DEPTH, MAX_OBJECTS
-from scenelang.scene.unused import find_unused
+from scenelang.evaluate import session
+from scenelang.evaluate.evaluation import evaluate
+from scenelang.evaluate.session import MAX_DEPTH, MAX_OBJECTS
+from scenelang.resolve.unused import find_unused
 from scenelang.syntax import nodes, parse
 from tests.work import lines_run
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import scenelang as nsg
+from scenelang.evaluate.vocabulary import shipped
 from scenelang.models.choose import choose_model
 from scenelang.models.manifest import load_manifest
-from scenelang.scene.vocabulary import shipped
 
 TEXT = "param k = 0.5 in 0..1; square { scale(0.1 + k); }"
 

@@ -7,9 +7,9 @@ from scene_cases import Outcome, run_text
 
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import did_you_mean, ranked
-from scenelang.scene import elsewhere
-from scenelang.scene.functions import FUNCTIONS
-from scenelang.scene.vocabulary import LANGUAGE
+from scenelang.evaluate.report import foreign_words
+from scenelang.evaluate.values.functions import FUNCTIONS
+from scenelang.evaluate.vocabulary import LANGUAGE
 from tests.syntax.reading import apply
 
 SPAN = Span(SourceFile("x", "x"), 0, 1)
@@ -113,9 +113,9 @@ def test_ranking() -> None:
 
 def test_words_of_other_languages_lead_to_words_of_this_one() -> None:
     ours = LANGUAGE | {"square", "sphere", "torus", "union", "smooth", "intersect", "material", "else if"}
-    assert set(elsewhere.WORDS.values()) <= ours
-    assert not set(elsewhere.WORDS) & ours
-    assert not set(elsewhere.FUNCTIONS) & set(FUNCTIONS)
+    assert set(foreign_words.WORDS.values()) <= ours
+    assert not set(foreign_words.WORDS) & ours
+    assert not set(foreign_words.FUNCTIONS) & set(FUNCTIONS)
 
 
 @pytest.mark.parametrize(

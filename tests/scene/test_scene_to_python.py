@@ -13,7 +13,7 @@ from hypothesis import given, settings
 import scenelang as nsg
 from scenelang.deep import deep_stack
 from scenelang.program.store import program_bytes
-from scenelang.scene.data import to_readable_json
+from scenelang.scene.json import to_readable_json
 from tests.strategies import scenes
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))

@@ -10,7 +10,7 @@ from scene_cases import run_text
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import apply_fixes
 from scenelang.diagnostics.span import SourceFile
-from scenelang.scene.unused import find_unused
+from scenelang.resolve.unused import find_unused
 from scenelang.syntax import parse
 
 ROOT = Path(__file__).parents[2]

@@ -20,8 +20,8 @@ from lark.exceptions import LarkError
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import evaluate
 from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.scene.evaluate import evaluate
 from scenelang.syntax import nodes, parse
 from scenelang.syntax.lexer import scan
 from scenelang.syntax.tables import grammar_path, tables

@@ -7,7 +7,7 @@ index), and the tests, which run every example.
 - The first line is ``# CODE: title`` with the title of `diagnostics.codes`.
 - The sections ``## Why``, ``## Example`` and ``## Instead`` follow the paragraph that says what it is.
 - A fence ``nsg {.bad}`` gives exactly this code, ``nsg {.good}`` nothing at all; ``json`` is a Scene for
-  `scenelang.scene.data`, ``python`` is run and raises `SceneError`.
+  `scenelang.scene.json`, ``python`` is run and raises `SceneError`.
 - A fence ``nsg title="parts.nsg"`` is a file beside all examples of the page, which are ``scene.nsg``.
 - A ``sh`` fence behind an example is the command that checks it; its options count.
 - ``<!-- with scenelang.module.LIMIT = 3 -->`` before an example lowers limits that it is too short to reach.

@@ -1,0 +1,1 @@
+"""Each class of the syntax tree, prepared once into a closure."""

@@ -1,0 +1,165 @@
+"""Literals, vectors and ranges, and the parts of vectors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+from scenelang.diagnostics.suggest import did_you_mean
+from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.names import Env, Scope
+from scenelang.evaluate.prepare.expressions import (
+    POISONED,
+    Code,
+    constant,
+    folded,
+    guarded,
+    prepare,
+    prepares,
+)
+from scenelang.evaluate.values import operators
+from scenelang.evaluate.values.functions import number
+from scenelang.evaluate.values.value import UNITS, Angle, Problem, RangeValue, Time, Vec, describe, unpack
+from scenelang.syntax import nodes
+
+
+@prepares(nodes.Number)
+def _number(expr: nodes.Number, unit: Unit, scope: Scope) -> Code:
+    value = float(expr.value)
+    if not math.isfinite(value):
+        unit.session.error("E0306", "the number is too large", expr.span)
+        return POISONED
+    match expr.unit:
+        case "deg":
+            return constant(Angle(math.radians(value)))
+        case "rad":
+            return constant(Angle(value))
+        case "turn":
+            return _finite_literal(Angle, value * math.tau, expr, unit)
+        case "s":
+            return constant(Time(value))
+        case "ms":
+            return constant(Time(value / 1000.0))
+        case _:
+            return constant(value)
+
+
+def _finite_literal(make: Callable[[float], Any], value: float, expr: nodes.Number, unit: Unit) -> Code:
+    if math.isfinite(value):
+        return constant(make(value))
+    unit.session.error("E0306", "the number is too large", expr.span)
+    return POISONED
+
+
+@prepares(nodes.String)
+@prepares(nodes.Bool)
+def _literal(expr: nodes.String | nodes.Bool, unit: Unit, scope: Scope) -> Code:
+    return constant(expr.value)
+
+
+@prepares(nodes.Color)
+def _color(expr: nodes.Color, unit: Unit, scope: Scope) -> Code:
+    return constant(Vec(tuple([float(c) for c in expr.rgb])))
+
+
+@prepares(nodes.BadExpr)
+def _bad(expr: nodes.BadExpr, unit: Unit, scope: Scope) -> Code:
+    return POISONED
+
+
+@prepares(nodes.Vector)
+def _vector(expr: nodes.Vector, unit: Unit, scope: Scope) -> Code:
+    codes = [prepare(item, unit, scope) for item in expr.items]
+    getters = tuple([code.run for code in codes])
+
+    def make(*items: Any) -> Vec:
+        for index, item in enumerate(items):
+            if item.__class__ is RangeValue:
+                raise Problem("E0301", "a range inside a vector", "write it without brackets", index)
+        return Vec(items)
+
+    slow = guarded(unit, make, expr.span, expr.items)
+    return folded(unit, codes, make, lambda env: slow(*[get(env) for get in getters]))
+
+
+@prepares(nodes.Range)
+def _range(expr: nodes.Range, unit: Unit, scope: Scope) -> Code:
+    parts = [expr.start, expr.stop] + ([expr.step] if expr.step is not None else [])
+    codes = [prepare(part, unit, scope) for part in parts]
+    exclusive = expr.exclusive
+
+    def make(start: Any, stop: Any, step: Any = None) -> RangeValue:
+        for index, value in enumerate((start, stop, step)):
+            if value.__class__ not in UNITS and (index < 2 or value is not None):
+                raise Problem("E0301", f"expected a number, found {describe(value)}", operand=index)
+        (a, ua), (b, ub) = unpack(start), unpack(stop)
+        kind = operators.same_unit(a, ua, b, ub)
+        if step is None:
+            return RangeValue(a, b, exclusive, None, kind)
+        s, us = unpack(step)
+        if kind == "angle" and us != "angle":
+            raise Problem("E0302", "a bare number as the step of angles", operand=2, fix="angle")
+        kind = operators.same_unit(b, kind, s, us) if us != kind else kind
+        if s == 0.0:
+            raise Problem("E0311", "a step of 0", operand=2)
+        return RangeValue(a, b, exclusive, s, kind)
+
+    getters = [code.run for code in codes]
+    slow = guarded(unit, make, expr.span, tuple(parts))
+    return folded(unit, codes, make, lambda env: slow(*[get(env) for get in getters]))
+
+
+# ---------------------------------------------------------------- parts of values
+
+COMPONENTS: Final = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
+
+
+def member(code: Code, name: nodes.Name, unit: Unit, of: nodes.Expr | None = None) -> Code:
+    """``code.name``, a component of a vector."""
+    index = COMPONENTS.get(name.text)
+    if index is None:
+        hint, fix = did_you_mean(name.text, COMPONENTS, name.span)
+        hint = hint or "vectors have .x .y .z, or .r .g .b, or [i]"
+        unit.session.error("E0212", f"no value has a member '{name.text}'", name.span, help=hint, fix=fix)
+        return POISONED
+    at = index
+
+    def pick(value: Any) -> Any:
+        if value.__class__ is not Vec:
+            raise Problem("E0301", f"'.{name.text}' of {describe(value)}, which is no vector")
+        if at >= len(value.items):
+            raise Problem("E0307", f"'.{name.text}' of {describe(value)}")
+        return value.items[at]
+
+    def run(env: Env) -> Any:
+        value = get(env)
+        return value.items[at] if value.__class__ is Vec and len(value.items) > at else slow(value)
+
+    get = code.run
+    slow = guarded(unit, pick, name.span, (of,))
+    return folded(unit, [code], pick, run)
+
+
+@prepares(nodes.Index)
+def _index(expr: nodes.Index, unit: Unit, scope: Scope) -> Code:
+    codes = [prepare(expr.value, unit, scope), prepare(expr.index, unit, scope)]
+
+    def pick(value: Any, index: Any) -> Any:
+        at = number(index, 1)
+        if value.__class__ is Vec:
+            length = len(value.items)
+        elif value.__class__ is RangeValue:
+            length = value.count()
+        else:
+            raise Problem("E0301", f"expected a vector or a range, found {describe(value)}", operand=0)
+        if not at.is_integer():
+            raise Problem("E0307", f"index {at:.6g} is no whole number", "round it with floor(…)", 1)
+        if not 0 <= at < length:
+            where = f"outside 0..{length - 1}" if length else "into an empty vector"
+            raise Problem("E0307", f"index {at:.0f} is {where}", operand=1)
+        return value.items[int(at)] if value.__class__ is Vec else value.item(int(at))
+
+    value, index = codes[0].run, codes[1].run
+    slow = guarded(unit, pick, expr.span, (expr.value, expr.index))
+    return folded(unit, codes, pick, lambda env: slow(value(env), index(env)))

@@ -1,0 +1,225 @@
+"""Params: typed, ranged inputs, and the values that come from outside for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from numbers import Real
+from typing import Any
+
+from scenelang.diagnostics.diagnostic import Diagnostics, Label
+from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.diagnostics.suggest import listing, nearest
+from scenelang.evaluate.builder import Builder
+from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.names import Binding, Env
+from scenelang.evaluate.prepare.blocks import Action, Place, define, states
+from scenelang.evaluate.prepare.expressions import VARIES, Code, prepare
+from scenelang.evaluate.prepare.settings import at_top_level
+from scenelang.evaluate.session import Session
+from scenelang.evaluate.values.operators import equal, same_unit
+from scenelang.evaluate.values.value import (
+    POISON,
+    UNITS,
+    Angle,
+    Problem,
+    RangeValue,
+    Time,
+    Vec,
+    describe,
+    unpack,
+)
+from scenelang.syntax import nodes, parse
+
+
+@dataclass(slots=True)
+class Defines:
+    """Values for params from outside, and the params that files have.
+
+    Args:
+        values: text as after ``-D NAME=``, or a Python value.
+        known: where each param stands, by its name seen from the first file.
+        lost: words that recovery skipped: a param may have been among them.
+    """
+
+    values: Mapping[str, Any]
+    known: dict[str, Span] = field(default_factory=dict)
+    lost: set[str] = field(default_factory=set)
+
+    def report_unused(self, diagnostics: Diagnostics) -> None:
+        """Report values that no param takes."""
+        for name in self.values:
+            if name in self.known or name in self.lost:
+                continue
+            found = nearest(name, self.known)
+            if found:
+                help, labels = f"did you mean '{found}'?", [Label(self.known[found], "this param")]
+            else:
+                names = listing(self.known)
+                help, labels = f"its params are {names}" if names else "the scene has no params", []
+            diagnostics.add("E0211", f"no param '{name}' to set", None, help=help, labels=labels)
+
+
+@states(nodes.Param)
+def _param(stmt: nodes.Param, place: Place) -> Action | None:
+    unit, name = place.unit, stmt.name
+    session = unit.session
+    default = prepare(stmt.default, unit, place.scope)
+    bounds = prepare(stmt.range, unit, place.scope) if stmt.range is not None else None
+    slot = place.scope.frame.slot()
+    if not at_top_level(place, name.span, "a param"):
+        define(name, Binding("poison", name.span), place)
+        return None
+    if not define(name, Binding("param", name.span, place.scope.frame, slot, needs=session.needs), place):
+        return None
+    full = unit.prefix + name.text
+    unit.defines.known[full] = name.span
+    given = unit.defines.values.get(full, VARIES)
+
+    def action(env: Env, out: Builder) -> None:
+        value = default.run(env)
+        allowed = bounds.run(env) if bounds is not None else None
+        if value is not POISON:
+            value = _checked_default(value, allowed, stmt, session)
+        if given is not VARIES:
+            value = _from_outside(full, given, value, allowed, stmt, unit)
+        env[slot] = value
+        if session.watch is not None:
+            session.watch(name.span, value)
+
+    return action
+
+
+def _checked_default(value: Any, allowed: Any, stmt: nodes.Param, session: Session) -> Any:
+    """The default, or poison where it has no type for a param; reports one outside the range."""
+    if value.__class__ not in (*UNITS, bool, str, Vec):
+        message = f"{describe(value)} as the value of a param"
+        help = "params are numbers, angles, times, booleans, strings and vectors"
+        session.error("E0301", message, stmt.default.span, help=help)
+        return POISON
+    if stmt.range is None or allowed is POISON:
+        return value
+    if allowed.__class__ is not RangeValue and allowed.__class__ is not Vec:
+        message = f"expected a range or a vector of choices, found {describe(allowed)}"
+        session.error("E0301", message, stmt.range.span, help="write in 0..1")
+        return value
+    try:
+        if not within(value, allowed):
+            labels = (Label(stmt.range.span, "the range"),)
+            message = f"default of '{stmt.name.text}' is outside {stmt.range.span.text}"
+            session.error("E0309", message, stmt.default.span, labels=labels)
+    except Problem as problem:
+        session.problem(problem, stmt.range.span, (stmt.default,))
+    return value
+
+
+def within(value: Any, allowed: Any) -> bool:
+    """Whether a value, or each number of a vector, is in a range or among choices.
+
+    Raises:
+        Problem: a value and a range that do not compare.
+    """
+    if allowed.__class__ is Vec:
+        return any(equal(value, choice) for choice in allowed.items)
+    if value.__class__ is Vec:
+        return all(within(item, allowed) for item in value.items)
+    if value.__class__ not in UNITS:
+        raise Problem("E0301", f"{describe(value)} with a range of {allowed.unit}s")
+    x, unit = unpack(value)
+    same_unit(x, unit, allowed.start or allowed.stop, allowed.unit)
+    return bool(allowed.contains(x))
+
+
+def _from_outside(full: str, given: Any, default: Any, allowed: Any, stmt: nodes.Param, unit: Unit) -> Any:
+    """The value from outside, of the default's type and in range; poison after a report."""
+    span, session = stmt.name.span, unit.session
+    text = given if isinstance(given, str) else repr(given)
+    shown = f"{full}={text}" if len(text) <= 60 else f"{full}={text[:57]}…"
+    if default.__class__ is str and isinstance(given, str):
+        value: Any = given
+    else:
+        value = literal(given, unit) if isinstance(given, str) else from_python(given)
+        if value is None:
+            advice = "write a number with its unit, a colour, a vector, true or false"
+            labels = (Label(stmt.default.span, "its default"),)
+            session.error("E0310", f"{shown} is not a literal", span, help=advice, labels=labels)
+            return POISON
+    if default is POISON:
+        return value
+    fitting = _fit(value, default)
+    if fitting is None:
+        help = "give it a unit, as in 30deg" if default.__class__ is Angle else None
+        message = f"{shown} is {describe(value)}, expected {describe(default)}"
+        labels = (Label(stmt.default.span, f"its default is {describe(default)}"),)
+        session.error("E0310", message, span, help=help, labels=labels)
+        return POISON
+    if allowed.__class__ is RangeValue or allowed.__class__ is Vec:
+        try:
+            inside = within(fitting, allowed)
+        except Problem:
+            return fitting  # the default has met and reported it
+        if not inside and stmt.range is not None:
+            labels = (Label(stmt.range.span, "the range"),)
+            session.error("E0309", f"{shown} is outside {stmt.range.span.text}", span, labels=labels)
+            return POISON
+    return fitting
+
+
+def _fit(value: Any, default: Any) -> Any:
+    """``value`` as the type of ``default``, or None: 0 is any angle, a bare number seconds."""
+    if value.__class__ is default.__class__:
+        return value
+    if default.__class__ is Angle and value.__class__ is float and value == 0.0:
+        return Angle(0.0)
+    if default.__class__ is Time and value.__class__ is float:
+        return Time(value)
+    return None
+
+
+def from_python(value: Any) -> Any:
+    """A Python value as one of the language; None where there is none."""
+    if isinstance(value, bool | str):
+        return value
+    if isinstance(value, Real):
+        try:
+            number = float(value)
+        except OverflowError:
+            return None
+        return number if number - number == 0.0 else None
+    if isinstance(value, Sequence) or hasattr(value, "tolist"):
+        try:
+            items = [from_python(item) for item in (value.tolist() if hasattr(value, "tolist") else value)]
+            return None if None in items else Vec(tuple(items))
+        except (Problem, RecursionError, TypeError):
+            return None
+    return None
+
+
+def literal(text: str, unit: Unit) -> Any:
+    """The value of a literal; None where ``text`` is no literal."""
+    diagnostics = Diagnostics()
+    head = "let value = "
+    file = parse(SourceFile("", f"{head}{text};"), diagnostics)
+    stmt = file.statements[0] if len(file.statements) == 1 else None
+    if diagnostics.errors or not isinstance(stmt, nodes.Let) or not _is_literal(stmt.value):
+        return None
+    session = Session(diagnostics, unit.session.vocabulary)
+    alone = Unit(SourceFile("", text), session, unit.loader, Defines({}))
+    code: Code = prepare(stmt.value, alone, alone.scope)
+    value = code.value if code.value is not VARIES else code.run([])
+    return None if value is POISON or diagnostics.errors else value
+
+
+def _is_literal(expr: nodes.Expr) -> bool:
+    """Whether an expression names nothing and computes nothing but a sign."""
+    match expr:
+        case nodes.Number() | nodes.Bool() | nodes.Color() | nodes.String():
+            return True
+        case nodes.Unary(op="-" | "+", operand=nodes.Number()):
+            return True
+        case nodes.Vector():
+            return all(_is_literal(item) for item in expr.items)
+        case nodes.CallExpr():
+            return expr.name.text in ("rgb", "hsv") and all(_is_literal(a.value) for a in expr.args)
+        case _:
+            return False

@@ -1,0 +1,196 @@
+"""Settings of a scene: version, model, canvas, background, animation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from scenelang.diagnostics.diagnostic import Edit, Fix, Label
+from scenelang.diagnostics.fixes import removal
+from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.suggest import did_you_mean, listing
+from scenelang.evaluate.builder import Builder, make
+from scenelang.evaluate.names import Env
+from scenelang.evaluate.prepare.arguments import bind
+from scenelang.evaluate.prepare.blocks import Action, Place, misplaced, states
+from scenelang.evaluate.prepare.expressions import prepare
+from scenelang.evaluate.session import Session
+from scenelang.evaluate.values.functions import number
+from scenelang.evaluate.values.transforms import color
+from scenelang.evaluate.values.value import POISON, Problem, Time, Vec, describe, show
+from scenelang.scene.schema import MAX_FRAMES, Animation
+from scenelang.syntax import nodes
+
+MAX_SIDE_PX: Final = 8192
+LEFT_OUT: Final = object()  # an argument that was not given; None is the value ``none``
+
+_PARAMS: Final[dict[str, tuple[tuple[str, ...], int]]] = {
+    "canvas": (("w", "h"), 2),
+    "background": (("c",), 1),
+    "animate": (("seconds", "fps", "loop"), 2),
+}
+
+
+def at_top_level(place: Place, span: Span, what: str) -> bool:
+    """Whether a statement stands at top level; reports it if not."""
+    if place.kind == "file" and not place.nested:
+        return True
+    misplaced(place, span, f"{what} inside a block", "it stands at top level")
+    return False
+
+
+def once(session: Session, what: str, span: Span) -> bool:
+    """Whether a setting is given for the first time; reports a second time."""
+    first = session.settings.given.setdefault(what, span)
+    if first is span:
+        return True
+    session.error("E0333", f"'{what}' is given twice", span, labels=(Label(first, "first given here"),))
+    return False
+
+
+@states(nodes.Version)
+def _version(stmt: nodes.Version, place: Place) -> Action | None:
+    session, version = place.unit.session, stmt.number
+    if not at_top_level(place, stmt.span, "the language version"):
+        return None
+    if version.unit or version.value != 1:
+        message = f"language version {version.span.text} is not supported"
+        session.error("E0334", message, version.span, help="this is version 1: nsg 1;")
+    elif place.unit.first is not stmt:
+        message = "the language version is not the first statement"
+        session.error("E0334", message, stmt.span, fix=_to_the_top(stmt, place.unit.first))
+    return None
+
+
+def _to_the_top(stmt: nodes.Version, first: nodes.Stmt | None) -> Fix | None:
+    """Move a statement before the first one."""
+    if first is None or stmt.span.source is not first.span.source:
+        return None
+    source, start = stmt.span.source, first.span.start
+    away = removal(source, stmt.span.start, stmt.span.end)
+    return Fix("move it to the top", (Edit(Span(source, start, start), f"{stmt.span.text}\n"), *away.edits))
+
+
+@states(nodes.Model)
+def _model(stmt: nodes.Model, place: Place) -> Action | None:
+    unit, session = place.unit, place.unit.session
+    if not at_top_level(place, stmt.span, "'model'") or not once(session, "model", stmt.span):
+        return None
+    if not isinstance(stmt.name, nodes.String):
+        if not isinstance(stmt.name, nodes.BadExpr):
+            prepare(stmt.name, unit, place.scope)
+            session.error("E0301", "expected the model's name as a string", stmt.name.span)
+        return None
+    known = [m.name for m in session.vocabulary.models]
+    if stmt.name.value not in known:
+        span = stmt.name.span
+        help, fix = did_you_mean(stmt.name.value, known, Span(span.source, span.start + 1, span.end - 1))
+        help = help or f"there is {listing(known)}"
+        session.error("E0210", f"unknown model '{stmt.name.value}'", span, help=help, fix=fix)
+    return None
+
+
+def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
+    """``canvas``, ``background`` or ``animate``."""
+    unit, name, span = place.unit, stmt.name.text, stmt.name.span
+    session = unit.session
+    codes = {id(arg): prepare(arg.value, unit, place.scope) for arg in stmt.args or ()}
+    if not at_top_level(place, span, f"'{name}'") or not once(session, name, span):
+        return None
+    if stmt.body is not None:
+        session.error("E0330", f"'{name}' takes no block", span, help=f"write {name}(…);")
+        return None
+    params, required = _PARAMS[name]
+    optional = [index >= required for index in range(len(params))]
+    bound = bind(session, name, params, optional, stmt.args or (), span, spread=name == "canvas")
+    if bound is None:
+        return _unknown_time(session) if name == "animate" else None
+    getters = [codes[id(arg)].run if arg is not None else None for arg in bound]
+    operands = tuple([arg.value if arg is not None else None for arg in bound])
+    apply = _APPLY[name]
+
+    def action(env: Env, out: Builder) -> None:
+        values = [LEFT_OUT if get is None else get(env) for get in getters]
+        if any(value is POISON for value in values):
+            if name == "animate":
+                session.animated[:] = [POISON] * 4
+            return
+        try:
+            apply(session, span, *values)
+        except Problem as problem:
+            session.problem(problem, span, operands)
+            if name == "animate":
+                session.animated[:] = [POISON] * 4
+
+    return action
+
+
+def _unknown_time(session: Session) -> Action:
+    """What `animate` with a mistake does: its variables are unknown, which is no further mistake."""
+
+    def action(env: Env, out: Builder) -> None:
+        session.animated[:] = [POISON] * 4
+
+    return action
+
+
+def _canvas(session: Session, span: Span, width: Any, height: Any) -> None:
+    if width.__class__ is Vec and height is LEFT_OUT:
+        if len(width.items) != 2:
+            raise Problem("E0301", f"expected a vector of 2 numbers, found {describe(width)}", operand=0)
+        width, height = width.items
+    if height is LEFT_OUT:
+        raise Problem("E0308", "'canvas' needs 'w' and 'h'", "it is called canvas(w, h)")
+    sides = []
+    for operand, value in enumerate((width, height)):
+        side = number(value, operand)
+        if not side.is_integer() or not 1 <= side <= MAX_SIDE_PX:
+            message = f"a canvas side of {show(side)} is not a whole number in 1..{MAX_SIDE_PX}"
+            raise Problem("E0311", message, operand=operand)
+        sides.append(int(side))
+    session.settings.canvas = (sides[0], sides[1])
+
+
+def _background(session: Session, span: Span, value: Any) -> None:
+    if session.vocabulary.chosen is not None and session.vocabulary.dimension == 3:
+        message = f"model '{session.vocabulary.chosen.name}' brings its own background"
+        help = "in 3D the background belongs to the model"
+        session.error("E0336", message, span, help=help, labels=session.model_label())
+        return
+    if value is None:
+        session.settings.background = None
+        return
+    rgb = color(value)
+    for component in rgb:
+        if not 0.0 <= component <= 1.0:
+            raise Problem("E0311", f"background component {show(component)} is outside 0..1", operand=0)
+    session.settings.background = rgb
+
+
+def _animate(session: Session, span: Span, seconds: Any, fps: Any, loop: Any) -> None:
+    length = seconds.s if seconds.__class__ is Time else number(seconds, 0)
+    rate = number(fps, 1)
+    for operand, (what, value) in enumerate((("length", length), ("frame rate", rate))):
+        if value <= 0.0:
+            raise Problem("E0311", f"a {what} of {show(value)} is not above 0", operand=operand)
+    if loop is not LEFT_OUT and loop.__class__ is not bool:
+        raise Problem("E0301", f"expected a boolean, found {describe(loop)}", operand=2)
+    rate = session.fps or rate
+    if length * rate > MAX_FRAMES:
+        raise Problem("E0311", f"an animation of more than {MAX_FRAMES:,} frames", operand=0)
+    looping = loop is not False
+    animation = make(Animation, {"seconds": length, "fps": rate, "loop": looping})
+    session.settings.animation = animation
+    frame, frames = session.frame, animation.frames
+    if not 0 <= frame < frames:
+        session.animated[:] = [POISON] * 4
+        raise Problem("E0337", f"frame {frame} is outside 0..{frames - 1}")
+    u = frame / frames if looping else frame / max(1, frames - 1)
+    session.animated[:] = [frame / rate, u, float(frame), float(frames)]
+
+
+_APPLY: Final[dict[str, Callable[..., None]]] = {
+    "canvas": _canvas,
+    "background": _background,
+    "animate": _animate,
+}

@@ -1,0 +1,180 @@
+"""Values of the wrong kind, traced to where they come from: what one definition causes is told as one.
+
+A `let` that has become a vector is wrong in one place and shows it in many. Uses that complain in the same
+words and share a variable or function, directly or by way of others, are places of one report.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Final
+
+from scenelang.diagnostics.diagnostic import Label
+from scenelang.diagnostics.span import Span
+from scenelang.evaluate.report.undefined import shown_places
+from scenelang.syntax import nodes
+
+if TYPE_CHECKING:
+    from scenelang.evaluate.session import Session
+
+_KINDS: Final = frozenset(("E0301", "E0302", "E0303", "E0307"))
+_COMPARISONS: Final = frozenset(("<", "<=", ">", ">=", "==", "!=", "&&", "||"))
+_MOST_ORIGINS: Final = 64  # definitions that one value is traced through
+_MOST_CALLS: Final = 16  # calls that give a parameter its value
+_OFTEN: Final = 3  # so many places of one report make its origin the culprit, whatever others say
+
+Origin = tuple[int, int]
+"""A definition: its file and where its name starts."""
+
+
+@dataclass(slots=True)
+class Shared:
+    """A report that several places share.
+
+    Args:
+        index: its index among the diagnostics.
+        own: labels of its own.
+        again: further places.
+    """
+
+    index: int
+    own: tuple[Label, ...]
+    again: dict[Span, None] = field(default_factory=dict)
+
+
+_FOUND: Final = re.compile(r"found (?!a number$)(.*)$|of (.*), which is no vector$")
+_PAIR: Final = re.compile(r"^cannot \w+ (.*) and (.*)$")
+_ANGLE: Final = "a bare number beside an angle"
+_OUTSIDE: Final = "outside"
+
+
+def _complaint(message: str) -> str:
+    """What a message says is odd about a value, whatever was going to be done with it."""
+    if _OUTSIDE in message:
+        return _OUTSIDE
+    if message == _ANGLE:
+        return "an angle"
+    pair = _PAIR.match(message)
+    if pair is not None:
+        odd = [kind for kind in pair.groups() if kind != "a number"]
+        return odd[0] if len(odd) == 1 else message
+    found = _FOUND.search(message)
+    return message if found is None else found[1] or found[2]
+
+
+def joined(session: Session, code: str, message: str, operands: tuple[nodes.Expr, ...], place: Span) -> bool:
+    """Whether a problem is one more place of an earlier report, which then shows it.
+
+    Args:
+        session: has the reports.
+        code, message: the problem.
+        operands: what may be to blame.
+        place: where it shows.
+    """
+    if code not in _KINDS:
+        return False
+    for origin, definition in origins(session, operands).items():
+        for words in (_complaint(message), ""):
+            shared = session.blamed.get((*origin, words))
+            if shared is not None:
+                _add(session, shared, definition, place)
+                return True
+    direct = _direct(session, operands[0]) if len(operands) == 1 and code == "E0301" else None
+    shared = session.blamed.get((*direct, code)) if direct else None
+    if shared is None or direct is None:
+        return False
+    _add(session, shared, session.defined[id(operands[0].span.source), operands[0].span.start], place)
+    return True
+
+
+def remember(session: Session, code: str, message: str, operands: tuple[nodes.Expr, ...]) -> None:
+    """Note the origins of the problem that was reported last."""
+    if code not in _KINDS:
+        return
+    index = len(session.diagnostics.items) - 1
+    shared = Shared(index, session.diagnostics.items[index].labels)
+    complaint = _complaint(message)
+    direct = _direct(session, operands[0]) if operands else None
+    if complaint == _OUTSIDE:
+        # One wrong index is one; of a second on, it is the vector that is too short.
+        if direct is not None and session.blamed.setdefault((*direct, code), shared) is not shared:
+            session.blamed.setdefault((*direct, complaint), shared)
+        return
+    for origin in origins(session, operands):
+        session.blamed.setdefault((*origin, complaint), shared)
+    if direct is not None and code == "E0301" and len(operands) == 1:
+        session.blamed.setdefault((*direct, code), shared)
+
+
+def origins(session: Session, operands: tuple[nodes.Expr, ...]) -> dict[Origin, Span]:
+    """The definitions that may give values their kind, nearest first."""
+    found: dict[Origin, Span] = {}
+    stack = list(reversed(operands))
+    while stack and len(found) < _MOST_ORIGINS:
+        for name in _carriers(stack.pop()):
+            definition = session.defined.get((id(name.source), name.start))
+            if definition is None:
+                continue
+            origin = id(definition.source), definition.start
+            value = session.origins.get(origin)
+            if origin in found or (isinstance(value, nodes.Number) and not value.unit):
+                continue  # a bare number makes nothing of another kind
+            found[origin] = definition
+            if value is not None:
+                stack.append(value)
+            elif origin in session.parameters:
+                node, index = session.parameters[origin]
+                given = [bound[index] for bound in session.given.get(node, ())[:_MOST_CALLS]]
+                stack.extend(argument.value for argument in given if argument is not None)
+    return found
+
+
+def _add(session: Session, shared: Shared, definition: Span, place: Span) -> None:
+    """Show a further place of a report, and what it has in common with the others."""
+    if place in shared.again:
+        return
+    shared.again[place] = None
+    if len(shared.again) + 1 >= _OFTEN:
+        session.blamed.setdefault((id(definition.source), definition.start, ""), shared)
+    items = session.diagnostics.items
+    if all(label.span != definition for label in shared.own):
+        shared.own = (*shared.own, Label(definition, f"'{definition.text}' is defined here"))
+    places = shown_places(shared.again, "also here", "in")
+    items[shared.index] = replace(items[shared.index], labels=(*shared.own, *places))
+
+
+def _direct(session: Session, operand: nodes.Expr) -> Origin | None:
+    """The variable that an operand is, or is a part of."""
+    while isinstance(operand, nodes.Member | nodes.Index):
+        operand = operand.value
+    if not isinstance(operand, nodes.NameRef):
+        return None
+    definition = session.defined.get((id(operand.span.source), operand.span.start))
+    return None if definition is None else (id(definition.source), definition.start)
+
+
+def _carriers(expr: nodes.Expr) -> Iterator[Span]:
+    """The names in an expression whose kind of value can make its own."""
+    stack: list[tuple[nodes.Expr, bool]] = [(expr, False)]  # and whether only an item of it counts
+    while stack:
+        at, item = stack.pop()
+        match at:
+            case nodes.NameRef():
+                yield at.span
+            case nodes.CallExpr():
+                yield at.name.span
+                stack.extend((arg.value, item) for arg in reversed(at.args))
+            case nodes.Unary() if at.op != "!":
+                stack.append((at.operand, item))
+            case nodes.Binary() if at.op not in _COMPARISONS:
+                stack += (at.right, item), (at.left, item)
+            case nodes.Conditional():
+                stack += (at.otherwise, item), (at.then, item)
+            case nodes.Member() | nodes.Index():
+                stack.append((at.value, True))
+            case nodes.Vector() if item:
+                stack.extend((one, False) for one in reversed(at.items))
+            case _:
+                pass

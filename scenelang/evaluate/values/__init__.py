@@ -1,0 +1,1 @@
+"""Values of expressions, operators, functions, and the arguments of transforms."""

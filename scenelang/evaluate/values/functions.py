@@ -1,0 +1,274 @@
+"""The functions and constants that every file can use."""
+
+from __future__ import annotations
+
+import colorsys
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+from scenelang.evaluate.values.operators import binary, finite, same_unit
+from scenelang.evaluate.values.value import (
+    UNITS,
+    Angle,
+    Problem,
+    RangeValue,
+    Vec,
+    describe,
+    pack,
+    show,
+    unpack,
+)
+
+_MASK = (1 << 64) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Builtin:
+    """A function of the language.
+
+    Args:
+        params: names of its parameters; the last may be repeated if ``variadic``.
+        run: its meaning; raises Problem.
+        variadic: takes one or more arguments.
+        doubt: a warning about values that it takes; its operand is to blame.
+    """
+
+    params: tuple[str, ...]
+    run: Callable[..., Any]
+    variadic: bool = False
+    doubt: Callable[..., Problem | None] | None = None
+
+
+def number(value: Any, operand: int = 0) -> float:
+    """A bare number; raises Problem for anything else."""
+    if value.__class__ is float:
+        return value
+    unit = {"an angle": "1deg", "a time": "1s"}.get(describe(value))
+    help = f"divide by {unit} for a bare number" if unit else None
+    raise Problem("E0301", f"expected a number, found {describe(value)}", help, operand)
+
+
+def angle(value: Any, operand: int = 0, fix: Literal["angle", "hue"] = "angle") -> float:
+    """An angle in radians; 0 needs no unit."""
+    if value.__class__ is Angle:
+        return value.rad
+    if value.__class__ is float:
+        if value == 0.0:
+            return 0.0
+        raise Problem("E0302", "expected an angle, found a bare number", operand=operand, fix=fix)
+    raise Problem("E0301", f"expected an angle, found {describe(value)}", None, operand)
+
+
+def _each(function: Callable[[Any], Any], value: Any) -> Any:
+    """``function`` of a scalar, or of each item of a vector."""
+    if value.__class__ is Vec:
+        return Vec(tuple([_each(function, item) for item in value.items]))
+    return function(value)
+
+
+def _of_angle(function: Callable[[float], float]) -> Callable[[Any], Any]:
+    return lambda value: _each(lambda x: finite(function(angle(x))), value)
+
+
+def _of_number(function: Callable[[float], float], domain: str) -> Callable[[Any], Any]:
+    def one(value: Any) -> float:
+        try:
+            return finite(function(number(value)))
+        except OverflowError:
+            raise Problem("E0306", "the result is too large for a number") from None
+        except ValueError:
+            raise Problem("E0305", f"expected a number {domain}, found {value:.6g}", operand=0) from None
+
+    return lambda value: _each(one, value)
+
+
+def _to_angle(function: Callable[[float], float]) -> Callable[[Any], Any]:
+    inner = _of_number(function, "in -1..1")
+    return lambda value: _each(Angle, inner(value))
+
+
+def _atan2(y: Any, x: Any) -> Angle:
+    return Angle(math.atan2(number(y, 0), number(x, 1)))
+
+
+def _scalar(value: Any, operand: int = 0) -> tuple[float, str]:
+    if value.__class__ in UNITS:
+        return unpack(value)
+    raise Problem("E0301", f"expected a number, found {describe(value)}", None, operand)
+
+
+def _abs(value: Any) -> Any:
+    def one(item: Any) -> Any:
+        x, unit = _scalar(item)
+        return pack(abs(x), unit)
+
+    return _each(one, value)
+
+
+def _pick(a: Any, b: Any, better: Callable[[float, float], bool]) -> Any:
+    """The better of two scalars, componentwise where one is a vector."""
+    if a.__class__ is Vec or b.__class__ is Vec:
+        length = len(a.items) if a.__class__ is Vec else len(b.items)
+        left = a.items if a.__class__ is Vec else (a,) * length
+        right = b.items if b.__class__ is Vec else (b,) * length
+        if len(left) != len(right):
+            raise Problem("E0307", f"vectors of {len(left)} and {len(right)} items do not combine")
+        return Vec(tuple([_pick(x, y, better) for x, y in zip(left, right, strict=True)]))
+    x, ua = _scalar(a, 0)
+    y, ub = _scalar(b, 1)
+    unit = same_unit(x, ua, y, ub)
+    return pack(x if better(x, y) else y, unit)
+
+
+def _less(x: float, y: float) -> bool:
+    return x <= y
+
+
+def _greater(x: float, y: float) -> bool:
+    return x >= y
+
+
+def _whole(function: Callable[..., Any]) -> Callable[..., Any]:
+    """``function`` with its problems blamed on the call, where steps inside know no argument."""
+
+    def run(*values: Any) -> Any:
+        try:
+            return function(*values)
+        except Problem as problem:
+            problem.operand = None
+            raise
+
+    return run
+
+
+def _best(better: Callable[[float, float], bool]) -> Callable[..., Any]:
+    def run(*values: Any) -> Any:
+        if len(values) == 1 and values[0].__class__ is Vec:
+            values = values[0].items
+            if not values:
+                raise Problem("E0305", "expected at least one number, found an empty vector", operand=0)
+        best = values[0]
+        if len(values) == 1:
+            _scalar(best)
+        for value in values[1:]:
+            best = _pick(best, value, better)
+        return best
+
+    return run
+
+
+def _clamp(x: Any, low: Any, high: Any) -> Any:
+    if low.__class__ in UNITS and high.__class__ in UNITS:
+        bottom, ua = unpack(low)
+        top, ub = unpack(high)
+        same_unit(bottom, ua, top, ub)
+        if bottom > top:
+            raise Problem("E0305", f"clamp from {bottom:.6g} down to {top:.6g}", operand=1)
+    return _pick(_pick(x, low, _greater), high, _less)
+
+
+def round_half_away(x: float) -> float:
+    """The nearest integer, halves away from zero, as C and OpenSCAD round."""
+    whole = math.floor(abs(x))
+    return math.copysign(whole + (abs(x) - whole >= 0.5), x)
+
+
+def _mix(a: Any, b: Any, t: Any) -> Any:
+    if t.__class__ is not Vec:
+        number(t, 2)
+    return binary("+", binary("*", a, binary("-", 1.0, t)), binary("*", b, t))
+
+
+def _smoothstep(low: Any, high: Any, x: Any) -> Any:
+    def one(item: Any) -> float:
+        (e0, u0), (e1, u1), (v, u) = _scalar(low, 0), _scalar(high, 1), _scalar(item, 2)
+        same_unit(e0, u0, e1, u1)
+        same_unit(e0, u0, v, u)
+        if e0 == e1:
+            raise Problem("E0304", "division by zero: the edges of smoothstep are equal", operand=1)
+        t = min(max(finite((v - e0) / finite(e1 - e0)), 0.0), 1.0)
+        return t * t * (3.0 - 2.0 * t)
+
+    return _each(one, x)
+
+
+def _len(value: Any) -> float:
+    if value.__class__ is Vec:
+        return float(len(value.items))
+    if value.__class__ is RangeValue:
+        return float(value.count())
+    if value.__class__ is str:
+        return float(len(value))
+    raise Problem("E0301", f"expected a vector, a range or a string, found {describe(value)}", operand=0)
+
+
+def _splitmix64(state: int) -> int:
+    """One output of SplitMix64 (Steele, Lea, Flood 2014)."""
+    state = (state + 0x9E3779B97F4A7C15) & _MASK
+    state = ((state ^ (state >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
+    state = ((state ^ (state >> 27)) * 0x94D049BB133111EB) & _MASK
+    return state ^ (state >> 31)
+
+
+def rand(seed: Any) -> float:
+    """A number in [0, 1): the top 53 bits of SplitMix64 over the seed's IEEE 754 bits, folded if a vector."""
+    state = 0
+    for item in seed.items if seed.__class__ is Vec else (seed,):
+        bits = struct.unpack("<Q", struct.pack("<d", number(item) + 0.0))[0]  # + 0.0 makes -0 a 0
+        state = _splitmix64(state ^ bits)
+    return (state >> 11) / (1 << 53)
+
+
+def _rgb(*components: Any) -> Vec:
+    return Vec(tuple([number(c, i) for i, c in enumerate(components)]))
+
+
+def _hsv(h: Any, s: Any, v: Any) -> Vec:
+    turns = h.rad / math.tau if h.__class__ is Angle else number(h, 0)
+    return Vec(colorsys.hsv_to_rgb(turns % 1.0, number(s, 1), number(v, 2)))
+
+
+def _doubt_hue(h: Any, s: Any, v: Any) -> Problem | None:
+    if h.__class__ is not float or abs(h) <= 2.0:
+        return None
+    help = f"a bare hue is in turns: write {show(h)}deg for degrees, or take % 1 where turns are meant"
+    return Problem("W0302", f"a hue of {show(h)} turns", help, operand=0)
+
+
+FUNCTIONS: Final[dict[str, Builtin]] = {
+    "sin": Builtin(("x",), _of_angle(math.sin)),
+    "cos": Builtin(("x",), _of_angle(math.cos)),
+    "tan": Builtin(("x",), _of_angle(math.tan)),
+    "asin": Builtin(("x",), _to_angle(math.asin)),
+    "acos": Builtin(("x",), _to_angle(math.acos)),
+    "atan2": Builtin(("y", "x"), _atan2),
+    "abs": Builtin(("x",), _abs),
+    "min": Builtin(("x",), _whole(_best(_less)), variadic=True),
+    "max": Builtin(("x",), _whole(_best(_greater)), variadic=True),
+    "clamp": Builtin(("x", "low", "high"), _whole(_clamp)),
+    "floor": Builtin(("x",), _of_number(lambda x: float(math.floor(x)), "")),
+    "ceil": Builtin(("x",), _of_number(lambda x: float(math.ceil(x)), "")),
+    "round": Builtin(("x",), _of_number(round_half_away, "")),
+    "sqrt": Builtin(("x",), _of_number(math.sqrt, "of at least 0")),
+    "exp": Builtin(("x",), _of_number(math.exp, "")),
+    "log": Builtin(("x",), _of_number(math.log, "above 0")),
+    "mix": Builtin(("a", "b", "t"), _whole(_mix)),
+    "smoothstep": Builtin(("low", "high", "x"), _whole(_smoothstep)),
+    "len": Builtin(("v",), _len),
+    "rand": Builtin(("seed",), rand),
+    "rgb": Builtin(("r", "g", "b"), _rgb),
+    "hsv": Builtin(("h", "s", "v"), _hsv, doubt=_doubt_hue),
+}
+
+CONSTANTS: Final[dict[str, Any]] = {
+    "PI": math.pi,
+    "TAU": math.tau,
+    "X": Vec((1.0, 0.0, 0.0)),
+    "Y": Vec((0.0, 1.0, 0.0)),
+    "Z": Vec((0.0, 0.0, 1.0)),
+    "none": None,
+}
+ANIMATED: Final = ("t", "u", "frame", "frames")

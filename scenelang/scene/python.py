@@ -1,0 +1,172 @@
+"""A Scene as Python code that makes an equal Scene, laid out as Black and Ruff lay code out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final
+
+from scenelang.deep import deep_stack
+from scenelang.scene.fields import Rgb
+from scenelang.scene.schema import Link, Material, MaterialOp, Object, Scene, SceneNode, Transform
+from scenelang.scene.text import degrees, hex_colour, number
+
+_WIDTH: Final = 88
+_INDENT: Final = "    "
+_DEEPEST: Final = 10
+"""Nodes within nodes of one expression; Python itself takes no more than 200 brackets."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Call:
+    """Brackets with something before them and something in them: a call, or a tuple."""
+
+    head: str
+    parts: tuple[_Code, ...]
+    is_tuple: bool = False
+
+
+_Code = str | _Call
+
+
+def to_python(scene: Scene) -> str:
+    """The code of ``scene``: the import, parts that nest too deep, and ``scene = nsg.Scene(…)``."""
+    with deep_stack():
+        made = _Maker()
+        whole = _Call("nsg.Scene", tuple(made.settings(scene)))
+        lines = ["import scenelang as nsg", ""]
+        for name, code in [*made.parts, ("scene", whole)]:
+            lines.append(f"{name} = {_laid_out(code, len(name) + 3, '')}")
+        return "\n".join(lines) + "\n"
+
+
+@dataclass(slots=True)
+class _Maker:
+    """Makes code of nodes; what nests too deep becomes a variable of its own in ``parts``."""
+
+    parts: list[tuple[str, _Code]] = field(default_factory=list)
+
+    def settings(self, scene: Scene) -> Iterable[_Code]:
+        if scene.model is not None:
+            yield f'model="{scene.model}"'
+        if scene.canvas != (256, 256):
+            yield _tuple("canvas=", map(str, scene.canvas))
+        if scene.background is None:
+            yield "background=None"
+        elif scene.background != (1.0, 1.0, 1.0):
+            yield _numbers("background=", scene.background)
+        if scene.animation is not None:
+            loop = () if scene.animation.loop else ("loop=False",)
+            times = (f"seconds={number(scene.animation.seconds)}", f"fps={number(scene.animation.fps)}")
+            yield _Call("animation=nsg.Animation", (*times, *loop))
+        if scene.nodes:
+            yield _tuple("nodes=", [self.node("", node)[0] for node in scene.nodes])
+
+    def node(self, prefix: str, node: SceneNode) -> tuple[_Code, int]:
+        """The code of a node, and how deep nodes nest in it."""
+        height = 0
+        parts: list[_Code] = []
+        if isinstance(node, Object):
+            name = "Object"
+            parts.append(f'"{node.geometry}"')
+        else:
+            name = type(node).__name__
+            if node.kind == "boolean":
+                parts.append(f'op="{node.op}"')
+            children: list[_Code] = []
+            for child in node.children:
+                code, inner = self.child(child)
+                height = max(height, inner + 1)
+                children.append(code)
+            if children:
+                parts.append(_tuple("children=", children))
+        if node.transforms:
+            parts.append(_tuple("transforms=", map(_step, node.transforms)))
+        if node.material is not None:
+            parts.append(_material(node.material))
+        if height < _DEEPEST:
+            return _Call(f"{prefix}nsg.{name}", tuple(parts)), height
+        variable = f"part_{len(self.parts) + 1}"
+        self.parts.append((variable, _Call(f"nsg.{name}", tuple(parts))))
+        return f"{prefix}{variable}", 0
+
+    def child(self, child: SceneNode | Link) -> tuple[_Code, int]:
+        if not isinstance(child, Link):
+            return self.node("", child)
+        code, height = self.node("node=", child.node)
+        op = () if child.op == "union" else (f'op="{child.op}"',)
+        return _Call("nsg.Link", (*op, code)), height
+
+
+def _material(material: Material) -> _Code:
+    ops = (_tuple("ops=", map(_step, material.ops)),) if material.ops else ()
+    return _Call("material=nsg.Material", (f'"{material.name}"', *ops))
+
+
+def _step(step: Transform | MaterialOp) -> _Code:
+    """A transform or a texture operation."""
+    match step.kind:
+        case "translate":
+            z = (number(step.z),) if number(step.z) != "0" else ()
+            return _Call("nsg.Translate", (number(step.x), number(step.y), *z))
+        case "rotate":
+            head, turn = _angle(step.angle)
+            axis = () if repr(step.axis) == "(0.0, 0.0, 1.0)" else (_numbers("axis=", step.axis),)
+            return _Call(f"nsg.Rotate{head}", (turn, *axis))
+        case "scale":
+            if step.x == step.y == step.z:
+                return _Call("nsg.Scale", (number(step.x),))
+            z = (number(step.z),) if step.z != 1.0 else ()
+            return _Call("nsg.Scale", (number(step.x), number(step.y), *z))
+        case "shear":
+            return _Call("nsg.Shear", (f'"{step.axes}"', number(step.k)))
+        case "matrix":
+            return _Call("nsg.Matrix", (_tuple("", [_numbers("", row) for row in step.rows]),))
+        case "displace":
+            return _Call("nsg.Displace", (number(step.amount), number(step.frequency)))
+        case "flip":
+            return _Call("nsg.Flip", ())
+        case "color":
+            written = hex_colour(step.rgb)
+            if written is not None:
+                return _Call("nsg.Color", (f'"{written}"',))
+            return _Call("nsg.Color", (_numbers("", step.rgb),))
+        case "grayscale":
+            return _Call("nsg.Grayscale", (number(step.amount),))
+        case "hue":
+            return _Call("nsg.Hue", (f"angle={number(step.angle)}",))
+        case _:
+            return _Call(f"nsg.{type(step).__name__}", (number(step.k),))
+
+
+def _angle(rad: float) -> tuple[str, str]:
+    exact = degrees(rad)
+    return ("", f"angle={number(rad)}") if exact is None else (".degrees", number(exact))
+
+
+def _numbers(head: str, values: Rgb | Iterable[float]) -> _Call:
+    return _tuple(head, map(number, values))
+
+
+def _tuple(head: str, parts: Iterable[_Code]) -> _Call:
+    return _Call(head, tuple(parts), True)
+
+
+def _flat(code: _Code) -> str:
+    if isinstance(code, str):
+        return code
+    comma = "," if code.is_tuple and len(code.parts) == 1 else ""
+    return f"{code.head}({', '.join(map(_flat, code.parts))}{comma})"
+
+
+def _laid_out(code: _Code, used: int, margin: str) -> str:
+    """Code that fits into the width; ``used`` columns of its first line are taken, one after it too."""
+    flat = _flat(code)
+    if isinstance(code, str) or used + len(flat) < _WIDTH:
+        return flat
+    inner = margin + _INDENT
+    together = ", ".join(map(_flat, code.parts))
+    if not code.is_tuple and len(inner) + len(together) <= _WIDTH:
+        return f"{code.head}(\n{inner}{together}\n{margin})"
+    lines = [f"{inner}{_laid_out(part, len(inner), inner)},\n" for part in code.parts]
+    return f"{code.head}(\n{''.join(lines)}{margin})"
