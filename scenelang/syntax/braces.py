@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
-from scenelang.diagnostics.diagnostic import Edit, Fix, Label
+from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.syntax.automaton import advance, fits, reach
 from scenelang.syntax.completion import completion
@@ -213,8 +213,7 @@ class _Mender:
         elif mend.delete:
             self._report_unmatched(at)
         elif mend.insert == (self.opening,):
-            fix = Fix("insert `{`", (Edit(Span(tokens.source, end, end), " {"),))
-            self.report.add("E0106", "missing `{`", end, end, fix=fix)
+            self.report.add("E0106", "missing `{`", end, end, fix=" {")
         elif mend.insert[0] != self.closing:
             report_broken_off(tokens, self.report, at, names)
         elif not tokens.cut:

@@ -10,7 +10,6 @@ from dataclasses import replace
 from math import isinf
 from typing import Any
 
-from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import nodes
 from scenelang.syntax.tables import tables
@@ -191,15 +190,10 @@ class ExpressionBuilder:
                 parts.append(_ESCAPES[letter])
                 continue
             parts.append(body[slash:at])
-            place = Span(self.source, start + slash, start + at)
-            self.report.add(
-                "E0119",
-                f"unknown escape `\\{letter}`",
-                place.start,
-                place.end,
-                help='the escapes are `\\"`, `\\\\`, `\\n` and `\\t`',
-                fix=Fix("write `\\\\`", (Edit(Span(self.source, place.start, place.start + 1), "\\\\"),)),
-            )
+            place = start + slash
+            help = 'the escapes are `\\"`, `\\\\`, `\\n` and `\\t`'
+            fix = self.report.change(place, place + 1, "\\\\")
+            self.report.add("E0119", f"unknown escape `\\{letter}`", place, start + at, help=help, fix=fix)
         parts.append(body[at:])
         return "".join(parts)
 

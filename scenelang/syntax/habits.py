@@ -128,7 +128,7 @@ class Habits(Slips):
             shown = " ".join(new.text.split())
             shown = shown if len(shown) <= 40 else f"{shown[:37]}…"
             words = f"write `{shown}`" if shown else "remove it"
-            fix = Fix(words, (Edit(Span(tokens.source, new.start, new.end), new.text),))
+            fix = self.report.change(new.start, new.end, new.text, words)
         help = habit.help and match.told(habit.help)
         self.report.add(habit.code, match.told(habit.message), *new.place, help=help, fix=fix)
         for column, values in zip((tokens.kinds, tokens.starts, tokens.ends), new.columns, strict=True):

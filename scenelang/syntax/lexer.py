@@ -12,8 +12,7 @@ from collections.abc import Callable
 from functools import cache
 from unicodedata import category
 
-from scenelang.diagnostics.diagnostic import Edit, Fix
-from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.diagnostics.span import SourceFile
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 
@@ -134,10 +133,6 @@ class _Slips:
         self.tokens.append(self.kind(kind), start, end)
         self.tokens.reported.add(start)
 
-    def _fix(self, start: int, end: int, text: str) -> Fix:
-        message = f"write `{text}`" if text else "remove it"
-        return Fix(message, (Edit(Span(self.tokens.source, start, end), text),))
-
     def _open_comment(self, start: int, end: int, text: str) -> None:
         self.tokens.cut = True
         self.report.add(
@@ -149,13 +144,11 @@ class _Slips:
         )
 
     def _close_comment(self, start: int, end: int, text: str) -> None:
-        self.report.add(
-            "E0115", "end of a comment that was never opened", start, end, fix=self._fix(start, end, "")
-        )
+        self.report.add("E0115", "end of a comment that was never opened", start, end, fix="")
 
     def _open_string(self, start: int, end: int, text: str) -> None:
         self._keep("STRING", start, end)
-        fix = Fix('insert `"`', (Edit(Span(self.tokens.source, end, end), '"'),)) if end - start > 1 else None
+        fix = self.report.change(end, end, '"') if end - start > 1 else None
         self.report.add(
             "E0114", "string is never closed", start, end, help='a string ends with `"` on its line', fix=fix
         )
@@ -163,7 +156,7 @@ class _Slips:
     def _quotes(self, start: int, end: int, text: str) -> None:
         self._keep("STRING", start, end)
         safe = '"' not in text and "\\" not in text
-        fix = self._fix(start, end, f'"{text[1:-1]}"') if safe else None
+        fix = f'"{text[1:-1]}"' if safe else None
         self.report.add(
             "E0123", "string in the wrong quotes", start, end, help='strings stand in `"`', fix=fix
         )
@@ -173,14 +166,14 @@ class _Slips:
         digits = re.match(r"[0-9]*\.?[0-9]*", text)
         value = digits[0] if digits else ""
         rest = text[len(value) :]
-        fix = None
+        fix: str | None = None
         help = "numbers look like `1`, `0.5` or `1e-3`"
         if re.fullmatch("(?:_[0-9]+)+", rest):
             message, help = f"`{text}` is not a number", "digits are not grouped"
-            fix = self._fix(start, end, text.replace("_", ""))
+            fix = text.replace("_", "")
         elif rest in UNIT_ALIASES:
             message = f"`{rest}` is not a unit"
-            fix = self._fix(start, end, value + UNIT_ALIASES[rest])
+            fix = value + UNIT_ALIASES[rest]
         elif rest and not rest.startswith((".", "e", "E")):
             message = f"`{rest}` is not a unit"
             help = f"units are {', '.join(f'`{unit}`' for unit in UNITS)}; a product is written with `*`"
@@ -189,9 +182,8 @@ class _Slips:
         self.report.add("E0116", message, start, end, help=help, fix=fix)
 
     def _hash(self, start: int, end: int, text: str) -> None:
-        fix = self._fix(start, start + 1, "//")
         self.report.add(
-            "E0127", "`#` begins no comment", start, start + 1, help="comments begin with `//`", fix=fix
+            "E0127", "`#` begins no comment", start, start + 1, help="comments begin with `//`", fix="//"
         )
 
     def _colour(self, start: int, end: int, text: str) -> None:
@@ -207,15 +199,19 @@ class _Slips:
     def _foreign(self, start: int, end: int, text: str) -> None:
         instead = FOREIGN[text]
         self._keep(instead, start, end)
-        fix = self._fix(start, end, instead)
         self.report.add(
-            "E0127", f"`{text}` is not used here", start, end, help=f"`{instead}` is the sign for it", fix=fix
+            "E0127",
+            f"`{text}` is not used here",
+            start,
+            end,
+            help=f"`{instead}` is the sign for it",
+            fix=instead,
         )
 
     def _illegal(self, start: int, end: int, text: str) -> None:
         self.tokens.reported.add(start)
         shown = text if text.isprintable() else " ".join(f"U+{ord(c):04X}" for c in text[:8])
         unseen = all(category(c) in ("Cf", "Cc") for c in text)  # comes along when text is copied
-        fix = self._fix(start, end, "") if unseen else None
+        fix = "" if unseen else None
         help = "it cannot be seen" if unseen else None
         self.report.add("E0113", f"illegal character `{shown}`", start, end, help=help, fix=fix)

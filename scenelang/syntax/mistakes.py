@@ -89,9 +89,8 @@ def report_instead(tokens: Tokens, report: Report, at: int, names: Sequence[str]
 def report_misspelt(tokens: Tokens, report: Report, at: int, word: str) -> None:
     """Report a word where a keyword was meant."""
     start, end = tokens.starts[at], tokens.ends[at]
-    fix = _change(f"write `{word}`", tokens, start, end, word)
     report.add(
-        "E0132", f"unknown word `{tokens.text(at)}`", start, end, help=f"did you mean `{word}`?", fix=fix
+        "E0132", f"unknown word `{tokens.text(at)}`", start, end, help=f"did you mean `{word}`?", fix=word
     )
 
 
@@ -124,10 +123,10 @@ def _report_insertion(
     if first in (")", "]"):
         text = "".join(names)
         labels = [Label(_span(tokens, open_brackets[-1]), "opened here")]
-        report.add("E0103", f"missing `{text}`", end, end, labels=labels, fix=_insert(tokens, end, text))
+        report.add("E0103", f"missing `{text}`", end, end, labels=labels, fix=text)
     elif first == ";":
         help = "a `;` ends every statement without a block"
-        report.add("E0102", "missing `;`", end, end, help=help, fix=_insert(tokens, end, ";"))
+        report.add("E0102", "missing `;`", end, end, help=help, fix=";")
     elif names == ["BAD_EXPRESSION"]:
         report.add("E0108", f"expected an expression, found {found}", *place)
     elif names == ["NAME"]:
@@ -138,11 +137,11 @@ def _report_insertion(
         report.add("E0106", "missing block", end, end, help="braces are mandatory here, even around nothing")
     elif first == "(":
         text = "".join(names)
-        report.add("E0107", f"missing `{text}`", end, end, fix=_insert(tokens, end, text))
+        report.add("E0107", f"missing `{text}`", end, end, fix=text)
     elif first == ",":
         literal = all(_is_literal(tokens, index) for index in (at - 1, at))
         message = "missing `,`" if literal else f"missing `,` or operator before {found}"
-        report.add("E0112", message, end, end, fix=_insert(tokens, end, ",") if literal else None)
+        report.add("E0112", message, end, end, fix="," if literal else None)
     elif first == "*":
         report.add("E0112", f"missing operator before {found}", end, end)
     elif names[1:]:
@@ -150,7 +149,7 @@ def _report_insertion(
         report.add("E0126", f"missing `{first}` and {what}", end, end)
     else:
         safe = first in ("=", "in", "as")
-        fix = _insert(tokens, end, f" {first}") if safe else None
+        fix = f" {first}" if safe else None
         start = end if not tokens.on_new_line(at) else tokens.starts[at]
         report.add("E0126", f"missing `{first}` before {found}", start, start, fix=fix)
 
@@ -159,14 +158,14 @@ def _report_deletion(tokens: Tokens, report: Report, repair: Repair) -> None:
     start, end = tokens.starts[repair.at], tokens.ends[repair.end - 1]
     text = tokens.source.text[start:end]
     if text in (")", "]"):
-        report.add(
-            "E0105", f"unmatched `{text}`", start, end, fix=_change("remove it", tokens, start, end, "")
-        )
+        report.add("E0105", f"unmatched `{text}`", start, end, fix="")
     else:
-        report.add("E0101", f"unexpected {_quoted(text)}", start, end, fix=_once(tokens, repair, start, end))
+        report.add(
+            "E0101", f"unexpected {_quoted(text)}", start, end, fix=_once(tokens, report, repair, start, end)
+        )
 
 
-def _once(tokens: Tokens, repair: Repair, start: int, end: int) -> Fix | None:
+def _once(tokens: Tokens, report: Report, repair: Repair, start: int, end: int) -> Fix | None:
     """Remove what is written twice in a row, with the space between."""
     text = tokens.source.text
     if repair.at and tokens.text(repair.at - 1) == text[start:end]:
@@ -177,18 +176,18 @@ def _once(tokens: Tokens, repair: Repair, start: int, end: int) -> Fix | None:
         end = end if text[end:behind].strip() else behind
     else:
         return None
-    return _change("remove it", tokens, start, end, "")
+    return report.change(start, end, "")
 
 
 def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
     start, end = tokens.starts[repair.at], tokens.ends[repair.end - 1]
     text = tokens.source.text[start:end]
     new = "".join(names)
-    fix: Fix | None = _change(f"write `{new}`", tokens, start, end, new)
+    fix: str | None = new
     if repair.delete == 2:
         first, second = tokens.text(repair.at), tokens.text(repair.at + 1)
         gap = tokens.source.text[tokens.ends[repair.at] : tokens.starts[repair.at + 1]]
-        swap = _change("swap them", tokens, start, end, f"{second}{gap}{first}")
+        swap = report.change(start, end, f"{second}{gap}{first}", "swap them")
         report.add("E0131", f"`{first}` and `{second}` are in the wrong order", start, end, fix=swap)
     elif new == "NAME" and text.isalpha():
         report.add("E0110", f"`{text}` is a keyword, not a name", start, end, help=_KEYWORD_HELP)
@@ -245,11 +244,3 @@ def _span(tokens: Tokens, index: int) -> Span:
 
 def _empty(tokens: Tokens, at: int) -> Span:
     return Span(tokens.source, at, at)
-
-
-def _insert(tokens: Tokens, at: int, text: str) -> Fix:
-    return Fix(f"insert `{text.strip()}`", (Edit(_empty(tokens, at), text),))
-
-
-def _change(message: str, tokens: Tokens, start: int, end: int, text: str) -> Fix:
-    return Fix(message, (Edit(Span(tokens.source, start, end), text),))

@@ -9,7 +9,6 @@ from __future__ import annotations
 from bisect import bisect_left
 from typing import Any
 
-from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import mistakes, nodes
 from scenelang.syntax.automaton import reach, statement_depth
@@ -98,8 +97,7 @@ class Recovery(Habits):
         if self._is(at, ";", "{") and self._better_swapped(states, at):
             return False
         if self._is(at, ";"):
-            fix = Fix("remove it", (Edit(Span(tokens.source, start, end), ""),))
-            self.report.add("W0101", "stray `;`", start, end, help="no `;` follows a block", fix=fix)
+            self.report.add("W0101", "stray `;`", start, end, help="no `;` follows a block", fix="")
             tokens.replace(at, 1, [])
             return True
         if self._is(at, "{"):
@@ -128,8 +126,7 @@ class Recovery(Habits):
         before = at - 1
         if at and self._is(before, ";") and not tokens.on_new_line(at):
             start, end = tokens.starts[before], tokens.ends[before]
-            fix = Fix("remove it", (Edit(Span(tokens.source, start, end), ""),))
-            self.report.add("E0130", "`;` between a statement and its block", start, end, fix=fix)
+            self.report.add("E0130", "`;` between a statement and its block", start, end, fix="")
             return
         help = "a block belongs to a geometry, a module, `group`, `material`, `for`, `if` or a boolean word"
         self.report.add("E0129", "block without a head", tokens.starts[at], tokens.ends[at], help=help)
@@ -152,9 +149,8 @@ class Recovery(Habits):
         word = max(read, key=read.__getitem__, default=None)
         if word is None or read[word] <= at + 1 - first:
             return False
-        fix = Fix(f"write `{word}`", (Edit(Span(tokens.source, start, end), word),))
         help = f"it is `{word}` here" if text in FOREIGN_HEADS else f"did you mean `{word}`?"
-        self.report.add("E0132", f"unknown statement `{text}`", start, end, help=help, fix=fix)
+        self.report.add("E0132", f"unknown statement `{text}`", start, end, help=help, fix=word)
         tokens.kinds[first] = self.literals[word]
         return True
 

@@ -81,7 +81,7 @@ class Slips:
             return False
         start, end = tokens.starts[at], tokens.ends[stop - 1]
         span = Span(tokens.source, start, end)
-        fix = Fix("put quotes around it", (Edit(span, f'"{span.text}"'),))
+        fix = self.report.change(start, end, f'"{span.text}"', "put quotes around it")
         self.report.add("E0126", f"expected a string, found `{span.text}`", start, end, fix=fix)
         tokens.replace(at, stop - at, [])
         self._insert(at, "STRING")
@@ -101,8 +101,7 @@ class Slips:
         end = start + found.end()
         written = f'import "{path}" as {alias};'
         message = f"`{found['word']}` without a name for the file"
-        fix: Fix | None = Fix(f"write `{written}`", (Edit(Span(tokens.source, start, end), written),))
-        fix = fix if path.endswith(".nsg") else None  # the file has to be written anew
+        fix = written if path.endswith(".nsg") else None  # any other file has to be written anew
         help = f"write {written} and use what it defines as {alias}.…"
         self.report.add("E0126", message, start, end, help=help, fix=fix)
         stop = first
@@ -140,18 +139,9 @@ class Slips:
             return False
         unit = UNIT_ALIASES.get(word, word)
         start, end = tokens.starts[at - 1], tokens.ends[at]
-        fix = Fix(
-            f"write `{unit}` right after the number",
-            (Edit(Span(tokens.source, tokens.ends[at - 1], end), unit),),
-        )
-        self.report.add(
-            "E0117",
-            "space between a number and its unit",
-            start,
-            end,
-            help="units are glued to their number",
-            fix=fix,
-        )
+        fix = self.report.change(tokens.ends[at - 1], end, unit, f"write `{unit}` right after the number")
+        help = "units are glued to their number"
+        self.report.add("E0117", "space between a number and its unit", start, end, help=help, fix=fix)
         if word in UNITS:
             tokens.ends[at - 1] = end
         else:
@@ -200,10 +190,8 @@ class Slips:
         start, end = tokens.starts[at - 1], tokens.ends[stop - 1]
         text = tokens.source.text[start:end]
         plain = text.replace(",", "")
-        fix = Fix(f"write `{plain}`", (Edit(Span(tokens.source, start, end), plain),))
-        self.report.add(
-            "E0116", f"`{text}` is not a number", start, end, help="digits are not grouped", fix=fix
-        )
+        help = "digits are not grouped"
+        self.report.add("E0116", f"`{text}` is not a number", start, end, help=help, fix=plain)
         tokens.reported.add(start)
         tokens.ends[at - 1] = end
         tokens.replace(at, stop - at, [])

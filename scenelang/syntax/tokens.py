@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Fix, Label
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Edit, Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
 
 MAX_MISTAKES = 200
@@ -32,9 +32,9 @@ class Report:
         *,
         labels: Iterable[Label] = (),
         help: str | None = None,
-        fix: Fix | None = None,
+        fix: Fix | str | None = None,
     ) -> None:
-        """Record a mistake at ``[start, end)``."""
+        """Record a mistake at ``[start, end)``; a fix that is text takes the place of what is there."""
         if self.full:
             return
         if len(self.found) == MAX_MISTAKES:
@@ -48,7 +48,14 @@ class Report:
                 )
             )
             return
+        if isinstance(fix, str):
+            fix = self.change(start, end, fix)
         self.found.append(Diagnostic(code, message, Span(self.source, start, end), tuple(labels), help, fix))
+
+    def change(self, start: int, end: int, text: str, message: str | None = None) -> Fix:
+        """A fix that puts a text in the place of ``[start, end)``."""
+        usual = "remove it" if not text else f"{'insert' if start == end else 'write'} `{text.strip()}`"
+        return Fix(message or usual, (Edit(Span(self.source, start, end), text),))
 
     def flush(self, diagnostics: Diagnostics) -> None:
         """Hand everything over, in the order of the text."""
