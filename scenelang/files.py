@@ -38,7 +38,7 @@ def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
         most_bytes: stop one byte after so many, so that the caller sees that there are more.
 
     Raises:
-        OSError: as the system says, or that it is no regular file.
+        OSError: as the system says, or that it is not a regular file.
     """
     name = os.fspath(path)
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
@@ -62,7 +62,7 @@ def read_json(data: bytes, *, most_depth: int = _JSON_DEPTH) -> Any:
     """The value of JSON text from a stranger.
 
     Raises:
-        ValueError: it is no JSON, nests deeper than ``most_depth``, or says something twice, in which case
+        ValueError: it is not JSON, nests deeper than ``most_depth``, or says something twice, in which case
             two readers could take different meanings from it.
     """
     import json  # not at the top: a command's help needs none
@@ -88,7 +88,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _no_number(constant: str) -> float:
-    raise ValueError(f"{constant} is no JSON number")
+    raise ValueError(f"{constant} is not a JSON number")
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""`scenelang.render` and its Image, from an empty scene to 200 objects, and what is no Program."""
+"""`scenelang.render` and its Image, from an empty scene to 200 objects, and what is not a Program."""
 
 from __future__ import annotations
 

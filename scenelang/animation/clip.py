@@ -202,7 +202,7 @@ def open_clip(path: str | os.PathLike[str], **options: Any) -> Clip:
     """A clip of a scene file; ``options`` as for `Clip`.
 
     Raises:
-        SceneError: the file is no text.
+        SceneError: the file is not text.
         OSError: the file cannot be opened.
     """
     where = Path(path)

@@ -150,7 +150,7 @@ def _drawn(
     workers: Workers | None = None
     spent_s = 0.0
     if painter.backend == "neural":
-        _ = painter.place  # loads torch, which is no part of a frame
+        _ = painter.place  # loads torch, which is not part of a frame
     try:
         for index, number in enumerate(numbers):
             started = time.perf_counter()

@@ -45,7 +45,7 @@ class Scenes:
         selection: which warnings count.
         frames: which frames are looked at.
         sources: their texts, by the names that the user wrote.
-        unread: what there is to say of those that are no text.
+        unread: what there is to say of those that are not text.
     """
 
     request: Request

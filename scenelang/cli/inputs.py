@@ -50,7 +50,7 @@ class Input:
 
     Args:
         name: as the user wrote it.
-        tree: None if it is no text.
+        tree: None if it is not text.
         scene: None if it has errors.
         spans: where its nodes were written.
         diagnostics: what was found so far.

@@ -28,7 +28,7 @@ def load(
 
     Args:
         path: the file.
-        params: values for params whose names are no Python identifiers (``lib.k``) or clash with an
+        params: values for params whose names are not Python identifiers (``lib.k``) or clash with an
             argument here.
         model: render with this model instead of the one that the file names.
         root: folder that imports cannot leave; by default the file's.

@@ -112,7 +112,7 @@ class ExpressionLayout:
         notes: the comments and blank lines around them.
 
     `doubtful` becomes true at what only the builder of the tree can refuse: an escape in a string, a number
-    that may be too large, a call of what may be no name.
+    that may be too large, a call of what may not be a name.
     """
 
     def __init__(self, tokens: Tokens, notes: Mapping[int, Notes]) -> None:

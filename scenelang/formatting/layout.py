@@ -90,7 +90,7 @@ class Block:
         return joined([*parts, " ", self.closing])
 
     def structural(self) -> str | None:
-        """Its one line where it is the block of something that is no object."""
+        """Its one line where it is the block of something that is not an object."""
         few = self.depth <= 1 or (self.depth == 2 and len(self.statements) == 1)
         return self.flat if few else None
 

@@ -35,7 +35,7 @@ class Leaf:
         moves: steps into the parent's space, nearest the leaf first.
         span: where the object was written.
         notes: what was worked out about a leaf that stays from frame to frame of an animation, by what it
-            is; None for a leaf that is used once. It is no part of the value.
+            is; None for a leaf that is used once. It is not part of the value.
     """
 
     geometry: str

@@ -51,7 +51,7 @@ def load_gltf(path: str | os.PathLike[str], *, model: str | None = None, plane: 
     """Read a .gltf or .glb file; arguments as for `import_gltf`.
 
     Raises:
-        GltfError: it is no glTF 2.0, or no scene can be made of it.
+        GltfError: it is not glTF 2.0, or no scene can be made of it.
         OSError: it cannot be read.
     """
     return import_gltf(read_gltf(path), model=model, plane=plane)
@@ -156,7 +156,7 @@ class _Import:
         node = self.gltf.nodes[index]
         path = f"{above}/{_shown(node.name, index)}"
         if index in self._met:
-            raise GltfError(f"{path}: the nodes are no tree: node {index} is met a second time")
+            raise GltfError(f"{path}: the nodes are not a tree: node {index} is met a second time")
         self._met.add(index)
         if depth > MOST_DEPTH:
             raise GltfError(f"{path[:200]}: nodes nested deeper than {MOST_DEPTH}")

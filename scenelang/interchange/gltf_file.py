@@ -26,7 +26,7 @@ Index = Annotated[int, Field(strict=True, ge=0)]
 
 
 class GltfError(Exception):
-    """A file that is no glTF 2.0, or one that cannot become a scene; the message says why."""
+    """A file that is not glTF 2.0, or one that cannot become a scene; the message says why."""
 
 
 class _Part(BaseModel):
@@ -102,7 +102,7 @@ def read_gltf(path: str | os.PathLike[str]) -> Gltf:
     """Read a .gltf or .glb file.
 
     Raises:
-        GltfError: it is no glTF 2.0, or larger than is read.
+        GltfError: it is not glTF 2.0, or larger than is read.
         OSError: it cannot be read.
     """
     return parse_gltf(read_regular(path, MOST_BYTES + _HEADER))
@@ -112,7 +112,7 @@ def parse_gltf(data: bytes) -> Gltf:
     """What a file's bytes say; of a .glb its beginning is enough.
 
     Raises:
-        GltfError: they are no glTF 2.0.
+        GltfError: they are not glTF 2.0.
     """
     text = _first_chunk(data) if data[:4] == b"glTF" else data
     if len(text) > MOST_BYTES:

@@ -33,7 +33,7 @@ def _position(place: tuple[int, int]) -> dict[str, int]:
 
 
 def tree_text(file: nodes.File) -> str:
-    """One line for each node: the field that holds it, its kind, what is no node in it, its place."""
+    """One line for each node: the field that holds it, its kind, what is not a node in it, its place."""
     with deep_stack():
         return "".join(_lines(file, "", ""))
 

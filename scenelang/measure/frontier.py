@@ -201,7 +201,7 @@ class Frontier:
         """
         found = read_json(data)
         if not isinstance(found, dict) or found.pop("format", None) != FORMAT:
-            raise ValueError(f"no frontier of format {FORMAT}")
+            raise ValueError(f"not a frontier of format {FORMAT}")
         if isinstance(points := found.get("points"), list):
             found["points"] = [
                 p for p in points if not isinstance(p, dict) or p.pop("precision", "float32") == "float32"

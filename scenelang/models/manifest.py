@@ -66,7 +66,7 @@ class Manifest:
         """Read a manifest.
 
         Raises:
-            ValueError: it is no JSON, a field is missing or unknown, or holds what it cannot.
+            ValueError: it is not JSON, a field is missing or unknown, or holds what it cannot.
         """
         text = text.encode("utf-8") if isinstance(text, str) else text
         if len(text) > _MOST_BYTES:

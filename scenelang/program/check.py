@@ -125,5 +125,5 @@ def check_evaluated(
         )
         left = wanted - looked
     if tree is not None and not diagnostics.errors:
-        find_unused(tree, diagnostics)  # a name that is misspelt where it is used is no second mistake
+        find_unused(tree, diagnostics)  # a name that is misspelt where it is used is not a second mistake
     return left

@@ -142,7 +142,7 @@ def _check_settings(program: Program) -> None:
     if colour is not None and not (
         len(colour) == 3 and all(type(v) in (int, float) and 0 <= v <= 1 for v in colour)
     ):
-        raise ProgramError(f"a background of {colour!r}, which is no colour")
+        raise ProgramError(f"a background of {colour!r}, which is not a colour")
     if not program.model:
         raise ProgramError("no model is named")
     if len(program.weights) != 64 or any(c not in "0123456789abcdef" for c in program.weights):

@@ -144,7 +144,7 @@ def _header(file: TensorFile) -> dict[str, Any]:
 def _names(header: dict[str, Any], key: str) -> list[str]:
     names = header[key]
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise ProgramError(f"`{key}` in the header are no names")
+        raise ProgramError(f"`{key}` in the header are not names")
     return names
 
 

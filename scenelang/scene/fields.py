@@ -16,7 +16,7 @@ from scenelang.scene.wording import refusal
 _NOT_0: dict[str, Any] = {"not": {"const": 0}}
 _NOT_000: dict[str, Any] = {"not": {"const": [0, 0, 0]}}
 
-# Strict: text such as "0.5" is no number. Integers are.
+# Strict: text such as "0.5" is not a number. Integers are.
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Length = Annotated[Finite, Field(description="world units; the shorter side of the canvas spans 2")]
 Radians = Annotated[Finite, Field(description="radians, counter-clockwise")]
@@ -60,7 +60,7 @@ Combine = Literal["union", "smooth", "subtract", "intersect"]
 def _whole(value: Any) -> Any:
     """256.0 is an integer and true is none, as in JSON Schema."""
     if isinstance(value, bool):
-        raise ValueError("true and false are no numbers")
+        raise ValueError("true and false are not numbers")
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 

@@ -81,7 +81,7 @@ def from_json(text: str | bytes) -> Scene:
     """A Scene from JSON.
 
     Raises:
-        SceneError: text that is no JSON, or no Scene.
+        SceneError: text that is not JSON, or not a Scene.
     """
     if isinstance(text, bytes):
         try:
@@ -177,7 +177,7 @@ def _build(data: Any, adapter: TypeAdapter[Any], source: SourceFile, path: tuple
 
 
 def _refuse(constant: str) -> float:
-    raise ValueError(f"{constant} is no JSON number")
+    raise ValueError(f"{constant} is not a JSON number")
 
 
 def _failure(message: str, span: Span | None = None, help: str | None = None) -> SceneError:

@@ -253,7 +253,7 @@ class Scene(Frozen):
         """Read JSON; like `model_validate_json`, and for scenes of any depth.
 
         Raises:
-            SceneError: text that is no JSON, or no Scene; it names each place.
+            SceneError: text that is not JSON, or not a Scene; it names each place.
         """
         from scenelang.scene.json import from_json
 

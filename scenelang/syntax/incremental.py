@@ -34,7 +34,7 @@ from scenelang.syntax.tokens import Report, Tokens
 _REACH: Final = 3 * FOLLOWED
 _MOST_MISTAKES: Final = 50  # with more of them the whole text is read: some limit may be near
 _GLOBAL: Final = ("E0115", "E0120", "E0121", "E0133")
-"""An open comment, nesting, too many, habits of other languages: these are no matter of one statement."""
+"""An open comment, nesting, too many, habits of other languages: these concern more than one statement."""
 
 
 @dataclass(slots=True)

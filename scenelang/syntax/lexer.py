@@ -183,7 +183,12 @@ class _Slips:
 
     def _hash(self, start: int, end: int, text: str) -> None:
         self.report.add(
-            "E0127", "`#` begins no comment", start, start + 1, help="comments begin with `//`", fix="//"
+            "E0127",
+            "`#` does not begin a comment",
+            start,
+            start + 1,
+            help="comments begin with `//`",
+            fix="//",
         )
 
     def _colour(self, start: int, end: int, text: str) -> None:

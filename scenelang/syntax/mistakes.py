@@ -101,7 +101,7 @@ def report_unexpected(tokens: Tokens, report: Report, at: int) -> None:
     start, end = tokens.starts[at], tokens.ends[at]
     if tokens.kinds[at] == END:
         start = end = tokens.end_before(at)
-    report.add("E0122", f"this is no statement: unexpected {_shown(tokens, at)}", start, end)
+    report.add("E0122", f"this is not a statement: unexpected {_shown(tokens, at)}", start, end)
 
 
 def _report_insertion(

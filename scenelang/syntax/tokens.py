@@ -8,7 +8,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Edit, Fix,
 from scenelang.diagnostics.span import SourceFile, Span
 
 MAX_MISTAKES = 200
-"""After so many the rest of a file is not reported: it is no scene."""
+"""After so many the rest of a file is not reported: it is not a scene."""
 
 
 class Report:
@@ -78,7 +78,7 @@ class Tokens:
         starts: offset of its first code point.
         ends: offset after its last one.
         reported: where tokens and illegal characters begin that a mistake has been reported for.
-        cut: the text ends inside a comment, so what is missing at its end is no further mistake.
+        cut: the text ends inside a comment, so what is missing at its end is not a further mistake.
     """
 
     __slots__ = ("cut", "ends", "kinds", "reported", "source", "starts")

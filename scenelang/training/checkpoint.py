@@ -28,7 +28,7 @@ def load_tensors(path: Path, device: str = "cpu") -> tuple[dict[str, Tensor], di
 
     Raises:
         OSError: it cannot be read.
-        ModelError: it is no such file, or a damaged one.
+        ModelError: it is not such a file, or a damaged one.
     """
     data = read_regular(path, _MOST_BYTES)
     try:

@@ -30,7 +30,7 @@ class Folder:
         return name
 
     def run(self, *arguments: str, stdin: str | None = None) -> Result:
-        """Run a command; whatever is no exit is raised."""
+        """Run a command; whatever is not an exit is raised."""
         result = CliRunner().invoke(cli, arguments, input=stdin, prog_name="scenelang")
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             raise result.exception

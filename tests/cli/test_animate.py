@@ -93,7 +93,7 @@ def test_params_and_reference(folder: Folder) -> None:
         (("a.nsg", "-o", "a.png", "--frames", "0..1"), 2, "holds one picture"),
         (("a.nsg", "-o", "a.png", "--fps", "3"), 2, "holds one picture"),
         (("a.nsg", "-o", "a.gif", "--frames", "3..1"), 2, "is empty"),
-        (("a.nsg", "-o", "a.gif", "--frames", "x"), 2, "no range of frames"),
+        (("a.nsg", "-o", "a.gif", "--frames", "x"), 2, "not a range of frames"),
         (("a.nsg", "-o", "a.gif", "--frames", "2..9"), 1, "frame 9 is outside 0..3"),
         (("a.nsg", "-o", "a.gif", "--frame", "1", "--frames", "2"), 2, "--frame asks for a picture"),
         (("a.nsg", "b.nsg", "-o", "out", "--fps", "3"), 2, "take one scene"),

@@ -145,7 +145,7 @@ def test_a_missing_or_damaged_frontier(shipped: Folder) -> None:
     path.write_text("{}", "utf-8")
     result = shipped.run("render", shipped.write("a.nsg"), "-o", "a.png", "--max-ms", "20")
     assert result.exit_code == 2
-    assert "the frontier of `shapes2d` is damaged: no frontier of format 1" in result.stderr
+    assert "the frontier of `shapes2d` is damaged: not a frontier of format 1" in result.stderr
     path.unlink()
     result = shipped.run("render", "a.nsg", "-o", "a.png", "--max-ms", "20")
     assert result.exit_code == 2

@@ -111,7 +111,7 @@ def test_shapes_in_weights_are_shapes(shape: object, monkeypatch: pytest.MonkeyP
 def test_a_program_has_a_colour_behind_it(background: list[float]) -> None:
     """numpy has no isfinite for 10^400, and -1e308 overflows float32."""
     program = compile_scene(loads("star { }"))
-    with pytest.raises(ProgramError, match="which is no colour"):
+    with pytest.raises(ProgramError, match="which is not a colour"):
         replace(program, background=tuple(background))
 
 
@@ -212,7 +212,7 @@ def test_formatting_takes_stray_semicolons_out(text: str, laid: str) -> None:
     [("a\udcff.nsg", "a%FF.nsg"), ("\ud800.nsg", "%ED%A0%80.nsg"), ("/é b.nsg", "file:///%C3%A9%20b.nsg")],
 )
 def test_files_whose_names_are_no_text(name: str, uri: str) -> None:
-    """Python names a file that is no UTF-8 by lone surrogates, of which SARIF made no URI."""
+    """Python names a file that is not UTF-8 by lone surrogates, of which SARIF made no URI."""
     source = SourceFile(name, "let")
     found = Diagnostics()
     parse(source, found)

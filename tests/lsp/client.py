@@ -152,7 +152,7 @@ class Client:
         return True
 
     def answer(self, request: int | None, seconds: float = PATIENCE_S) -> Json:
-        """The whole answer to a request; to None, that to what is no request."""
+        """The whole answer to a request; to None, that to what is not a request."""
         end = time.monotonic() + seconds
         while request not in self._answers:
             assert self._take(end - time.monotonic()), f"no answer to {request}"

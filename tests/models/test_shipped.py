@@ -16,7 +16,7 @@ MODELS = available()
 
 @pytest.mark.parametrize("name", MODELS)
 def test_it_draws_unseen_scenes_better_than_nothing_does(name: str) -> None:
-    """A white picture is no easy rival: most of a picture is white."""
+    """A white picture is not an easy rival: most of a picture is white."""
     model = open_model(name)
     scene_at = scenes_of(model, "unions", 77)
     size = model.manifest.sizes[0] if model.manifest.sizes else (64, 64)

@@ -94,7 +94,7 @@ class Proof:
 def stages(scene: Scene) -> list[tuple[str, Graph]] | None:
     """The graph as lowered and after each pass; None where the boolean rule refuses the scene.
 
-    Checks report what a model cannot draw, which is no matter here.
+    Checks report what a model cannot draw, which does not matter here.
     """
     diagnostics = Diagnostics()
     graph = lower(scene, MANIFEST, None, diagnostics)

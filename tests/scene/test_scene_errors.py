@@ -145,7 +145,7 @@ def test_labels_show_what_else_takes_part(text: str, labels: list[tuple[str, str
 
 
 def test_diagnostics_of_what_recovery_skipped_stay_single() -> None:
-    """A definition lost to a syntax error is no second mistake where it is used."""
+    """A definition lost to a syntax error is not a second mistake where it is used."""
     outcome = run_text("let size 5;\nsquare { scale(size); }")
     assert outcome.scene is None
     assert [code[:3] for code in outcome.codes] == ["E01"]

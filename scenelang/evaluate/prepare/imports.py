@@ -29,7 +29,7 @@ _BROUGHT = (nodes.Param, nodes.Let, nodes.Fn, nodes.Module, nodes.Import, nodes.
 
 
 class Unreadable(Exception):
-    """A file that is no scene text; the message says why."""
+    """A file that is not scene text; the message says why."""
 
     def __init__(self, code: str, message: str) -> None:
         super().__init__(message)
@@ -41,7 +41,7 @@ def read_source(path: Path, name: str) -> SourceFile:
 
     Raises:
         Unreadable: too large, or not UTF-8.
-        OSError: as the system says, or that it is no regular file.
+        OSError: as the system says, or that it is not a regular file.
     """
     return decode_source(read_regular(path, MAX_BYTES), name)
 

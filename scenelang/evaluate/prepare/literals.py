@@ -127,7 +127,7 @@ def member(code: Code, name: nodes.Name, unit: Unit, of: nodes.Expr | None = Non
 
     def pick(value: Any) -> Any:
         if value.__class__ is not Vec:
-            raise Problem("E0301", f"'.{name.text}' of {describe(value)}, which is no vector")
+            raise Problem("E0301", f"'.{name.text}' of {describe(value)}, which is not a vector")
         if at >= len(value.items):
             raise Problem("E0307", f"'.{name.text}' of {describe(value)}")
         return value.items[at]
@@ -154,7 +154,7 @@ def _index(expr: nodes.Index, unit: Unit, scope: Scope) -> Code:
         else:
             raise Problem("E0301", f"expected a vector or a range, found {describe(value)}", operand=0)
         if not at.is_integer():
-            raise Problem("E0307", f"index {at:.6g} is no whole number", "round it with floor(…)", 1)
+            raise Problem("E0307", f"index {at:.6g} is not a whole number", "round it with floor(…)", 1)
         if not 0 <= at < length:
             where = f"outside 0..{length - 1}" if length else "into an empty vector"
             raise Problem("E0307", f"index {at:.0f} is {where}", operand=1)

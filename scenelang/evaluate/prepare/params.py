@@ -196,7 +196,7 @@ def from_python(value: Any) -> Any:
 
 
 def literal(text: str, unit: Unit) -> Any:
-    """The value of a literal; None where ``text`` is no literal."""
+    """The value of a literal; None where ``text`` is not a literal."""
     diagnostics = Diagnostics()
     head = "let value = "
     file = parse(SourceFile("", f"{head}{text};"), diagnostics)

@@ -126,7 +126,7 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
 
 
 def _unknown_time(session: Session) -> Action:
-    """What `animate` with a mistake does: its variables are unknown, which is no further mistake."""
+    """What `animate` with a mistake does: its variables are unknown, which is not a further mistake."""
 
     def action(env: Env, out: Builder) -> None:
         session.animated[:] = [POISON] * 4

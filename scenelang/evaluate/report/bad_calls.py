@@ -148,7 +148,7 @@ def _report_definition(
     index, missing = lost
     inside = items[index]
     help = f"'{missing}' is used inside: add it to the parameters"
-    used = (Label(inside.span, "it is no parameter"),) if inside.span else ()
+    used = (Label(inside.span, "it is not a parameter"),) if inside.span else ()
     items[index] = Diagnostic("E0308", message, name.span, (*used, *labels), help)
 
 

@@ -44,7 +44,7 @@ class Shared:
     again: dict[Span, None] = field(default_factory=dict)
 
 
-_FOUND: Final = re.compile(r"found (?!a number$)(.*)$|of (.*), which is no vector$")
+_FOUND: Final = re.compile(r"found (?!a number$)(.*)$|of (.*), which is not a vector$")
 _PAIR: Final = re.compile(r"^cannot \w+ (.*) and (.*)$")
 _ANGLE: Final = "a bare number beside an angle"
 _OUTSIDE: Final = "outside"

@@ -66,7 +66,7 @@ def power(a: float, b: float) -> float:
     except ValueError:
         if a == 0.0:
             raise Problem("E0304", "division by zero: 0 to a negative power") from None
-        raise Problem("E0305", "a negative number to a power that is no integer") from None
+        raise Problem("E0305", "a negative number to a power that is not an integer") from None
 
 
 ARITHMETIC: Final[dict[str, Callable[[float, float], float]]] = {

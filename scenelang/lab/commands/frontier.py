@@ -123,7 +123,7 @@ def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path 
     except FileNotFoundError:
         raise click.UsageError(f"'{base}' ships no frontier; measure one and give --promises") from None
     except ValueError as error:
-        raise click.UsageError(f"'{path}' is no frontier: {error}") from None
+        raise click.UsageError(f"'{path}' is not a frontier: {error}") from None
     try:
         found = verify(frontier, base, scenes, VERIFY_SEED if seed is None else seed, common.reporter())
     except ValueError as error:

@@ -146,5 +146,5 @@ class _Arrays(pickle.Unpickler):
 def _reconstruct(kind: type, shape: tuple[int, ...], code: bytes) -> Any:
     """As numpy's function of that name, for plain arrays alone."""
     if kind is not np.ndarray or shape != (0,):
-        raise LpipsError("weights that are no plain arrays")
+        raise LpipsError("weights that are not plain arrays")
     return np.ndarray.__new__(np.ndarray, shape, code.decode())
