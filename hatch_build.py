@@ -18,14 +18,15 @@ class Tables(BuildHookInterface):  # type: ignore[misc, type-arg]
         """Make them; in an editable install they go where the checkout looks for them."""
         sys.path.insert(0, self.root)
         from scenelang.syntax.generate import make
-        from scenelang.syntax.tables import PLACE, grammar_path
+        from scenelang.syntax.tables import PLACE, grammar_path, source_mark
 
+        grammar = grammar_path()
         if version == "editable":
-            make(grammar_path(), PLACE)
+            make(grammar, PLACE, source_mark(grammar))
             return
         self.folder = tempfile.mkdtemp()
         place = Path(self.folder, "tables.json")
-        make(grammar_path(), place)
+        make(grammar, place, source_mark(grammar))
         build_data["force_include"][str(place)] = "scenelang/syntax/tables.json"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:

@@ -61,7 +61,7 @@ def measure(kind: str, count: int) -> dict[str, float | int | str]:
     from scenelang.models.manifest import load_manifest
     from scenelang.passes import check_scene
     from scenelang.program.compile import compile_scene
-    from scenelang.program.store import program_bytes
+    from scenelang.program.program import program_bytes
 
     manifest = load_manifest("shapes2d")
     scene = scene_of(kind, count)

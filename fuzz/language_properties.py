@@ -16,7 +16,8 @@ from fuzz.drawn import drawn
 from fuzz.target import Failure, hold, load_target
 from fuzz.targets.parse import BEYOND
 from scenelang.deep import deep_stack
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.api import loads
 from scenelang.syntax import parse

@@ -11,10 +11,12 @@ from typing import Any
 from fuzz.target import Failure, hold
 from scenelang.diagnostics import render
 from scenelang.diagnostics.codes import CODES
-from scenelang.diagnostics.diagnostic import Diagnostic, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostic
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.program.compile import compile_scene
-from scenelang.program.store import parse_program, program_bytes
+from scenelang.program.program import program_bytes
+from scenelang.program.store import parse_program
 from scenelang.scene.schema import Scene
 from scenelang.syntax import nodes
 

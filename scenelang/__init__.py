@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from scenelang.backend.render import render as render
     from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
     from scenelang.diagnostics.diagnostic import Diagnostics as Diagnostics
-    from scenelang.diagnostics.diagnostic import SceneError as SceneError
+    from scenelang.diagnostics.error import SceneError as SceneError
     from scenelang.evaluate.api import load as load
     from scenelang.evaluate.api import loads as loads
     from scenelang.formatting.format import format_text as format_text
@@ -61,7 +61,8 @@ _HOME: Final = {
     "scenelang.animation.timing": ("FramesError",),
     "scenelang.backend.errors": ("RenderError",),
     "scenelang.backend.render": ("render",),
-    "scenelang.diagnostics.diagnostic": ("Diagnostic", "Diagnostics", "SceneError"),
+    "scenelang.diagnostics.diagnostic": ("Diagnostic", "Diagnostics"),
+    "scenelang.diagnostics.error": ("SceneError",),
     "scenelang.formatting.format": ("format_text",),
     "scenelang.image": ("Image",),
     "scenelang.measure.metrics": ("compare",),

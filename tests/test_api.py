@@ -11,7 +11,7 @@ import pytest
 import scenelang as nsg
 from scenelang.backend import neural
 from scenelang.backend.memory import keep_memory
-from scenelang.backend.render import Device
+from scenelang.backend.options import Device
 from scenelang.models.framed import load_arrays
 from scenelang.renderers.draw import draw
 

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 from scenelang.syntax.tables import tables
@@ -106,6 +107,16 @@ def test_imports_run_forward() -> None:
         if target in MODULES and target not in BARE and place(target) > place(module)
     ]
     assert not wrong, "\n".join(wrong)
+
+
+def test_no_imports_run_in_a_circle() -> None:
+    """Imports for types alone and in functions count: they are read in an order too."""
+    graph = {
+        module: {target for target, _ in imports(path) if target in MODULES and target != module}
+        for module, path in MODULES.items()
+        if module not in FACADES and not inside(module, "scenelang.evaluate")
+    }
+    TopologicalSorter(graph).prepare()  # raises CycleError, which names one
 
 
 def test_reference_and_renderers_stay_apart() -> None:

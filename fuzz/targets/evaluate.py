@@ -22,12 +22,13 @@ from fuzz import text
 from fuzz.oracles import check_compiling, check_diagnostics, same
 from fuzz.target import Target, hold, sampled
 from scenelang.deep import deep_stack
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.render import render_json
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate import evaluation as evaluating
 from scenelang.program.compile import compile_scene
-from scenelang.program.store import program_bytes
+from scenelang.program.program import program_bytes
 from scenelang.scene.schema import Scene
 
 SMALL: Final = {

@@ -10,7 +10,8 @@ from fuzz import text
 from fuzz.oracles import check_diagnostics
 from fuzz.target import Target, hold
 from scenelang.deep import deep_stack
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.formatting import format_text
 from scenelang.syntax import parse

@@ -10,7 +10,7 @@ from typing import Any
 from fuzz import trees
 from fuzz.target import Target, hold
 from scenelang.deep import deep_stack
-from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.api import loads
 from scenelang.interchange.gltf import import_gltf
 from scenelang.interchange.gltf_file import GltfError, parse_gltf

@@ -11,7 +11,7 @@ from fuzz import text, trees
 from fuzz.oracles import check_compiling, check_diagnostics
 from fuzz.target import Failure, Target, hold, sampled
 from scenelang.deep import deep_stack
-from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.api import loads
 from scenelang.evaluate.vocabulary import MATERIAL_OPS, TRANSFORMS
 from scenelang.models.manifest import available, load_manifest

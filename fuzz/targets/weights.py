@@ -21,7 +21,8 @@ from fuzz.oracles import check_diagnostics
 from fuzz.target import Target, hold
 from scenelang.backend.errors import RenderError
 from scenelang.backend.neural import draw_program
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.api import loads
 from scenelang.evaluate.evaluation import load_source

@@ -16,7 +16,7 @@ from scenelang.scene.schema import Scene
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
-    from scenelang.backend.render import Backend, Device
+    from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
 
 Frames = range | str | None

@@ -13,7 +13,7 @@ from scenelang.animation.clip import Clip, Shot
 from scenelang.animation.store import frame_key
 
 if TYPE_CHECKING:
-    from scenelang.backend.render import Backend, Device
+    from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
     from scenelang.program.program import Program
     from scenelang.renderers.kept import Kept

@@ -14,7 +14,7 @@ from scenelang.animation.painting import Painter
 from scenelang.animation.pictures import Film
 from scenelang.animation.store import Store, deliver
 from scenelang.animation.targets import Target
-from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.diagnostics.error import SceneError
 from scenelang.files import output_place, write_whole
 
 if TYPE_CHECKING:

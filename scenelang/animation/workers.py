@@ -54,7 +54,7 @@ class Workers:
         Raises:
             RenderError, OSError: an earlier one failed.
         """
-        from scenelang.program.store import program_bytes
+        from scenelang.program.program import program_bytes
 
         while len(self._waiting) >= AHEAD * self.count:
             self.take()

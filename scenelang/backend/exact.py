@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.graph.lower import Spans, lower
 from scenelang.image import Image
 from scenelang.program.compile import find_model

@@ -17,7 +17,7 @@ import torch
 
 from scenelang.backend.errors import RenderError
 from scenelang.backend.memory import keep_memory
-from scenelang.backend.render import Samples
+from scenelang.backend.options import Samples
 from scenelang.backend.small import check_fits
 from scenelang.models.load import Model, ModelError, load_model, place_of
 from scenelang.program.program import Program, ProgramError

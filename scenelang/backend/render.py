@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, get_args
 
 from scenelang.backend.errors import RenderError
+from scenelang.backend.options import Backend, Device, Samples
 from scenelang.scene.schema import Scene
 
 if TYPE_CHECKING:
     from scenelang.image import Image
     from scenelang.program.program import Program
-
-Backend = Literal["neural", "reference"]
-Device = Literal["auto", "cpu", "cuda"]
-Samples = Literal["adaptive", "four", "one"]
 
 
 def render(

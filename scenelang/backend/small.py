@@ -12,7 +12,7 @@ from typing import Final, Literal, NamedTuple
 
 from scenelang.backend.errors import RenderError
 from scenelang.backend.memory import keep_memory
-from scenelang.backend.render import Device, Samples
+from scenelang.backend.options import Device, Samples
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError

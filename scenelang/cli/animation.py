@@ -12,7 +12,8 @@ from scenelang.animation.clip import Clip
 from scenelang.animation.targets import PICTURES, Target, TargetError, find_target, is_animation
 from scenelang.animation.timing import FrameRange, FramesError
 from scenelang.cli.inputs import STDIN, Request, read_text
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.diagnostics.suggest import listing
 

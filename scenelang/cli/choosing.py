@@ -12,7 +12,7 @@ from scenelang.cli.jobs import Job, program_notes
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from scenelang.backend.render import Samples
+    from scenelang.backend.options import Samples
     from scenelang.measure.choose import Choice, Offer
     from scenelang.measure.frontier import Frontier, Limits, Point
     from scenelang.program.program import Program
@@ -146,7 +146,8 @@ def _compiled(job: Job, program: Program, point: Point) -> Program | str:
     """The Program for a point's model; the reason where it cannot draw the scene as promised."""
     if point.model in (None, program.model):
         return program
-    from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+    from scenelang.diagnostics.diagnostic import Diagnostics
+    from scenelang.diagnostics.error import SceneError
     from scenelang.program.compile import compile_scene
 
     source = job.source

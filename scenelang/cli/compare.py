@@ -35,7 +35,7 @@ def command(
     from scenelang.cli.inputs import read_scene
     from scenelang.cli.outputs import composed
     from scenelang.cli.say import need_metrics, say_diagnostics
-    from scenelang.diagnostics.diagnostic import SceneError
+    from scenelang.diagnostics.error import SceneError
 
     need_metrics()
     stem = "stdin" if scene == "-" else Path(scene).stem

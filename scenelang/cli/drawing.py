@@ -11,7 +11,7 @@ from scenelang.cli.inputs import Request
 from scenelang.cli.jobs import Job
 
 if TYPE_CHECKING:
-    from scenelang.backend.render import Device, Samples
+    from scenelang.backend.options import Device, Samples
     from scenelang.image import Image
     from scenelang.measure.frontier import Limits
 

@@ -64,7 +64,7 @@ class _Run:
 
     def take(self, name: str) -> None:
         """Format one file."""
-        from scenelang.diagnostics.diagnostic import SceneError
+        from scenelang.diagnostics.error import SceneError
         from scenelang.formatting import format_text
 
         try:

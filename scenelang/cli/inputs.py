@@ -143,7 +143,7 @@ def _from_json(
     if request.frame:
         fact = f"frame {request.frame} of a scene from JSON, which is one frame"
         diagnostics.add("E0337", fact, None, help="convert that frame of the animation to JSON")
-    return load_json(source, diagnostics)
+    return load_json(source, Scene, diagnostics)
 
 
 def _with_scene(found: Input, scene: Scene | None, spans: SpanMap, request: Request) -> Input:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from scenelang.cli.clock import Clock
 from scenelang.cli.inputs import Input, Request, read_input
-from scenelang.diagnostics.diagnostic import Diagnostic, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostic
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.graph.nodes import Graph, Leaf
 from scenelang.graph.walk import nodes

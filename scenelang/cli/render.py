@@ -12,7 +12,7 @@ from scenelang.cli import options
 
 if TYPE_CHECKING:
     from scenelang.animation.targets import Target
-    from scenelang.backend.render import Samples
+    from scenelang.backend.options import Samples
     from scenelang.cli.animation import Wanted
     from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import Request
@@ -196,7 +196,8 @@ def _animate(
     from scenelang.cli.main import Trouble, describe
     from scenelang.cli.progress import Bar
     from scenelang.cli.say import say_diagnostics
-    from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+    from scenelang.diagnostics.diagnostic import Diagnostics
+    from scenelang.diagnostics.error import SceneError
 
     started = time.perf_counter()
     found = Diagnostics()

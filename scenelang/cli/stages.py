@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import click
 
 from scenelang.cli.inputs import Input, Request, read_scene
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.graph.nodes import Graph
 
 if TYPE_CHECKING:

@@ -121,17 +121,3 @@ class Diagnostics:
 
     def __len__(self) -> int:
         return len(self.items)
-
-
-class SceneError(Exception):
-    """Raised by the library where a scene has errors; carries the diagnostics.
-
-    Args:
-        diagnostics: all that was found, errors and warnings.
-    """
-
-    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
-        self.diagnostics = tuple(diagnostics)
-        from scenelang.diagnostics.render import render_text
-
-        super().__init__(render_text(self.diagnostics, fixable=0))

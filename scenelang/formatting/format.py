@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.formatting.documents import Part
 from scenelang.formatting.layout import Layout

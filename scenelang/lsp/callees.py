@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from scenelang.lsp import words
 from scenelang.lsp.context import Cursor
+from scenelang.lsp.describe import describe_symbol
 from scenelang.lsp.sight import sight_at
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.resolve.names import Names
@@ -67,8 +68,6 @@ def find_symbol(
 
 def callee_of(symbol: Symbol) -> Callee:
     """A fn or module as a callee."""
-    from scenelang.lsp.signatures import describe_symbol
-
     head, text = describe_symbol(symbol)
     return Callee(symbol.name, head, tuple(p.name for p in symbol.params), {}, text)
 

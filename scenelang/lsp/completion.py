@@ -13,8 +13,8 @@ from scenelang.lsp import words
 from scenelang.lsp.callees import Callee, find_callee
 from scenelang.lsp.completion_items import Item, strings, units
 from scenelang.lsp.context import COMBINE, Cursor, cursor_at
+from scenelang.lsp.describe import describe_symbol
 from scenelang.lsp.sight import sight_at
-from scenelang.lsp.signatures import describe_symbol
 from scenelang.lsp.vocabulary import vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.resolve.names import Names

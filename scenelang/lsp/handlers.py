@@ -8,7 +8,7 @@ from typing import Any, Final
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException
 
-from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.diagnostics.error import SceneError
 from scenelang.lsp import (
     actions,
     colours,

@@ -9,7 +9,7 @@ from lsprotocol import types
 
 from scenelang.lsp import values, words
 from scenelang.lsp.check import Seen
-from scenelang.lsp.signatures import describe_symbol
+from scenelang.lsp.describe import describe_symbol
 from scenelang.lsp.tree import path_to
 from scenelang.lsp.vocabulary import space_of, vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace

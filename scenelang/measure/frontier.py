@@ -15,7 +15,7 @@ from typing import Any, Final, Literal
 
 from pydantic import ConfigDict, NonNegativeFloat, NonNegativeInt, PositiveInt, TypeAdapter, ValidationError
 
-from scenelang.backend.render import Samples
+from scenelang.backend.options import Samples
 from scenelang.files import read_json, read_regular
 from scenelang.models.manifest import ROOT, available, load_manifest
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING
 
-from scenelang.diagnostics.diagnostic import Diagnostics, Label, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics, Label
+from scenelang.diagnostics.error import SceneError
 from scenelang.graph.lower import Memory, Spans
 from scenelang.graph.nodes import Graph
 from scenelang.models.choose import apart, best_of_sets, choose_model

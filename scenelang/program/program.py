@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,7 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.files import write_output
 from scenelang.notebook import bundle
+from scenelang.tensors import FORMAT
 
 MOST_OBJECTS = 100_000
 MOST_PIXELS = 8192
@@ -103,9 +106,37 @@ class Program:
         Raises:
             OSError: the file cannot be written.
         """
-        from scenelang.program.store import save_program
+        write_output(path, program_bytes(self))
 
-        save_program(self, path)
+
+def program_bytes(program: Program) -> bytes:
+    """The file of a Program; equal Programs give equal bytes."""
+    from safetensors.numpy import save
+
+    geometries = sorted(set(program.objects))
+    files = sorted({place.file for place in program.places if place is not None})
+    of_geometry = {name: index for index, name in enumerate(geometries)}
+    of_file = {name: index for index, name in enumerate(files)}
+    places = [(-1,) * 5 if place is None else (of_file[place.file], *place[1:]) for place in program.places]
+    header = {
+        "background": program.background,
+        "canvas": program.canvas,
+        "files": files,
+        "format": FORMAT,
+        "geometries": geometries,
+        "model": program.model,
+        "weights": program.weights,
+    }
+    tensors: dict[str, npt.NDArray[Any]] = {
+        "vectors": program.vectors,
+        "tokens": program.tokens,
+        "bounds": program.bounds,
+        "objects": np.array([of_geometry[name] for name in program.objects], dtype=np.int32),
+        "places": np.array(places, dtype=np.int32).reshape(len(program), 5),
+    }
+    text = json.dumps(header, sort_keys=True, separators=(",", ":"))
+    data: bytes = save(tensors, metadata={"scenelang": text})
+    return data
 
 
 def _frozen(name: str, array: Any, dtype: type[np.generic], shape: tuple[int, ...]) -> npt.NDArray[Any]:

@@ -7,16 +7,14 @@ end column), all -1 where unknown. The header is the metadata entry ``scenelang`
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import read_regular, write_output
+from scenelang.files import read_regular
 from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
-from scenelang.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
+from scenelang.tensors import MOST_HEADER, TensorError, TensorFile, read_tensors
 
 MOST_BYTES = MOST_HEADER + 8 + MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20)
 
@@ -27,45 +25,6 @@ _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
     "objects": ("I32", ()),
     "places": ("I32", (5,)),
 }
-
-
-def save_program(program: Program, path: str | Path) -> None:
-    """Write a Program to a temporary file beside ``path``, then rename it: whole or not at all.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
-    write_output(path, program_bytes(program))
-
-
-def program_bytes(program: Program) -> bytes:
-    """The file of a Program; equal Programs give equal bytes."""
-    from safetensors.numpy import save
-
-    geometries = sorted(set(program.objects))
-    files = sorted({place.file for place in program.places if place is not None})
-    of_geometry = {name: index for index, name in enumerate(geometries)}
-    of_file = {name: index for index, name in enumerate(files)}
-    places = [(-1,) * 5 if place is None else (of_file[place.file], *place[1:]) for place in program.places]
-    header = {
-        "background": program.background,
-        "canvas": program.canvas,
-        "files": files,
-        "format": FORMAT,
-        "geometries": geometries,
-        "model": program.model,
-        "weights": program.weights,
-    }
-    tensors: dict[str, npt.NDArray[Any]] = {
-        "vectors": program.vectors,
-        "tokens": program.tokens,
-        "bounds": program.bounds,
-        "objects": np.array([of_geometry[name] for name in program.objects], dtype=np.int32),
-        "places": np.array(places, dtype=np.int32).reshape(len(program), 5),
-    }
-    text = json.dumps(header, sort_keys=True, separators=(",", ":"))
-    data: bytes = save(tensors, metadata={"scenelang": text})
-    return data
 
 
 def load_program(path: str | Path, *, weights: str | None = None) -> Program:

@@ -8,20 +8,23 @@ from __future__ import annotations
 
 import json
 from difflib import get_close_matches
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticSerializationError
 
 from scenelang.deep import deep_stack
-from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.files import depth_of_json
-from scenelang.scene import schema, wording
+from scenelang.scene import modifiers, nodes, wording
 from scenelang.scene.json_places import Key, Value, deeper_than, follow, read_places, record_places
-from scenelang.scene.schema import MAX_NODE_DEPTH, Link, Object, Scene, SceneNode
+from scenelang.scene.nodes import MAX_NODE_DEPTH, Link, Object, SceneData, SceneNode
 from scenelang.scene.spans import SpanMap
+
+S = TypeVar("S", bound=SceneData)
 
 MAX_CHARS: Final = 200_000_000
 _BRACKETS_PER_NODE: Final = 3  # a link of a chain: list, link, node
@@ -31,7 +34,7 @@ _MAX_PATH: Final = 80
 _WIDTH: Final = 90
 
 
-def to_json(scene: Scene) -> str:
+def to_json(scene: SceneData) -> str:
     """JSON of a Scene, on one line."""
     try:
         return scene.model_dump_json()
@@ -40,7 +43,7 @@ def to_json(scene: Scene) -> str:
             return json.dumps(_plain(scene), separators=(",", ":"), allow_nan=False)
 
 
-def to_readable_json(scene: Scene) -> str:
+def to_readable_json(scene: SceneData) -> str:
     """JSON of a Scene for people: what differs from the defaults, indented, short values on one line."""
     with deep_stack():
         return _laid_out(_plain(scene, brief=True), "") + "\n"
@@ -77,8 +80,12 @@ def _laid_out(value: Any, margin: str) -> str:
     return f"{start}\n{inner}" + f",\n{inner}".join(parts) + f"\n{margin}{end}"
 
 
-def from_json(text: str | bytes) -> Scene:
+def from_json(text: str | bytes, kind: type[S]) -> S:
     """A Scene from JSON.
+
+    Args:
+        text: the JSON.
+        kind: the class of the Scene.
 
     Raises:
         SceneError: text that is not JSON, or not a Scene.
@@ -89,14 +96,15 @@ def from_json(text: str | bytes) -> Scene:
         except UnicodeDecodeError as error:
             found = [Diagnostic("E0313", f"not UTF-8 text: byte {error.start}", None)]
             raise SceneError(found) from None
-    return _read(SourceFile("<json>", text))
+    return _read(SourceFile("<json>", text), kind)
 
 
-def load_json(source: SourceFile, diagnostics: Diagnostics) -> tuple[Scene | None, SpanMap]:
+def load_json(source: SourceFile, kind: type[S], diagnostics: Diagnostics) -> tuple[S | None, SpanMap]:
     """A Scene from JSON text, and where its nodes are written there.
 
     Args:
         source: the text.
+        kind: the class of the Scene.
         diagnostics: receives E0313.
 
     Returns:
@@ -104,7 +112,7 @@ def load_json(source: SourceFile, diagnostics: Diagnostics) -> tuple[Scene | Non
     """
     spans = SpanMap()
     try:
-        scene = _read(source)
+        scene = _read(source, kind)
     except SceneError as error:
         for d in error.diagnostics:
             diagnostics.add(d.code, d.message, d.span, help=d.help)
@@ -113,7 +121,7 @@ def load_json(source: SourceFile, diagnostics: Diagnostics) -> tuple[Scene | Non
     return scene, spans
 
 
-def _read(source: SourceFile) -> Scene:
+def _read(source: SourceFile, kind: type[S]) -> S:
     text = source.text
     if len(text) > MAX_CHARS:
         raise _failure(f"more than {MAX_CHARS:,} characters of JSON")
@@ -123,9 +131,9 @@ def _read(source: SourceFile) -> Scene:
         raise _failure(f"nodes nested deeper than {MAX_NODE_DEPTH}", Span(source, bracket, bracket + 1))
     try:
         if depth <= _PLAIN_DEPTH:
-            return Scene.model_validate_json(text)
+            return kind.model_validate_json(text)
         with deep_stack():
-            scene = _read_deep(source)
+            scene = _read_deep(source, kind)
         if _node_depth(scene) > MAX_NODE_DEPTH:
             raise _failure(f"nodes nested deeper than {MAX_NODE_DEPTH}")
         return scene
@@ -137,7 +145,7 @@ def _read(source: SourceFile) -> Scene:
         ) from None
 
 
-def _node_depth(scene: Scene) -> int:
+def _node_depth(scene: SceneData) -> int:
     """How deep nodes nest: 0 where none holds another."""
     depth, level = -1, list(scene.nodes)
     while level:
@@ -147,16 +155,16 @@ def _node_depth(scene: Scene) -> int:
     return depth
 
 
-def _read_deep(source: SourceFile) -> Scene:
+def _read_deep(source: SourceFile, kind: type[S]) -> S:
     try:
         data = json.loads(source.text, parse_constant=_refuse)
     except ValueError as error:
         raise _no_json(error, source) from None
     if isinstance(data, dict) and isinstance(data.get("nodes"), list):
         adapter: TypeAdapter[Any] = TypeAdapter(SceneNode)
-        nodes = [_build(node, adapter, source, ("nodes", at)) for at, node in enumerate(data["nodes"])]
-        data = {**data, "nodes": nodes}
-    return Scene.model_validate(data)
+        built = [_build(node, adapter, source, ("nodes", at)) for at, node in enumerate(data["nodes"])]
+        data = {**data, "nodes": built}
+    return kind.model_validate(data)
 
 
 def _build(data: Any, adapter: TypeAdapter[Any], source: SourceFile, path: tuple[Key, ...]) -> Any:
@@ -229,7 +237,7 @@ def _problem(item: ErrorDetails, location: tuple[Key, ...], root: Value, source:
 _FIELDS: Final = sorted(
     {
         name
-        for model in vars(schema).values()
+        for model in (*vars(modifiers).values(), *vars(nodes).values())
         if isinstance(model, type) and issubclass(model, BaseModel)
         for name in model.__annotations__
         if not name.startswith(("_", "model_"))

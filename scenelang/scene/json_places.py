@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.scene.schema import Chain, Object, Scene, SceneNode, Transform
+from scenelang.scene.modifiers import Transform
+from scenelang.scene.nodes import Chain, Object, SceneData, SceneNode
 from scenelang.scene.spans import Place, SpanMap
 
 Key = str | int
@@ -96,7 +97,7 @@ def follow(root: Value, location: Sequence[Key]) -> tuple[Value, str]:
     return value, path
 
 
-def record_places(scene: Scene, root: Value, source: SourceFile, spans: SpanMap) -> None:
+def record_places(scene: SceneData, root: Value, source: SourceFile, spans: SpanMap) -> None:
     """Put the places of a scene and all its nodes, transforms and materials into ``spans``."""
     named = root.items.get("model")
     if named is not None:

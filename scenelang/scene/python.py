@@ -8,7 +8,8 @@ from typing import Final
 
 from scenelang.deep import deep_stack
 from scenelang.scene.fields import Rgb
-from scenelang.scene.schema import Link, Material, MaterialOp, Object, Scene, SceneNode, Transform
+from scenelang.scene.modifiers import MaterialOp, Transform
+from scenelang.scene.nodes import Link, Material, Object, SceneData, SceneNode
 from scenelang.scene.text import degrees, hex_colour, number
 
 _WIDTH: Final = 88
@@ -29,7 +30,7 @@ class _Call:
 _Code = str | _Call
 
 
-def to_python(scene: Scene) -> str:
+def to_python(scene: SceneData) -> str:
     """The code of ``scene``: the import, parts that nest too deep, and ``scene = nsg.Scene(…)``."""
     with deep_stack():
         made = _Maker()
@@ -46,7 +47,7 @@ class _Maker:
 
     parts: list[tuple[str, _Code]] = field(default_factory=list)
 
-    def settings(self, scene: Scene) -> Iterable[_Code]:
+    def settings(self, scene: SceneData) -> Iterable[_Code]:
         if scene.model is not None:
             yield f'model="{scene.model}"'
         if scene.canvas != (256, 256):

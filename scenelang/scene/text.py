@@ -6,25 +6,17 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.diagnostics.error import SceneError
 from scenelang.formatting import format_text
 from scenelang.scene.fields import Rgb
-from scenelang.scene.schema import (
-    Boolean,
-    Chain,
-    Material,
-    MaterialOp,
-    Object,
-    Scene,
-    SceneNode,
-    Transform,
-)
+from scenelang.scene.modifiers import MaterialOp, Transform
+from scenelang.scene.nodes import Boolean, Chain, Material, Object, SceneData, SceneNode
 
 _INDENT: Final = "  "
 _AXES: Final = {"[1, 0, 0]": "X", "[0, 1, 0]": "Y"}
 
 
-def to_nsg(scene: Scene, notes: Mapping[int, str] | None = None) -> str:
+def to_nsg(scene: SceneData, notes: Mapping[int, str] | None = None) -> str:
     """The text of ``scene``: settings that differ from the defaults, then its nodes in order.
 
     Args:

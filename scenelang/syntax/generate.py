@@ -17,7 +17,6 @@ from lark.grammar import Rule
 from lark.lexer import PatternStr
 
 from scenelang.files import write_whole
-from scenelang.syntax.tables import source_mark
 
 
 def generate(grammar: str) -> dict[str, Any]:
@@ -82,14 +81,15 @@ def _rule(rule: Rule, origins: list[str]) -> tuple[int, int, str]:
     return len(rule.expansion), origins.index(rule.origin.name), callback
 
 
-def make(grammar: Path, place: Path) -> dict[str, Any]:
+def make(grammar: Path, place: Path, mark: int) -> dict[str, Any]:
     """Make the tables and write them to a file; where that cannot be written, they are made all the same.
 
     Args:
         grammar: the grammar's file.
         place: of `tables.json`.
+        mark: a checksum that tells when to make them again.
     """
-    data = {"source": source_mark(grammar), **generate(grammar.read_text("utf-8"))}
+    data = {"source": mark, **generate(grammar.read_text("utf-8"))}
     with contextlib.suppress(OSError):
         write_whole(place, json.dumps(data, separators=(",", ":")).encode())
     return data

@@ -98,7 +98,7 @@ def current(grammar: Path, place: Path, *, shipped: bool) -> dict[str, Any]:
             return found
     from scenelang.syntax.generate import make  # and Lark with it
 
-    return make(grammar, place)
+    return make(grammar, place, source_mark(grammar))
 
 
 @cache

@@ -16,14 +16,15 @@ from scenelang.animation.clip import Clip, open_clip
 from scenelang.animation.painting import Painter
 from scenelang.animation.run import make
 from scenelang.animation.timing import FrameRange, FramesError
-from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.prepare.params import Defines
 from scenelang.watching.changes import Stamps, stamps
 
 if TYPE_CHECKING:
     from scenelang.animation.run import Progress
     from scenelang.animation.targets import Target
-    from scenelang.backend.render import Backend, Device
+    from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
     from scenelang.renderers.kept import Kept
 

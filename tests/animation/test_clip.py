@@ -8,7 +8,8 @@ import pytest
 
 import scenelang as nsg
 from scenelang.animation.clip import Clip, open_clip
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import load_source
 from scenelang.program.program import Program

@@ -9,7 +9,8 @@ import pytest
 
 import scenelang
 from scenelang.diagnostics.codes import CODES
-from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.pages import AREAS, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate import session
@@ -23,7 +24,6 @@ from scenelang.models.manifest import available, load_manifest
 from scenelang.program.check import check_compiles, check_frames
 from scenelang.resolve.unused import find_unused
 from scenelang.scene import schema
-from scenelang.scene.json import from_json
 from scenelang.scene.schema import Scene
 from scenelang.syntax import nesting, parse, tokens
 from scenelang.syntax.tables import tables
@@ -56,7 +56,7 @@ def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
     spans = None
     if example.language == "json":
         try:
-            scene: Scene | None = from_json(example.text)
+            scene: Scene | None = Scene.from_json(example.text)
         except SceneError as error:
             return list(error.diagnostics)
     else:

@@ -7,7 +7,8 @@ import unicodedata
 
 import pytest
 
-from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Edit, Fix, Label, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Edit, Fix, Label
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.render import (
     render_concise,
     render_github,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.diagnostics.error import SceneError
 from scenelang.formatting import format_text
 
 ROOT = Path(__file__).parents[2]

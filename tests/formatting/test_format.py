@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import scenelang
-from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.diagnostics.error import SceneError
 from scenelang.formatting import format_text
 from scenelang.formatting.layout import Layout
 from scenelang.syntax.tables import tables

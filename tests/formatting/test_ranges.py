@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from scenelang.diagnostics.diagnostic import SceneError
+from scenelang.diagnostics.error import SceneError
 from scenelang.formatting import format_range, format_text
 from tests.formatting.sameness import comments, tree_of
 from tests.formatting.test_properties import TEXTS, words_of

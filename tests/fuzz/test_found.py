@@ -12,7 +12,8 @@ import pytest
 from fuzz.oracles import check_rendering
 from scenelang.backend.errors import RenderError
 from scenelang.backend.render import render
-from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.render import render_sarif, render_text
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.api import loads

@@ -12,9 +12,10 @@ import pytest
 import torch
 from torch import Tensor
 
-from scenelang.lab.designs.ablations import SEEDS, SIZES, VARIANTS, ablation_runs
+from scenelang.lab.designs.ablation_runs import SEEDS, SIZES, ablation_runs
+from scenelang.lab.designs.ablations import VARIANTS, make_student
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, random_scenes
-from scenelang.lab.designs.students import FramedStudent, StudentConfig, make_student
+from scenelang.lab.designs.students import FramedStudent, StudentConfig
 from scenelang.lab.designs.studies import Study, StudyConfig
 from scenelang.renderers.network import FramedConfig
 from scenelang.training.losses import leaf_loss, trace_loss

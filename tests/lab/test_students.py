@@ -8,15 +8,10 @@ import torch
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
+from scenelang.lab.designs.ablations import make_student
 from scenelang.lab.designs.encoders import LiftingConfig
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, exact_vectors, pictures, random_scenes
-from scenelang.lab.designs.students import (
-    FramedStudent,
-    StudentConfig,
-    largest_stretch,
-    make_student,
-    read_points,
-)
+from scenelang.lab.designs.students import FramedStudent, StudentConfig, largest_stretch, read_points
 from scenelang.models.load import load_model
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene

@@ -8,7 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from scenelang.diagnostics.diagnostic import Diagnostics, SceneError
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import load_source
 from scenelang.lifting.exact import affine_matrix

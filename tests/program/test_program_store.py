@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from test_program_compile import CHAIN, compiled
 
-from scenelang.program.program import ProgramError
-from scenelang.program.store import load_program, parse_program, program_bytes, save_program
+from scenelang.program.program import ProgramError, program_bytes
+from scenelang.program.store import load_program, parse_program
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_a_failed_write_leaves_what_was_there(chain, tmp_path: Path, monkeypatch
 
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OSError, match="No space"):
-        save_program(chain, path)
+        chain.save(path)
     assert path.read_bytes() == b"before"
     assert list(tmp_path.iterdir()) == [path]
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 
 import scenelang as nsg
 from scenelang.deep import deep_stack
-from scenelang.program.store import program_bytes
+from scenelang.program.program import program_bytes
 from scenelang.scene.json import to_readable_json
 from tests.strategies import scenes
 

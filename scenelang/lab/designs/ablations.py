@@ -1,8 +1,7 @@
 """The `framed` renderer without one of its parts at a time, to see what each part buys.
 
 Each network here derives from the shipped one and has one thing taken away. None of them ships, and the
-shipped renderer knows nothing of them. `ablation_runs` lists the study: the same data, budget, rate and
-seed for all.
+shipped renderer knows nothing of them. `ablation_runs.py` lists the study.
 
 Letters: B streams, N objects, P points, F features, S state, L lines of the paint gate, as in
 `renderers/network.py`.
@@ -18,8 +17,13 @@ import torch
 from torch import Tensor, nn
 
 from scenelang.lab.designs.pictures import Scenes, stretch
-from scenelang.lab.designs.students import FramedStudent, StudentConfig
-from scenelang.lab.designs.studies import RATES, StudyConfig
+from scenelang.lab.designs.students import (
+    FramedStudent,
+    ReadingStudent,
+    StreamingStudent,
+    Student,
+    StudentConfig,
+)
 from scenelang.lifting.layout import PLANE_LAYOUT
 from scenelang.renderers.framed import Framed, Trace
 from scenelang.renderers.network import TOKENS, FramedConfig
@@ -27,17 +31,6 @@ from scenelang.training.scenes import GEOMETRIES
 
 HIDDEN = 16  # units of the hidden layer that the cell had
 MEMORY = 8  # entries of the state that may learn to hold a colour where no register does
-SEEDS = 3  # of the whole renderer: differences below their spread mean nothing
-
-SIZES: Mapping[str, tuple[int, ...]] = {
-    "decoder_width": (8, 16, 32, 64),
-    "code": (1, 2, 4, 8),
-    "state": (1, 4),
-    "paint_lines": (1, 2, 4),
-}
-"""Values of each field of `FramedConfig` that are tried, the shipped one among them."""
-
-LABELS = {"decoder_width": "decoder", "code": "code size", "state": "state", "paint_lines": "paint lines"}
 
 
 class WithoutRegister(Framed):
@@ -215,28 +208,12 @@ VARIANTS: Mapping[str, type[FramedStudent]] = {
 }
 
 
-def ablation_runs(budget_s: float, seed: int) -> list[tuple[str, str, StudyConfig]]:
-    """The study: (name, group, what is trained) of the whole renderer, of all variants and of all sizes.
-
-    The whole renderer stands for the shipped value of every size.
-
-    Args:
-        budget_s: processor seconds of each.
-        seed: of parameters and scenes; the whole renderer is trained with the two after it as well.
-    """
-    whole = StudyConfig(StudentConfig("framed", "exact"), seconds=budget_s, rate=RATES["framed"], seed=seed)
-    runs = [("framed", "whole", replace(whole, seed=seed + i)) for i in range(SEEDS)]
-    runs += [
-        (name, "parts", replace(whole, student=replace(whole.student, variant=name)))
-        for name in VARIANTS
-        if name != "code"
-    ]
-    shipped = FramedConfig()
-    for size, values in SIZES.items():
-        for value in values:
-            if value == getattr(shipped, size):
-                continue
-            sizes = FramedConfig(**{**shipped.to_json(), size: value})
-            student = replace(whole.student, framed=sizes, variant="code" if size == "code" else "")
-            runs.append((f"{LABELS[size]} {value}", size, replace(whole, student=student)))
-    return runs
+def make_student(config: StudentConfig, *, grown: bool = False) -> Student:
+    """Build a student with random parameters."""
+    if config.renderer == "streaming":
+        return StreamingStudent(config, grown=grown)
+    if config.renderer == "reading":
+        return ReadingStudent(config)
+    if config.variant:
+        return VARIANTS[config.variant](config)
+    return FramedStudent(config)

@@ -237,16 +237,3 @@ def largest_stretch(m: Tensor) -> Tensor:
     first = ((a + d).square() + (b - c).square() + 1e-12).sqrt()
     second = ((a - d).square() + (b + c).square() + 1e-12).sqrt()
     return (first + second) / 2
-
-
-def make_student(config: StudentConfig, *, grown: bool = False) -> Student:
-    """Build a student with random parameters."""
-    if config.renderer == "streaming":
-        return StreamingStudent(config, grown=grown)
-    if config.renderer == "reading":
-        return ReadingStudent(config)
-    if config.variant:
-        from scenelang.lab.designs.ablations import VARIANTS  # which derive from what is defined here
-
-        return VARIANTS[config.variant](config)
-    return FramedStudent(config)

@@ -24,6 +24,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from scenelang.lab.designs.ablations import make_student
 from scenelang.lab.designs.pictures import (
     PictureConfig,
     Scenes,
@@ -40,7 +41,6 @@ from scenelang.lab.designs.students import (
     StreamingStudent,
     Student,
     StudentConfig,
-    make_student,
 )
 from scenelang.renderers.streaming import SMALLEST
 from scenelang.training.checkpoint import load_tensors, pack_training, save_tensors, unpack_training

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
-from scenelang.lab.designs.ablations import ablation_runs
+from scenelang.lab.designs.ablation_runs import ablation_runs
 from scenelang.lab.designs.encoders import LiftingConfig
 from scenelang.lab.designs.students import LiftingName, RendererName, StudentConfig
 from scenelang.lab.designs.studies import RATES, StudyConfig

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from scenelang.backend.neural import draw_program, open_model
-from scenelang.backend.render import Samples
+from scenelang.backend.options import Samples
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.image import Image, from_samples

@@ -1,0 +1,215 @@
+"""The nodes of a Scene, frozen and validated, and what a Scene holds beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, overload
+
+from pydantic import Field, field_validator, model_validator
+
+from scenelang.scene.fields import (
+    Combine,
+    Finite,
+    Frozen,
+    Opaque,
+    Pixels,
+    Version,
+    Word,
+    first_joins_by_union,
+)
+from scenelang.scene.modifiers import MaterialOp, Transform, Transforms
+
+MAX_FRAMES = 1_000_000
+MAX_NODE_DEPTH = 400  # nodes within nodes
+
+
+class Material(Frozen):
+    """A material of the model, with its texture and colour operations in order."""
+
+    name: Annotated[Word, Field(description="a material of the model")]
+    ops: Annotated[tuple[MaterialOp, ...], Field(description="in order, nearest the leaf first")] = ()
+
+    if TYPE_CHECKING:
+
+        def __init__(self, name: str, ops: Iterable[MaterialOp] | MaterialOp = ()) -> None: ...
+
+
+class Object(Frozen):
+    """A leaf geometry, its transforms nearest the leaf first, and its material."""
+
+    kind: Literal["object"] = "object"
+    geometry: Annotated[Word, Field(description="a leaf geometry of the model")]
+    transforms: Transforms = ()
+    material: Material | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            geometry: str,
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
+
+
+class Group(Frozen):
+    """Children as a union in order, then transforms that apply to all of them."""
+
+    kind: Literal["group"] = "group"
+    children: tuple[SceneNode, ...] = ()
+    transforms: Transforms = ()
+    material: Material | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            children: Iterable[SceneNode] | SceneNode = (),
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
+
+
+class Boolean(Frozen):
+    """A boolean node over its children, folded left."""
+
+    kind: Literal["boolean"] = "boolean"
+    op: Combine
+    children: tuple[SceneNode, ...] = ()
+    transforms: Transforms = ()
+    material: Material | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            op: Combine,
+            children: Iterable[SceneNode] | SceneNode = (),
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
+
+
+class Link(Frozen):
+    """One child of a chain with the word that joins it to what came before (first: union)."""
+
+    op: Combine = "union"
+    node: SceneNode
+
+    if TYPE_CHECKING:
+
+        @overload
+        def __init__(self, op: Combine, node: SceneNode) -> None: ...
+        @overload
+        def __init__(self, *, op: Combine = "union", node: SceneNode) -> None: ...
+        def __init__(self, *args: Any, **data: Any) -> None: ...
+
+
+class Chain(Frozen):
+    """The streamed form: children in order, each with its boolean word."""
+
+    kind: Literal["chain"] = "chain"
+    children: Annotated[tuple[Link, ...], Field(json_schema_extra=first_joins_by_union)] = ()
+    transforms: Transforms = ()
+    material: Material | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            children: Iterable[Link | SceneNode] | SceneNode = (),
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        """A child without a word is joined by union."""
+        given = super()._arranged(args, data)
+        if isinstance(given.get("children"), list | tuple):
+            nodes = (Object, Group, Boolean, Chain)
+            given["children"] = tuple(
+                Link("union", child) if isinstance(child, nodes) else child for child in given["children"]
+            )
+        return given
+
+    @field_validator("children")
+    @classmethod
+    def _starts_with_union(cls, children: tuple[Link, ...]) -> tuple[Link, ...]:
+        if children and children[0].op != "union":
+            raise ValueError(f"the first child of a chain is joined by union, not {children[0].op}")
+        return children
+
+
+SceneNode = Annotated[Object | Group | Boolean | Chain, Field(discriminator="kind")]
+
+
+class Animation(Frozen):
+    """``animate(seconds, fps, loop)``."""
+
+    seconds: Annotated[Finite, Field(gt=0)]
+    fps: Annotated[Finite, Field(gt=0, description="frames per second")]
+    loop: Annotated[bool, Field(strict=True, description="the last frame is followed by the first")] = True
+
+    if TYPE_CHECKING:
+
+        def __init__(self, seconds: float, fps: float, loop: bool = True) -> None: ...
+
+    @model_validator(mode="after")
+    def _is_bounded(self) -> Animation:
+        if self.seconds * self.fps > MAX_FRAMES:
+            raise ValueError(f"an animation of more than {MAX_FRAMES:,} frames")
+        return self
+
+    @property
+    def frames(self) -> int:
+        """Number of frames, at least 1."""
+        return max(1, round(self.seconds * self.fps))
+
+
+class SceneData(Frozen):
+    """What a `Scene` holds."""
+
+    version: Version = 1
+    model: Annotated[
+        str | None,
+        Field(
+            pattern=r'^[^"\\\x00-\x1f]+$', description="the model to draw with; null: the smallest that fits"
+        ),
+    ] = None
+    canvas: Annotated[tuple[Pixels, Pixels], Field(description="width and height in pixels")] = (256, 256)
+    background: Annotated[
+        Opaque | None, Field(description="as colours are written; null gives an image with alpha")
+    ] = (1.0, 1.0, 1.0)
+    animation: Annotated[
+        Animation | None, Field(description="the animation that this Scene is one frame of")
+    ] = None
+    nodes: Annotated[tuple[SceneNode, ...], Field(description="a union, the last on top")] = ()
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            version: Literal[1] = 1,
+            model: str | None = None,
+            canvas: tuple[int, int] = (256, 256),
+            background: tuple[float, float, float] | None = (1.0, 1.0, 1.0),
+            animation: Animation | None = None,
+            nodes: Iterable[SceneNode] | SceneNode = (),
+        ) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        if args:
+            raise TypeError(f"Scene takes its arguments by name: {', '.join(cls._names())}")
+        return super()._arranged(args, data)
+
+    def sized(self, size: tuple[int, int]) -> Self:
+        """The same scene on a canvas of that width and height in pixels.
+
+        Raises:
+            ValueError: not two numbers from 1 to 8192.
+        """
+        canvas = type(self)(canvas=size).canvas
+        return self.model_copy(update={"canvas": canvas})
