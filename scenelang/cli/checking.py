@@ -13,7 +13,7 @@ from scenelang.cli.inputs import STDIN, Request, merged, read_input, read_text, 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import Settled, settle
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.prepare.params import Defines
+from scenelang.evaluate.inputs import Defines
 from scenelang.program.check import Frames, check_evaluated
 
 

@@ -11,8 +11,8 @@ from scenelang.cli.clock import Clock
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.evaluation import Evaluation
-from scenelang.evaluate.prepare.imports import Unreadable, decode_source, read_source
-from scenelang.evaluate.prepare.params import Defines
+from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.loader import Unreadable, decode_source, read_source
 from scenelang.evaluate.session import MAX_BYTES
 from scenelang.files import note_input
 from scenelang.scene.schema import Scene

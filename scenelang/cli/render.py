@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from scenelang.cli.jobs import Job
     from scenelang.cli.progress import Bar
     from scenelang.diagnostics.span import SourceFile
-    from scenelang.evaluate.prepare.params import Defines
+    from scenelang.evaluate.inputs import Defines
     from scenelang.measure.frontier import Limits
 
 

@@ -12,7 +12,7 @@ from scenelang.cli import options
 if TYPE_CHECKING:
     import PIL.Image
 
-    from scenelang.evaluate.prepare.params import Defines
+    from scenelang.evaluate.inputs import Defines
     from scenelang.watching.picture import Easel, Outcome
     from scenelang.watching.screen import Screen
 

@@ -19,15 +19,17 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.loader import Loader, Unreadable, read_source
+from scenelang.evaluate.names import UNBOUND
 from scenelang.evaluate.prepare import (
     heads,  # noqa: F401  (registers its statements)
     params,  # noqa: F401  (registers its statements)
 )
 from scenelang.evaluate.prepare.blocks import Body
-from scenelang.evaluate.prepare.imports import Loader, Unreadable, prepare_file, read_source
-from scenelang.evaluate.prepare.params import Defines
+from scenelang.evaluate.prepare.imports import prepare_file
 from scenelang.evaluate.report.bad_calls import report_misfits
-from scenelang.evaluate.session import MAX_OBJECTS, MAX_STEPS, UNBOUND, Halt, Session, Watch
+from scenelang.evaluate.session import MAX_OBJECTS, MAX_STEPS, Halt, Session, Watch
 from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.models.manifest import Manifest
 from scenelang.scene.schema import Scene

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.loader import Loader
 from scenelang.evaluate.names import Env, Frame, Scope, file_frame
 from scenelang.evaluate.report.suppression import NONE, Damage
 from scenelang.evaluate.session import Session
 from scenelang.syntax import nodes
-
-if TYPE_CHECKING:
-    from scenelang.evaluate.prepare.imports import Loader
-    from scenelang.evaluate.prepare.params import Defines
 
 
 @dataclass(slots=True)

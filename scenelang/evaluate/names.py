@@ -8,14 +8,48 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from scenelang.diagnostics.span import Span
-from scenelang.evaluate.replay import Needs
-from scenelang.evaluate.session import UNBOUND
 from scenelang.syntax import nodes
 
 Env = list[Any]
+
+
+class Unbound:
+    """What a slot holds before its ``let``, ``param`` or ``animate`` has run."""
+
+    __slots__ = ()
+
+
+UNBOUND: Final = Unbound()
+
+
+@dataclass(slots=True, eq=False)
+class Needs:
+    """What a statement, a function's or a module's body depends on.
+
+    Args:
+        frame: it reads ``t``, ``u`` or ``frame`` itself.
+        on: the needs of the names in it.
+    """
+
+    frame: bool = False
+    on: list[Needs] = field(default_factory=list)
+
+    def varies(self) -> bool:
+        """Whether it may differ from frame to frame; ask when everything is prepared."""
+        seen = {id(self)}
+        stack = [self]
+        while stack:
+            needs = stack.pop()
+            if needs.frame:
+                return True
+            for other in needs.on:
+                if id(other) not in seen:
+                    seen.add(id(other))
+                    stack.append(other)
+        return False
 
 
 @dataclass(slots=True)

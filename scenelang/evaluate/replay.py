@@ -9,41 +9,13 @@ which later stages know again.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
+from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
-
-if TYPE_CHECKING:
-    from scenelang.diagnostics.span import Span
-    from scenelang.evaluate.session import Session
-
-
-@dataclass(slots=True, eq=False)
-class Needs:
-    """What a statement, a function's or a module's body depends on.
-
-    Args:
-        frame: it reads ``t``, ``u`` or ``frame`` itself.
-        on: the needs of the names in it.
-    """
-
-    frame: bool = False
-    on: list[Needs] = field(default_factory=list)
-
-    def varies(self) -> bool:
-        """Whether it may differ from frame to frame; ask when everything is prepared."""
-        seen = {id(self)}
-        stack = [self]
-        while stack:
-            needs = stack.pop()
-            if needs.frame:
-                return True
-            for other in needs.on:
-                if id(other) not in seen:
-                    seen.add(id(other))
-                    stack.append(other)
-        return False
+from scenelang.evaluate.names import Needs
+from scenelang.evaluate.session import Session
 
 
 @dataclass(slots=True)

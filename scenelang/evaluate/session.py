@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from scenelang.diagnostics.diagnostic import Diagnostics, Fix, Label
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import Effort
-from scenelang.evaluate.replay import Needs
+from scenelang.evaluate.names import UNBOUND, Needs
 from scenelang.evaluate.report.suppression import NONE, Damage
 from scenelang.evaluate.values.value import Problem
 from scenelang.evaluate.vocabulary import Vocabulary
@@ -36,15 +36,6 @@ Watch = Callable[[Span, Any], None]
 
 class Halt(Exception):
     """A limit was met and reported; the evaluation ends."""
-
-
-class Unbound:
-    """What a slot holds before its ``let``, ``param`` or ``animate`` has run."""
-
-    __slots__ = ()
-
-
-UNBOUND: Final = Unbound()
 
 
 @dataclass(slots=True)

@@ -18,7 +18,7 @@ from pygls.uris import from_fs_path, to_fs_path
 from scenelang.diagnostics.diagnostic import Diagnostic, Fix, Label
 from scenelang.diagnostics.diagnostic import Edit as Change
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.evaluate.prepare.imports import Unreadable, read_source
+from scenelang.evaluate.loader import Unreadable, read_source
 from scenelang.lsp.text import Encoding, Lines, applied
 from scenelang.resolve.names import Names
 from scenelang.resolve.symbols import Symbol, Use

@@ -11,7 +11,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import settle
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.evaluation import Evaluation, in_file_order
-from scenelang.evaluate.prepare.imports import Unreadable, read_source
+from scenelang.evaluate.loader import Unreadable, read_source
 from scenelang.program.check import Frames, check_evaluated
 from scenelang.syntax import parse
 

@@ -13,10 +13,10 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.pages import AREAS, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate import session
+from scenelang.evaluate import loader, session
 from scenelang.evaluate.evaluation import Evaluation, load_source
-from scenelang.evaluate.prepare import imports, settings
-from scenelang.evaluate.prepare.params import Defines
+from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.prepare import settings
 from scenelang.evaluate.values import functions
 from scenelang.evaluate.values import value as values
 from scenelang.graph import lower
@@ -150,7 +150,7 @@ def test_pages_state_the_lists_and_limits_of_the_code() -> None:
         "E0321": f"{session.MAX_DEPTH} deep, or groups more than {schema.MAX_NODE_DEPTH}",
         "E0322": f"{session.MAX_STEPS // 1_000_000} million steps",
         "E0323": f"nest more than {values.MAX_VECTOR_DEPTH} deep",
-        "E0324": f"{session.MAX_BYTES // 1_000_000} MB, or imports nest more than {imports.MAX_IMPORT_DEPTH}",
+        "E0324": f"{session.MAX_BYTES // 1_000_000} MB, or imports nest more than {loader.MAX_IMPORT_DEPTH}",
         "E0405": f"{lower.MAX_DEPTH:,} levels",
     }.items():
         assert number in prose(code), code

@@ -10,12 +10,12 @@ from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.file_context import Unit
-from scenelang.evaluate.names import Binding, Definition, Env, Frame, Scope
+from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Frame, Needs, Scope
 from scenelang.evaluate.prepare.expressions import VARIES, guarded, prepare, watched
 from scenelang.evaluate.prepare.operations import condition
-from scenelang.evaluate.replay import Needs, Still
+from scenelang.evaluate.replay import Still
 from scenelang.evaluate.report.undefined import report_shared
-from scenelang.evaluate.session import MAX_NESTING, UNBOUND
+from scenelang.evaluate.session import MAX_NESTING
 from scenelang.evaluate.values.value import POISON, Problem, RangeValue, Vec, describe
 from scenelang.evaluate.vocabulary import LANGUAGE, SETTINGS
 from scenelang.syntax import nodes

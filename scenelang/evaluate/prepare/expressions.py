@@ -7,8 +7,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.file_context import Unit
-from scenelang.evaluate.names import Env, Scope
-from scenelang.evaluate.replay import Needs
+from scenelang.evaluate.names import Env, Needs, Scope
 from scenelang.evaluate.session import MAX_NESTING
 from scenelang.evaluate.values.value import POISON, Problem, Vec
 from scenelang.syntax import nodes

@@ -8,7 +8,7 @@ from typing import Any
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.file_context import Unit
-from scenelang.evaluate.names import Binding, Definition, Env, Scope
+from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Scope
 from scenelang.evaluate.prepare.arguments import Bound, bind
 from scenelang.evaluate.prepare.expressions import (
     POISONED,
@@ -23,7 +23,7 @@ from scenelang.evaluate.prepare.expressions import (
 )
 from scenelang.evaluate.prepare.literals import member
 from scenelang.evaluate.report.undefined import VALUES, report_shared, unknown, unknown_member
-from scenelang.evaluate.session import MAX_DEPTH, UNBOUND
+from scenelang.evaluate.session import MAX_DEPTH
 from scenelang.evaluate.values.functions import ANIMATED, CONSTANTS, FUNCTIONS, Builtin
 from scenelang.evaluate.values.value import POISON
 from scenelang.scene.spans import Calls
