@@ -9,6 +9,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeVar
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
+from scenelang.evaluate.costs import CALL_STEPS, HALF_STEPS
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Frame, Needs, Scope
 from scenelang.evaluate.prepare.expressions import VARIES, guarded, prepare, watched
@@ -53,9 +54,6 @@ class Body(NamedTuple):
     weight: int
 
 
-CALL_STEPS: Final = 8
-"""A call of a function takes as long as so many passes of an empty loop; a limit of steps is one of time."""
-
 Prepare = Callable[[Any, Place], Action | None]
 S = TypeVar("S", bound=Prepare)
 _PREPARE: Final[dict[type, Prepare]] = {}
@@ -73,6 +71,7 @@ def states(node: type) -> Callable[[S], S]:
 
 def prepare_statement(stmt: nodes.Stmt, place: Place) -> Action | None:
     """One statement's action; None where it does nothing when it runs."""
+    place.unit.weight += HALF_STEPS.get(stmt.__class__, 0)
     return _PREPARE[stmt.__class__](stmt, place)
 
 
@@ -101,7 +100,8 @@ def prepare_block(statements: Sequence[nodes.Stmt], place: Place, span: Span) ->
         if body is not None:
             body()
     unit.nesting -= 1
-    return Body(tuple(actions), 1 + len(actions) + (unit.weight - before) // 8)
+    weight, unit.weight = unit.weight - before, before  # whoever runs the block counts it
+    return Body(tuple(actions), 1 + len(actions) + weight // 2)
 
 
 def _collected(stmt: nodes.Stmt, place: Place) -> Action | None:
@@ -249,7 +249,8 @@ def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: 
         name = stmt.name.span
         unit.session.origins[id(name.source), name.start] = stmt.body
         definition.run = prepare(stmt.body, unit, scope).run
-        definition.weight = CALL_STEPS + (unit.weight - before) // 8
+        definition.weight = CALL_STEPS + (unit.weight - before) // 2
+        unit.weight = before
     else:
         body = prepare_block(stmt.body.statements, Place(unit, Scope(frame, scope), "group"), stmt.body.span)
         definition.run = body.actions
@@ -281,7 +282,7 @@ def _for(stmt: nodes.For, place: Place) -> Action | None:
     slot = frame.slot()
     define(stmt.variable, Binding("loop", stmt.variable.span, frame, slot), loop)
     body = prepare_block(stmt.body.statements, inner(loop), stmt.body.span)
-    session, span, actions, weight = unit.session, stmt.iterable.span, body.actions, body.weight
+    session, span, actions, weight = unit.session, stmt.iterable.span, body.actions, body.weight + 1
 
     def items(value: Any) -> Any:
         if value.__class__ is Vec:
@@ -295,7 +296,7 @@ def _for(stmt: nodes.For, place: Place) -> Action | None:
         advice = "write 0..<n for n passes" if value.__class__ is float else None
         raise Problem("E0301", f"expected a range or a vector, found {describe(value)}", advice)
 
-    check = guarded(unit, items, span, ())
+    check = guarded(unit, items, span, (), item_steps=0)
     get = iterable.run
 
     def action(env: Env, out: Builder) -> None:

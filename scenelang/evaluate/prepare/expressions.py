@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Final, NamedTuple, TypeVar
 
 from scenelang.diagnostics.span import Span
+from scenelang.evaluate.costs import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Env, Needs, Scope
 from scenelang.evaluate.session import MAX_NESTING
@@ -72,7 +73,7 @@ def prepares(node: type) -> Callable[[E_], E_]:
 
 def prepare(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
     """Resolve the names of ``expr`` and make it runnable; reports what is wrong in any case."""
-    unit.weight += 1
+    unit.weight += HALF_STEPS.get(expr.__class__, 1)
     unit.nesting += 1
     if unit.nesting > MAX_NESTING:
         unit.nesting -= 1
@@ -129,20 +130,26 @@ def folded(unit: Unit, codes: list[Code], function: Callable[..., Any], run: Run
 
 
 def guarded(
-    unit: Unit, function: Callable[..., Any], span: Span, operands: tuple[nodes.Expr | None, ...]
+    unit: Unit,
+    function: Callable[..., Any],
+    span: Span,
+    operands: tuple[nodes.Expr | None, ...],
+    item_steps: int = ITEM_STEPS,
 ) -> Callable[..., Any]:
-    """``function`` on values: silent on poison, problems reported, work on vectors counted."""
+    """``function`` on values: silent on poison, problems reported, its work counted."""
     session = unit.session
 
     def run(*values: Any) -> Any:
+        session.steps += GENERAL_STEPS  # the next call or pass looks at the limit
         for value in values:
             if value is POISON:
                 return POISON
             if value.__class__ is Vec:
-                session.tick(value.count, span)
+                session.tick(item_steps * value.count, span)
         try:
             return function(*values)
         except Problem as problem:
+            session.steps += 2 * GENERAL_STEPS
             session.problem(problem, span, operands)
             return POISON
 

@@ -79,7 +79,7 @@ def _vector(expr: nodes.Vector, unit: Unit, scope: Scope) -> Code:
                 raise Problem("E0301", "a range inside a vector", "write it without brackets", index)
         return Vec(items)
 
-    slow = guarded(unit, make, expr.span, expr.items)
+    slow = guarded(unit, make, expr.span, expr.items, item_steps=0)
     return folded(unit, codes, make, lambda env: slow(*[get(env) for get in getters]))
 
 
@@ -137,7 +137,7 @@ def member(code: Code, name: nodes.Name, unit: Unit, of: nodes.Expr | None = Non
         return value.items[at] if value.__class__ is Vec and len(value.items) > at else slow(value)
 
     get = code.run
-    slow = guarded(unit, pick, name.span, (of,))
+    slow = guarded(unit, pick, name.span, (of,), item_steps=0)
     return folded(unit, [code], pick, run)
 
 
@@ -161,5 +161,5 @@ def _index(expr: nodes.Index, unit: Unit, scope: Scope) -> Code:
         return value.items[int(at)] if value.__class__ is Vec else value.item(int(at))
 
     value, index = codes[0].run, codes[1].run
-    slow = guarded(unit, pick, expr.span, (expr.value, expr.index))
+    slow = guarded(unit, pick, expr.span, (expr.value, expr.index), item_steps=0)
     return folded(unit, codes, pick, lambda env: slow(value(env), index(env)))

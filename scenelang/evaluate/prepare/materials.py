@@ -9,6 +9,7 @@ from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.evaluate.builder import Builder, make
+from scenelang.evaluate.costs import MATERIAL_VALUE
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Binding, Env, Scope
 from scenelang.evaluate.prepare.blocks import Action, Place, inner, misplaced, prepare_block, states
@@ -132,6 +133,7 @@ def prepare_value_use(stmt: nodes.Call, binding: Binding, place: Place) -> Actio
         help = "materials stand in the block of an object or a group"
         misplaced(place, name.span, f"value '{name.text}' {where}", help)
         return None
+    unit.weight += MATERIAL_VALUE
     labels = (Label(binding.span, "defined here"),) if binding.span else ()
     where_made = spans.Place(name.span, stmt.span)
 

@@ -7,6 +7,7 @@ from typing import Any
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder, ChainBuilder, make
+from scenelang.evaluate.costs import MODULE_CALL, OBJECT
 from scenelang.evaluate.names import Definition, Env
 from scenelang.evaluate.prepare.blocks import (
     Action,
@@ -88,6 +89,7 @@ def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
     if not fits:
         return None
     where, actions, weight = spans.Place(stmt.name.span, stmt.span), body.actions, body.weight
+    unit.weight += OBJECT
 
     def action(env: Env, out: Builder) -> None:
         inside = Builder()
@@ -226,6 +228,7 @@ def prepare_module_call(stmt: nodes.Call, definition: Definition, place: Place) 
     if enter is None or not fits:
         return None
     where = spans.Place(stmt.name.span, stmt.span)
+    unit.weight += MODULE_CALL
 
     def action(env: Env, out: Builder) -> None:
         before = session.calls
@@ -237,6 +240,7 @@ def prepare_module_call(stmt: nodes.Call, definition: Definition, place: Place) 
         transforms, material = inside.transforms, inside.material
         if block is not None:
             own = Builder()
+            session.tick(block.weight, where.name)
             for act in block.actions:
                 act(env, own)
             transforms = [*transforms, *own.transforms]

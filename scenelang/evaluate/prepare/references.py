@@ -7,6 +7,7 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
+from scenelang.evaluate import costs
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Scope
 from scenelang.evaluate.prepare.arguments import Bound, bind
@@ -223,7 +224,9 @@ def _call(expr: nodes.CallExpr, unit: Unit, scope: Scope) -> Code:
     args = [arg for arg in ordered if arg is not None]
     inputs = [codes[id(arg)] for arg in args]
     meaning = builtin.run if builtin.doubt is None else _doubted(builtin, args, unit)
-    slow = guarded(unit, meaning, expr.span, tuple([arg.value for arg in args]))
+    unit.weight += costs.FUNCTIONS.get(name.text, 0)
+    per_item = 0 if name.text == "len" else costs.FUNCTION_ITEM_STEPS
+    slow = guarded(unit, meaning, expr.span, tuple([arg.value for arg in args]), per_item)
     if len(inputs) == 1:
         get = inputs[0].run
         return folded(unit, inputs, meaning, lambda env: slow(get(env)))

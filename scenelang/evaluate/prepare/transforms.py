@@ -6,6 +6,7 @@ from typing import Any
 
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
+from scenelang.evaluate.costs import MATRIX, MOVE, SAME_MOVE
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Env
 from scenelang.evaluate.prepare.arguments import bind
@@ -114,6 +115,7 @@ def _action(
 
     getters = [None if code is None else code.run for code in inputs]
     if all(code is None or code.value is not VARIES for code in inputs):
+        unit.weight += SAME_MOVE
         constants = [None if code is None else code.value for code in inputs]
         made: list[Any] = []
 
@@ -125,6 +127,8 @@ def _action(
             append(made[0], out)
 
         return repeat
+
+    unit.weight += MATRIX if stmt.name.text == "matrix" else MOVE
 
     def action(env: Env, out: Builder) -> None:
         node = construct([None if get is None else get(env) for get in getters])
