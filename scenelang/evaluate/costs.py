@@ -1,4 +1,4 @@
-"""What running costs, in evaluation steps: about a quarter of a microsecond each, so that the limit is one of time.
+"""What running costs, in evaluation steps of about a quarter of a microsecond: their limit is one of time.
 
 Most of it is known when a block is prepared: a node of the tree is half a step, unless it is named here.
 """

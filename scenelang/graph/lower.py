@@ -13,6 +13,7 @@ from scenelang.graph.looks import WHITE, Look
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
 from scenelang.graph.space import Refusal, Space
 from scenelang.graph.spaces import PLANE, SPACES
+from scenelang.graph.steps import Step
 from scenelang.graph.transforms import step_of
 from scenelang.models.manifest import Manifest
 from scenelang.scene import schema
@@ -116,6 +117,7 @@ class _Lowering:
     objects: int = 0
     looks: dict[int, Look] = field(default_factory=dict)
     said: set[tuple[str, str]] = field(default_factory=set)
+    steps: dict[int, Step | Refusal] = field(default_factory=dict)
 
     def run(self, scene: schema.Scene) -> Fold:
         stack = [_Open("union", None, "scene", _unions(scene.nodes), None)]
@@ -179,7 +181,9 @@ class _Lowering:
             if transform.kind not in self.manifest.transforms:
                 self.refuse("E0503", "transform", transform.kind, self.manifest.transforms, transform)
                 continue
-            step = step_of(transform, self.space)
+            step = self.steps.get(id(transform))  # the Scene holds it, so that its id stays its own
+            if step is None:
+                step = self.steps[id(transform)] = step_of(transform, self.space)
             if isinstance(step, Refusal):
                 self.say(step.code, step.message, transform, step.help)
             else:

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from enum import Enum
 
-from scenelang.graph.nodes import Fold, Graph, Move
+from scenelang.graph.nodes import Fold, Graph, Leaf, Move
 from scenelang.graph.space import Space
 from scenelang.graph.steps import IDENTITY, Affine
 
@@ -22,17 +22,21 @@ class Invariant(Enum):
     STREAM = "every child of the root is a leaf"
 
 
+Sound = dict["_Check", dict[int, Leaf]]
+
+
 class InternalError(RuntimeError):
     """A bug of the compiler, not of the scene."""
 
 
-def verify(graph: Graph, stage: str, holds: Collection[Invariant] = ()) -> Graph:
+def verify(graph: Graph, stage: str, holds: Collection[Invariant] = (), sound: Sound | None = None) -> Graph:
     """Check a graph after ``stage``, the name of a pass or ``lower``.
 
     Args:
         graph: any graph.
         stage: whom to name.
         holds: what this stage and those before it established.
+        sound: leaves that an earlier stage left sound and this one may have kept; takes those of this graph.
 
     Returns:
         The graph itself.
@@ -43,7 +47,16 @@ def verify(graph: Graph, stage: str, holds: Collection[Invariant] = ()) -> Graph
     fault = None
     if graph.root.kind != "scene" or graph.root.moves:
         fault = "the root is a scene without moves"
-    check = _Check(graph.space, Invariant.NO_IDENTITIES in holds, Invariant.MERGED in holds)
+    check = _Check(
+        graph.space,
+        Invariant.NO_IDENTITIES in holds,
+        Invariant.MERGED in holds,
+        Invariant.LOOKS in holds,
+    )
+    sound = {} if sound is None else sound
+    if check not in sound:
+        sound.clear()
+    leaves = sound.setdefault(check, {})
     folds = [graph.root]
     while folds and fault is None:
         fold = folds.pop()
@@ -57,10 +70,14 @@ def verify(graph: Graph, stage: str, holds: Collection[Invariant] = ()) -> Graph
                 if check in node.notes:
                     continue
                 node.notes[check] = True
+            elif leaves.get(id(node)) is node:
+                continue
+            else:
+                leaves[id(node)] = node
             r, g, b = node.look.rgb
             if not (0.0 <= r <= 1.0 and 0.0 <= g <= 1.0 and 0.0 <= b <= 1.0):
                 fault = "colours lie in [0, 1]"
-            elif Invariant.LOOKS in holds and node.look.folded() is not node.look:
+            elif check.folded and node.look.folded() is not node.look:
                 fault = Invariant.LOOKS.value
             elif node.moves:
                 fault = fault or check.moves_fault(node.moves)
@@ -85,11 +102,12 @@ def _fold_fault(fold: Fold, root: bool, holds: Collection[Invariant]) -> str | N
 
 @dataclass(frozen=True, slots=True)
 class _Check:
-    """What must hold of each chain: maps stay within the space, no identities, no neighbouring maps."""
+    """What must hold of each leaf: maps of the space, no identities, no neighbouring maps, a folded look."""
 
     space: Space
     tidy: bool
     merged: bool
+    folded: bool
 
     def moves_fault(self, moves: tuple[Move, ...]) -> str | None:
         after_map = False

@@ -13,7 +13,7 @@ from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import Memory, Spans, lower
 from scenelang.graph.nodes import Graph
-from scenelang.graph.verify import Invariant, verify
+from scenelang.graph.verify import Invariant, Sound, verify
 from scenelang.models.manifest import Manifest
 from scenelang.passes.check_levels import check_levels
 from scenelang.passes.check_trained import check_trained
@@ -84,7 +84,8 @@ def run_passes(
     if not OPTIONAL.issuperset(without):
         raise ValueError(f"passes that cannot be left out: {', '.join(sorted(set(without) - OPTIONAL))}")
     holds: frozenset[Invariant] = frozenset()
-    verify(graph, "lower")
+    sound: Sound = {}
+    verify(graph, "lower", sound=sound)
     if after is not None:
         after("lower", graph)
     for step in PASSES:
@@ -93,7 +94,7 @@ def run_passes(
         before, graph = graph, step.run(graph, context)
         if graph is not before or step.establishes:
             holds |= step.establishes
-            verify(graph, step.name, holds)
+            verify(graph, step.name, holds, sound)
         if after is not None:
             after(step.name, graph)
         if context.diagnostics.errors:

@@ -48,7 +48,8 @@ def _check(leaf: Leaf, space: Space, context: Context) -> None:
             )
             return
     # Each map is lifted by itself, so each needs an inverse, and so does what they compose to.
-    maps = [affine.composed(leaf.steps), *(m.step.rows for m in leaf.moves if isinstance(m.step, Affine))]
+    maps = [move.step.rows for move in leaf.moves if isinstance(move.step, Affine)]
+    maps += [affine.composed(leaf.steps)] if len(maps) > 1 else []
     bad = next((rows for rows in maps if not space.usable(rows)), None)
     if bad is not None:
         smallest, largest = space.stretches(bad)

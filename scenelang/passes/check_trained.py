@@ -64,7 +64,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     if "smooth" in manifest.trained and len(smooth) > manifest.trained["smooth"][1]:
         last = next((node for node in reversed(smooth) if isinstance(node, Leaf)), None)
         _warn(context, "smooth", f"{len(smooth):,} smooth unions are outside the measured range {{}}", last)
-    if "blend" in manifest.trained:
+    if smooth and "blend" in manifest.trained:
         _check_blends(graph, context)
     limits = manifest.trained.get("objects")
     if limits is not None and count > limits[1]:
