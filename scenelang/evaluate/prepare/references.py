@@ -224,7 +224,7 @@ def _call(expr: nodes.CallExpr, unit: Unit, scope: Scope) -> Code:
     args = [arg for arg in ordered if arg is not None]
     inputs = [codes[id(arg)] for arg in args]
     meaning = builtin.run if builtin.doubt is None else _doubted(builtin, args, unit)
-    unit.weight += costs.FUNCTIONS.get(name.text, 0)
+    unit.weight += costs.FUNCTIONS.get(name.text, 4 * len(args) if builtin.variadic else 0)
     per_item = 0 if name.text == "len" else costs.FUNCTION_ITEM_STEPS
     slow = guarded(unit, meaning, expr.span, tuple([arg.value for arg in args]), per_item)
     if len(inputs) == 1:
