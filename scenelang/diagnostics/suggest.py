@@ -122,7 +122,19 @@ def did_you_mean(
     if len(near) > 1:
         shown = [f"'{candidate}'" for candidate in near[:3]]
         return f"did you mean {', '.join(shown[:-1])} or {shown[-1]}?", None
-    return f"did you mean '{near[0]}'?", Fix(f"rename to '{near[0]}'", (Edit(span, near[0]),))
+    fix = Fix(f"rename to '{near[0]}'", (Edit(span, near[0]),)) if is_slip(name, near[0], best) else None
+    return f"did you mean '{near[0]}'?", fix
+
+
+def is_slip(name: str, other: str, distance: float) -> bool:
+    """Whether one name can only have been meant for the other.
+
+    `p3` is not `p2`, `rotateX` not `rotate` and `heptagon` not `pentagon`: they mean something of their own.
+    """
+    digits, others = ([c for c in text if c.isdigit()] for text in (name, other))
+    axis = name[-1:] in "xyzXYZ" and name[:-1].rstrip("_").lower() == other.lower()
+    start = distance < 2 or name[:1].lower() == other[:1].lower()
+    return digits == others and not axis and distance <= 2 and start
 
 
 def instead(

@@ -18,6 +18,8 @@ from scenelang.syntax.tokens import Report, Tokens
 Arguments = tuple[tuple[nodes.Argument, ...], int]
 
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
+_ESCAPES_ELSEWHERE = "abefrvxuUN'01234567"
+"""What means something behind a backslash in other languages: there nobody meant the backslash itself."""
 _LITERALS = (nodes.Number, nodes.String, nodes.Bool, nodes.Color, nodes.NameRef, nodes.BadExpr)
 
 
@@ -192,8 +194,9 @@ class ExpressionBuilder:
             parts.append(body[slash:at])
             place = start + slash
             help = 'the escapes are `\\"`, `\\\\`, `\\n` and `\\t`'
-            fix = self.report.change(place, place + 1, "\\\\")
-            self.report.add("E0119", f"unknown escape `\\{letter}`", place, start + at, help=help, fix=fix)
+            double = None if letter in _ESCAPES_ELSEWHERE else self.report.change(place, place + 1, "\\\\")
+            message = f"unknown escape `\\{letter}`"
+            self.report.add("E0119", message, place, start + at, help=help, fix=double)
         parts.append(body[at:])
         return "".join(parts)
 

@@ -8,6 +8,7 @@ from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
+from scenelang.syntax import mistakes
 from scenelang.syntax.automaton import reach
 from scenelang.syntax.foreign import HABITS, Habit
 from scenelang.syntax.patterns import (
@@ -164,7 +165,9 @@ class Habits(Slips):
             return False
         start, end = tokens.starts[first], tokens.ends[calls[-1][1] - 1]
         message = f"`{tokens.text(first)}` stands before what it applies to"
-        fix = self._moved_inside(calls, child)
+        # Among other transforms it lacks its `;`, and what follows is a material.
+        among = first > 0 and mistakes.head(tokens, first - 1) in _PREFIXES
+        fix = None if among else self._moved_inside(calls, child)
         self.report.add("E0133", message, start, end, help=_INSIDE, fix=fix)
         tokens.replace(first, child - first, [])
         return True

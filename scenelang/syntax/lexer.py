@@ -65,6 +65,8 @@ _SLIPS = {
     "name": r"[^\W\d]\w*+",
     "foreign": r"&(?!&)|\|(?!\|)|" + "|".join(re.escape(text) for text in FOREIGN if text not in "&|"),
 }
+_AFTER_STRING = re.compile(r"[ \t]*+(?:[;)]|as\b|$)", re.MULTILINE)
+"""What may follow a string whose end is known though its quote is missing."""
 _ILLEGAL = r"[^\s\w\x21-\x7e]+|[@$\\~`]+|[\s\S]"
 
 
@@ -148,7 +150,8 @@ class _Slips:
 
     def _open_string(self, start: int, end: int, text: str) -> None:
         self._keep("STRING", start, end)
-        fix = self.report.change(end, end, '"') if end - start > 1 else None
+        sure = end - start > 1 and _AFTER_STRING.match(self.tokens.source.text, end)
+        fix = self.report.change(end, end, '"') if sure else None
         self.report.add(
             "E0114", "string is never closed", start, end, help='a string ends with `"` on its line', fix=fix
         )
@@ -182,13 +185,14 @@ class _Slips:
         self.report.add("E0116", message, start, end, help=help, fix=fix)
 
     def _hash(self, start: int, end: int, text: str) -> None:
+        fix = None if text.rstrip().endswith((";", "{", "}")) else "//"  # OpenSCAD marks objects by it
         self.report.add(
             "E0127",
             "`#` does not begin a comment",
             start,
             start + 1,
             help="comments begin with `//`",
-            fix="//",
+            fix=fix,
         )
 
     def _colour(self, start: int, end: int, text: str) -> None:

@@ -6,15 +6,20 @@ from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.syntax.repairs import REPLACEMENTS, Repair
+from scenelang.syntax.repairs import MAX_REPLAY, REPLACEMENTS, Repair
 from scenelang.syntax.spelling import keywords_near, word_for
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 
+DEFINITIONS = ("let", "param", "fn")
+_ENDS = ("`}`", "the end of the file")
+_OPERATORS = ("+", "-", "*", "/", "%", "^", "<", "<=", ">", ">=", "==", "!=", "&&", "||", "?", "..", "..<")
 _KEYWORD_HELP = "choose another name"
 
 
-def report_repair(tokens: Tokens, report: Report, repair: Repair, open_brackets: Sequence[int]) -> None:
+def report_repair(
+    tokens: Tokens, report: Report, repair: Repair, open_brackets: Sequence[int], sure: bool = True
+) -> None:
     """Report the mistake that a repair mends.
 
     Args:
@@ -22,6 +27,7 @@ def report_repair(tokens: Tokens, report: Report, repair: Repair, open_brackets:
         report: takes the diagnostic.
         repair: what is going to be done.
         open_brackets: indices of the brackets open before it.
+        sure: what is inserted can stand nowhere else.
     """
     touched = range(repair.at, repair.end)
     if any(tokens.starts[index] in tokens.reported for index in touched):
@@ -33,7 +39,7 @@ def report_repair(tokens: Tokens, report: Report, repair: Repair, open_brackets:
         return  # what belongs here was read as something illegal
     names = [tables().kinds[kind] for kind in repair.insert]
     if not repair.delete:
-        _report_insertion(tokens, report, repair.at, names, open_brackets)
+        _report_insertion(tokens, report, repair.at, names, open_brackets, sure)
     elif not names:
         _report_deletion(tokens, report, repair)
     else:
@@ -48,7 +54,7 @@ def report_braces(tokens: Tokens, report: Report, statements: Sequence[tuple[int
         edits.append(Edit(_empty(tokens, tokens.ends[stop - 1]), " }"))
     first = statements[0][0]
     at = tokens.end_before(first) if tokens.on_new_line(first) else tokens.starts[first]
-    fix = Fix("put braces around it", tuple(edits))
+    fix = None if _goes_on(tokens, *statements[-1]) else Fix("put braces around it", tuple(edits))
     report.add("E0106", "missing braces", at, at, help="braces are mandatory here", fix=fix)
 
 
@@ -105,7 +111,7 @@ def report_unexpected(tokens: Tokens, report: Report, at: int) -> None:
 
 
 def _report_insertion(
-    tokens: Tokens, report: Report, at: int, names: list[str], open_brackets: Sequence[int]
+    tokens: Tokens, report: Report, at: int, names: list[str], open_brackets: Sequence[int], sure: bool
 ) -> None:
     end = tokens.end_before(at)
     found = _shown(tokens, at)
@@ -123,10 +129,13 @@ def _report_insertion(
     if first in (")", "]"):
         text = "".join(names)
         labels = [Label(_span(tokens, open_brackets[-1]), "opened here")]
-        report.add("E0103", f"missing `{text}`", end, end, labels=labels, fix=text)
+        report.add("E0103", f"missing `{text}`", end, end, labels=labels, fix=text if sure else None)
     elif first == ";":
         help = "a `;` ends every statement without a block"
-        report.add("E0102", "missing `;`", end, end, help=help, fix=";")
+        # Inside a line an operator may be missing as well, or a brace.
+        called = tokens.text(at - 1) == ")" and head(tokens, at) not in DEFINITIONS
+        sure = tokens.on_new_line(at) or called or found in _ENDS
+        report.add("E0102", "missing `;`", end, end, help=help, fix=";" if sure else None)
     elif names == ["BAD_EXPRESSION"]:
         report.add("E0108", f"expected an expression, found {found}", *place)
     elif names == ["NAME"]:
@@ -141,7 +150,9 @@ def _report_insertion(
     elif first == ",":
         literal = all(_is_literal(tokens, index) for index in (at - 1, at))
         message = "missing `,`" if literal else f"missing `,` or operator before {found}"
-        report.add("E0112", message, end, end, fix="," if literal else None)
+        # Of equal ones, one may be too many; beside others an operator may be missing.
+        sure = literal and tokens.text(at - 1) != tokens.text(at) and _are_items(tokens, at - 1, at + 1)
+        report.add("E0112", message, end, end, fix="," if sure else None)
     elif first == "*":
         report.add("E0112", f"missing operator before {found}", end, end)
     elif names[1:]:
@@ -158,7 +169,9 @@ def _report_deletion(tokens: Tokens, report: Report, repair: Repair) -> None:
     start, end = tokens.starts[repair.at], tokens.ends[repair.end - 1]
     text = tokens.source.text[start:end]
     if text in (")", "]"):
-        report.add("E0105", f"unmatched `{text}`", start, end, fix="")
+        # Beside operators it may be the opening one that is missing.
+        fix = None if _has_operator(tokens, repair.at + 1) else ""
+        report.add("E0105", f"unmatched `{text}`", start, end, fix=fix)
     else:
         report.add(
             "E0101", f"unexpected {_quoted(text)}", start, end, fix=_once(tokens, report, repair, start, end)
@@ -168,14 +181,17 @@ def _report_deletion(tokens: Tokens, report: Report, repair: Repair) -> None:
 def _once(tokens: Tokens, report: Report, repair: Repair, start: int, end: int) -> Fix | None:
     """Remove what is written twice in a row, with the space between."""
     text = tokens.source.text
-    if repair.at and tokens.text(repair.at - 1) == text[start:end]:
-        before = tokens.ends[repair.at - 1]
-        start = start if text[before:start].strip() else before
-    elif tokens.text(repair.end) == text[start:end]:
-        behind = tokens.starts[repair.end]
-        end = end if text[end:behind].strip() else behind
+    word = text[start:end]
+    if repair.at and tokens.text(repair.at - 1) == word:
+        gap = slice(tokens.ends[repair.at - 1], start)
+    elif tokens.text(repair.end) == word:
+        gap = slice(end, tokens.starts[repair.end])
     else:
         return None
+    if word == "," or _is_literal(tokens, repair.at):
+        return None  # something may be missing between them
+    if not text[gap].strip():
+        start, end = min(start, gap.start), max(end, gap.stop)
     return report.change(start, end, "")
 
 
@@ -187,11 +203,15 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
     if repair.delete == 2:
         first, second = tokens.text(repair.at), tokens.text(repair.at + 1)
         gap = tokens.source.text[tokens.ends[repair.at] : tokens.starts[repair.at + 1]]
-        swap = report.change(start, end, f"{second}{gap}{first}", "swap them")
+        bracket = any(one in "()[]" for one in (first, second))
+        sure = not (bracket and _has_operator(tokens, repair.at + 2))
+        swap = report.change(start, end, f"{second}{gap}{first}", "swap them") if sure else None
         report.add("E0131", f"`{first}` and `{second}` are in the wrong order", start, end, fix=swap)
     elif new == "NAME" and text.isalpha():
         report.add("E0110", f"`{text}` is a keyword, not a name", start, end, help=_KEYWORD_HELP)
     elif new == "==":
+        if head(tokens, repair.at) in DEFINITIONS:
+            fix = None  # two names for one value, more likely
         report.add("E0111", "`=` does not compare", start, end, help="equality is `==`", fix=fix)
     elif new == "{}":
         report.add("E0106", f"missing block, found `{text}`", start, end)
@@ -209,6 +229,45 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
         report.add("E0130", f"`{text}` where `{new}` belongs", start, end, fix=fix)
     else:
         report_instead(tokens, report, repair.at, names)
+
+
+def head(tokens: Tokens, at: int) -> str:
+    """The first word of the statement that the token at an index belongs to."""
+    return (_statement(tokens, at) or [""])[-1]
+
+
+def _statement(tokens: Tokens, at: int) -> list[str]:
+    """The tokens of a statement before the one at an index, from the last to the first."""
+    found: list[str] = []
+    while at and len(found) < MAX_REPLAY:
+        at -= 1
+        text = tokens.text(at)
+        if text in (";", "{", "}"):
+            break
+        found.append(text)
+    return found
+
+
+def _has_operator(tokens: Tokens, at: int) -> bool:
+    """Whether brackets matter in what stands before a token in its statement."""
+    return any(text in _OPERATORS for text in _statement(tokens, at))
+
+
+def _are_items(tokens: Tokens, first: int, stop: int) -> bool:
+    """Whether two literals are nothing but items of a list."""
+    first -= tokens.text(first - 1) == "-"
+    return tokens.text(first - 1) in ("(", "[", ",") and tokens.text(stop) in (")", "]", ",")
+
+
+def _goes_on(tokens: Tokens, first: int, stop: int) -> bool:
+    """Whether what follows a statement on a line of its own is laid out as its sibling."""
+    text, starts = tokens.source.text, tokens.starts
+    if not tokens.on_new_line(first) or not tokens.on_new_line(stop) or tokens.kinds[stop] == END:
+        return False
+    if tokens.text(stop) in ("}", "else"):
+        return False
+    first, stop = (starts[at] - text.rfind("\n", 0, starts[at]) for at in (first, stop))
+    return first == stop
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -12,8 +12,9 @@ from typing import Any
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import mistakes, nodes
 from scenelang.syntax.automaton import reach, statement_depth
+from scenelang.syntax.completion import closes_earlier
 from scenelang.syntax.habits import Habits
-from scenelang.syntax.repairs import FOLLOWED, MAX_REPLAY, Search
+from scenelang.syntax.repairs import FOLLOWED, MAX_REPLAY, Repair, Search
 from scenelang.syntax.spelling import FOREIGN_HEADS, keywords_near
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
@@ -74,12 +75,24 @@ class Recovery(Habits):
         if repair is None:
             del states[depth + 1 :], values[depth:]
             return self._skip(first, at)
-        mistakes.report_repair(self.tokens, self.report, repair, search.open_brackets(repair.at))
+        sure = self._stands_there(states[: depth + 1], search, repair)
+        mistakes.report_repair(self.tokens, self.report, repair, search.open_brackets(repair.at), sure)
         self.tokens.replace(repair.at, repair.delete, repair.insert)
         if at - first > MAX_REPLAY:
             return at
         del states[depth + 1 :], values[depth:]
         return first
+
+    def _stands_there(self, stack: list[int], search: Search, repair: Repair) -> bool:
+        """Whether a bracket that a repair closes can be closed nowhere else in the statement."""
+        if repair.delete or repair.insert[0] not in search.closings:
+            return True
+        kinds, opening = self.tokens.kinds, search.open_brackets(repair.at)[0]
+        if repair.at - search.first > MAX_REPLAY:
+            return False
+        reach(stack, kinds, search.first, opening + 1)
+        after = [*repair.insert[1:], *kinds[repair.at : search.bound]]
+        return not closes_earlier(stack, repair.insert[0], kinds[opening + 1 : repair.at], after)
 
     def _index(self, value: Any) -> int:
         """Index of the first token of something on the value stack."""
@@ -126,7 +139,8 @@ class Recovery(Habits):
         before = at - 1
         if at and self._is(before, ";") and not tokens.on_new_line(at):
             start, end = tokens.starts[before], tokens.ends[before]
-            self.report.add("E0130", "`;` between a statement and its block", start, end, fix="")
+            fix = None if mistakes.head(tokens, before) in mistakes.DEFINITIONS else ""  # it needs its `;`
+            self.report.add("E0130", "`;` between a statement and its block", start, end, fix=fix)
             return
         help = "a block belongs to a geometry, a module, `group`, `material`, `for`, `if` or a boolean word"
         self.report.add("E0129", "block without a head", tokens.starts[at], tokens.ends[at], help=help)
@@ -149,8 +163,9 @@ class Recovery(Habits):
         word = max(read, key=read.__getitem__, default=None)
         if word is None or read[word] <= at + 1 - first:
             return False
+        fix = None if text == "int" else word  # whose quotients are whole
         help = f"it is `{word}` here" if text in FOREIGN_HEADS else f"did you mean `{word}`?"
-        self.report.add("E0132", f"unknown statement `{text}`", start, end, help=help, fix=word)
+        self.report.add("E0132", f"unknown statement `{text}`", start, end, help=help, fix=fix)
         tokens.kinds[first] = self.literals[word]
         return True
 

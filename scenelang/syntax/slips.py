@@ -190,8 +190,9 @@ class Slips:
         start, end = tokens.starts[at - 1], tokens.ends[stop - 1]
         text = tokens.source.text[start:end]
         plain = text.replace(",", "")
-        help = "digits are not grouped"
-        self.report.add("E0116", f"`{text}` is not a number", start, end, help=help, fix=plain)
+        help = "digits are not grouped, and decimals stand behind a point"
+        fix = plain if text.count(",") > 1 else None  # one comma may be the decimal one
+        self.report.add("E0116", f"`{text}` is not a number", start, end, help=help, fix=fix)
         tokens.reported.add(start)
         tokens.ends[at - 1] = end
         tokens.replace(at, stop - at, [])

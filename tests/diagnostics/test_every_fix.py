@@ -103,7 +103,7 @@ def test_fixes_of_slips_come_to_rest(seed: int) -> None:
     source = SourceFile("a.nsg", text)
     tokens = scan(source, Report(source))
     at = draw.randrange(len(tokens.kinds) - 2)
-    start, end, following, last = (*_place(tokens, at), *_place(tokens, at + 1))
+    start, end, following, last = (*place(tokens, at), *place(tokens, at + 1))
     slips = [
         text[:start] + text[end:],
         text[:end] + " " + text[start:],
@@ -117,5 +117,5 @@ def test_fixes_of_slips_come_to_rest(seed: int) -> None:
     assert len([d for _, d in done.left if d.code.startswith("E01")]) <= len(broken)
 
 
-def _place(tokens: Tokens, index: int) -> tuple[int, int]:
+def place(tokens: Tokens, index: int) -> tuple[int, int]:
     return tokens.starts[index], tokens.ends[index]

@@ -31,7 +31,7 @@ def mended(text: str, outcome: Outcome) -> str:
         ("background(null);", "background(none);"),
         ("square { material flat { color(Red); } }", "square { material flat { color(#f00); } }"),
         ("cube { scale(0.5); }", 'import "std/shapes" as s;\ns.rect() { scale(0.5); }'),
-        ("square { resize(0.5); }", "square { scale(0.5); }"),
+        ("square { zoom(0.5); }", "square { scale(0.5); }"),
         ("square { material flat { colour(#d33); } }", "square { material flat { color(#d33); } }"),
         ("intersection { square {} star {} }", "intersect { square {} star {} }"),
         ("gruop { square {} }", "group { square {} }"),
@@ -44,7 +44,7 @@ def mended(text: str, outcome: Outcome) -> str:
             "let far_off = 1; square { translate(faroff, 0); }",
             "let far_off = 1; square { translate(far_off, 0); }",
         ),
-        ("square { translate(sqr(2), 0); }", "square { translate(sqrt(2), 0); }"),
+        ("square { translate(srqt(2), 0); }", "square { translate(sqrt(2), 0); }"),
         ("let ab = 1; square { translate(ba, 0); }", None),
         ("let sizes = 1; square { scale(size); }", "let sizes = 1; square { scale(sizes); }"),
         # the definition has the slip: what is used twice is right

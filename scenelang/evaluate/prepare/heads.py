@@ -147,8 +147,9 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         hint, fix = did_you_mean(name.text, candidates, name.span, effort=session.effort)
         if hint is None and place.kind in HOLDERS:
             hint, fix = in_library(stmt, unit, scope)
-        if hint is None:
-            hint, fix = instead(name.text, foreign_words.WORDS, candidates, name.span)
+        if fix is None:
+            known, fix = instead(name.text, foreign_words.WORDS, candidates, name.span)
+            hint = known or hint
         if hint is None and foreign_words.STATEMENTS.get(name.text):
             hint = foreign_words.STATEMENTS[name.text]
         if hint is None and place.kind in ("file", "group", "chain") and words.geometries:

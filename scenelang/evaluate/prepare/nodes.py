@@ -168,9 +168,10 @@ def _check_first(stmt: nodes.Node, place: Place) -> None:
         if isinstance(child, nodes.Combined):
             word = child.keyword
             edit = Edit(Span(word.source, word.start, child.child.span.start), "")
-            fix = Fix(f"remove '{child.op}'", (edit,))
+            fix = Fix(f"remove '{child.op}'", (edit,)) if child.op in ("union", "smooth") else None
+            help = None if fix else "what it is taken from or cut with stands before it"
             message = f"'{child.op}' on the first child of a chain joins it to nothing"
-            place.unit.session.error("E0335", message, word, fix=fix)
+            place.unit.session.error("E0335", message, word, help=help, fix=fix)
             return
         if isinstance(child, nodes.Call | nodes.Node | nodes.For | nodes.If):
             return

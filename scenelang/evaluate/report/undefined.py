@@ -9,7 +9,7 @@ from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.diagnostics.suggest import did_you_mean, listing, ranked
+from scenelang.diagnostics.suggest import did_you_mean, is_slip, listing, ranked
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Binding, Scope
 from scenelang.evaluate.report import foreign_words
@@ -115,7 +115,7 @@ def told_at_definition(
         f"'{name}' is defined here, '{text}' is used",
         span,
         help=f"did you mean to define '{text}'?",
-        fix=Fix(f"rename to '{text}'", (Edit(span, text),)),
+        fix=Fix(f"rename to '{text}'", (Edit(span, text),)) if is_slip(text, name, near[0][0]) else None,
         labels=shown_places(places, "used here"),
     )
     return True
@@ -228,6 +228,8 @@ def unknown(name: nodes.Name, unit: Unit, scope: Scope, *, called: bool = False)
     def advise() -> Advice:
         if called and text in foreign_words.FUNCTIONS:
             return foreign_words.FUNCTIONS[text], None
+        if not called and text.lower() in foreign_words.VALUES:
+            return foreign_words.VALUES[text.lower()], None
         visible = (n for n, _ in within_effort(session, scope, kinds))
         help, fix = did_you_mean(text, {*visible, *own}, name.span, effort=session.effort)
         here = None if called else foreign_words.NAMES.get(text.lower())
