@@ -22,10 +22,7 @@ from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.loader import Loader, Unreadable, read_source
 from scenelang.evaluate.names import UNBOUND
-from scenelang.evaluate.prepare import (
-    heads,  # noqa: F401  (registers its statements)
-    params,  # noqa: F401  (registers its statements)
-)
+from scenelang.evaluate.prepare import EXPRESSIONS, STATEMENTS
 from scenelang.evaluate.prepare.blocks import Body
 from scenelang.evaluate.prepare.imports import prepare_file
 from scenelang.evaluate.report.bad_calls import report_misfits
@@ -116,7 +113,9 @@ class Evaluation:
         self._errors = len(diagnostics.errors)
         words = _choose(file, vocabulary(models), model, diagnostics)
         self._steps = self._objects = 0
-        self._session = session = Session(diagnostics, words, frame, fps, replays=replays and self.animates)
+        self._session = session = Session(
+            diagnostics, words, EXPRESSIONS, STATEMENTS, frame, fps, replays=replays and self.animates
+        )
         session.watch = watch
         resolved = path.resolve() if path is not None else None
         folder = root.resolve() if root is not None else resolved.parent if resolved is not None else None

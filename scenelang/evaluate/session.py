@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -62,6 +62,7 @@ class Session:
     Args:
         diagnostics: where mistakes go.
         vocabulary: names that models offer.
+        expressions, statements: how each class of the syntax tree is prepared.
         frame: number of the frame to evaluate.
         fps: frames a second instead of those that ``animate`` names.
         replays: run what no frame changes once; the evaluation is for several frames.
@@ -72,6 +73,8 @@ class Session:
 
     diagnostics: Diagnostics
     vocabulary: Vocabulary
+    expressions: Mapping[type, Callable[..., Any]]
+    statements: Mapping[type, Callable[..., Any]]
     frame: int = 0
     fps: float | None = None
     spans: SpanMap = field(default_factory=SpanMap)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from typing import Any, Final, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
@@ -54,25 +54,11 @@ class Body(NamedTuple):
     weight: int
 
 
-Prepare = Callable[[Any, Place], Action | None]
-S = TypeVar("S", bound=Prepare)
-_PREPARE: Final[dict[type, Prepare]] = {}
-
-
-def states(node: type) -> Callable[[S], S]:
-    """Register how statements of class ``node`` are prepared."""
-
-    def register(function: S) -> S:
-        _PREPARE[node] = function
-        return function
-
-    return register
-
-
 def prepare_statement(stmt: nodes.Stmt, place: Place) -> Action | None:
     """One statement's action; None where it does nothing when it runs."""
     place.unit.weight += HALF_STEPS.get(stmt.__class__, 0)
-    return _PREPARE[stmt.__class__](stmt, place)
+    action: Action | None = place.unit.session.statements[stmt.__class__](stmt, place)
+    return action
 
 
 def prepare_block(statements: Sequence[nodes.Stmt], place: Place, span: Span) -> Body:
@@ -189,8 +175,7 @@ def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
     return True
 
 
-@states(nodes.Let)
-def _let(stmt: nodes.Let, place: Place) -> Action | None:
+def prepare_let(stmt: nodes.Let, place: Place) -> Action | None:
     code = prepare(stmt.value, place.unit, place.scope)
     name = stmt.name.span
     place.unit.session.origins[id(name.source), name.start] = stmt.value
@@ -259,22 +244,18 @@ def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: 
     definition.slots = frame.size
 
 
-@states(nodes.Fn)
-@states(nodes.Module)
-def _declared(stmt: nodes.Fn | nodes.Module, place: Place) -> Action | None:
+def skip_declared(stmt: nodes.Fn | nodes.Module, place: Place) -> Action | None:
     return None  # done by `declare`
 
 
-@states(nodes.BadStmt)
-def _bad(stmt: nodes.BadStmt, place: Place) -> Action | None:
+def skip_bad(stmt: nodes.BadStmt, place: Place) -> Action | None:
     return None
 
 
 # ---------------------------------------------------------------- control flow
 
 
-@states(nodes.For)
-def _for(stmt: nodes.For, place: Place) -> Action | None:
+def prepare_for(stmt: nodes.For, place: Place) -> Action | None:
     unit = place.unit
     iterable = prepare(stmt.iterable, unit, place.scope)
     loop = inner(place)._replace(repeated=True)
@@ -314,8 +295,7 @@ def _for(stmt: nodes.For, place: Place) -> Action | None:
     return action
 
 
-@states(nodes.If)
-def _if(stmt: nodes.If, place: Place) -> Action | None:
+def prepare_if(stmt: nodes.If, place: Place) -> Action | None:
     unit = place.unit
     arms: list[tuple[Callable[[Env], Any], Body]] = []
     at: nodes.If | nodes.Block | None = stmt

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple
 
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.costs import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS
@@ -56,20 +56,6 @@ def constant(value: Any) -> Code:
 
 POISONED: Final = constant(POISON)
 
-Prepare = Callable[[Any, Unit, Scope], Code]
-E_ = TypeVar("E_", bound=Prepare)
-_PREPARE: Final[dict[type, Prepare]] = {}
-
-
-def prepares(node: type) -> Callable[[E_], E_]:
-    """Register how expressions of class ``node`` are prepared."""
-
-    def register(function: E_) -> E_:
-        _PREPARE[node] = function
-        return function
-
-    return register
-
 
 def prepare(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
     """Resolve the names of ``expr`` and make it runnable; reports what is wrong in any case."""
@@ -80,7 +66,8 @@ def prepare(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
         message = f"a tree of more than {MAX_NESTING} levels"
         raise unit.session.halt("E0324", message, expr.span)
     try:
-        return _PREPARE[expr.__class__](expr, unit, scope)
+        code: Code = unit.session.expressions[expr.__class__](expr, unit, scope)
+        return code
     finally:
         unit.nesting -= 1
 

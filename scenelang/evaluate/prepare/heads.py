@@ -5,7 +5,7 @@ from __future__ import annotations
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.suggest import did_you_mean, instead, listing
 from scenelang.evaluate.names import Binding, Scope
-from scenelang.evaluate.prepare.blocks import Action, Place, inner, prepare_block, states
+from scenelang.evaluate.prepare.blocks import Action, Place, inner, prepare_block
 from scenelang.evaluate.prepare.expressions import prepare
 from scenelang.evaluate.prepare.materials import prepare_value_use
 from scenelang.evaluate.prepare.nodes import HOLDERS, prepare_module_call, prepare_object
@@ -30,8 +30,7 @@ from scenelang.syntax import nodes
 NODE_WORDS = ("group", "union", "smooth", "subtract", "intersect", "chain")
 
 
-@states(nodes.Call)
-def _call(stmt: nodes.Call, place: Place) -> Action | None:
+def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
     name = stmt.name.text
     if name in SETTINGS:
         return prepare_setting(stmt, place)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Binding, Env
-from scenelang.evaluate.prepare.blocks import Action, Body, Place, define, prepare_block, states
+from scenelang.evaluate.prepare.blocks import Action, Body, Place, define, prepare_block
 from scenelang.evaluate.prepare.settings import at_top_level
 from scenelang.evaluate.report.suppression import find_damage
 from scenelang.syntax import nodes
@@ -13,8 +13,7 @@ from scenelang.syntax import nodes
 _BROUGHT = (nodes.Param, nodes.Let, nodes.Fn, nodes.Module, nodes.Import, nodes.Version)
 
 
-@states(nodes.Import)
-def _import(stmt: nodes.Import, place: Place) -> Action | None:
+def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
     unit = place.unit
     if not at_top_level(place, stmt.span, "an import"):
         define(stmt.alias, Binding("poison", stmt.alias.span), place)

@@ -16,7 +16,6 @@ from scenelang.evaluate.prepare.expressions import (
     folded,
     guarded,
     prepare,
-    prepares,
 )
 from scenelang.evaluate.values import operators
 from scenelang.evaluate.values.functions import number
@@ -24,8 +23,7 @@ from scenelang.evaluate.values.value import UNITS, Angle, Problem, RangeValue, T
 from scenelang.syntax import nodes
 
 
-@prepares(nodes.Number)
-def _number(expr: nodes.Number, unit: Unit, scope: Scope) -> Code:
+def prepare_number(expr: nodes.Number, unit: Unit, scope: Scope) -> Code:
     value = float(expr.value)
     if not math.isfinite(value):
         unit.session.error("E0306", "the number is too large", expr.span)
@@ -52,24 +50,19 @@ def _finite_literal(make: Callable[[float], Any], value: float, expr: nodes.Numb
     return POISONED
 
 
-@prepares(nodes.String)
-@prepares(nodes.Bool)
-def _literal(expr: nodes.String | nodes.Bool, unit: Unit, scope: Scope) -> Code:
+def prepare_literal(expr: nodes.String | nodes.Bool, unit: Unit, scope: Scope) -> Code:
     return constant(expr.value)
 
 
-@prepares(nodes.Color)
-def _color(expr: nodes.Color, unit: Unit, scope: Scope) -> Code:
+def prepare_color(expr: nodes.Color, unit: Unit, scope: Scope) -> Code:
     return constant(Vec(tuple([float(c) for c in expr.rgb])))
 
 
-@prepares(nodes.BadExpr)
-def _bad(expr: nodes.BadExpr, unit: Unit, scope: Scope) -> Code:
+def skip_bad(expr: nodes.BadExpr, unit: Unit, scope: Scope) -> Code:
     return POISONED
 
 
-@prepares(nodes.Vector)
-def _vector(expr: nodes.Vector, unit: Unit, scope: Scope) -> Code:
+def prepare_vector(expr: nodes.Vector, unit: Unit, scope: Scope) -> Code:
     codes = [prepare(item, unit, scope) for item in expr.items]
     getters = tuple([code.run for code in codes])
 
@@ -83,8 +76,7 @@ def _vector(expr: nodes.Vector, unit: Unit, scope: Scope) -> Code:
     return folded(unit, codes, make, lambda env: slow(*[get(env) for get in getters]))
 
 
-@prepares(nodes.Range)
-def _range(expr: nodes.Range, unit: Unit, scope: Scope) -> Code:
+def prepare_range(expr: nodes.Range, unit: Unit, scope: Scope) -> Code:
     parts = [expr.start, expr.stop] + ([expr.step] if expr.step is not None else [])
     codes = [prepare(part, unit, scope) for part in parts]
     exclusive = expr.exclusive
@@ -141,8 +133,7 @@ def member(code: Code, name: nodes.Name, unit: Unit, of: nodes.Expr | None = Non
     return folded(unit, [code], pick, run)
 
 
-@prepares(nodes.Index)
-def _index(expr: nodes.Index, unit: Unit, scope: Scope) -> Code:
+def prepare_index(expr: nodes.Index, unit: Unit, scope: Scope) -> Code:
     codes = [prepare(expr.value, unit, scope), prepare(expr.index, unit, scope)]
 
     def pick(value: Any, index: Any) -> Any:

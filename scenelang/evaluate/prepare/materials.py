@@ -12,8 +12,8 @@ from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.costs import MATERIAL_VALUE
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Binding, Env, Scope
-from scenelang.evaluate.prepare.blocks import Action, Place, inner, misplaced, prepare_block, states
-from scenelang.evaluate.prepare.expressions import Code, constant, prepares
+from scenelang.evaluate.prepare.blocks import Action, Place, inner, misplaced, prepare_block
+from scenelang.evaluate.prepare.expressions import Code, constant
 from scenelang.evaluate.prepare.references import value_of
 from scenelang.evaluate.values.value import POISON, MaterialValue, describe
 from scenelang.scene import spans
@@ -21,8 +21,7 @@ from scenelang.scene.schema import Material
 from scenelang.syntax import nodes
 
 
-@states(nodes.MaterialUse)
-def _use(stmt: nodes.MaterialUse, place: Place) -> Action | None:
+def prepare_use(stmt: nodes.MaterialUse, place: Place) -> Action | None:
     word = Span(stmt.span.source, stmt.span.start, stmt.name.span.end)
     if place.kind in ("file", "material"):
         where = "at top level" if place.kind == "file" else "inside a material"
@@ -40,8 +39,7 @@ def _use(stmt: nodes.MaterialUse, place: Place) -> Action | None:
     return action
 
 
-@prepares(nodes.MaterialExpr)
-def _value(expr: nodes.MaterialExpr, unit: Unit, scope: Scope) -> Code:
+def prepare_material(expr: nodes.MaterialExpr, unit: Unit, scope: Scope) -> Code:
     make_material = _prepare(expr.name, expr.body, unit, scope, expr.span)
     if make_material is None:
         return constant(POISON)

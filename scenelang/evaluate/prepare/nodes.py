@@ -17,7 +17,6 @@ from scenelang.evaluate.prepare.blocks import (
     misplaced,
     prepare_block,
     prepare_statement,
-    states,
 )
 from scenelang.evaluate.prepare.expressions import prepare
 from scenelang.evaluate.prepare.references import entering, lookup
@@ -114,8 +113,7 @@ def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
 # ---------------------------------------------------------------- groups, booleans, chains
 
 
-@states(nodes.Node)
-def _node(stmt: nodes.Node, place: Place) -> Action | None:
+def prepare_node(stmt: nodes.Node, place: Place) -> Action | None:
     fits = holds_children(place, stmt.keyword, f"'{stmt.kind}'")
     chain = stmt.kind == "chain"
     around = inner(place, "chain" if chain else "group")
@@ -177,8 +175,7 @@ def _check_first(stmt: nodes.Node, place: Place) -> None:
             return
 
 
-@states(nodes.Combined)
-def _combined(stmt: nodes.Combined, place: Place) -> Action | None:
+def prepare_combined(stmt: nodes.Combined, place: Place) -> Action | None:
     session, op = place.unit.session, stmt.op
     if place.kind not in ("chain", "unknown"):
         help = "put the children into chain { … }, or write a boolean node: " + op + " { … }"

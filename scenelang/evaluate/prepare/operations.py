@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Env, Scope
-from scenelang.evaluate.prepare.expressions import POISONED, Code, Run, folded, guarded, prepare, prepares
+from scenelang.evaluate.prepare.expressions import POISONED, Code, Run, folded, guarded, prepare
 from scenelang.evaluate.values import operators
 from scenelang.evaluate.values.value import POISON, Problem, describe
 from scenelang.syntax import nodes
@@ -67,8 +67,7 @@ def _join(left: Run, right: Run, op: str, slow: Callable[[Any, Any], Any]) -> Ru
     return compare
 
 
-@prepares(nodes.Binary)
-def _binary(expr: nodes.Binary, unit: Unit, scope: Scope) -> Code:
+def prepare_binary(expr: nodes.Binary, unit: Unit, scope: Scope) -> Code:
     if expr.op in ("&&", "||"):
         return _logic(expr, unit, scope)
     left, right = prepare(expr.left, unit, scope), prepare(expr.right, unit, scope)
@@ -113,8 +112,7 @@ def _logic(expr: nodes.Binary, unit: Unit, scope: Scope) -> Code:
     return Code(run)
 
 
-@prepares(nodes.Unary)
-def _unary(expr: nodes.Unary, unit: Unit, scope: Scope) -> Code:
+def prepare_unary(expr: nodes.Unary, unit: Unit, scope: Scope) -> Code:
     if expr.op == "!":
         truth = condition(expr.operand, unit, scope).run
 
@@ -130,8 +128,7 @@ def _unary(expr: nodes.Unary, unit: Unit, scope: Scope) -> Code:
     return folded(unit, [code], meaning, lambda env: slow(get(env)))
 
 
-@prepares(nodes.Conditional)
-def _conditional(expr: nodes.Conditional, unit: Unit, scope: Scope) -> Code:
+def prepare_conditional(expr: nodes.Conditional, unit: Unit, scope: Scope) -> Code:
     test = condition(expr.condition, unit, scope).run
     then = prepare(expr.then, unit, scope).run
     otherwise = prepare(expr.otherwise, unit, scope).run

@@ -12,7 +12,7 @@ from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.names import Binding, Env
-from scenelang.evaluate.prepare.blocks import Action, Place, define, states
+from scenelang.evaluate.prepare.blocks import Action, Place, define
 from scenelang.evaluate.prepare.expressions import VARIES, Code, prepare
 from scenelang.evaluate.prepare.settings import at_top_level
 from scenelang.evaluate.session import Session
@@ -31,8 +31,7 @@ from scenelang.evaluate.values.value import (
 from scenelang.syntax import nodes, parse
 
 
-@states(nodes.Param)
-def _param(stmt: nodes.Param, place: Place) -> Action | None:
+def prepare_param(stmt: nodes.Param, place: Place) -> Action | None:
     unit, name = place.unit, stmt.name
     session = unit.session
     default = prepare(stmt.default, unit, place.scope)
@@ -174,7 +173,8 @@ def literal(text: str, unit: Unit) -> Any:
     stmt = file.statements[0] if len(file.statements) == 1 else None
     if diagnostics.errors or not isinstance(stmt, nodes.Let) or not _is_literal(stmt.value):
         return None
-    session = Session(diagnostics, unit.session.vocabulary)
+    around = unit.session
+    session = Session(diagnostics, around.vocabulary, around.expressions, around.statements)
     alone = Unit(SourceFile("", text), session, unit.loader, Defines({}))
     code: Code = prepare(stmt.value, alone, alone.scope)
     value = code.value if code.value is not VARIES else code.run([])

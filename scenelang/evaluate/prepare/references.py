@@ -20,7 +20,6 @@ from scenelang.evaluate.prepare.expressions import (
     guarded,
     prepare,
     prepare_arguments,
-    prepares,
 )
 from scenelang.evaluate.prepare.literals import member
 from scenelang.evaluate.report.undefined import VALUES, report_shared, unknown, unknown_member
@@ -97,15 +96,14 @@ def wrong_kind(name: nodes.Name, binding: Binding, unit: Unit, wanted: str, help
     report_shared(unit.session, ("E0213", message, *where), "E0213", message, name.span, help, labels)
 
 
-@prepares(nodes.NameRef)
-def _name(expr: nodes.NameRef, unit: Unit, scope: Scope) -> Code:
+def prepare_name(expr: nodes.NameRef, unit: Unit, scope: Scope) -> Code:
     name = expr.name
     alias, _, rest = name.text.partition(".")
     if rest:
         head = Span(name.span.source, name.span.start, name.span.start + len(alias))
         tail = Span(name.span.source, name.span.end - len(rest), name.span.end)
         base = nodes.NameRef(nodes.Name(alias, head), head)
-        return _member(nodes.Member(base, nodes.Name(rest, tail), expr.span), unit, scope)
+        return prepare_member(nodes.Member(base, nodes.Name(rest, tail), expr.span), unit, scope)
     binding = scope.find(name.text)
     if binding is None:
         return _own_name(name, unit, scope)
@@ -146,8 +144,7 @@ def _own_name(name: nodes.Name, unit: Unit, scope: Scope) -> Code:
     return Code(run)
 
 
-@prepares(nodes.Member)
-def _member(expr: nodes.Member, unit: Unit, scope: Scope) -> Code:
+def prepare_member(expr: nodes.Member, unit: Unit, scope: Scope) -> Code:
     value = expr.value
     if isinstance(value, nodes.NameRef):
         binding = scope.find(value.name.text)
@@ -156,7 +153,7 @@ def _member(expr: nodes.Member, unit: Unit, scope: Scope) -> Code:
             return _imported(name, binding, unit, scope)
     if isinstance(value, nodes.Member) and isinstance(value.value, nodes.NameRef):
         # lib.v.x: the inner member is the qualified name
-        return member(_member(value, unit, scope), expr.name, unit)
+        return member(prepare_member(value, unit, scope), expr.name, unit)
     code = prepare(value, unit, scope)
     return POISONED if code.value is POISON else member(code, expr.name, unit, value)
 
@@ -185,8 +182,7 @@ def _imported(name: nodes.Name, binding: Binding, unit: Unit, scope: Scope) -> C
 # ---------------------------------------------------------------- calls
 
 
-@prepares(nodes.CallExpr)
-def _call(expr: nodes.CallExpr, unit: Unit, scope: Scope) -> Code:
+def prepare_call(expr: nodes.CallExpr, unit: Unit, scope: Scope) -> Code:
     name = expr.name
     binding = lookup(name, unit, scope)
     codes = prepare_arguments(name.text if binding is None else "", expr.args, unit, scope)

@@ -12,7 +12,7 @@ from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.names import Env
 from scenelang.evaluate.prepare.arguments import bind
-from scenelang.evaluate.prepare.blocks import Action, Place, misplaced, states
+from scenelang.evaluate.prepare.blocks import Action, Place, misplaced
 from scenelang.evaluate.prepare.expressions import prepare
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import number
@@ -48,8 +48,7 @@ def once(session: Session, what: str, span: Span) -> bool:
     return False
 
 
-@states(nodes.Version)
-def _version(stmt: nodes.Version, place: Place) -> Action | None:
+def prepare_version(stmt: nodes.Version, place: Place) -> Action | None:
     session, version = place.unit.session, stmt.number
     if not at_top_level(place, stmt.span, "the language version"):
         return None
@@ -71,8 +70,7 @@ def _to_the_top(stmt: nodes.Version, first: nodes.Stmt | None) -> Fix | None:
     return Fix("move it to the top", (Edit(Span(source, start, start), f"{stmt.span.text}\n"), *away.edits))
 
 
-@states(nodes.Model)
-def _model(stmt: nodes.Model, place: Place) -> Action | None:
+def prepare_model(stmt: nodes.Model, place: Place) -> Action | None:
     unit, session = place.unit, place.unit.session
     if not at_top_level(place, stmt.span, "'model'") or not once(session, "model", stmt.span):
         return None
