@@ -200,9 +200,9 @@ class Session:
             return
         help, fix = problem.help, None
         if problem.fix:
-            from scenelang.evaluate.report.angles import angle_advice
+            from scenelang.evaluate.report.habits import advice
 
-            help, fix = angle_advice(operand, self.defined, hue=problem.fix == "hue")
+            help, fix = advice(problem, operand, self.defined)
         labels = [
             Label(other.span, words)
             for index, words in problem.notes.items()

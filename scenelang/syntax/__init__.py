@@ -1,4 +1,4 @@
-"""Text to syntax tree: `parse` reads a whole file, reports every mistake and always returns a tree."""
+"""Text to syntax tree: `parse` reads a whole file, reports the mistakes and always returns a tree."""
 
 from scenelang.syntax.parser import parse as parse
 

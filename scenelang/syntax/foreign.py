@@ -38,8 +38,8 @@ _FUNCTION: Final = "a function is `fn` and one expression"
 _PARENTHESES: Final = "missing parentheses"
 _TYPES: Final = "names have no types"
 _RANGE: Final = "ranges are written with `..`"
-_ONCE: Final = "`<n>` cannot be changed"
-_ONCE_HELP: Final = "names keep their values; bind another one with let, or count with for (i in 0..<n) { … }"
+ONCE: Final = "`<n>` cannot be changed"
+ONCE_HELP: Final = "names keep their values; bind another one with let, or count with for (i in 0..<n) { … }"
 _IMPORT: Final = "functions are there without an import"
 
 HABITS: Final = (
@@ -96,10 +96,10 @@ HABITS: Final = (
     Habit("<call>: <E>;", "<call>(<E>);", "`<call>` is called, not set"),
     Habit("<n> = <LINE> <;?>", "let <n> = <LINE>;", "missing `let` before `<n>`", code="E0126"),
     Habit("<n> = <E>;", "let <n> = <E>;", "missing `let` before `<n>`", code="E0126"),
-    _unsafe("<n> <+|-|*|/|%> = <E>;", "let <n> = BAD_EXPRESSION;", _ONCE, _ONCE_HELP),
-    _unsafe("<n>++;", "let <n> = BAD_EXPRESSION;", _ONCE, _ONCE_HELP),
-    _unsafe("<n>--;", "let <n> = BAD_EXPRESSION;", _ONCE, _ONCE_HELP),
-    _unsafe("<n>[<I>] = <E>;", "let <n> = BAD_EXPRESSION;", _ONCE, _ONCE_HELP),
+    _unsafe("<n> <+|-|*|/|%> = <E>;", "let <n> = BAD_EXPRESSION;", ONCE, ONCE_HELP),
+    _unsafe("<n>++;", "let <n> = BAD_EXPRESSION;", ONCE, ONCE_HELP),
+    _unsafe("<n>--;", "let <n> = BAD_EXPRESSION;", ONCE, ONCE_HELP),
+    _unsafe("<n>[<I>] = <E>;", "let <n> = BAD_EXPRESSION;", ONCE, ONCE_HELP),
     # blocks
     Habit("<n> <VALUES>;", "<n>(<VALUES>);", _PARENTHESES, code="E0107"),
     Habit("<node>()", "<node>", "`<node>` takes no arguments"),

@@ -131,7 +131,8 @@ class Habits(Slips):
             words = f"write `{shown}`" if shown else "remove it"
             fix = self.report.change(new.start, new.end, new.text, words)
         help = habit.help and match.told(habit.help)
-        self.report.add(habit.code, match.told(habit.message), *new.place, help=help, fix=fix)
+        if tokens.starts[match.start] not in tokens.reported:
+            self.report.add(habit.code, match.told(habit.message), *new.place, help=help, fix=fix)
         for column, values in zip((tokens.kinds, tokens.starts, tokens.ends), new.columns, strict=True):
             column[new.first : new.stop] = values
 

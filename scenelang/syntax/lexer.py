@@ -60,7 +60,8 @@ _SLIPS = {
     "open_string": r'"(?:\\[^\n]|[^\s;,(){}\[\]"\\])*+',
     "quotes": r"'[^'\n]*+'|[“”][^“”\n]*+[“”]",
     "number": r"\.?[0-9](?:[\w°]|\.(?!\.))*+",
-    "hash": r"#[ \t!#][^\n]*+|#(?=\n|\Z)|(?<![^\n])#\w++[ \t]++[A-Za-z][^\n]*+",
+    "variable": r"\$[A-Za-z_]\w*+",
+    "hash": r"#[ \t!#][^\n]*+|#(?=\n|\Z)|(?<![^\n])#\w++[ \t]++[A-Za-z0-9][^\n]*+",
     "colour": r"#\w*+",
     "name": r"[^\W\d]\w*+",
     "foreign": r"&(?!&)|\|(?!\|)|" + "|".join(re.escape(text) for text in FOREIGN if text not in "&|"),
@@ -171,7 +172,10 @@ class _Slips:
         rest = text[len(value) :]
         fix: str | None = None
         help = "numbers look like `1`, `0.5` or `1e-3`"
-        if re.fullmatch("(?:_[0-9]+)+", rest):
+        if rest in ("f", "F"):
+            message, help = f"`{text}` is not a number", "numbers have no type"
+            fix = value
+        elif re.fullmatch("(?:_[0-9]+)+", rest):
             message, help = f"`{text}` is not a number", "digits are not grouped"
             fix = text.replace("_", "")
         elif rest in UNIT_ALIASES:
@@ -185,6 +189,11 @@ class _Slips:
         self.report.add("E0116", message, start, end, help=help, fix=fix)
 
     def _hash(self, start: int, end: int, text: str) -> None:
+        constant = re.fullmatch(r"#define[ \t]+([A-Za-z_]\w*)[ \t]+([^;/\n]+)", text)
+        if constant:
+            bound = f"let {constant[1]} = {constant[2].rstrip()};"
+            self.report.add("E0133", "names are bound by `let`", start, end, fix=bound)
+            return
         fix = None if text.rstrip().endswith((";", "{", "}")) else "//"  # OpenSCAD marks objects by it
         self.report.add(
             "E0127",
@@ -204,6 +213,10 @@ class _Slips:
         self._keep("NAME", start, end)
         help = "names are made of the letters a to z and A to Z, digits and `_`"
         self.report.add("E0124", f"`{text}` is not a name", start, end, help=help)
+
+    def _variable(self, start: int, end: int, text: str) -> None:
+        self._keep("NAME", start, end)
+        self.report.add("E0113", f"illegal name `{text}`", start, end, help="names have no `$`")
 
     def _foreign(self, start: int, end: int, text: str) -> None:
         instead = FOREIGN[text]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
@@ -14,6 +15,9 @@ from scenelang.syntax.tokens import Report, Tokens
 DEFINITIONS = ("let", "param", "fn")
 _ENDS = ("`}`", "the end of the file")
 _OPERATORS = ("+", "-", "*", "/", "%", "^", "<", "<=", ">", ">=", "==", "!=", "&&", "||", "?", "..", "..<")
+_DIVISION = re.compile(r"[ \t]*//[ \t]*[\w.()]{1,40}[ \t]*;[ \t]*(?=\n)")
+"""What is taken for a comment and was meant for a division."""
+
 _KEYWORD_HELP = "choose another name"
 
 
@@ -135,6 +139,8 @@ def _report_insertion(
         # Inside a line an operator may be missing as well, or a brace.
         called = tokens.text(at - 1) == ")" and head(tokens, at) not in DEFINITIONS
         sure = tokens.on_new_line(at) or called or found in _ENDS
+        if tokens.kinds[at] != END and _DIVISION.match(tokens.source.text, end):
+            help, sure = "`//` begins a comment; the whole part of a / b is floor(a / b)", False
         report.add("E0102", "missing `;`", end, end, help=help, fix=";" if sure else None)
     elif names == ["BAD_EXPRESSION"]:
         report.add("E0108", f"expected an expression, found {found}", *place)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostic
-from scenelang.diagnostics.fixes import settle
+from scenelang.diagnostics.fixes import apply_fixes, settle
 from scenelang.syntax.foreign import HABITS
 from scenelang.syntax.patterns import WORDS, pieces
 from tests.scene.scene_cases import HERE, mismatch, run_text
@@ -41,6 +41,25 @@ def test_habit(title: str, text: str, meant: str) -> None:
     assert not meant or not done.left, done.left
 
 
+@pytest.mark.parametrize(
+    ("text", "code", "meant"),
+    [
+        ("let a = 7 // 2;\nsquare { scale(a / 7); }", "E0102", None),
+        (
+            "let a = 7 // of them\nsquare { scale(a / 7); }",
+            "E0102",
+            "let a = 7; // of them\nsquare { scale(a / 7); }",
+        ),
+        ("#define K 0.5\nsquare { scale(K); }", "E0133", "let K = 0.5;\nsquare { scale(K); }"),
+    ],
+)
+def test_habit_in_what_is_taken_for_a_comment(text: str, code: str, meant: str | None) -> None:
+    found = run_text(text).only()
+    assert found.code == code
+    assert (found.fix and apply_fixes(text, [found])[0]) == meant
+    assert meant is None or not check(meant)
+
+
 def test_patterns_are_well_formed() -> None:
     """What is written here names only what the pattern finds."""
     for habit in HABITS:
@@ -52,8 +71,8 @@ def test_patterns_are_well_formed() -> None:
 
 def test_habits_next_to_each_other_are_told_apart() -> None:
     """One after the other in one text, each is reported where it is."""
-    local = [text for _, text, _ in CASES if not re.search("let |for i|param|uniform|import", text)]
-    texts = [text for text in local if text.count("//!") == 1]
+    own = [text for _, text, _ in CASES if set(re.findall("[EW][0-9]{4}", text)) == {"E0133"}]
+    texts = [text for text in own if not re.search("let |for i|param|uniform|import|define", text)]
     together = "".join(f"group {{\n{text}\n}}\n" for text in texts)
     assert len(texts) > 20
     assert mismatch(together, run_text(together).diagnostics) == ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from scene_cases import Outcome, run_text
 
+from scenelang.diagnostics.fixes import apply_fixes
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import did_you_mean, ranked
 from scenelang.evaluate.report import foreign_words
@@ -82,7 +83,7 @@ def test_one_fix_mends(bad: str, good: str | None) -> None:
 @pytest.mark.parametrize(
     ("text", "help"),
     [
-        ("difference { square {} star {} }", "write chain { a { … } subtract b { … } }"),
+        ("difference { square {} star {} }", "it is called 'subtract' here"),
         ("square { translate(vec2(1, 2)); }", "write [x, y]"),
         (
             "legs(side, paint) { square { scale(side); } }",
@@ -112,7 +113,17 @@ def test_ranking() -> None:
 
 
 def test_words_of_other_languages_lead_to_words_of_this_one() -> None:
-    ours = LANGUAGE | {"square", "sphere", "torus", "union", "smooth", "intersect", "material", "else if"}
+    ours = LANGUAGE | {
+        "square",
+        "sphere",
+        "torus",
+        "union",
+        "smooth",
+        "intersect",
+        "subtract",
+        "material",
+        "else if",
+    }
     assert set(foreign_words.WORDS.values()) <= ours
     assert not set(foreign_words.WORDS) & ours
     assert not set(foreign_words.FUNCTIONS) & set(FUNCTIONS)
@@ -143,3 +154,23 @@ def test_a_syntax_mistake_has_no_consequences(text: str) -> None:
 def test_mistakes_elsewhere_are_reported_beside_one_of_syntax() -> None:
     text = "let a = 1\nsquare { scale(nope); }\nstar { rotate(30); }\ntriangle { falt; }\n"
     assert sorted(run_text(text).codes) == ["E0102", "E0201", "E0204", "E0302"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "square { scale(2 ** nope); }",  # a sign
+        "square { scale(0.5f); translate(nope, 0); }",  # a number
+        "square { rotate(30 deg); translate(nope, 0); }",
+        "const a = nope;\nsquare { scale(a); }",  # a word
+        "if (true and nope) { square; }",
+        "fn f(x) { return x * 2; }\nsquare { scale(f(nope)); }",
+    ],
+)
+def test_what_a_fix_mends_for_sure_hides_nothing(text: str) -> None:
+    """Both are reported at once, and the second is what is left when the first is mended."""
+    first, second = sorted(run_text(text).diagnostics, key=lambda d: d.code)
+    assert first.code.startswith("E01")
+    assert second.code == "E0201"
+    left = run_text(apply_fixes(text, [first])[0]).only()
+    assert (left.code, left.message) == (second.code, second.message)

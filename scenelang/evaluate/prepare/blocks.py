@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple
 
-from scenelang.diagnostics.diagnostic import Label
+from scenelang.diagnostics.diagnostic import Fix, Label
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.costs import CALL_STEPS, HALF_STEPS
@@ -15,7 +15,7 @@ from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Frame, N
 from scenelang.evaluate.prepare.expressions import VARIES, guarded, prepare, watched
 from scenelang.evaluate.prepare.operations import condition
 from scenelang.evaluate.replay import Still
-from scenelang.evaluate.report.undefined import report_shared
+from scenelang.evaluate.report.undefined import report_shared, tell_bound
 from scenelang.evaluate.session import MAX_NESTING
 from scenelang.evaluate.values.value import POISON, Problem, RangeValue, Vec, describe
 from scenelang.evaluate.vocabulary import LANGUAGE, SETTINGS
@@ -134,7 +134,9 @@ def inner(place: Place, kind: Kind | None = None) -> Place:
     return Place(place.unit, scope, kind, False, place.repeated, scope)
 
 
-def misplaced(place: Place, span: Span, message: str, help: str | None = None) -> bool:
+def misplaced(
+    place: Place, span: Span, message: str, help: str | None = None, fix: Fix | None = None
+) -> bool:
     """Report a statement in the wrong place, unless nothing is known about the place.
 
     Several of a sort in one block are told as one: it is the block that is of the wrong kind.
@@ -143,10 +145,10 @@ def misplaced(place: Place, span: Span, message: str, help: str | None = None) -
     if place.kind == "unknown":
         return True
     if place.block is None:
-        session.error("E0330", message, span, help=help)
+        session.error("E0330", message, span, help=help, fix=fix)
     else:
         sort = re.sub(r"'[^']*'", "", message)
-        report_shared(session, ("E0330", id(place.block), sort), "E0330", message, span, help)
+        report_shared(session, ("E0330", id(place.block), sort), "E0330", message, span, help, fix=fix)
         session.blocks.append(place.block)  # as long as it is kept, no other block has its number
     return True
 
@@ -160,7 +162,11 @@ def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
     earlier = scope.names.get(name.text)
     scope.later.pop(name.text, None)
     if unit.damage and unit.damage.holds(name.span):
-        binding.kind = "poison"  # what it stands for is known when its statement reads again
+        # What it stands for is known when its statement reads again.
+        binding.kind = "poison"
+        scope.names[name.text] = binding
+        tell_bound(unit.session, name, earlier or (scope.parent.find(name.text) if scope.parent else None))
+        return True
     if earlier is not None:
         labels = (Label(earlier.span, "first defined here"),) if earlier.span else ()
         unit.session.error(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from scenelang.diagnostics.diagnostic import Label
+from scenelang.diagnostics.diagnostic import Edit, Fix, Label
+from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, instead, listing
 from scenelang.evaluate.names import Binding, Scope
 from scenelang.evaluate.prepare.blocks import Action, Place, inner, prepare_block
@@ -149,6 +150,15 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         if fix is None:
             known, fix = instead(name.text, foreign_words.WORDS, candidates, name.span)
             hint = known or hint
+        if fix is not None and stmt.body is not None and fix.edits[0].replacement in NODE_WORDS:
+            span = Span(name.span.source, name.span.start, stmt.body.span.start)  # without parentheses
+            fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
+        meant = foreign_words.WORDS.get(name.text, "")
+        if hint is None and place.kind == "object" and meant in words.material_ops - words.transforms:
+            from scenelang.evaluate.report.habits import in_material  # only mistakes need it
+
+            hint = f"it is called '{meant}' here and stands in a material: material flat {{ {meant}(…); }}"
+            fix = in_material(stmt, place, meant)
         if hint is None and foreign_words.STATEMENTS.get(name.text):
             hint = foreign_words.STATEMENTS[name.text]
         if hint is None and place.kind in ("file", "group", "chain") and words.geometries:
@@ -173,7 +183,7 @@ def _candidates(stmt: nodes.Call, place: Place, scope: Scope) -> set[str]:
     if place.kind == "object":
         return {*names, "material"}
     found = words.geometries | names
-    if stmt.args is None and stmt.body is not None:
+    if not stmt.args and stmt.body is not None:
         found.update((*NODE_WORDS, *(otherwise - {"else if"})))
     if stmt.args is not None and stmt.body is None:
         found.update(words.transforms if place.kind != "file" else SETTINGS)

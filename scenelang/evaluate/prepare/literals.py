@@ -111,7 +111,11 @@ def member(code: Code, name: nodes.Name, unit: Unit, of: nodes.Expr | None = Non
     """``code.name``, a component of a vector."""
     index = COMPONENTS.get(name.text)
     if index is None:
-        hint, fix = did_you_mean(name.text, COMPONENTS, name.span)
+        from scenelang.evaluate.report.habits import member_advice  # only mistakes need it
+
+        hint, fix = member_advice(of, name)
+        if hint is None:
+            hint, fix = did_you_mean(name.text, COMPONENTS, name.span)
         hint = hint or "vectors have .x .y .z, or .r .g .b, or [i]"
         unit.session.error("E0212", f"no value has a member '{name.text}'", name.span, help=hint, fix=fix)
         return POISONED
@@ -148,7 +152,8 @@ def prepare_index(expr: nodes.Index, unit: Unit, scope: Scope) -> Code:
             raise Problem("E0307", f"index {at:.6g} is not a whole number", "round it with floor(…)", 1)
         if not 0 <= at < length:
             where = f"outside 0..{length - 1}" if length else "into an empty vector"
-            raise Problem("E0307", f"index {at:.0f} is {where}", operand=1)
+            help = "items are counted from 0; the last is v[len(v) - 1]" if at < 0 else None
+            raise Problem("E0307", f"index {at:.0f} is {where}", help, operand=1)
         return value.items[int(at)] if value.__class__ is Vec else value.item(int(at))
 
     value, index = codes[0].run, codes[1].run

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from numbers import Real
 from typing import Any
 
-from scenelang.diagnostics.diagnostic import Diagnostics, Label
+from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix, Label
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.file_context import Unit
@@ -15,6 +15,7 @@ from scenelang.evaluate.names import Binding, Env
 from scenelang.evaluate.prepare.blocks import Action, Place, define
 from scenelang.evaluate.prepare.expressions import VARIES, Code, prepare
 from scenelang.evaluate.prepare.settings import at_top_level
+from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.operators import equal, same_unit
 from scenelang.evaluate.values.value import (
@@ -77,10 +78,26 @@ def _checked_default(value: Any, allowed: Any, stmt: nodes.Param, session: Sessi
         if not within(value, allowed):
             labels = (Label(stmt.range.span, "the range"),)
             message = f"default of '{stmt.name.text}' is outside {stmt.range.span.text}"
-            session.error("E0309", message, stmt.default.span, labels=labels)
+            advice, fix = _range_meant(value, allowed, stmt.range)
+            session.error("E0309", message, stmt.default.span, labels=labels, help=advice, fix=fix)
     except Problem as problem:
         session.problem(problem, stmt.range.span, (stmt.default,))
     return value
+
+
+def _range_meant(value: Any, allowed: Any, range: nodes.Expr) -> tuple[str | None, Fix | None]:
+    """Help and fix for `in [3, 9]` where the default lies between the two."""
+    ends = allowed.items if allowed.__class__ is Vec else ()
+    if len(ends) != 2 or not all(one.__class__ is value.__class__ and one.__class__ in UNITS for one in ends):
+        return None, None
+    low, at, high = (unpack(one)[0] for one in (ends[0], value, ends[1]))
+    if not low < at < high:
+        return None, None
+    help = "a vector has the choices there are; a range is written 3..9"
+    if not isinstance(range, nodes.Vector):
+        return help, None
+    text = "..".join(item.span.text for item in range.items)
+    return help, Fix(f"write '{text}'", (Edit(range.span, text),))
 
 
 def within(value: Any, allowed: Any) -> bool:
@@ -110,7 +127,10 @@ def _from_outside(full: str, given: Any, default: Any, allowed: Any, stmt: nodes
     else:
         value = literal(given, unit) if isinstance(given, str) else from_python(given)
         if value is None:
+            colour = foreign_words.COLOURS.get(given.lower()) if isinstance(given, str) else None
             advice = "write a number with its unit, a colour, a vector, true or false"
+            if colour:
+                advice = f"colours have no names; {given} is {colour}"
             labels = (Label(stmt.default.span, "its default"),)
             session.error("E0310", f"{shown} is not a literal", span, help=advice, labels=labels)
             return POISON

@@ -198,12 +198,14 @@ def prepare_call(expr: nodes.CallExpr, unit: Unit, scope: Scope) -> Code:
         alias = scope.find(name.text.partition(".")[0])
         if alias is not None and alias.kind == "import" and alias.value is not None:
             unknown_member(name, unit, alias.value)
-        elif alias is None or alias.kind != "import":
-            unknown(name, unit, scope, called=True)
+        elif alias is None:
+            unknown(name, unit, scope, expr)
+        elif alias.kind != "import":
+            _method(expr, unit)
         return POISONED
     builtin = FUNCTIONS.get(name.text)
     if builtin is None:
-        unknown(name, unit, scope, called=True)
+        unknown(name, unit, scope, expr)
         return POISONED
     if builtin.variadic:
         if not expr.args or any(arg.name for arg in expr.args):
@@ -228,6 +230,19 @@ def prepare_call(expr: nodes.CallExpr, unit: Unit, scope: Scope) -> Code:
         return folded(unit, inputs, meaning, lambda env: slow(get(env)))
     getters = tuple([code.run for code in inputs])
     return folded(unit, inputs, meaning, lambda env: slow(*[get(env) for get in getters]))
+
+
+def _method(expr: nodes.CallExpr, unit: Unit) -> None:
+    """Report `v.length()`: a value has no functions."""
+    alias, _, rest = expr.name.text.partition(".")
+    start = expr.name.span.start
+    value = nodes.Name(alias, Span(unit.source, start, start + len(alias)))
+    last = nodes.Name(rest, Span(unit.source, expr.name.span.end - len(rest), expr.span.end))
+    from scenelang.evaluate.report.habits import member_advice  # only mistakes need it
+
+    help, fix = member_advice(nodes.NameRef(value, value.span), last)
+    help = help or f"write {rest}(…) with the value as an argument"
+    unit.session.error("E0128", "only a name can be called", expr.name.span, help=help, fix=fix)
 
 
 def _doubted(builtin: Builtin, args: Sequence[nodes.Argument], unit: Unit) -> Callable[..., Any]:

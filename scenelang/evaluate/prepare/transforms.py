@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from scenelang.diagnostics.diagnostic import Fix
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.costs import MATRIX, MOVE, SAME_MOVE
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Env
 from scenelang.evaluate.prepare.arguments import bind
-from scenelang.evaluate.prepare.blocks import Action, Place, misplaced
+from scenelang.evaluate.prepare.blocks import Action, Place, inner, misplaced, prepare_block
 from scenelang.evaluate.prepare.expressions import VARIES, Code, prepare_arguments
 from scenelang.evaluate.values.transforms import EVEN_SCALE, GEOMETRY, TEXTURE, Spec, outside_unit, spread
 from scenelang.evaluate.values.value import POISON, Problem
@@ -28,7 +29,8 @@ def prepare_move(stmt: nodes.Call, place: Place) -> Action | None:
         return None
     if stmt.body is not None:
         help = f"put {name}(…); into the block of what it moves, as in square {{ {name}(…); }}"
-        unit.session.error("E0330", f"'{name}' takes no block", stmt.name.span, help=help)
+        fix = _grouped(stmt, place)
+        unit.session.error("E0330", f"'{name}' takes no block", stmt.name.span, help=help, fix=fix)
         return None
     if name == "scale" and len(args) == 1 and (args[0].name is None or args[0].name.text == "s"):
         spec = EVEN_SCALE
@@ -55,13 +57,26 @@ def _spec(stmt: nodes.Call, place: Place) -> Spec | None:
         return None
     if name not in GEOMETRY and place.kind != "unknown":
         help = f"put it into a material's block, as in material flat {{ {name}(…); }}"
-        misplaced(place, span, f"'{name}' stands outside a material", help)
+        from scenelang.evaluate.report.habits import in_material  # only mistakes need it
+
+        fix = _grouped(stmt, place) or in_material(stmt, place, name)
+        misplaced(place, span, f"'{name}' stands outside a material", help, fix)
         return None
     if place.kind == "file":
         help = "put what it moves and the transform into group { … }"
-        misplaced(place, span, f"transform '{name}' at top level", help)
+        misplaced(place, span, f"transform '{name}' at top level", help, _grouped(stmt, place))
         return None
     return GEOMETRY.get(name) or TEXTURE[name]
+
+
+def _grouped(stmt: nodes.Call, place: Place) -> Fix | None:
+    """The fix for a transform with a block, which is looked through as one of children."""
+    if stmt.body is None or place.kind not in ("file", "group", "chain"):
+        return None
+    from scenelang.evaluate.report.habits import as_group  # only mistakes need it
+
+    prepare_block(stmt.body.statements, inner(place, "group"), stmt.body.span)
+    return as_group(stmt, place)
 
 
 def _offered(stmt: nodes.Call, place: Place) -> bool:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Final
 
 FUNCTIONS: Final = {
-    "pow": "write a ^ b",
-    "mod": "write a % b",
-    "fmod": "write a % b",
-    "fract": "write x % 1",
-    "frac": "write x % 1",
+    "pow": "a b -> a ^ b",
+    "mod": "a b -> a % b",
+    "fmod": "write a % b, which takes the sign of b",
+    "fract": "x -> x % 1",
+    "frac": "x -> x % 1",
     "length": "len counts items; for a norm write sqrt(v.x ^ 2 + v.y ^ 2)",
     "norm": "write sqrt(v.x ^ 2 + v.y ^ 2)",
     "distance": "write sqrt((a.x - b.x) ^ 2 + (a.y - b.y) ^ 2)",
@@ -17,35 +17,35 @@ FUNCTIONS: Final = {
     "normalize": "divide by sqrt(v.x ^ 2 + v.y ^ 2)",
     "atan": "write atan2(y, x)",
     "ln": "log is the natural logarithm",
-    "log10": "write log(x) / log(10)",
-    "log2": "write log(x) / log(2)",
+    "log10": "x -> log(x) / log(10)",
+    "log2": "x -> log(x) / log(2)",
     "cbrt": "write x ^ (1 / 3)",
     "sqr": "write x ^ 2",
-    "exp2": "write 2 ^ x",
+    "exp2": "x -> 2 ^ x",
     "cot": "write 1 / tan(x)",
     "sec": "write 1 / cos(x)",
     "csc": "write 1 / sin(x)",
     "sinh": "write (exp(x) - exp(-x)) / 2",
     "cosh": "write (exp(x) + exp(-x)) / 2",
     "tanh": "write 1 - 2 / (exp(2 * x) + 1)",
-    "square": "write x ^ 2",
-    "lerp": "write mix(a, b, t)",
-    "step": "write x < edge ? 0 : 1",
-    "sign": "write x < 0 ? -1 : x > 0 ? 1 : 0",
+    "square": "x -> x ^ 2",
+    "lerp": "a b t -> mix(a, b, t)",
+    "step": "e x -> x < e ? 0 : 1",
+    "sign": "x -> x < 0 ? -1 : x > 0 ? 1 : 0",
     "trunc": "write floor(x), or ceil(x) below 0",
     "int": "write floor(x)",
-    "float": "numbers need no conversion",
-    "saturate": "write clamp(x, 0, 1)",
+    "float": "x -> x",
+    "saturate": "x -> clamp(x, 0, 1)",
     "random": "write rand(seed)",
     "rands": "write rand(seed)",
     "noise": "write rand(seed), or rand([seed, i]) for one of many",
-    "range": "write 0..<n",
-    "vec2": "write [x, y]",
-    "vec3": "write [x, y, z]",
+    "range": "n -> 0..<n; a b -> a..<b; a b s -> a..<b step s",
+    "vec2": "x y -> [x, y]",
+    "vec3": "x y z -> [x, y, z]; x -> [x, x, x]",
     "vec4": "write [x, y, z]; colours have no alpha",
-    "float2": "write [x, y]",
-    "float3": "write [x, y, z]",
-    "point": "write [x, y]",
+    "float2": "x y -> [x, y]",
+    "float3": "x y z -> [x, y, z]",
+    "point": "x y -> [x, y]",
     "rgba": "write rgb(r, g, b); colours have no alpha",
     "hsl": "write hsv(h, s, v)",
     "rad": "glue the unit to the number: 30deg; what is computed is multiplied by 1deg",
@@ -54,7 +54,10 @@ FUNCTIONS: Final = {
     "concat": "vectors are not joined; write all items into one",
     "str": "strings are not put together",
 }
-"""Functions, and what to write."""
+"""Functions, and what to write: advice, or `parameters -> what stands for a call` for each number of them."""
+
+LIBRARIES: Final = ("Math", "math", "np", "numpy")
+"""What stands before the names of functions and constants."""
 
 VALUES: Final = {"e": "write exp(1)", "phi": "write (1 + sqrt(5)) / 2"}
 """Constants, in small letters, and what to write."""
@@ -119,6 +122,8 @@ WORDS: Final = {
     "desaturate": "grayscale",
     "mirror": "flip",
     "intersection": "intersect",
+    "difference": "subtract",
+    "minus": "subtract",
     "merge": "union",
     "add": "union",
     "join": "union",
@@ -136,8 +141,7 @@ WORDS: Final = {
 """Words that head statements, under another name."""
 
 STATEMENTS: Final = {
-    "difference": "write chain { a { … } subtract b { … } }",
-    "minus": "write chain { a { … } subtract b { … } }",
+    "children": "what is called has no children: put what it draws into its block",
     "hull": "there is no hull; smooth { … } blends objects into each other",
     "minkowski": "there is no Minkowski sum; smooth { … } blends objects into each other",
     "linear_extrude": "a 2D scene is not extruded",

@@ -22,6 +22,9 @@ _DEFINITION = re.compile(
     r"|(?:import|include|use|require)\b(?P<alias>.{0,200}?\bas[ \t]{1,20}\w+)?"
 )
 _NAMES = frozenset(("E0201", "E0202", "E0203", "E0204", "E0206", "E0207", "E0208", "E0212", "E0213"))
+_CERTAIN = frozenset(("E0116", "E0117", "E0123", "E0127", "E0132"))
+"""Mistakes in one word, number or sign: those with a fix are read as fixed, and hide nothing."""
+
 _PLACES = frozenset(("E0330", "E0331", "E0332", "E0333", "E0334", "E0335"))
 
 
@@ -80,6 +83,7 @@ def find_damage(file: nodes.File, found: Iterable[Diagnostic]) -> Damage:
         (d.code, d.span)
         for d in found
         if d.code.startswith("E01") and d.span is not None and d.span.source is source
+        if d.fix is None or d.code not in _CERTAIN
     ]
     if not marks:
         return NONE
@@ -119,7 +123,7 @@ def _is_nameless(definition: re.Match[str]) -> bool:
 
 
 def _is_about_braces(code: str, span: Span) -> bool:
-    return code in ("E0104", "E0106", "E0129") or "{" in span.text or "}" in span.text
+    return code in ("E0104", "E0106", "E0129") or (code != "E0133" and not {"{", "}"}.isdisjoint(span.text))
 
 
 def _lines(span: Span) -> Span:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import islice
 from typing import Final
 
-from scenelang.diagnostics.diagnostic import Edit, Fix, Label
+from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import did_you_mean, is_slip, listing, ranked
 from scenelang.evaluate.file_context import Unit
@@ -72,20 +72,39 @@ def report_shared(
     span: Span,
     help: str | None = None,
     labels: tuple[Label, ...] = (),
+    fix: Fix | None = None,
 ) -> None:
-    """Report a mistake, or show its place at the report of the same one with the same key."""
+    """Report a mistake, or show its place at the report of the same one with the same key.
+
+    A fix is for one place: where there are several it is left out.
+    """
     items = session.diagnostics.items
     known = session.shared.get(key)
     if known is not None:
         index, again = known
         if span != items[index].span and span not in again and not session.follows(code, span):
             again[span] = None
-            items[index] = replace(items[index], labels=(*labels, *shown_places(again, "also here")))
+            labels = (*labels, *shown_places(again, "also here"))
+            items[index] = replace(items[index], labels=labels, fix=None)
         return
     before = len(items)
-    session.error(code, message, span, help=help, labels=labels)
+    session.error(code, message, span, help=help, labels=labels, fix=fix)
     if len(items) > before:
         session.shared[key] = before, {}
+
+
+def tell_bound(session: Session, name: nodes.Name, known: Binding | None) -> None:
+    """`i = i + 1;` where `i` is bound: that no `let` stands before it is not what is wrong."""
+    start, items = name.span.start, session.diagnostics.items
+    before = name.span.source.text[max(0, start - 20) : start].rstrip()
+    if known is None or known.span is None or before[-1:].isalpha():
+        return  # a `let` does stand there
+    for index, d in enumerate(items):
+        if d.code == "E0126" and d.span is not None and d.span.start == start:
+            from scenelang.syntax.foreign import ONCE, ONCE_HELP  # only mistakes need it
+
+            labels = (Label(known.span, "defined here"),)
+            items[index] = Diagnostic("E0133", ONCE.replace("<n>", name.text), name.span, labels, ONCE_HELP)
 
 
 def told_at_definition(
@@ -203,8 +222,8 @@ def unknown_member(name: nodes.Name, unit: Unit, exported: Unit) -> None:
     report_unknown(end, unit, Scope(unit.frame), "E0212", f"'{alias}' has no '{rest}'", advise=advise)
 
 
-def unknown(name: nodes.Name, unit: Unit, scope: Scope, *, called: bool = False) -> None:
-    """Report a name that stands for nothing in an expression."""
+def unknown(name: nodes.Name, unit: Unit, scope: Scope, call: nodes.CallExpr | None = None) -> None:
+    """Report a name that stands for nothing in an expression, perhaps the one that is called."""
     text, session = name.text, unit.session
     if unit.damage and unit.damage.loses(text):
         return
@@ -222,24 +241,29 @@ def unknown(name: nodes.Name, unit: Unit, scope: Scope, *, called: bool = False)
         labels = (Label(later, "defined here"),)
         session.error("E0203", message, name.span, labels=labels, help=advice)
         return
-    kinds = ("fn",) if called else (*VALUES, "import")
-    own = FUNCTIONS if called else (*CONSTANTS, *ANIMATED, "true", "false")
+    kinds = ("fn",) if call else (*VALUES, "import")
+    own = FUNCTIONS if call else (*CONSTANTS, *ANIMATED, "true", "false")
 
     def advise() -> Advice:
-        if called and text in foreign_words.FUNCTIONS:
-            return foreign_words.FUNCTIONS[text], None
-        if not called and text.lower() in foreign_words.VALUES:
+        if call and text in foreign_words.FUNCTIONS:
+            from scenelang.evaluate.report.habits import call_advice  # only mistakes need it
+
+            return call_advice(text, call)
+        if not call and text.lower() in foreign_words.VALUES:
             return foreign_words.VALUES[text.lower()], None
         visible = (n for n, _ in within_effort(session, scope, kinds))
         help, fix = did_you_mean(text, {*visible, *own}, name.span, effort=session.effort)
-        here = None if called else foreign_words.NAMES.get(text.lower())
-        colour = None if called else foreign_words.COLOURS.get(text.lower())
-        if here is not None and here.lower() != text.lower():
+        here = None if call else foreign_words.NAMES.get(text.lower())
+        colour = None if call else foreign_words.COLOURS.get(text.lower())
+        if text in foreign_words.LIBRARIES and unit.source.text[name.span.end : name.span.end + 1] == ".":
+            prefix = Span(name.span.source, name.span.start, name.span.end + 1)
+            help, fix = "functions and constants stand alone", Fix(f"remove '{text}.'", (Edit(prefix, ""),))
+        elif here is not None and here.lower() != text.lower():
             help, fix = f"it is called '{here}' here", Fix(f"write '{here}'", (Edit(name.span, here),))
         elif help is None and colour is not None:
             help = f"colours have no names; {text.lower()} is {colour}"
             fix = Fix(f"write '{colour}'", (Edit(name.span, colour),))
         return help, fix
 
-    code, what = ("E0207", "function") if called else ("E0201", "name")
+    code, what = ("E0207", "function") if call else ("E0201", "name")
     report_unknown(name, unit, scope, code, f"unknown {what} '{text}'", advise=advise, kinds=kinds)

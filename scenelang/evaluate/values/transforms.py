@@ -60,7 +60,7 @@ def color(value: Any, operand: int = 0) -> tuple[float, float, float]:
     """A colour's three numbers."""
     if value.__class__ is not Vec:
         help = "write #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)"
-        raise Problem("E0301", f"expected a colour, found {describe(value)}", help, operand)
+        raise Problem("E0301", f"expected a colour, found {describe(value)}", help, operand, fix="colour")
     r, g, b = vector(value, 3, operand, "a colour")
     return r, g, b
 
@@ -71,6 +71,9 @@ def _translate(x: Any, y: Any, z: Any) -> Translate:
 
 
 def _rotate(turn: Any, axis: Any) -> Rotate:
+    if turn.__class__ is Vec:
+        help = "it turns by one angle about one axis: rotate(45deg), or rotate(45deg, axis = X)"
+        raise Problem("E0301", f"expected an angle, found {describe(turn)}", help, 0, fix="turns")
     rad = angle(turn, 0)
     direction = (0.0, 0.0, 1.0) if axis is None else vector(axis, 3, 1, "an axis")
     if not any(direction):

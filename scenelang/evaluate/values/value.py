@@ -25,7 +25,8 @@ class Problem(Exception):
         message: the fact.
         help: advice.
         operand: which operand or argument is to blame, from 0; None for all of it.
-        fix: ``angle`` or ``hue`` where that operand lacks the unit of one; the help comes with the fix.
+        fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, for which the help comes
+            with the fix; a ``colour`` of a string; of three ``turns`` the last.
         notes: words for further operands, by their numbers.
     """
 
