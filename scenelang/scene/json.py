@@ -131,18 +131,37 @@ def _read(source: SourceFile, kind: type[S]) -> S:
         raise _failure(f"nodes nested deeper than {MAX_NODE_DEPTH}", Span(source, bracket, bracket + 1))
     try:
         if depth <= _PLAIN_DEPTH:
-            return kind.model_validate_json(text)
-        with deep_stack():
-            scene = _read_deep(source, kind)
-        if _node_depth(scene) > MAX_NODE_DEPTH:
-            raise _failure(f"nodes nested deeper than {MAX_NODE_DEPTH}")
-        return scene
+            scene = kind.model_validate_json(text)
+        else:
+            with deep_stack():
+                scene = _read_deep(source, kind)
+            if _node_depth(scene) > MAX_NODE_DEPTH:
+                raise _failure(f"nodes nested deeper than {MAX_NODE_DEPTH}")
     except ValidationError as error:
         raise SceneError(_problems(error, source)) from None
     except UnicodeEncodeError as error:
         raise _failure(
             f"half of a character at {error.start}", Span(source, error.start, error.end)
         ) from None
+    _refuse_repeated(source)
+    return scene
+
+
+def _refuse_repeated(source: SourceFile) -> None:
+    """Refuse a sound text whose objects have a key twice: readers take the last one, people see the first."""
+    repeated = False
+
+    def note(pairs: list[tuple[str, Any]]) -> None:
+        nonlocal repeated
+        repeated = repeated or len({key for key, _ in pairs}) < len(pairs)
+
+    with deep_stack():
+        json.loads(source.text, object_pairs_hook=note, parse_int=len)  # of long numbers Python refuses some
+    if repeated:
+        twice: list[Value] = []
+        read_places(source.text, twice)
+        found = [Diagnostic("E0313", "a key that the object has already", v.span(source)) for v in twice]
+        raise SceneError(found[:_MAX_SHOWN])
 
 
 def _node_depth(scene: SceneData) -> int:

@@ -50,8 +50,8 @@ def deeper_than(text: str, most: int) -> int:
     return len(text)
 
 
-def read_places(text: str) -> Value:
-    """The places in a text that is known to be JSON."""
+def read_places(text: str, twice: list[Value] | None = None) -> Value:
+    """The places in a text that is known to be JSON; keys that their object has already go to ``twice``."""
     root = Value(0, len(text))
     stack: list[tuple[Value, bool]] = []  # open lists and objects, and whether they are lists
     key: Key | None = None
@@ -71,6 +71,8 @@ def read_places(text: str) -> Value:
                 elif key is None:
                     word = token.group()
                     key = str(json.loads(word)) if "\\" in word else word[1:-1]
+                    if twice is not None and key in inside.items:
+                        twice.append(Value(token.start(), token.end()))
                     continue
                 value = inside.items[key] = Value(token.start(), token.end())
             else:

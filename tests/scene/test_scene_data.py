@@ -103,6 +103,22 @@ def test_hostile_json(text: str, part: str) -> None:
     assert {d.code for d in caught.value.diagnostics} == {"E0313"}
 
 
+@pytest.mark.parametrize("depth", [0, 100])
+def test_keys_given_twice_are_shown(depth: int) -> None:
+    """JSON readers take the last of two equal keys, in silence."""
+    good = nested(depth)
+    nsg.Scene.from_json(good)
+    text = good.replace('"kind":"object",', '"kind":"object","geometry":"star",').replace(
+        '{"nodes"', '{"version":1,"ver\\u0073ion":1,"nodes"'
+    )
+    with pytest.raises(nsg.SceneError) as caught:
+        nsg.Scene.from_json(text)
+    assert [d.span.text for d in caught.value.diagnostics if d.span] == ['"ver\\u0073ion"', '"geometry"']
+    assert {(d.code, d.message) for d in caught.value.diagnostics} == {
+        ("E0313", "a key that the object has already")
+    }
+
+
 def test_bytes_and_bad_bytes() -> None:
     assert nsg.Scene.from_json(b"{}") == nsg.Scene()
     with pytest.raises(nsg.SceneError):
