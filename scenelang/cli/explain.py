@@ -32,7 +32,7 @@ _WIDEST = 96
 def command(code: str | None, listed: bool, kind: str, color: options.Color) -> None:
     """Say what CODE means, such as E0401, with an example and what to write instead.
 
-    A word instead of a code lists the codes that are about it.
+    A word instead of a code lists the codes whose pages have it.
     """
     from scenelang.cli.say import wants_color
     from scenelang.diagnostics.codes import CODES
@@ -48,10 +48,21 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
 
         _print_page(read_page(wanted), kind, paint)
         return
-    about = [known for known, title in CODES.items() if wanted.lower() in title.lower()]
-    if not about or len(wanted) < 3:
+    about = _about(wanted) if len(wanted) >= 3 else []
+    if not about:
         raise click.UsageError(f"No code '{code}'.{_advice(wanted, list(CODES))}")
     _print_list(about, kind, paint)
+
+
+def _about(word: str) -> list[str]:
+    """The codes whose pages have a word, in British or American spelling, in their text or examples."""
+    from scenelang.diagnostics.codes import CODES
+    from scenelang.diagnostics.pages import read_page
+
+    def plain(text: str) -> str:
+        return text.lower().replace("colour", "color").replace("grey", "gray")
+
+    return [code for code in CODES if plain(word) in plain(read_page(code).text)]
 
 
 def _advice(wanted: str, known: list[str]) -> str:

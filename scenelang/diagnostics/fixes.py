@@ -55,16 +55,18 @@ def apply_fix(text: str, fix: Fix) -> str:
 
 
 def removal(source: SourceFile, start: int, end: int) -> Fix:
-    """A fix that takes ``[start, end)`` away, with its line where nothing else stands on it."""
+    """A fix that takes ``[start, end)`` away, with the line or the spaces that nothing is left of."""
     text = source.text
     first = text.rfind("\n", 0, start) + 1
     last = text.find("\n", end)
     last = len(text) if last < 0 else last + 1
     if not text[first:start].strip() and not text[end:last].strip():
         start, end = first, last
-    else:
+    elif text[start - 1 : start] in (" ", "\n", ""):
         while text[end : end + 1] == " ":
             end += 1
+        if text[end : end + 1] in ("\n", ";", ",", ")", "]", ""):
+            start = first + len(text[first:start].rstrip(" "))
     return Fix("remove it", (Edit(Span(source, start, end), ""),))
 
 

@@ -151,8 +151,10 @@ def _report_insertion(
     elif names == ["{", "}"]:
         report.add("E0106", "missing block", end, end, help="braces are mandatory here, even around nothing")
     elif first == "(":
-        text = "".join(names)
-        report.add("E0107", f"missing `{text}`", end, end, fix=text)
+        text, next = "".join(names), tokens.starts[at]
+        gap = tokens.source.text[end:next] == " " and names == ["("]
+        opening = report.change(end, next if gap else end, text, f"insert `{text}`")
+        report.add("E0107", f"missing `{text}`", end, end, fix=opening)
     elif first == ",":
         literal = all(_is_literal(tokens, index) for index in (at - 1, at))
         message = "missing `,`" if literal else f"missing `,` or operator before {found}"
@@ -179,26 +181,13 @@ def _report_deletion(tokens: Tokens, report: Report, repair: Repair) -> None:
         fix = None if _has_operator(tokens, repair.at + 1) else ""
         report.add("E0105", f"unmatched `{text}`", start, end, fix=fix)
     else:
-        report.add(
-            "E0101", f"unexpected {_quoted(text)}", start, end, fix=_once(tokens, report, repair, start, end)
-        )
+        report.add("E0101", f"unexpected {_quoted(text)}", start, end, fix=_once(tokens, repair, text))
 
 
-def _once(tokens: Tokens, report: Report, repair: Repair, start: int, end: int) -> Fix | None:
-    """Remove what is written twice in a row, with the space between."""
-    text = tokens.source.text
-    word = text[start:end]
-    if repair.at and tokens.text(repair.at - 1) == word:
-        gap = slice(tokens.ends[repair.at - 1], start)
-    elif tokens.text(repair.end) == word:
-        gap = slice(end, tokens.starts[repair.end])
-    else:
-        return None
-    if word == "," or _is_literal(tokens, repair.at):
-        return None  # something may be missing between them
-    if not text[gap].strip():
-        start, end = min(start, gap.start), max(end, gap.stop)
-    return report.change(start, end, "")
+def _once(tokens: Tokens, repair: Repair, text: str) -> str | None:
+    """What to write for something that stands twice in a row: nothing, unless it may be meant to."""
+    twice = text == tokens.text(repair.end) or (repair.at and text == tokens.text(repair.at - 1))
+    return "" if twice and text != "," and not _is_literal(tokens, repair.at) else None
 
 
 def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
@@ -206,6 +195,8 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
     text = tokens.source.text[start:end]
     new = "".join(names)
     fix: str | None = new
+    if new == "=" and (tokens.end_before(repair.at), tokens.starts[repair.end]) == (start, end + 1):
+        fix = " ="  # as in `angle: 30deg`
     if repair.delete == 2:
         first, second = tokens.text(repair.at), tokens.text(repair.at + 1)
         gap = tokens.source.text[tokens.ends[repair.at] : tokens.starts[repair.at + 1]]

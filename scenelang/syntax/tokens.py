@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Edit, Fix, Label
+from scenelang.diagnostics.fixes import removal
 from scenelang.diagnostics.span import SourceFile, Span
 
 MAX_MISTAKES = 200
@@ -54,7 +55,9 @@ class Report:
 
     def change(self, start: int, end: int, text: str, message: str | None = None) -> Fix:
         """A fix that puts a text in the place of ``[start, end)``."""
-        usual = "remove it" if not text else f"{'insert' if start == end else 'write'} `{text.strip()}`"
+        if not text:
+            return removal(self.source, start, end)
+        usual = f"{'insert' if start == end else 'write'} `{text.strip()}`"
         return Fix(message or usual, (Edit(Span(self.source, start, end), text),))
 
     def flush(self, diagnostics: Diagnostics) -> None:

@@ -56,7 +56,11 @@ def test_all_codes(folder: Folder, arguments: tuple[str, ...]) -> None:
 
 def test_codes_about_a_word(folder: Folder) -> None:
     shown = folder.run("explain", "semicolon").stdout
-    assert re.findall(r"[EW]\d{4}", shown) == ["E0102", "W0101"]
+    assert re.findall(r"[EW]\d{4}", shown) == ["E0102", "E0130", "W0101"]
+    for word in ("colour", "Color"):
+        assert {"E0118", "E0301", "E0330", "W0301"} <= set(
+            re.findall(r"[EW]\d{4}", folder.run("explain", word).stdout)
+        )
 
 
 @pytest.mark.parametrize(

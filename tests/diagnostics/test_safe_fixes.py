@@ -102,6 +102,27 @@ def test_brackets_are_closed_where_they_can_be_closed_nowhere_else() -> None:
         assert fixed.replace("_", "") == good
 
 
+@pytest.mark.parametrize(
+    ("bad", "good"),
+    [
+        ("square { rotate(angle: 30deg); }", "square { rotate(angle = 30deg); }"),
+        ("let _d = rgb 0.1, 0.2, 0.3);", "let _d = rgb(0.1, 0.2, 0.3);"),
+        ("for (_i in /* to */ in 0..3) { square {} }", "for (_i in /* to */ 0..3) { square {} }"),
+        ("square { scale(1, 2) ); }", "square { scale(1, 2); }"),
+        ("star; ;  // a star", "star; // a star"),
+        ("star;;  // a star", "star;  // a star"),
+        ("star;\n  ;\nsquare;", "star;\nsquare;"),
+        ("star {} ;\n", "star {}\n"),
+        ("star ; { scale(2); }", "star { scale(2); }"),
+        ("square { scale(2); } */ star;", "square { scale(2); } star;"),
+        ("let let _a = 1;", "let _a = 1;"),
+    ],
+)
+def test_fixes_leave_no_odd_spaces(bad: str, good: str) -> None:
+    fixed, _ = apply_fixes(bad, check(bad))
+    assert fixed == good
+
+
 SMALL = [text for path in EXAMPLES if len(text := path.read_text("utf-8")) < 1500]
 
 
