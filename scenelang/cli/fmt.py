@@ -12,10 +12,10 @@ from scenelang.cli.folders import SUFFIX, named
 from scenelang.cli.main import describe
 from scenelang.cli.say import say_diagnostics, say_trouble
 from scenelang.deep import deep_stack
+from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.files import followed, read_regular, write_whole
 
 STDIN: Final = "-"
-MAX_BYTES: Final = 10_000_000  # as every scene; the module that says so would cost half of the start-up
 
 
 @click.command("fmt")

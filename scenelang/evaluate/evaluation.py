@@ -20,13 +20,15 @@ from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.limits import MAX_OBJECTS, MAX_STEPS, Halt
 from scenelang.evaluate.loader import Loader, Unreadable, read_source
 from scenelang.evaluate.names import UNBOUND
 from scenelang.evaluate.prepare import EXPRESSIONS, STATEMENTS
 from scenelang.evaluate.prepare.blocks import Body
 from scenelang.evaluate.prepare.imports import prepare_file
 from scenelang.evaluate.report.bad_calls import report_misfits
-from scenelang.evaluate.session import MAX_OBJECTS, MAX_STEPS, Halt, Session, Watch
+from scenelang.evaluate.report.reporter import Reporter
+from scenelang.evaluate.session import Session, Watch
 from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.models.manifest import Manifest
 from scenelang.scene.schema import Scene
@@ -114,7 +116,13 @@ class Evaluation:
         words = _choose(file, vocabulary(models), model, diagnostics)
         self._steps = self._objects = 0
         self._session = session = Session(
-            diagnostics, words, EXPRESSIONS, STATEMENTS, frame, fps, replays=replays and self.animates
+            Reporter(diagnostics),
+            words,
+            EXPRESSIONS,
+            STATEMENTS,
+            frame,
+            fps,
+            replays=replays and self.animates,
         )
         session.watch = watch
         resolved = path.resolve() if path is not None else None
@@ -134,7 +142,7 @@ class Evaluation:
             except Halt:
                 pass
             with suppress(Halt):
-                report_misfits(session)
+                report_misfits(session.report)
         self.wanted = tuple(loader.wanted)
         """All files that it imports, also those that are not there."""
         self.sources = (file.span.source, *(imported.span.source for imported in loader.parsed.values()))

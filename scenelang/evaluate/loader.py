@@ -11,7 +11,8 @@ from typing import Final
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import listing
-from scenelang.evaluate.session import MAX_BYTES, Session
+from scenelang.evaluate.limits import MAX_BYTES
+from scenelang.evaluate.session import Session
 from scenelang.files import read_regular
 from scenelang.scene import library
 from scenelang.syntax import nodes, parse
@@ -83,7 +84,7 @@ class Loader:
             # The first file of the chain, unless it is standard input, was not imported.
             around = self.sites[max(0, self.chain.index(path) + 1 - len(self.chain) + len(self.sites)) :]
             labels = tuple([Label(site, "which imports this") for site in around])
-            session.error("E0216", f"import cycle: {names}", span, labels=labels)
+            session.report.error("E0216", f"import cycle: {names}", span, labels=labels)
             return None
         self.count += 1
         if self.count > MAX_IMPORTS:
@@ -99,28 +100,28 @@ class Loader:
             shipped = library.find(text)
             if shipped is None:
                 help = f"it has {listing(library.names())}; a file of your own is './{text}'"
-                session.error("E0214", f"the library has no '{text}'", span, help=help)
+                session.report.error("E0214", f"the library has no '{text}'", span, help=help)
             return shipped
         folder = importer.parent if importer is not None else self.root
         if folder is None or self.root is None:
             help = "load the scene from a file, or give a root"
-            session.error("E0214", "text without a folder cannot import", span, help=help)
+            session.report.error("E0214", "text without a folder cannot import", span, help=help)
             return None
         if not text or "\0" in text:
-            session.error("E0214", "an import path without a file name", span)
+            session.report.error("E0214", "an import path without a file name", span)
             return None
         if os.path.isabs(text) or PureWindowsPath(text).drive or text[0] in "/\\":
             help = "paths are relative to the importing file"
-            session.error("E0215", f"'{text}' is an absolute path", span, help=help)
+            session.report.error("E0215", f"'{text}' is an absolute path", span, help=help)
             return None
         try:
             path = (folder / text).resolve()
         except (OSError, RuntimeError, ValueError) as error:
-            session.error("E0214", f"cannot read '{text}': {_reason(error)}", span)
+            session.report.error("E0214", f"cannot read '{text}': {_reason(error)}", span)
             return None
         if not path.is_relative_to(self.root):
             help = f"imports stay inside {self.root}; --root sets another folder"
-            session.error("E0215", f"'{text}' lies outside the import root", span, help=help)
+            session.report.error("E0215", f"'{text}' lies outside the import root", span, help=help)
             return None
         self.wanted.update({Path(os.path.abspath(folder / text)): None, path: None})
         return path
@@ -138,13 +139,13 @@ class Loader:
             given = self.texts.get(path)
             source = read_source(path, name) if given is None else SourceFile(name, given)
         except Unreadable as error:
-            session.error(error.code, f"cannot read '{text}': {error}", span)
+            session.report.error(error.code, f"cannot read '{text}': {error}", span)
             return None
         except OSError as error:
             help, fix = library.meant(text, span)
-            session.error("E0214", f"cannot read '{text}': {_reason(error)}", span, help=help, fix=fix)
+            session.report.error("E0214", f"cannot read '{text}': {_reason(error)}", span, help=help, fix=fix)
             return None
-        file = parse(source, session.diagnostics)
+        file = parse(source, session.report.diagnostics)
         self.parsed[path] = file
         return file
 

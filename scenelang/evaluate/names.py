@@ -127,7 +127,7 @@ class Binding:
     needs: Needs | None = None
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Scope:
     """The names of one block, and the block around it."""
 

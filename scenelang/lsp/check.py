@@ -15,7 +15,7 @@ from typing import Any, Final
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.evaluation import Evaluation, in_file_order
-from scenelang.evaluate.session import Halt
+from scenelang.evaluate.limits import Halt
 from scenelang.graph.nodes import Graph
 from scenelang.models.manifest import Manifest
 from scenelang.program.check import check_compiles, check_frames

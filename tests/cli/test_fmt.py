@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from scenelang.cli import fmt
-from scenelang.evaluate import session
 from tests.cli.conftest import Folder
 
 ROUGH = "square   { scale( 0.5 ); }\n"
@@ -121,7 +120,6 @@ def test_what_cannot_be_read(folder: Folder) -> None:
 
 
 def test_too_large(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert fmt.MAX_BYTES == session.MAX_BYTES
     monkeypatch.setattr(fmt, "MAX_BYTES", 8)
     done = folder.run("fmt", folder.write("rough.nsg", ROUGH))
     assert done.exit_code == 2

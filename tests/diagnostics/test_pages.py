@@ -13,7 +13,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.pages import AREAS, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate import loader, session
+from scenelang.evaluate import limits, loader
 from scenelang.evaluate.evaluation import Evaluation, load_source
 from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.prepare import settings
@@ -146,11 +146,11 @@ def test_pages_state_the_lists_and_limits_of_the_code() -> None:
         "E0120": f"{nesting.MAX_DEPTH} levels",
         "E0121": f"more than {tokens.MAX_MISTAKES} syntax",
         "E0311": f"above {settings.MAX_SIDE_PX}",
-        "E0320": f"{session.MAX_OBJECTS:,} objects",
-        "E0321": f"{session.MAX_DEPTH} deep, or groups more than {schema.MAX_NODE_DEPTH}",
-        "E0322": f"{session.MAX_STEPS // 1_000_000} million steps",
+        "E0320": f"{limits.MAX_OBJECTS:,} objects",
+        "E0321": f"{limits.MAX_DEPTH} deep, or groups more than {schema.MAX_NODE_DEPTH}",
+        "E0322": f"{limits.MAX_STEPS // 1_000_000} million steps",
         "E0323": f"nest more than {values.MAX_VECTOR_DEPTH} deep",
-        "E0324": f"{session.MAX_BYTES // 1_000_000} MB, or imports nest more than {loader.MAX_IMPORT_DEPTH}",
+        "E0324": f"{limits.MAX_BYTES // 1_000_000} MB, or imports nest more than {loader.MAX_IMPORT_DEPTH}",
         "E0405": f"{lower.MAX_DEPTH:,} levels",
     }.items():
         assert number in prose(code), code

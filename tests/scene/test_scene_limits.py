@@ -14,7 +14,8 @@ from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate import session
 from scenelang.evaluate.evaluation import Evaluation, evaluate
-from scenelang.evaluate.session import MAX_DEPTH, MAX_OBJECTS
+from scenelang.evaluate.limits import MAX_DEPTH, MAX_OBJECTS
+from scenelang.evaluate.report import reporter
 from scenelang.resolve.unused import find_unused
 from scenelang.syntax import nodes, parse
 from tests.work import lines_run
@@ -192,7 +193,7 @@ def test_ten_thousand_flat_objects() -> None:
 )
 def test_mistakes_cost_the_same_however_many_there_are(unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Four times the text takes at most four times the work, and less where the limit on reports is met."""
-    monkeypatch.setattr(session, "MAX_COMPARED", 5_000)
+    monkeypatch.setattr(reporter, "MAX_COMPARED", 5_000)
 
     def check(count: int) -> None:
         text = "module f(a) {} " + "".join(unit.replace("¤", str(n)) for n in range(count))

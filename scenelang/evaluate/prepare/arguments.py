@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, listing
-from scenelang.evaluate.report.bad_calls import Misfit, report_misfit
+from scenelang.evaluate.report.bad_calls import report_misfit
+from scenelang.evaluate.report.mismatch import Misfit
 from scenelang.evaluate.report.undefined import told_at_definition
 from scenelang.evaluate.session import Session
 from scenelang.syntax import nodes
@@ -74,14 +75,14 @@ def bind(
                     help=shown if params else help,
                     labels=labels,
                 )
-                report_misfit(session, surplus, definition)
+                report_misfit(session.report, surplus, definition)
                 return None
             index = position
             position += 1
         elif arg.name.text in indices:
             index = indices[arg.name.text]
         elif told_at_definition(
-            session,
+            session.report,
             arg.name.text,
             arg.name.span.source,
             [(param, place, "argument") for param, place in zip(params, places, strict=False)],
@@ -89,7 +90,7 @@ def bind(
             good = False
             continue
         else:
-            hint, fix = did_you_mean(arg.name.text, params, arg.name.span, effort=session.effort)
+            hint, fix = did_you_mean(arg.name.text, params, arg.name.span, effort=session.report.effort)
             hint = hint or (f"its arguments are {listing(params)}" if params else "it takes no arguments")
             foreign = Misfit(
                 "E0206",
@@ -103,7 +104,7 @@ def bind(
                 fix=fix,
                 labels=labels,
             )
-            report_misfit(session, foreign, definition)
+            report_misfit(session.report, foreign, definition)
             good = False
             continue
         earlier = bound[index]
@@ -118,7 +119,7 @@ def bind(
                 here="given twice",
                 labels=(Label(earlier.span, "first given here"), *labels),
             )
-            report_misfit(session, twice, definition)
+            report_misfit(session.report, twice, definition)
             good = False
             continue
         bound[index] = arg
@@ -144,6 +145,6 @@ def bind(
             labels=labels,
             blamed=needy[0] if needy else None,
         )
-        report_misfit(session, lacking, definition)
+        report_misfit(session.report, lacking, definition)
         return None
     return bound

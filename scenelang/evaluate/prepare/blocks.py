@@ -11,12 +11,12 @@ from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.costs import CALL_STEPS, HALF_STEPS
 from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.limits import MAX_NESTING
 from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Frame, Needs, Scope
 from scenelang.evaluate.prepare.expressions import VARIES, guarded, prepare, watched
 from scenelang.evaluate.prepare.operations import condition
 from scenelang.evaluate.replay import Still
-from scenelang.evaluate.report.undefined import report_shared, tell_bound
-from scenelang.evaluate.session import MAX_NESTING
+from scenelang.evaluate.report.undefined import tell_bound
 from scenelang.evaluate.values.value import POISON, Problem, RangeValue, Vec, describe
 from scenelang.evaluate.vocabulary import LANGUAGE, SETTINGS
 from scenelang.syntax import nodes
@@ -145,11 +145,10 @@ def misplaced(
     if place.kind == "unknown":
         return True
     if place.block is None:
-        session.error("E0330", message, span, help=help, fix=fix)
+        session.report.error("E0330", message, span, help=help, fix=fix)
     else:
         sort = re.sub(r"'[^']*'", "", message)
-        report_shared(session, ("E0330", id(place.block), sort), "E0330", message, span, help, fix=fix)
-        session.blocks.append(place.block)  # as long as it is kept, no other block has its number
+        session.report.error_once(("E0330", place.block, sort), "E0330", message, span, help=help, fix=fix)
     return True
 
 
@@ -165,11 +164,13 @@ def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
         # What it stands for is known when its statement reads again.
         binding.kind = "poison"
         scope.names[name.text] = binding
-        tell_bound(unit.session, name, earlier or (scope.parent.find(name.text) if scope.parent else None))
+        tell_bound(
+            unit.session.report, name, earlier or (scope.parent.find(name.text) if scope.parent else None)
+        )
         return True
     if earlier is not None:
         labels = (Label(earlier.span, "first defined here"),) if earlier.span else ()
-        unit.session.error(
+        unit.session.report.error(
             "E0202",
             f"'{name.text}' is already defined in this scope",
             name.span,
@@ -184,7 +185,7 @@ def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
 def prepare_let(stmt: nodes.Let, place: Place) -> Action | None:
     code = prepare(stmt.value, place.unit, place.scope)
     name = stmt.name.span
-    place.unit.session.origins[id(name.source), name.start] = stmt.value
+    place.unit.session.report.origins[id(name.source), name.start] = stmt.value
     frame = place.scope.frame
     slot = frame.slot()
     known = code.value is not VARIES
@@ -205,7 +206,7 @@ def declare(stmt: nodes.Fn | nodes.Module, place: Place) -> Callable[[], None] |
     name = stmt.name
     if isinstance(stmt, nodes.Module) and name.text in LANGUAGE:
         message = f"'{name.text}' is a word of the language and names no module"
-        unit.session.error("E0209", message, name.span, help="rename it")
+        unit.session.report.error("E0209", message, name.span, help="rename it")
         return None
     frame = Frame(scope.frame)
     definition = Definition(stmt, scope.frame)
@@ -223,14 +224,16 @@ def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: 
     optional = False
     for index, (param, slot) in enumerate(zip(stmt.params, slots, strict=True)):
         at = param.name.span
-        unit.session.parameters[id(at.source), at.start] = id(stmt), index
+        unit.session.report.parameters[id(at.source), at.start] = id(stmt), index
         if param.default is not None:
             optional = True
             defaults.append(prepare(param.default, unit, scope).run)
         else:
             if optional:
                 message = f"'{param.name.text}' has no default but follows one that has"
-                unit.session.error("E0308", message, param.span, help="put it first, or give it a default")
+                unit.session.report.error(
+                    "E0308", message, param.span, help="put it first, or give it a default"
+                )
             defaults.append(lambda env: POISON)
         define(param.name, Binding("argument", param.name.span, frame, slot), params)
     definition.defaults = tuple(defaults)
@@ -238,7 +241,7 @@ def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: 
     around, unit.session.needs = unit.session.needs, definition.needs
     if isinstance(stmt, nodes.Fn):
         name = stmt.name.span
-        unit.session.origins[id(name.source), name.start] = stmt.body
+        unit.session.report.origins[id(name.source), name.start] = stmt.body
         definition.run = prepare(stmt.body, unit, scope).run
         definition.weight = CALL_STEPS + (unit.weight - before) // 2
         unit.weight = before

@@ -8,8 +8,9 @@ from typing import Any, Final, NamedTuple
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.costs import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS
 from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.limits import MAX_NESTING
 from scenelang.evaluate.names import Env, Needs, Scope
-from scenelang.evaluate.session import MAX_NESTING
+from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.values.value import POISON, Problem, Vec
 from scenelang.syntax import nodes
 
@@ -137,7 +138,7 @@ def guarded(
             return function(*values)
         except Problem as problem:
             session.steps += 2 * GENERAL_STEPS
-            session.problem(problem, span, operands)
+            report_problem(session.report, problem, span, operands)
             return POISON
 
     return run

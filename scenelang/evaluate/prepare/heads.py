@@ -14,15 +14,9 @@ from scenelang.evaluate.prepare.references import lookup, wrong_kind
 from scenelang.evaluate.prepare.settings import prepare_setting
 from scenelang.evaluate.prepare.transforms import prepare_move
 from scenelang.evaluate.report import foreign_words
+from scenelang.evaluate.report.reporter import Advice
 from scenelang.evaluate.report.shapes import in_library
-from scenelang.evaluate.report.undefined import (
-    VALUES,
-    Advice,
-    report_unknown,
-    unknown,
-    unknown_member,
-    within_effort,
-)
+from scenelang.evaluate.report.undefined import VALUES, report_unknown, unknown, unknown_member, within_effort
 from scenelang.evaluate.values.functions import ANIMATED, CONSTANTS, FUNCTIONS
 from scenelang.evaluate.values.transforms import GEOMETRY, TEXTURE
 from scenelang.evaluate.vocabulary import SETTINGS
@@ -128,23 +122,25 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
     if later is not None:
         help = f"move the definition of '{name.text}' above this line"
         labels = (Label(later, "defined here"),)
-        session.error("E0203", f"'{name.text}' is used before its line", name.span, labels=labels, help=help)
+        session.report.error(
+            "E0203", f"'{name.text}' is used before its line", name.span, labels=labels, help=help
+        )
         return
     owner = words.owner(name.text)
     if owner is not None and words.chosen is not None:
         message = f"geometry '{name.text}' belongs to model '{owner}', not '{words.chosen.name}'"
         help = f"model '{words.chosen.name}' draws {listing(words.geometries)}"
-        session.error("E0205", message, name.span, help=help, labels=session.model_label())
+        session.report.error("E0205", message, name.span, help=help, labels=session.model_label())
         return
     if name.text in FUNCTIONS:
         message = f"'{name.text}' is a function, not an object or a module"
-        session.error("E0213", message, name.span)
+        session.report.error("E0213", message, name.span)
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
 
     def advise() -> Advice:
         candidates = _candidates(stmt, place, scope)
-        hint, fix = did_you_mean(name.text, candidates, name.span, effort=session.effort)
+        hint, fix = did_you_mean(name.text, candidates, name.span, effort=session.report.effort)
         if hint is None and place.kind in HOLDERS:
             hint, fix = in_library(stmt, unit, scope)
         if fix is None:
@@ -158,7 +154,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
             from scenelang.evaluate.report.habits import in_material  # only mistakes need it
 
             hint = f"it is called '{meant}' here and stands in a material: material flat {{ {meant}(…); }}"
-            fix = in_material(stmt, place, meant)
+            fix = in_material(stmt, place.unit.session, meant)
         if hint is None and foreign_words.STATEMENTS.get(name.text):
             hint = foreign_words.STATEMENTS[name.text]
         if hint is None and place.kind in ("file", "group", "chain") and words.geometries:
@@ -178,7 +174,7 @@ def _candidates(stmt: nodes.Call, place: Place, scope: Scope) -> set[str]:
         return words.material_ops
     if place.kind == "object" and stmt.args is not None:
         return words.transforms
-    near = within_effort(place.unit.session, scope, VALUES if place.kind == "object" else ("module",))
+    near = within_effort(place.unit.session.report, scope, VALUES if place.kind == "object" else ("module",))
     names = {n for n, _ in near}
     if place.kind == "object":
         return {*names, "material"}

@@ -46,9 +46,9 @@ def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
 
 def prepare_file(unit: Unit, file: nodes.File, *, imported: bool = False) -> Body:
     """Prepare a file's statements; of an imported one only what it brings."""
-    unit.damage = find_damage(file, unit.session.diagnostics)
+    unit.damage = find_damage(file, unit.session.report.diagnostics)
     if unit.damage:
-        unit.session.damaged[id(unit.source)] = unit.damage
+        unit.session.report.damaged[id(unit.source)] = unit.damage
     unit.first = file.statements[0] if file.statements else None
     statements = [s for s in file.statements if not imported or isinstance(s, _BROUGHT)]
     return prepare_block(statements, Place(unit, unit.scope, "file"), file.span)

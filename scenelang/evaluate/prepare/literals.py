@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
 
 from scenelang.diagnostics.suggest import did_you_mean
 from scenelang.evaluate.file_context import Unit
@@ -19,14 +19,24 @@ from scenelang.evaluate.prepare.expressions import (
 )
 from scenelang.evaluate.values import operators
 from scenelang.evaluate.values.functions import number
-from scenelang.evaluate.values.value import UNITS, Angle, Problem, RangeValue, Time, Vec, describe, unpack
+from scenelang.evaluate.values.value import (
+    COMPONENTS,
+    UNITS,
+    Angle,
+    Problem,
+    RangeValue,
+    Time,
+    Vec,
+    describe,
+    unpack,
+)
 from scenelang.syntax import nodes
 
 
 def prepare_number(expr: nodes.Number, unit: Unit, scope: Scope) -> Code:
     value = float(expr.value)
     if not math.isfinite(value):
-        unit.session.error("E0306", "the number is too large", expr.span)
+        unit.session.report.error("E0306", "the number is too large", expr.span)
         return POISONED
     match expr.unit:
         case "deg":
@@ -46,7 +56,7 @@ def prepare_number(expr: nodes.Number, unit: Unit, scope: Scope) -> Code:
 def _finite_literal(make: Callable[[float], Any], value: float, expr: nodes.Number, unit: Unit) -> Code:
     if math.isfinite(value):
         return constant(make(value))
-    unit.session.error("E0306", "the number is too large", expr.span)
+    unit.session.report.error("E0306", "the number is too large", expr.span)
     return POISONED
 
 
@@ -104,8 +114,6 @@ def prepare_range(expr: nodes.Range, unit: Unit, scope: Scope) -> Code:
 
 # ---------------------------------------------------------------- parts of values
 
-COMPONENTS: Final = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
-
 
 def member(code: Code, name: nodes.Name, unit: Unit, of: nodes.Expr | None = None) -> Code:
     """``code.name``, a component of a vector."""
@@ -117,7 +125,9 @@ def member(code: Code, name: nodes.Name, unit: Unit, of: nodes.Expr | None = Non
         if hint is None:
             hint, fix = did_you_mean(name.text, COMPONENTS, name.span)
         hint = hint or "vectors have .x .y .z, or .r .g .b, or [i]"
-        unit.session.error("E0212", f"no value has a member '{name.text}'", name.span, help=hint, fix=fix)
+        unit.session.report.error(
+            "E0212", f"no value has a member '{name.text}'", name.span, help=hint, fix=fix
+        )
         return POISONED
     at = index
 

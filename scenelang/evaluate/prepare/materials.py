@@ -95,16 +95,16 @@ def _unknown(name: nodes.Name, unit: Unit, scope: Scope, known: set[str]) -> Non
         away = Fix("remove 'material'", (Edit(Span(head.source, start, head.start), ""),))
         help = f"to use the value write {name.text}; without 'material'"
         message = f"'{name.text}' is a value, not a material's name"
-        session.error("E0213", message, name.span, help=help, fix=away if start >= 0 else None)
+        session.report.error("E0213", message, name.span, help=help, fix=away if start >= 0 else None)
         return
     if owner is not None and words.chosen is not None:
         message = f"material '{name.text}' belongs to model '{owner}', not '{words.chosen.name}'"
         help = f"model '{words.chosen.name}' has {listing(known)}"
-        session.error("E0205", message, name.span, help=help, labels=session.model_label())
+        session.report.error("E0205", message, name.span, help=help, labels=session.model_label())
         return
     hint, fix = did_you_mean(name.text, known, name.span)
     help = hint or f"there is {listing(known)}"
-    session.error("E0208", f"unknown material '{name.text}'", name.span, help=help, fix=fix)
+    session.report.error("E0208", f"unknown material '{name.text}'", name.span, help=help, fix=fix)
 
 
 def give(material: Material, span: Span, out: Builder, place: Place) -> None:
@@ -114,7 +114,7 @@ def give(material: Material, span: Span, out: Builder, place: Place) -> None:
         out.material_span = span
         return
     labels = (Label(out.material_span, "first material here"),) if out.material_span else ()
-    place.unit.session.error("E0332", "a second material in one block", span, labels=labels)
+    place.unit.session.report.error("E0332", "a second material in one block", span, labels=labels)
 
 
 def prepare_value_use(stmt: nodes.Call, binding: Binding, place: Place) -> Action | None:
@@ -124,7 +124,7 @@ def prepare_value_use(stmt: nodes.Call, binding: Binding, place: Place) -> Actio
     get = value_of(name, binding, unit, place.scope).run
     session = unit.session
     if stmt.args:
-        session.error("E0308", f"'{name.text}' is a value and takes no arguments", stmt.args[0].span)
+        session.report.error("E0308", f"'{name.text}' is a value and takes no arguments", stmt.args[0].span)
         return None
     if place.kind in ("file", "material"):
         where = "at top level" if place.kind == "file" else "inside a material"
@@ -141,7 +141,7 @@ def prepare_value_use(stmt: nodes.Call, binding: Binding, place: Place) -> Actio
             return
         if value.__class__ is not MaterialValue:
             message = f"expected a material, found {describe(value)}"
-            session.error("E0301", message, name.span, labels=labels)
+            session.report.error("E0301", message, name.span, labels=labels)
             return
         material = value.material
         if operations is not None:

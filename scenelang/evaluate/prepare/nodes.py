@@ -44,7 +44,7 @@ def holds_children(place: Place, span: Span, what: str) -> bool:
 
 def place_child(node: Any, where: spans.Place, out: Builder, session: Session) -> None:
     """Hand a finished node to the block it stands in."""
-    session.spans.record(node, where, session.calls)
+    session.spans.record(node, where, session.report.calls)
     session.count_parts(1, where.name)
     join_child(node, where, out, session)
 
@@ -52,7 +52,7 @@ def place_child(node: Any, where: spans.Place, out: Builder, session: Session) -
 def join_child(node: Any, where: spans.Place, out: Builder, session: Session) -> None:
     """Append ``node`` to its block, which must not have transforms yet."""
     if out.moved is not None:
-        session.error(
+        session.report.error(
             "E0331",
             "a child after a transform",
             where.name,
@@ -83,7 +83,7 @@ def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
         help = f"size it in its block: {name} {{ scale(0.5); }}"
         if name == "square":
             help += f'; its sides are sqrt(2) long, those of rect(w, h) in "{library.SHAPES}" as written'
-        session.error("E0308", f"'{name}' takes no arguments", stmt.args[0].span, help=help)
+        session.report.error("E0308", f"'{name}' takes no arguments", stmt.args[0].span, help=help)
         return None
     if not fits:
         return None
@@ -169,7 +169,7 @@ def _check_first(stmt: nodes.Node, place: Place) -> None:
             fix = Fix(f"remove '{child.op}'", (edit,)) if child.op in ("union", "smooth") else None
             help = None if fix else "what it is taken from or cut with stands before it"
             message = f"'{child.op}' on the first child of a chain joins it to nothing"
-            place.unit.session.error("E0335", message, word, help=help, fix=fix)
+            place.unit.session.report.error("E0335", message, word, help=help, fix=fix)
             return
         if isinstance(child, nodes.Call | nodes.Node | nodes.For | nodes.If):
             return
@@ -195,7 +195,7 @@ def prepare_combined(stmt: nodes.Combined, place: Place) -> Action | None:
         if not isinstance(out, ChainBuilder):
             return
         if not out.children and op in ("subtract", "intersect"):
-            session.error("E0335", f"'{op}' with nothing before it", stmt.keyword)
+            session.report.error("E0335", f"'{op}' with nothing before it", stmt.keyword)
         out.op = op if out.children else "union"
         act(env, out)
         out.op = "union"
@@ -229,11 +229,11 @@ def prepare_module_call(stmt: nodes.Call, definition: Definition, place: Place) 
     unit.weight += MODULE_CALL
 
     def action(env: Env, out: Builder) -> None:
-        before = session.calls
+        before = session.report.calls
         frame = enter(env)
         inside = Builder()
         run_body(Body(definition.run, 1), frame, inside, session, where.name)
-        session.calls = before
+        session.report.calls = before
         session.depth -= 1
         transforms, material = inside.transforms, inside.material
         if block is not None:

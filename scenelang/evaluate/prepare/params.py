@@ -16,6 +16,8 @@ from scenelang.evaluate.prepare.blocks import Action, Place, define
 from scenelang.evaluate.prepare.expressions import VARIES, Code, prepare
 from scenelang.evaluate.prepare.settings import at_top_level
 from scenelang.evaluate.report import foreign_words
+from scenelang.evaluate.report.reporter import Reporter
+from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.operators import equal, same_unit
 from scenelang.evaluate.values.value import (
@@ -66,22 +68,22 @@ def _checked_default(value: Any, allowed: Any, stmt: nodes.Param, session: Sessi
     if value.__class__ not in (*UNITS, bool, str, Vec):
         message = f"{describe(value)} as the value of a param"
         help = "params are numbers, angles, times, booleans, strings and vectors"
-        session.error("E0301", message, stmt.default.span, help=help)
+        session.report.error("E0301", message, stmt.default.span, help=help)
         return POISON
     if stmt.range is None or allowed is POISON:
         return value
     if allowed.__class__ is not RangeValue and allowed.__class__ is not Vec:
         message = f"expected a range or a vector of choices, found {describe(allowed)}"
-        session.error("E0301", message, stmt.range.span, help="write in 0..1")
+        session.report.error("E0301", message, stmt.range.span, help="write in 0..1")
         return value
     try:
         if not within(value, allowed):
             labels = (Label(stmt.range.span, "the range"),)
             message = f"default of '{stmt.name.text}' is outside {stmt.range.span.text}"
             advice, fix = _range_meant(value, allowed, stmt.range)
-            session.error("E0309", message, stmt.default.span, labels=labels, help=advice, fix=fix)
+            session.report.error("E0309", message, stmt.default.span, labels=labels, help=advice, fix=fix)
     except Problem as problem:
-        session.problem(problem, stmt.range.span, (stmt.default,))
+        report_problem(session.report, problem, stmt.range.span, (stmt.default,))
     return value
 
 
@@ -132,7 +134,7 @@ def _from_outside(full: str, given: Any, default: Any, allowed: Any, stmt: nodes
             if colour:
                 advice = f"colours have no names; {given} is {colour}"
             labels = (Label(stmt.default.span, "its default"),)
-            session.error("E0310", f"{shown} is not a literal", span, help=advice, labels=labels)
+            session.report.error("E0310", f"{shown} is not a literal", span, help=advice, labels=labels)
             return POISON
     if default is POISON:
         return value
@@ -141,7 +143,7 @@ def _from_outside(full: str, given: Any, default: Any, allowed: Any, stmt: nodes
         help = "give it a unit, as in 30deg" if default.__class__ is Angle else None
         message = f"{shown} is {describe(value)}, expected {describe(default)}"
         labels = (Label(stmt.default.span, f"its default is {describe(default)}"),)
-        session.error("E0310", message, span, help=help, labels=labels)
+        session.report.error("E0310", message, span, help=help, labels=labels)
         return POISON
     if allowed.__class__ is RangeValue or allowed.__class__ is Vec:
         try:
@@ -150,7 +152,7 @@ def _from_outside(full: str, given: Any, default: Any, allowed: Any, stmt: nodes
             return fitting  # the default has met and reported it
         if not inside and stmt.range is not None:
             labels = (Label(stmt.range.span, "the range"),)
-            session.error("E0309", f"{shown} is outside {stmt.range.span.text}", span, labels=labels)
+            session.report.error("E0309", f"{shown} is outside {stmt.range.span.text}", span, labels=labels)
             return POISON
     return fitting
 
@@ -194,7 +196,7 @@ def literal(text: str, unit: Unit) -> Any:
     if diagnostics.errors or not isinstance(stmt, nodes.Let) or not _is_literal(stmt.value):
         return None
     around = unit.session
-    session = Session(diagnostics, around.vocabulary, around.expressions, around.statements)
+    session = Session(Reporter(diagnostics), around.vocabulary, around.expressions, around.statements)
     alone = Unit(SourceFile("", text), session, unit.loader, Defines({}))
     code: Code = prepare(stmt.value, alone, alone.scope)
     value = code.value if code.value is not VARIES else code.run([])

@@ -9,6 +9,7 @@ from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate import costs
 from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.limits import MAX_DEPTH
 from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Scope
 from scenelang.evaluate.prepare.arguments import Bound, bind
 from scenelang.evaluate.prepare.expressions import (
@@ -22,8 +23,7 @@ from scenelang.evaluate.prepare.expressions import (
     prepare_arguments,
 )
 from scenelang.evaluate.prepare.literals import member
-from scenelang.evaluate.report.undefined import VALUES, report_shared, unknown, unknown_member
-from scenelang.evaluate.session import MAX_DEPTH
+from scenelang.evaluate.report.undefined import VALUES, unknown, unknown_member
 from scenelang.evaluate.values.functions import ANIMATED, CONSTANTS, FUNCTIONS, Builtin
 from scenelang.evaluate.values.value import POISON
 from scenelang.scene.spans import Calls
@@ -39,7 +39,7 @@ def value_of(name: nodes.Name, binding: Binding, unit: Unit, scope: Scope) -> Co
         return POISONED
     session, span = unit.session, name.span
     if binding.span is not None:
-        session.defined[id(span.source), span.start] = binding.span
+        session.report.defined[id(span.source), span.start] = binding.span
     if frame is scope.frame and frame is not unit.frame:
         return constant(binding.value) if binding.known else Code(lambda env: env[slot])
     if frame is scope.frame and binding.known:
@@ -48,7 +48,9 @@ def value_of(name: nodes.Name, binding: Binding, unit: Unit, scope: Scope) -> Co
     def check(value: Any) -> Any:
         if value is UNBOUND:
             label = (Label(binding.span, "defined here"),) if binding.span else ()
-            session.error("E0203", f"'{name.text}' is used before its line has run", span, labels=label)
+            session.report.error(
+                "E0203", f"'{name.text}' is used before its line has run", span, labels=label
+            )
             return POISON
         return value
 
@@ -93,7 +95,9 @@ def wrong_kind(name: nodes.Name, binding: Binding, unit: Unit, wanted: str, help
     labels = (Label(binding.span, "defined here"),) if binding.span else ()
     message = f"'{name.text}' is {kind}, not {wanted}"
     where = id(unit.source), binding.span.start if binding.span else -1
-    report_shared(unit.session, ("E0213", message, *where), "E0213", message, name.span, help, labels)
+    unit.session.report.error_once(
+        ("E0213", message, *where), "E0213", message, name.span, help=help, labels=labels
+    )
 
 
 def prepare_name(expr: nodes.NameRef, unit: Unit, scope: Scope) -> Code:
@@ -122,7 +126,7 @@ def _own_name(name: nodes.Name, unit: Unit, scope: Scope) -> Code:
     if text not in ANIMATED:
         if text in FUNCTIONS:
             message = f"'{text}' is a function, not a value"
-            session.error("E0213", message, name.span, help=f"call it: {text}(…)")
+            session.report.error("E0213", message, name.span, help=f"call it: {text}(…)")
         else:
             unknown(name, unit, scope)
         return POISONED
@@ -137,7 +141,7 @@ def _own_name(name: nodes.Name, unit: Unit, scope: Scope) -> Code:
         value = session.animated[index]
         if value is UNBOUND:
             help = "move the line that needs it below animate(…)"
-            session.error("E0203", f"'{text}' is used before animate(…)", name.span, help=help)
+            session.report.error("E0203", f"'{text}' is used before animate(…)", name.span, help=help)
             return POISON
         return value
 
@@ -210,7 +214,7 @@ def prepare_call(expr: nodes.CallExpr, unit: Unit, scope: Scope) -> Code:
     if builtin.variadic:
         if not expr.args or any(arg.name for arg in expr.args):
             message = f"'{name.text}' takes one or more arguments without names"
-            unit.session.error("E0308", message, name.span)
+            unit.session.report.error("E0308", message, name.span)
             return POISONED
         ordered: Bound = list(expr.args)
     else:
@@ -242,7 +246,7 @@ def _method(expr: nodes.CallExpr, unit: Unit) -> None:
 
     help, fix = member_advice(nodes.NameRef(value, value.span), last)
     help = help or f"write {rest}(…) with the value as an argument"
-    unit.session.error("E0128", "only a name can be called", expr.name.span, help=help, fix=fix)
+    unit.session.report.error("E0128", "only a name can be called", expr.name.span, help=help, fix=fix)
 
 
 def _doubted(builtin: Builtin, args: Sequence[nodes.Argument], unit: Unit) -> Callable[..., Any]:
@@ -254,8 +258,8 @@ def _doubted(builtin: Builtin, args: Sequence[nodes.Argument], unit: Unit) -> Ca
         doubt = builtin.doubt(*values) if builtin.doubt else None
         if doubt is not None and doubt.operand is not None:
             span = args[doubt.operand].value.span
-            if not session.follows(doubt.code, span):
-                session.diagnostics.add(doubt.code, doubt.message, span, help=doubt.help)
+            if not session.report.follows(doubt.code, span):
+                session.report.diagnostics.add(doubt.code, doubt.message, span, help=doubt.help)
         return result
 
     return run
@@ -268,13 +272,13 @@ def _call_fn(
     if enter is None:
         return POISONED
     session = unit.session
-    session.defined[id(expr.name.span.source), expr.name.span.start] = definition.node.name.span
+    session.report.defined[id(expr.name.span.source), expr.name.span.start] = definition.node.name.span
 
     def run(env: Env) -> Any:
-        before = session.calls
+        before = session.report.calls
         frame = enter(env)
         value = definition.run(frame)
-        session.calls = before
+        session.report.calls = before
         session.depth -= 1
         return value
 
@@ -308,7 +312,7 @@ def entering(
     )
     if bound is None:
         return None
-    session.given.setdefault(id(definition.node), []).append(bound)
+    session.report.given.setdefault(id(definition.node), []).append(bound)
     given = [codes[id(arg)].run if arg is not None else None for arg in bound]
     link = _link(definition, scope)
 
@@ -319,15 +323,15 @@ def entering(
         session.tick(definition.weight, span)
         frame: Env = [UNBOUND] * definition.slots
         frame[0] = link(env)
-        before, slot = session.calls, 1
+        before, slot = session.report.calls, 1
         inside = Calls(span, before)
         for get in given:
-            session.calls = before if get is not None else inside  # defaults are the callee's
+            session.report.calls = before if get is not None else inside  # defaults are the callee's
             frame[slot] = get(env) if get is not None else definition.defaults[slot - 1](frame)
             if session.watch is not None:
                 session.watch(params[slot - 1].name.span, frame[slot])
             slot += 1
-        session.calls = inside
+        session.report.calls = inside
         return frame
 
     return enter

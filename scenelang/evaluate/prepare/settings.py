@@ -14,6 +14,7 @@ from scenelang.evaluate.names import Env
 from scenelang.evaluate.prepare.arguments import bind
 from scenelang.evaluate.prepare.blocks import Action, Place, misplaced
 from scenelang.evaluate.prepare.expressions import prepare
+from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import number
 from scenelang.evaluate.values.transforms import color
@@ -44,7 +45,9 @@ def once(session: Session, what: str, span: Span) -> bool:
     first = session.settings.given.setdefault(what, span)
     if first is span:
         return True
-    session.error("E0333", f"'{what}' is given twice", span, labels=(Label(first, "first given here"),))
+    session.report.error(
+        "E0333", f"'{what}' is given twice", span, labels=(Label(first, "first given here"),)
+    )
     return False
 
 
@@ -54,10 +57,10 @@ def prepare_version(stmt: nodes.Version, place: Place) -> Action | None:
         return None
     if version.unit or version.value != 1:
         message = f"language version {version.span.text} is not supported"
-        session.error("E0334", message, version.span, help="this is version 1: nsg 1;")
+        session.report.error("E0334", message, version.span, help="this is version 1: nsg 1;")
     elif place.unit.first is not stmt:
         message = "the language version is not the first statement"
-        session.error("E0334", message, stmt.span, fix=_to_the_top(stmt, place.unit.first))
+        session.report.error("E0334", message, stmt.span, fix=_to_the_top(stmt, place.unit.first))
     return None
 
 
@@ -77,14 +80,14 @@ def prepare_model(stmt: nodes.Model, place: Place) -> Action | None:
     if not isinstance(stmt.name, nodes.String):
         if not isinstance(stmt.name, nodes.BadExpr):
             prepare(stmt.name, unit, place.scope)
-            session.error("E0301", "expected the model's name as a string", stmt.name.span)
+            session.report.error("E0301", "expected the model's name as a string", stmt.name.span)
         return None
     known = [m.name for m in session.vocabulary.models]
     if stmt.name.value not in known:
         span = stmt.name.span
         help, fix = did_you_mean(stmt.name.value, known, Span(span.source, span.start + 1, span.end - 1))
         help = help or f"there is {listing(known)}"
-        session.error("E0210", f"unknown model '{stmt.name.value}'", span, help=help, fix=fix)
+        session.report.error("E0210", f"unknown model '{stmt.name.value}'", span, help=help, fix=fix)
     return None
 
 
@@ -96,7 +99,7 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
     if not at_top_level(place, span, f"'{name}'") or not once(session, name, span):
         return None
     if stmt.body is not None:
-        session.error("E0330", f"'{name}' takes no block", span, help=f"write {name}(…);")
+        session.report.error("E0330", f"'{name}' takes no block", span, help=f"write {name}(…);")
         return None
     params, required = _PARAMS[name]
     optional = [index >= required for index in range(len(params))]
@@ -116,7 +119,7 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
         try:
             apply(session, span, *values)
         except Problem as problem:
-            session.problem(problem, span, operands)
+            report_problem(session.report, problem, span, operands)
             if name == "animate":
                 session.animated[:] = [POISON] * 4
 
@@ -153,7 +156,7 @@ def _background(session: Session, span: Span, value: Any) -> None:
     if session.vocabulary.chosen is not None and session.vocabulary.dimension == 3:
         message = f"model '{session.vocabulary.chosen.name}' brings its own background"
         help = "in 3D the background belongs to the model"
-        session.error("E0336", message, span, help=help, labels=session.model_label())
+        session.report.error("E0336", message, span, help=help, labels=session.model_label())
         return
     if value is None:
         session.settings.background = None

@@ -13,6 +13,7 @@ from scenelang.evaluate.names import Env
 from scenelang.evaluate.prepare.arguments import bind
 from scenelang.evaluate.prepare.blocks import Action, Place, inner, misplaced, prepare_block
 from scenelang.evaluate.prepare.expressions import VARIES, Code, prepare_arguments
+from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.values.transforms import EVEN_SCALE, GEOMETRY, TEXTURE, Spec, outside_unit, spread
 from scenelang.evaluate.values.value import POISON, Problem
 from scenelang.scene import spans
@@ -30,7 +31,7 @@ def prepare_move(stmt: nodes.Call, place: Place) -> Action | None:
     if stmt.body is not None:
         help = f"put {name}(…); into the block of what it moves, as in square {{ {name}(…); }}"
         fix = _grouped(stmt, place)
-        unit.session.error("E0330", f"'{name}' takes no block", stmt.name.span, help=help, fix=fix)
+        unit.session.report.error("E0330", f"'{name}' takes no block", stmt.name.span, help=help, fix=fix)
         return None
     if name == "scale" and len(args) == 1 and (args[0].name is None or args[0].name.text == "s"):
         spec = EVEN_SCALE
@@ -40,7 +41,7 @@ def prepare_move(stmt: nodes.Call, place: Place) -> Action | None:
     if bound is None:
         return None
     if name == "shear" and any(arg.name is None for arg in args):
-        unit.session.error("E0308", "shear takes a named term", args[0].span, help=spec.help)
+        unit.session.report.error("E0308", "shear takes a named term", args[0].span, help=spec.help)
         return None
     inputs = [codes[id(arg)] if arg is not None else None for arg in bound]
     operands = tuple([arg.value if arg is not None else None for arg in bound])
@@ -59,7 +60,7 @@ def _spec(stmt: nodes.Call, place: Place) -> Spec | None:
         help = f"put it into a material's block, as in material flat {{ {name}(…); }}"
         from scenelang.evaluate.report.habits import in_material  # only mistakes need it
 
-        fix = _grouped(stmt, place) or in_material(stmt, place, name)
+        fix = _grouped(stmt, place) or in_material(stmt, place.unit.session, name)
         misplaced(place, span, f"'{name}' stands outside a material", help, fix)
         return None
     if place.kind == "file":
@@ -76,7 +77,7 @@ def _grouped(stmt: nodes.Call, place: Place) -> Fix | None:
     from scenelang.evaluate.report.habits import as_group  # only mistakes need it
 
     prepare_block(stmt.body.statements, inner(place, "group"), stmt.body.span)
-    return as_group(stmt, place)
+    return as_group(stmt, place.unit.session)
 
 
 def _offered(stmt: nodes.Call, place: Place) -> bool:
@@ -90,7 +91,7 @@ def _offered(stmt: nodes.Call, place: Place) -> bool:
     help = f"model '{owner}' has it" if owner else None
     session = place.unit.session
     message = f"{model} no transform '{name}'"
-    session.error("E0205", message, stmt.name.span, help=help, labels=session.model_label())
+    session.report.error("E0205", message, stmt.name.span, help=help, labels=session.model_label())
     return False
 
 
@@ -114,7 +115,7 @@ def _action(
         try:
             node = spec.build(*spread(values, spec)) if spec.spread else spec.build(*values)
         except Problem as problem:
-            session.problem(problem, span, (one,) * len(spec.params) if alone else operands)
+            report_problem(session.report, problem, span, (one,) * len(spec.params) if alone else operands)
             return None
         _warn(node, unit, one.span if one else span)
         return node
@@ -156,8 +157,8 @@ def _action(
 
 def _warn(node: Any, unit: Unit, span: Span) -> None:
     outside = outside_unit(node)
-    if outside is not None and not unit.session.follows("W0301", span):
-        unit.session.diagnostics.add(
+    if outside is not None and not unit.session.report.follows("W0301", span):
+        unit.session.report.diagnostics.add(
             "W0301",
             f"{outside:.6g} is outside 0 to 1",
             span,

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Container, Iterable
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.evaluate.prepare.literals import COMPONENTS
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.angles import angle_advice
-from scenelang.evaluate.report.undefined import Advice, uses
+from scenelang.evaluate.report.reporter import Advice
+from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.transforms import GEOMETRY
-from scenelang.evaluate.values.value import Problem
+from scenelang.evaluate.values.value import COMPONENTS, Problem
 from scenelang.syntax import nodes
-
-if TYPE_CHECKING:
-    from scenelang.evaluate.prepare.blocks import Place
 
 _SIMPLE: Final = re.compile(r"[\w.#]+(?:\([^()]*\)|\[[^\[\]]*\])?|\([^()]*\)|\[[^\[\]]*\]")
 _NEAR: Final = 500
@@ -84,10 +81,9 @@ def _colour(text: str) -> str | None:
     return plain[0] if plain else foreign_words.COLOURS.get(text.strip().lower())
 
 
-def _material(place: Place, source: SourceFile) -> str | None:
+def _material(session: Session, source: SourceFile) -> str | None:
     """The only material that there is for what a text draws; None where there are several."""
-    session = place.unit.session
-    drawn = uses(session, source)
+    drawn = session.report.uses(source)
     models = [m for m in session.vocabulary.in_use if any(geometry in drawn for geometry in m.geometries)]
     materials = {material for model in models for material in model.materials}
     return materials.pop() if len(materials) == 1 else None
@@ -113,10 +109,10 @@ def _level(letters: Iterable[str], deeper: str, higher: str) -> str | None:
     return None
 
 
-def in_material(stmt: nodes.Call, place: Place, name: str) -> Fix | None:
+def in_material(stmt: nodes.Call, session: Session, name: str) -> Fix | None:
     """`square { color(#d33); }`: into the material, where there is but one for what the text draws."""
     source, span = stmt.span.source, stmt.span
-    material = _material(place, source)
+    material = _material(session, source)
     beside = _beside(source.text, span.start, span.end)
     if material is None or stmt.body is not None or beside is None or "material" in beside:
         return None
@@ -124,7 +120,7 @@ def in_material(stmt: nodes.Call, place: Place, name: str) -> Fix | None:
     return Fix("put it into a material", (head, Edit(Span(source, span.end, span.end), " }")))
 
 
-def as_group(stmt: nodes.Call, place: Place) -> Fix | None:
+def as_group(stmt: nodes.Call, session: Session) -> Fix | None:
     """`translate(1, 0) { … }`: a group that ends with the transform, or with the material of a colour."""
     body, source = stmt.body, stmt.span.source
     if body is None or not body.span.text.endswith("}"):
@@ -133,7 +129,7 @@ def as_group(stmt: nodes.Call, place: Place) -> Fix | None:
     last = body.statements[-1].span.end if body.statements else body.span.start + 1
     moved = f"{head.text.rstrip()};"
     if stmt.name.text not in GEOMETRY:
-        material = _material(place, source)
+        material = _material(session, source)
         if material is None or any(isinstance(one, nodes.MaterialUse) for one in body.statements):
             return None
         moved = f"material {material} {{ {moved} }}"

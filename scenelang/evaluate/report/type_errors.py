@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
-from scenelang.evaluate.report.undefined import shown_places
+from scenelang.evaluate.report.reporter import Reporter, Shared
+from scenelang.evaluate.values.value import Problem
+from scenelang.scene import library
 from scenelang.syntax import nodes
-
-if TYPE_CHECKING:
-    from scenelang.evaluate.session import Session
 
 _KINDS: Final = frozenset(("E0301", "E0302", "E0303", "E0307"))
 _COMPARISONS: Final = frozenset(("<", "<=", ">", ">=", "==", "!=", "&&", "||"))
@@ -27,21 +25,6 @@ _OFTEN: Final = 3  # so many places of one report make its origin the culprit, w
 
 Origin = tuple[int, int]
 """A definition: its file and where its name starts."""
-
-
-@dataclass(slots=True)
-class Shared:
-    """A report that several places share.
-
-    Args:
-        index: its index among the diagnostics.
-        own: labels of its own.
-        again: further places.
-    """
-
-    index: int
-    own: tuple[Label, ...]
-    again: dict[Span, None] = field(default_factory=dict)
 
 
 _FOUND: Final = re.compile(r"found (?!a number$)(.*)$|of (.*), which is not a vector$")
@@ -64,94 +47,127 @@ def _complaint(message: str) -> str:
     return message if found is None else found[1] or found[2]
 
 
-def joined(session: Session, code: str, message: str, operands: tuple[nodes.Expr, ...], place: Span) -> bool:
+def report_problem(
+    report: Reporter, problem: Problem, span: Span, operands: tuple[nodes.Expr | None, ...] = ()
+) -> None:
+    """Report a `Problem` at the operand it blames, or else at ``span``."""
+    operand = None
+    if problem.operand is not None and problem.operand < len(operands):
+        operand = operands[problem.operand]
+    place = operand.span if operand else span
+    if (id(place.source), place.start, place.end) in report.reported:
+        return
+    if library.holds(place.source):
+        report.error(problem.code, problem.message, place, help=problem.help)
+        return
+    alone = operand is not None and problem.code == "E0301"
+    blamed = tuple([one for one in ((operand,) if alone else operands) if one is not None])
+    if not report.follows(problem.code, place) and joined(
+        report, problem.code, problem.message, blamed, place
+    ):
+        return
+    help, fix = problem.help, None
+    if problem.fix:
+        from scenelang.evaluate.report.habits import advice  # only mistakes need it
+
+        help, fix = advice(problem, operand, report.defined)
+    labels = [
+        Label(other.span, words)
+        for index, words in problem.notes.items()
+        if index < len(operands) and (other := operands[index]) is not None
+    ]
+    if isinstance(operand, nodes.NameRef):
+        defined = report.defined.get((id(operand.span.source), operand.span.start))
+        if defined is not None:
+            labels.append(Label(defined, f"'{operand.name.text}' is defined here"))
+    found = report.error(problem.code, problem.message, place, help=help, fix=fix, labels=tuple(labels))
+    if found is not None:
+        remember(report, found, problem.code, problem.message, blamed)
+
+
+def joined(report: Reporter, code: str, message: str, operands: tuple[nodes.Expr, ...], place: Span) -> bool:
     """Whether a problem is one more place of an earlier report, which then shows it.
 
     Args:
-        session: has the reports.
+        report: has the reports.
         code, message: the problem.
         operands: what may be to blame.
         place: where it shows.
     """
     if code not in _KINDS:
         return False
-    for origin, definition in origins(session, operands).items():
+    for origin, definition in origins(report, operands).items():
         for words in (_complaint(message), ""):
-            shared = session.blamed.get((*origin, words))
+            shared = report.blamed.get((*origin, words))
             if shared is not None:
-                _add(session, shared, definition, place)
+                _add(report, shared, definition, place)
                 return True
-    direct = _direct(session, operands[0]) if len(operands) == 1 and code == "E0301" else None
-    shared = session.blamed.get((*direct, code)) if direct else None
+    direct = _direct(report, operands[0]) if len(operands) == 1 and code == "E0301" else None
+    shared = report.blamed.get((*direct, code)) if direct else None
     if shared is None or direct is None:
         return False
-    _add(session, shared, session.defined[id(operands[0].span.source), operands[0].span.start], place)
+    _add(report, shared, report.defined[id(operands[0].span.source), operands[0].span.start], place)
     return True
 
 
-def remember(session: Session, code: str, message: str, operands: tuple[nodes.Expr, ...]) -> None:
-    """Note the origins of the problem that was reported last."""
+def remember(
+    report: Reporter, shared: Shared, code: str, message: str, operands: tuple[nodes.Expr, ...]
+) -> None:
+    """Note the origins of a problem that was reported."""
     if code not in _KINDS:
         return
-    index = len(session.diagnostics.items) - 1
-    shared = Shared(index, session.diagnostics.items[index].labels)
     complaint = _complaint(message)
-    direct = _direct(session, operands[0]) if operands else None
+    direct = _direct(report, operands[0]) if operands else None
     if complaint == _OUTSIDE:
         # One wrong index is one; of a second on, it is the vector that is too short.
-        if direct is not None and session.blamed.setdefault((*direct, code), shared) is not shared:
-            session.blamed.setdefault((*direct, complaint), shared)
+        if direct is not None and report.blamed.setdefault((*direct, code), shared) is not shared:
+            report.blamed.setdefault((*direct, complaint), shared)
         return
-    for origin in origins(session, operands):
-        session.blamed.setdefault((*origin, complaint), shared)
+    for origin in origins(report, operands):
+        report.blamed.setdefault((*origin, complaint), shared)
     if direct is not None and code == "E0301" and len(operands) == 1:
-        session.blamed.setdefault((*direct, code), shared)
+        report.blamed.setdefault((*direct, code), shared)
 
 
-def origins(session: Session, operands: tuple[nodes.Expr, ...]) -> dict[Origin, Span]:
+def origins(report: Reporter, operands: tuple[nodes.Expr, ...]) -> dict[Origin, Span]:
     """The definitions that may give values their kind, nearest first."""
     found: dict[Origin, Span] = {}
     stack = list(reversed(operands))
     while stack and len(found) < _MOST_ORIGINS:
         for name in _carriers(stack.pop()):
-            definition = session.defined.get((id(name.source), name.start))
+            definition = report.defined.get((id(name.source), name.start))
             if definition is None:
                 continue
             origin = id(definition.source), definition.start
-            value = session.origins.get(origin)
+            value = report.origins.get(origin)
             if origin in found or (isinstance(value, nodes.Number) and not value.unit):
                 continue  # a bare number makes nothing of another kind
             found[origin] = definition
             if value is not None:
                 stack.append(value)
-            elif origin in session.parameters:
-                node, index = session.parameters[origin]
-                given = [bound[index] for bound in session.given.get(node, ())[:_MOST_CALLS]]
+            elif origin in report.parameters:
+                node, index = report.parameters[origin]
+                given = [bound[index] for bound in report.given.get(node, ())[:_MOST_CALLS]]
                 stack.extend(argument.value for argument in given if argument is not None)
     return found
 
 
-def _add(session: Session, shared: Shared, definition: Span, place: Span) -> None:
+def _add(report: Reporter, shared: Shared, definition: Span, place: Span) -> None:
     """Show a further place of a report, and what it has in common with the others."""
-    if place in shared.again:
-        return
-    shared.again[place] = None
-    if len(shared.again) + 1 >= _OFTEN:
-        session.blamed.setdefault((id(definition.source), definition.start, ""), shared)
-    items = session.diagnostics.items
     if all(label.span != definition for label in shared.own):
         shared.own = (*shared.own, Label(definition, f"'{definition.text}' is defined here"))
-    places = shown_places(shared.again, "also here", "in")
-    items[shared.index] = replace(items[shared.index], labels=(*shared.own, *places))
+    report.share(shared, place, "in")
+    if len(shared.again) + 1 >= _OFTEN:
+        report.blamed.setdefault((id(definition.source), definition.start, ""), shared)
 
 
-def _direct(session: Session, operand: nodes.Expr) -> Origin | None:
+def _direct(report: Reporter, operand: nodes.Expr) -> Origin | None:
     """The variable that an operand is, or is a part of."""
     while isinstance(operand, nodes.Member | nodes.Index):
         operand = operand.value
     if not isinstance(operand, nodes.NameRef):
         return None
-    definition = session.defined.get((id(operand.span.source), operand.span.start))
+    definition = report.defined.get((id(operand.span.source), operand.span.start))
     return None if definition is None else (id(definition.source), definition.start)
 
 

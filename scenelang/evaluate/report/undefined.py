@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import replace
-from itertools import islice
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
@@ -13,123 +11,39 @@ from scenelang.diagnostics.suggest import did_you_mean, is_slip, listing, ranked
 from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Binding, Scope
 from scenelang.evaluate.report import foreign_words
-from scenelang.evaluate.session import Session
+from scenelang.evaluate.report.reporter import Advice, Reporter, shown_places
 from scenelang.evaluate.values.functions import ANIMATED, CONSTANTS, FUNCTIONS
 from scenelang.syntax import nodes
-from scenelang.syntax.lexer import scan
-from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report
 
 VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of bindings that are values."""
 
-Advice = tuple[str | None, Fix | None]
-
-_SHOWN: Final = 3  # places of one report
 _CODES: Final = {"module": "E0204", "fn": "E0207"}
 
 
-def uses(session: Session, source: SourceFile) -> dict[str, list[Span]]:
-    """Where each name stands in a text, its definition included; made once, at the first unknown name."""
-    known = session.names_in.get(id(source))
-    if known is None:
-        known = session.names_in[id(source)] = {}
-        tokens = scan(source, Report(source))
-        kinds = {tables().kind(name) for name in ("NAME", "step", "as")}
-        for index, kind in enumerate(tokens.kinds):
-            if kind in kinds:
-                span = Span(source, tokens.starts[index], tokens.ends[index])
-                known.setdefault(span.text, []).append(span)
-    return known
-
-
-def is_unused(session: Session, name: str, span: Span | None) -> bool:
-    """Whether nothing in a text bears a name but its definition at ``span``."""
-    return span is not None and len(uses(session, span.source).get(name, ())) == 1
-
-
-def shown_places(places: Collection[Span], words: str | Sequence[str], rest: str = "") -> tuple[Label, ...]:
-    """Labels for the places that share one report: the first few, and how many there are beyond.
-
-    Args:
-        places: in the order in which they were met.
-        words: what is said at each place, or at all.
-        rest: how the number of the others is put: "in" for "and in 2 more".
-    """
-    each = [words] * _SHOWN if isinstance(words, str) else words
-    labels = [Label(place, text) for place, text in zip(islice(places, _SHOWN), each, strict=False)]
-    if len(places) > _SHOWN:
-        more = f"{rest} {len(places) - _SHOWN} more".strip()
-        labels[-1] = replace(labels[-1], message=f"{labels[-1].message}, and {more}")
-    return tuple(labels)
-
-
-def report_shared(
-    session: Session,
-    key: tuple[str | int, ...],
-    code: str,
-    message: str,
-    span: Span,
-    help: str | None = None,
-    labels: tuple[Label, ...] = (),
-    fix: Fix | None = None,
-) -> None:
-    """Report a mistake, or show its place at the report of the same one with the same key.
-
-    A fix is for one place: where there are several it is left out.
-    """
-    items = session.diagnostics.items
-    known = session.shared.get(key)
-    if known is not None:
-        index, again = known
-        if span != items[index].span and span not in again and not session.follows(code, span):
-            again[span] = None
-            labels = (*labels, *shown_places(again, "also here"))
-            items[index] = replace(items[index], labels=labels, fix=None)
-        return
-    before = len(items)
-    session.error(code, message, span, help=help, labels=labels, fix=fix)
-    if len(items) > before:
-        session.shared[key] = before, {}
-
-
-def tell_bound(session: Session, name: nodes.Name, known: Binding | None) -> None:
-    """`i = i + 1;` where `i` is bound: that no `let` stands before it is not what is wrong."""
-    start, items = name.span.start, session.diagnostics.items
-    before = name.span.source.text[max(0, start - 20) : start].rstrip()
-    if known is None or known.span is None or before[-1:].isalpha():
-        return  # a `let` does stand there
-    for index, d in enumerate(items):
-        if d.code == "E0126" and d.span is not None and d.span.start == start:
-            from scenelang.syntax.foreign import ONCE, ONCE_HELP  # only mistakes need it
-
-            labels = (Label(known.span, "defined here"),)
-            items[index] = Diagnostic("E0133", ONCE.replace("<n>", name.text), name.span, labels, ONCE_HELP)
-
-
 def told_at_definition(
-    session: Session, text: str, source: SourceFile, defined: Iterable[tuple[str, Span | None, str]]
+    report: Reporter, text: str, source: SourceFile, defined: Iterable[tuple[str, Span | None, str]]
 ) -> bool:
     """Report a name that is used several times at the definition that was misspelt, if there is one.
 
     Args:
-        session: where it is reported.
+        report: where it is reported.
         text: the unknown name.
         source: the file that it is used in.
         defined: names that are defined around it, each with its place and the kind of its binding.
     """
-    places = uses(session, source).get(text, [])
-    if len(places) < 2 or "." in text or session.effort.spent:
+    places = report.uses(source).get(text, [])
+    if len(places) < 2 or "." in text or report.effort.spent:
         return False
-    spans = {name: (span, kind) for name, span, kind in defined if is_unused(session, name, span)}
-    near = ranked(text, spans, max(1, len(text) // 3), session.effort)
+    spans = {name: (span, kind) for name, span, kind in defined if report.is_unused(name, span)}
+    near = ranked(text, spans, max(1, len(text) // 3), report.effort)
     if not near or (near[1:] and near[1][0] - near[0][0] < 0.5):
         return False
     name = near[0][1]
     span, kind = spans[name]
     if span is None or span.source is not source:
         return False
-    session.error(
+    report.error(
         _CODES.get(kind, "E0201"),
         f"'{name}' is defined here, '{text}' is used",
         span,
@@ -161,43 +75,38 @@ def report_unknown(
         advise: makes advice and a safe change; where there is neither an unused name nearby is suggested.
         kinds: kinds of bindings that it could have stood for.
     """
-    session = unit.session
+    report = unit.session.report
     key = (code, name.text, id(unit.source))
-    known = session.unknown.get(key)
-    items = session.diagnostics.items
-    if known is not None and known[0] < len(items) and items[known[0]].code == code:
-        first, own, again = known
-        if name.span != items[first].span and name.span not in again:
-            again[name.span] = None
-            items[first] = replace(items[first], labels=(*own, *shown_places(again, "also here")))
+    known, items = report.unknown.get(key), report.diagnostics.items
+    if known is not None and known.index < len(items) and items[known.index].code == code:
+        report.share(known, name.span)
         return
-    if key in session.told or session.follows(code, name.span):
+    if key in report.told or report.follows(code, name.span):
         return
-    around = within_effort(session, scope, kinds)
+    around = within_effort(report, scope, kinds)
     defined = [(n, b.span, b.kind) for n, b in around]
-    if told_at_definition(session, name.text, unit.source, defined):
-        session.told.add(key)
+    if told_at_definition(report, name.text, unit.source, defined):
+        report.told.add(key)
         return
     labels: tuple[Label, ...] = ()
     help, fix = advise()
     if help is None:
-        unused = [n for n, b in around if is_unused(session, n, b.span)]
-        help, _ = did_you_mean(name.text, unused, name.span, slips=1, effort=session.effort)
+        unused = [n for n, b in around if report.is_unused(n, b.span)]
+        help, _ = did_you_mean(name.text, unused, name.span, slips=1, effort=report.effort)
     suggested = _suggested(help, around)
     if suggested is not None and suggested.span is not None:
         labels = (Label(suggested.span, "defined here"),)
-    before = len(items)
-    session.error(code, message, name.span, help=help, fix=fix, labels=labels)
-    if len(items) > before:
-        session.unknown[key] = before, items[before].labels, {}
+    found = report.error(code, message, name.span, help=help, fix=fix, labels=labels)
+    if found is not None:
+        report.unknown[key] = found
 
 
-def within_effort(session: Session, scope: Scope, kinds: Sequence[str]) -> list[tuple[str, Binding]]:
+def within_effort(report: Reporter, scope: Scope, kinds: Sequence[str]) -> list[tuple[str, Binding]]:
     """The names in sight of some kinds; none any more where looking through them has taken too long."""
-    if session.effort.spent:
+    if report.effort.spent:
         return []
     seen = list(scope.visible())
-    session.effort.left -= 2 * len(seen)
+    report.effort.left -= 2 * len(seen)
     return [(n, b) for n, b in seen if b.kind in kinds]
 
 
@@ -215,7 +124,7 @@ def unknown_member(name: nodes.Name, unit: Unit, exported: Unit) -> None:
 
     def advise() -> Advice:
         known = [n for n, b in exported.scope.names.items() if b.kind != "import"]
-        help, fix = did_you_mean(rest, known, last, effort=unit.session.effort)
+        help, fix = did_you_mean(rest, known, last, effort=unit.session.report.effort)
         return help or (f"it has {listing(known)}" if known else "it defines nothing"), fix
 
     end = nodes.Name(rest, last)
@@ -224,7 +133,7 @@ def unknown_member(name: nodes.Name, unit: Unit, exported: Unit) -> None:
 
 def unknown(name: nodes.Name, unit: Unit, scope: Scope, call: nodes.CallExpr | None = None) -> None:
     """Report a name that stands for nothing in an expression, perhaps the one that is called."""
-    text, session = name.text, unit.session
+    text, report = name.text, unit.session.report
     if unit.damage and unit.damage.loses(text):
         return
     alias, dot, _ = text.partition(".")
@@ -239,7 +148,7 @@ def unknown(name: nodes.Name, unit: Unit, scope: Scope, call: nodes.CallExpr | N
             f"move the definition of '{text}' above this line",
         )
         labels = (Label(later, "defined here"),)
-        session.error("E0203", message, name.span, labels=labels, help=advice)
+        report.error("E0203", message, name.span, labels=labels, help=advice)
         return
     kinds = ("fn",) if call else (*VALUES, "import")
     own = FUNCTIONS if call else (*CONSTANTS, *ANIMATED, "true", "false")
@@ -251,8 +160,8 @@ def unknown(name: nodes.Name, unit: Unit, scope: Scope, call: nodes.CallExpr | N
             return call_advice(text, call)
         if not call and text.lower() in foreign_words.VALUES:
             return foreign_words.VALUES[text.lower()], None
-        visible = (n for n, _ in within_effort(session, scope, kinds))
-        help, fix = did_you_mean(text, {*visible, *own}, name.span, effort=session.effort)
+        visible = (n for n, _ in within_effort(report, scope, kinds))
+        help, fix = did_you_mean(text, {*visible, *own}, name.span, effort=report.effort)
         here = None if call else foreign_words.NAMES.get(text.lower())
         colour = None if call else foreign_words.COLOURS.get(text.lower())
         if text in foreign_words.LIBRARIES and unit.source.text[name.span.end : name.span.end + 1] == ".":
@@ -267,3 +176,17 @@ def unknown(name: nodes.Name, unit: Unit, scope: Scope, call: nodes.CallExpr | N
 
     code, what = ("E0207", "function") if call else ("E0201", "name")
     report_unknown(name, unit, scope, code, f"unknown {what} '{text}'", advise=advise, kinds=kinds)
+
+
+def tell_bound(report: Reporter, name: nodes.Name, known: Binding | None) -> None:
+    """`i = i + 1;` where `i` is bound: that no `let` stands before it is not what is wrong."""
+    start, items = name.span.start, report.diagnostics.items
+    before = name.span.source.text[max(0, start - 20) : start].rstrip()
+    if known is None or known.span is None or before[-1:].isalpha():
+        return  # a `let` does stand there
+    for index, d in enumerate(items):
+        if d.code == "E0126" and d.span is not None and d.span.start == start:
+            from scenelang.syntax.foreign import ONCE, ONCE_HELP  # only mistakes need it
+
+            labels = (Label(known.span, "defined here"),)
+            items[index] = Diagnostic("E0133", ONCE.replace("<n>", name.text), name.span, labels, ONCE_HELP)

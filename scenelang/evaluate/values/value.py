@@ -185,6 +185,7 @@ class MaterialValue:
 
 Value = float | bool | str | Angle | Time | Vec | RangeValue | MaterialValue | Poison | None
 
+COMPONENTS: Final = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
 UNITS: Final[dict[type, str]] = {float: "number", Angle: "angle", Time: "time"}
 
 
