@@ -33,7 +33,7 @@ error[E0302]: expected an angle, found a bare number
   |                 ^^
   |
   = help: give it a unit: deg, rad or turn
-  = fix: add 'deg'
+  = fix: add `deg`
   |
 1 | square { rotate(45deg); }
   |                   +++

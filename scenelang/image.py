@@ -79,7 +79,7 @@ def image_format(path: str | os.PathLike[str]) -> str:
         pillow.init()
     kind = pillow.EXTENSION.get(suffix)
     if kind is None or kind not in pillow.SAVE:
-        raise ValueError(f"no image format has the suffix '{suffix}'")
+        raise ValueError(f"no image format has the suffix `{suffix}`")
     return kind
 
 

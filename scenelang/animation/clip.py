@@ -212,6 +212,6 @@ def open_clip(path: str | os.PathLike[str], **options: Any) -> Clip:
         source = read_source(where, name)
     except Unreadable as error:
         found = options.get("diagnostics") or Diagnostics()
-        found.add(error.code, f"cannot read '{where.name}': {error}", Span(SourceFile(name, ""), 0, 0))
+        found.add(error.code, f"cannot read `{where.name}`: {error}", Span(SourceFile(name, ""), 0, 0))
         raise SceneError(found) from None
     return Clip(source, path=where, **options)

@@ -56,12 +56,12 @@ class Store:
         self._made = [p for p in (folder, *folder.parents) if not p.exists()]
         for place in (folder, folder / _LOCK):
             if place.is_symlink():
-                raise RenderError(f"cannot keep frames in '{folder}': '{place.name}' is a link")
+                raise RenderError(f"cannot keep frames in `{folder}`: `{place.name}` is a link")
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = os.fdopen(open_own(folder / _LOCK), "rb")
         if lock(self._lock.fileno(), folder / _LOCK) is False:
             self._lock.close()
-            raise Busy(f"another process is drawing into '{folder}'")
+            raise Busy(f"another process is drawing into `{folder}`")
         for part in self._named(_PASSING):
             part.unlink()
 

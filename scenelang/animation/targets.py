@@ -81,7 +81,7 @@ def find_target(out: str, stem: str = "frame") -> Target:
         bare = path.name.replace("%%", "")
         if len(_NUMBER.findall(bare)) != 1 or "%" in _NUMBER.sub("", bare):
             raise TargetError(
-                f"'{path.name}' has more than one place for a number, or a stray '%' (write %%)"
+                f"`{path.name}` has more than one place for a number, or a stray `%` (write %%)"
             )
         try:
             image_format(path)
@@ -91,13 +91,13 @@ def find_target(out: str, stem: str = "frame") -> Target:
         return Target("sequence", path.parent, path.name)
     if out.endswith(("/", "\\")) or path.is_dir():
         if path.exists() and not path.is_dir():
-            raise TargetError(f"'{out}' is a file")
+            raise TargetError(f"`{out}` is a file")
         return Target("sequence", path, f"{stem.replace('%', '%%')}-%04d.png")
     kind = ENCODED.get(path.suffix.lower())
     if kind is None:
         suffixes = ", ".join(ENCODED)
         raise TargetError(
-            f"'{out}' holds one picture; an animation goes to a file with one of the suffixes {suffixes}, to "
+            f"`{out}` holds one picture; an animation goes to a file with one of the suffixes {suffixes}, to "
             "numbered pictures such as frame-%04d.png, or to a folder, which ends in a slash"
         )
     _check_folder(path.parent, out)
@@ -106,7 +106,7 @@ def find_target(out: str, stem: str = "frame") -> Target:
 
 def _check_folder(folder: Path, out: str) -> None:
     if not folder.is_dir():
-        raise TargetError(f"cannot write '{out}': there is no folder '{folder}'")
+        raise TargetError(f"cannot write `{out}`: there is no folder `{folder}`")
 
 
 def _filled(pattern: str, frame: int) -> str:

@@ -39,7 +39,7 @@ class FrameRange:
         """
         found = _RANGE.fullmatch(text)
         if found is None or (found[2] and found[3] is None):
-            raise FramesError(f"'{text}' is not a range of frames such as 0..23, 0..<24, 12.. or 7")
+            raise FramesError(f"`{text}` is not a range of frames such as 0..23, 0..<24, 12.. or 7")
         first = int(found[1])
         if ".." not in text:
             return cls(first, first)
@@ -47,7 +47,7 @@ class FrameRange:
             return cls(first)
         last = int(found[3]) - bool(found[2])
         if last < first:
-            raise FramesError(f"the range of frames '{text}' is empty")
+            raise FramesError(f"the range of frames `{text}` is empty")
         return cls(first, last)
 
     def among(self, frames: int) -> range:

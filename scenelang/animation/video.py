@@ -74,7 +74,7 @@ def _codec(ffmpeg: str, suffix: str) -> tuple[str, ...]:
     for codec in wanted:
         if codec[0] in known:
             return codec
-    raise NoFfmpeg(f"'{ffmpeg}' has no encoder {' or '.join(c[0] for c in wanted)}, which {suffix} needs")
+    raise NoFfmpeg(f"`{ffmpeg}` has no encoder {' or '.join(c[0] for c in wanted)}, which {suffix} needs")
 
 
 def check_video(suffix: str) -> None:

@@ -38,7 +38,7 @@ def choose_device(device: str) -> str:
         ValueError: an unknown name.
     """
     if device not in ("auto", "cpu", "cuda"):
-        raise ValueError(f"unknown device {device!r}; there are 'auto', 'cpu' and 'cuda'")
+        raise ValueError(f"unknown device `{device}`; there are `auto`, `cpu` and `cuda`")
     if device == "cpu":
         return "cpu"
     if torch.cuda.is_available():

@@ -53,7 +53,7 @@ def render(
         ValueError: an argument is none of the above.
     """
     if samples not in get_args(Samples):
-        raise ValueError(f"unknown samples {samples!r}; there are 'adaptive', 'four' and 'one'")
+        raise ValueError(f"unknown samples `{samples}`; there are `adaptive`, `four` and `one`")
     if threads is not None and threads < 1:
         raise ValueError(f"{threads} threads, where at least 1 is needed")
     if size is not None:
@@ -69,7 +69,7 @@ def render(
             raise RenderError("the reference draws scenes; a program keeps only what the network needs")
         return draw_exact(program_or_scene)
     if backend != "neural":
-        raise ValueError(f"unknown backend {backend!r}; there are 'neural' and 'reference'")
+        raise ValueError(f"unknown backend `{backend}`; there are `neural` and `reference`")
     if isinstance(program_or_scene, Scene):
         from scenelang.program.compile import compile_scene
 

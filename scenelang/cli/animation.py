@@ -112,7 +112,7 @@ def still_picture(clip: Clip, target: Target, wanted: Wanted, out: str) -> bool:
         return target.kind != "sequence"
     suffixes = listing(sorted(PICTURES))
     raise click.UsageError(
-        f"'{out}' is for animations, and the scene has no animate(…); {suffixes} hold a picture too."
+        f"`{out}` is for animations, and the scene has no animate(…); {suffixes} hold a picture too."
     )
 
 
@@ -157,7 +157,7 @@ def strays(target: Target, made: Made) -> str | None:
     ]
     if not others:
         return None
-    return f"'{target.path}' also holds {len(others)} such files of another run, '{min(others)}' among them"
+    return f"`{target.path}` also holds {len(others)} such files of another run, `{min(others)}` among them"
 
 
 def made_pattern(target: Target) -> tuple[str, str]:

@@ -28,9 +28,9 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
     found = [code.strip().upper() for value in values for code in value.split(",") if code.strip()]
     for code in found:
         if not any(known.startswith(code) for known in CODES):
-            raise click.BadParameter(f"no code begins with '{code}'", ctx, param)
+            raise click.BadParameter(f"no code begins with `{code}`", ctx, param)
         if not code.startswith("W"):
-            raise click.BadParameter(f"'{code}' is an error, and errors always count", ctx, param)
+            raise click.BadParameter(f"`{code}` is an error, and errors always count", ctx, param)
     return tuple(found)
 
 

@@ -37,9 +37,9 @@ def command(
     from scenelang.cli.say import say_diagnostics
 
     if file.endswith(PROGRAM):
-        raise click.UsageError(f"'{file}' is a compiled program already.")
+        raise click.UsageError(f"`{file}` is a compiled program already.")
     if not out.endswith(PROGRAM):
-        raise click.UsageError(f"A program's file ends in {PROGRAM}, '{out}' does not.")
+        raise click.UsageError(f"A program's file ends in {PROGRAM}, `{out}` does not.")
     clock = Clock()
     job = prepare(file, request, clock, verbose=verbose)
     job.diagnostics = [*job.diagnostics, *unused_defines(request)]

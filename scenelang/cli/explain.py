@@ -50,7 +50,7 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
         return
     about = _about(wanted) if len(wanted) >= 3 else []
     if not about:
-        raise click.UsageError(f"No code '{code}'.{_advice(wanted, list(CODES))}")
+        raise click.UsageError(f"No code `{code}`.{_advice(wanted, list(CODES))}")
     _print_list(about, kind, paint)
 
 

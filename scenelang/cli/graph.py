@@ -83,7 +83,7 @@ def _kind(out: str | None, kind: str | None) -> str:
     if out in (None, "-"):
         return "mmd"
     if suffix not in _SUFFIXES:
-        raise click.UsageError(f"'{out}' has none of the suffixes {', '.join(_SUFFIXES)}; say one with --to.")
+        raise click.UsageError(f"`{out}` has none of the suffixes {', '.join(_SUFFIXES)}; say one with --to.")
     return suffix[1:]
 
 
@@ -94,7 +94,7 @@ def _find_dot(kind: str) -> str | None:
     found = shutil.which("dot")
     if found is None:
         raise click.UsageError(
-            f".{kind} needs Graphviz, whose program 'dot' is not here: install the package 'graphviz', "
+            f".{kind} needs Graphviz, whose program `dot` is not here: install the package `graphviz`, "
             "or write .dot or .mmd, which need nothing."
         )
     return found

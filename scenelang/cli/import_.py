@@ -51,7 +51,7 @@ def command(
     from scenelang.passes import check_scene
 
     if not file.lower().endswith(_SUFFIXES):
-        raise click.UsageError(f"'{file}' is not a .gltf or .glb file.")
+        raise click.UsageError(f"`{file}` is not a .gltf or .glb file.")
     try:
         made = load_gltf(file, model=model, plane=plane)
     except GltfError as error:

@@ -78,7 +78,7 @@ def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
         return read_source(Path(name), name)
     except Unreadable as error:
         empty = SourceFile(name, "")
-        diagnostics.add(error.code, f"cannot read '{name}': {error}", Span(empty, 0, 0))
+        diagnostics.add(error.code, f"cannot read `{name}`: {error}", Span(empty, 0, 0))
         return None
 
 

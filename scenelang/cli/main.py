@@ -92,10 +92,10 @@ class Commands(click.Group):
             from difflib import get_close_matches
 
             if args[0] in self.moved:
-                ctx.fail(f"'{args[0]}' is now '{ctx.command_path} {self.moved[args[0]]}'.")
+                ctx.fail(f"`{args[0]}` is now `{ctx.command_path} {self.moved[args[0]]}`.")
             near = get_close_matches(args[0], self.table, 1)
-            advice = f" Did you mean '{near[0]}'?" if near else ""
-            ctx.fail(f"No such command '{args[0]}'.{advice}")
+            advice = f" Did you mean `{near[0]}`?" if near else ""
+            ctx.fail(f"No such command `{args[0]}`.{advice}")
         return super().resolve_command(ctx, args)
 
 
@@ -142,7 +142,7 @@ def describe(error: OSError) -> str:
     """A system error in a line."""
     reason = (error.strerror or str(error) or "unreadable").lower()
     if isinstance(error, NotWritten):
-        return f"cannot write '{error.filename}': {reason}"
+        return f"cannot write `{error.filename}`: {reason}"
     return f"{error.filename}: {reason}" if error.filename else reason
 
 

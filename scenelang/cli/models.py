@@ -34,7 +34,7 @@ def command(name: str | None, kind: Literal["human", "json"]) -> None:
             click.echo(f"{manifest['name']}  {manifest['dimension']}D  {manifest['summary']}")
         return
     if name not in known:
-        raise click.UsageError(f"No model '{name}'; there is {', '.join(known)}.")
+        raise click.UsageError(f"No model `{name}`; there is {', '.join(known)}.")
     facts = _facts(load_manifest(name))
     click.echo(json.dumps(facts, indent=2) if kind == "json" else _text(facts))
 

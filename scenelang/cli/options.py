@@ -21,10 +21,10 @@ def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tupl
         return None
     found = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", value)
     if found is None:
-        raise click.BadParameter(f"'{value}' is not a size such as 320x192", ctx, param)
+        raise click.BadParameter(f"`{value}` is not a size such as 320x192", ctx, param)
     width, height = int(found[1]), int(found[2])
     if not (1 <= width <= 8192 and 1 <= height <= 8192):
-        raise click.BadParameter(f"'{value}' has a side outside 1..8192", ctx, param)
+        raise click.BadParameter(f"`{value}` has a side outside 1..8192", ctx, param)
     return width, height
 
 
@@ -35,7 +35,7 @@ def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
     for value in values:
         name, equals, text = value.partition("=")
         if not equals or not re.fullmatch(r"[A-Za-z_][\w.]*", name.strip()):
-            raise click.BadParameter(f"'{value}' is not NAME=value", ctx, param)
+            raise click.BadParameter(f"`{value}` is not NAME=value", ctx, param)
         found[name.strip()] = text.strip()
     return Defines(found)
 

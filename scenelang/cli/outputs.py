@@ -30,22 +30,22 @@ def targets(names: Sequence[str], out: str) -> list[Path]:
             image_format(path)
         except ValueError as error:
             advice = "a picture has a suffix such as .png, a folder ends in a slash"
-            raise click.UsageError(f"cannot write '{out}': {error if path.suffix else advice}.") from None
+            raise click.UsageError(f"cannot write `{out}`: {error if path.suffix else advice}.") from None
         if not path.parent.is_dir():
-            raise click.UsageError(f"cannot write '{out}': there is no folder '{path.parent}'.")
+            raise click.UsageError(f"cannot write `{out}`: there is no folder `{path.parent}`.")
         return [path]
     if path.exists() and not path.is_dir():
-        raise click.UsageError(f"'{out}' is a file; {len(names)} scenes need a folder.")
+        raise click.UsageError(f"`{out}` is a file; {len(names)} scenes need a folder.")
     if not path.exists() and not out.endswith(("/", "\\")):
         what = "a picture" if _is_picture(path) else "an animation" if is_animation(out) else None
         if what is not None:
-            raise click.UsageError(f"'{out}' names {what}; {len(names)} scenes need a folder.")
+            raise click.UsageError(f"`{out}` names {what}; {len(names)} scenes need a folder.")
     files = [composed(path / f"{_stem(name)}.png") for name in names]
     owner: dict[str, str] = {}
     for name, file in zip(names, files, strict=True):
         first = owner.setdefault(file.name.casefold(), name)
         if first is not name:
-            raise click.UsageError(f"'{first}' and '{name}' would both be drawn to '{file}'.")
+            raise click.UsageError(f"`{first}` and `{name}` would both be drawn to `{file}`.")
     path.mkdir(parents=True, exist_ok=True)
     return files
 
@@ -57,7 +57,7 @@ def composed(file: Path) -> Path:
         click.UsageError: it is a link, which may lead anywhere.
     """
     if file.is_symlink():
-        raise click.UsageError(f"'{file}' is a link; it is followed only where -o names it.")
+        raise click.UsageError(f"`{file}` is a link; it is followed only where -o names it.")
     return file
 
 

@@ -230,11 +230,11 @@ def _animate(
     except KeyboardInterrupt:
         if target.work.exists():
             click.echo(
-                f"\nframes are kept in '{target.work}'; the same command goes on with the rest", err=True
+                f"\nframes are kept in `{target.work}`; the same command goes on with the rest", err=True
             )
         raise
     except OSError as error:
-        raise Trouble(f"cannot write '{out}': {describe(error)}") from None
+        raise Trouble(f"cannot write `{out}`: {describe(error)}") from None
     say_diagnostics(found)
     click.echo(summary(made, target, clip, started), err=True)
     if (others := strays(target, made)) is not None:

@@ -56,8 +56,8 @@ def known_stages(wanted: tuple[str, ...], *, without: tuple[str, ...] = ()) -> t
     for name in wanted:
         if name not in names:
             near = get_close_matches(name, names, 1)
-            advice = f" Did you mean '{near[0]}'?" if near else ""
-            raise click.UsageError(f"No stage '{name}'.{advice} There are {', '.join(names)}.")
+            advice = f" Did you mean `{near[0]}`?" if near else ""
+            raise click.UsageError(f"No stage `{name}`.{advice} There are {', '.join(names)}.")
     return wanted
 
 

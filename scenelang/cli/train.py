@@ -80,11 +80,11 @@ def command(
     from scenelang.training.loop import train
 
     if is_study(config_data(config)):
-        raise click.UsageError(f"'{config}' configures a study; scenelang lab train trains it.")
+        raise click.UsageError(f"`{config}` configures a study; scenelang lab train trains it.")
     try:
         wanted = read_config(config)
     except ValidationError as error:
-        raise click.UsageError(f"bad configuration '{config}': {first_mistake(error)}") from None
+        raise click.UsageError(f"bad configuration `{config}`: {first_mistake(error)}") from None
     keep_memory()
     torch.set_num_threads(threads or 1)
     place = choose_device(device)

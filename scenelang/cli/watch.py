@@ -76,7 +76,7 @@ def command(
         target = wanted_target(str(file), out, wanted)
     path = Path(out) if target is not None else targets([str(file)], out)[0]
     if not file.is_file():
-        raise click.UsageError(f"there is no file '{file}'.")
+        raise click.UsageError(f"there is no file `{file}`.")
     wish = Wish(
         file,
         path,

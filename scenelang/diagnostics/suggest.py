@@ -120,10 +120,10 @@ def did_you_mean(
     best = found[0][0]
     near = [candidate for distance, candidate in found if distance < best + _CLEAR]
     if len(near) > 1:
-        shown = [f"'{candidate}'" for candidate in near[:3]]
+        shown = [f"`{candidate}`" for candidate in near[:3]]
         return f"did you mean {', '.join(shown[:-1])} or {shown[-1]}?", None
-    fix = Fix(f"rename to '{near[0]}'", (Edit(span, near[0]),)) if is_slip(name, near[0], best) else None
-    return f"did you mean '{near[0]}'?", fix
+    fix = Fix(f"rename to `{near[0]}`", (Edit(span, near[0]),)) if is_slip(name, near[0], best) else None
+    return f"did you mean `{near[0]}`?", fix
 
 
 def is_slip(name: str, other: str, distance: float) -> bool:
@@ -144,7 +144,7 @@ def instead(
     here = words.get(name.lower())
     if here is None or here not in known:
         return None, None
-    return f"it is called '{here}' here", Fix(f"write '{here}'", (Edit(span, here),))
+    return f"it is called `{here}` here", Fix(f"write `{here}`", (Edit(span, here),))
 
 
 def listing(known: Iterable[str], limit: int = 12) -> str:

@@ -219,7 +219,7 @@ def _choose(file: nodes.File, words: Vocabulary, model: str | None, diagnostics:
         chosen = words.choose(model)
         if chosen is None:
             help = f"there is {listing(m.name for m in words.models)}"
-            diagnostics.add("E0210", f"unknown model '{model}'", None, help=help)
+            diagnostics.add("E0210", f"unknown model `{model}`", None, help=help)
         return chosen or Vocabulary(words.models, blind=True)
     for stmt in file.statements:
         if isinstance(stmt, nodes.Model) and isinstance(stmt.name, nodes.String):
@@ -252,7 +252,7 @@ def load_scene(
         source = read_source(where, os.fspath(path))
     except Unreadable as error:
         empty = SourceFile(os.fspath(path), "")
-        diagnostics.add(error.code, f"cannot read '{where.name}': {error}", Span(empty, 0, 0))
+        diagnostics.add(error.code, f"cannot read `{where.name}`: {error}", Span(empty, 0, 0))
         return None, SpanMap()
     return load_source(
         source,

@@ -32,8 +32,8 @@ class Defines:
                 continue
             found = nearest(name, self.known)
             if found:
-                help, labels = f"did you mean '{found}'?", [Label(self.known[found], "this param")]
+                help, labels = f"did you mean `{found}`?", [Label(self.known[found], "this param")]
             else:
                 names = listing(self.known)
                 help, labels = f"its params are {names}" if names else "the scene has no params", []
-            diagnostics.add("E0211", f"no param '{name}' to set", None, help=help, labels=labels)
+            diagnostics.add("E0211", f"no param `{name}` to set", None, help=help, labels=labels)

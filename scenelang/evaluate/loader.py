@@ -99,8 +99,8 @@ class Loader:
         if library.is_reserved(text):
             shipped = library.find(text)
             if shipped is None:
-                help = f"it has {listing(library.names())}; a file of your own is './{text}'"
-                session.report.error("E0214", f"the library has no '{text}'", span, help=help)
+                help = f"it has {listing(library.names())}; a file of your own is `./{text}`"
+                session.report.error("E0214", f"the library has no `{text}`", span, help=help)
             return shipped
         folder = importer.parent if importer is not None else self.root
         if folder is None or self.root is None:
@@ -112,16 +112,16 @@ class Loader:
             return None
         if os.path.isabs(text) or PureWindowsPath(text).drive or text[0] in "/\\":
             help = "paths are relative to the importing file"
-            session.report.error("E0215", f"'{text}' is an absolute path", span, help=help)
+            session.report.error("E0215", f"`{text}` is an absolute path", span, help=help)
             return None
         try:
             path = (folder / text).resolve()
         except (OSError, RuntimeError, ValueError) as error:
-            session.report.error("E0214", f"cannot read '{text}': {_reason(error)}", span)
+            session.report.error("E0214", f"cannot read `{text}`: {_reason(error)}", span)
             return None
         if not path.is_relative_to(self.root):
             help = f"imports stay inside {self.root}; --root sets another folder"
-            session.report.error("E0215", f"'{text}' lies outside the import root", span, help=help)
+            session.report.error("E0215", f"`{text}` lies outside the import root", span, help=help)
             return None
         self.wanted.update({Path(os.path.abspath(folder / text)): None, path: None})
         return path
@@ -139,11 +139,11 @@ class Loader:
             given = self.texts.get(path)
             source = read_source(path, name) if given is None else SourceFile(name, given)
         except Unreadable as error:
-            session.report.error(error.code, f"cannot read '{text}': {error}", span)
+            session.report.error(error.code, f"cannot read `{text}`: {error}", span)
             return None
         except OSError as error:
             help, fix = library.meant(text, span)
-            session.report.error("E0214", f"cannot read '{text}': {_reason(error)}", span, help=help, fix=fix)
+            session.report.error("E0214", f"cannot read `{text}`: {_reason(error)}", span, help=help, fix=fix)
             return None
         file = parse(source, session.report.diagnostics)
         self.parsed[path] = file

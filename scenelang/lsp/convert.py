@@ -60,7 +60,7 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
         if where is None:
             return None
         place = document.lines.span(where)
-        message = f"in '{Path(d.span.source.name).name}': {message}"
+        message = f"in `{Path(d.span.source.name).name}`: {message}"
         related.insert(0, types.DiagnosticRelatedInformation(to_location(d.span, document), d.message))
     return types.Diagnostic(
         range=place,

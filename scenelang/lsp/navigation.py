@@ -88,7 +88,7 @@ def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.Pr
         return None
     found = docs.definition(document, use)
     if found is None:
-        raise Refused(f"'{use.text}' is not defined in a scene file")
+        raise Refused(f"`{use.text}` is not defined in a scene file")
     _check_owner(found[0], use)
     return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
 
@@ -136,17 +136,17 @@ def plain_edit(edit: types.WorkspaceEdit) -> types.WorkspaceEdit:
 
 def _check_owner(where: Document, use: Use) -> None:
     if where.path is not None and library.owns(where.path):
-        raise Refused(f"'{use.text}' belongs to the library that ships")
+        raise Refused(f"`{use.text}` belongs to the library that ships")
 
 
 def _check_name(new: str, symbol: Symbol) -> None:
     keywords = {text for text in tables().literals if text[0].isalpha()} - {"step", "as"}
     if not _NAME.fullmatch(new):
-        raise Refused(f"'{new}' is not a name: letters, digits and _, not beginning with a digit")
+        raise Refused(f"`{new}` is not a name: letters, digits and _, not beginning with a digit")
     if new in keywords:
-        raise Refused(f"'{new}' is a keyword")
+        raise Refused(f"`{new}` is a keyword")
     if symbol.kind == "module" and new in LANGUAGE:
-        raise Refused(f"'{new}' is a word of the language and names no module")
+        raise Refused(f"`{new}` is a word of the language and names no module")
 
 
 def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
@@ -159,7 +159,7 @@ def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
         taken = inner.symbols.get(new)
         if taken is not None:
             line = taken.span.locate()[0][0]
-            raise Refused(f"'{new}' is already defined in line {line} of {_called(other)}")
+            raise Refused(f"`{new}` is already defined in line {line} of {_called(other)}")
         if inner is symbol.scope:
             return
         if inner.parent is None:
@@ -171,7 +171,7 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
     """Whether the renamed definition would be meant where the new name means something else now."""
     scope = symbol.scope
     if symbol.owner is not None and any(p.name == new for p in symbol.owner.params):
-        raise Refused(f"'{symbol.owner.name}' has a parameter '{new}' already")
+        raise Refused(f"`{symbol.owner.name}` has a parameter `{new}` already")
     for use in where.names.uses:
         if use.text != new or use.role in ("member", "argument", "property", "material", "model", "path"):
             continue
@@ -181,7 +181,7 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
         meant = inner.find(new)
         if meant is None or not (scope.start <= meant.scope.start and meant.scope.end <= scope.end):
             line = where.lines.position(use.start).line + 1
-            raise Refused(f"'{new}' in line {line} of {_called(where)} would mean this")
+            raise Refused(f"`{new}` in line {line} of {_called(where)} would mean this")
 
 
 def _called(document: Document) -> str:

@@ -77,7 +77,7 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
     file = open_weights(data)
     make = _MAKERS.get(manifest.renderer)
     if make is None:
-        raise ModelError(f"an unknown renderer '{manifest.renderer}'")
+        raise ModelError(f"an unknown renderer `{manifest.renderer}`")
     try:
         with torch.random.fork_rng(devices=[]):
             # Not on the meta device, which takes no memory but 1.8 s to import what it stands on.

@@ -84,7 +84,7 @@ def shipped_weights(name: str, path: Path | None = None) -> bytes:
         return read_weights(path or weights_path(name))
     except OSError as error:
         why = (error.strerror or str(error)).lower()
-        raise ModelError(f"cannot read the weights of '{name}': {why}") from None
+        raise ModelError(f"cannot read the weights of `{name}`: {why}") from None
 
 
 def open_weights(data: bytes) -> TensorFile:

@@ -44,7 +44,7 @@ def check(
         source = read_source(Path(path), name)
     except Unreadable as error:
         found = Diagnostics()
-        found.add(error.code, f"cannot read '{name}': {error}", Span(SourceFile(name, ""), 0, 0))
+        found.add(error.code, f"cannot read `{name}`: {error}", Span(SourceFile(name, ""), 0, 0))
         return found
     return _look(source, Path(path), params, model, root, all_frames)
 

@@ -60,7 +60,7 @@ def find_unused(file: nodes.File, diagnostics: Diagnostics) -> None:
             continue
         if isinstance(found.stmt, nodes.Import):
             fix = removal(found.name.span.source, found.stmt.span.start, found.stmt.span.end)
-            message = f"import '{found.name.text}' is never used"
+            message = f"import `{found.name.text}` is never used"
             diagnostics.add("W0201", message, found.name.span, help="delete it", fix=fix)
         elif not (library and top.names.get(found.name.text) is found):
             _warn(found, top, diagnostics)
@@ -70,14 +70,14 @@ def _warn(found: _Defined, top: _Scope, diagnostics: Diagnostics) -> None:
     name, kind = found.name, _KINDS[type(found.stmt)]
     if kind == "param":
         help = "it changes nothing: use it or delete it"
-        diagnostics.add("W0201", f"param '{name.text}' is never used", name.span, help=help)
+        diagnostics.add("W0201", f"param `{name.text}` is never used", name.span, help=help)
         return
-    fix = Fix(f"rename to '_{name.text}'", (Edit(name.span, f"_{name.text}"),))
+    fix = Fix(f"rename to `_{name.text}`", (Edit(name.span, f"_{name.text}"),))
     diagnostics.add(
         "W0201",
-        f"{kind} '{name.text}' is never used",
+        f"{kind} `{name.text}` is never used",
         name.span,
-        help="delete it, or let its name begin with '_'",
+        help="delete it, or let its name begin with `_`",
         fix=None if f"_{name.text}" in name.span.source.text else fix,
     )
 

@@ -53,4 +53,4 @@ def meant(text: str, span: Span) -> tuple[str | None, Fix | None]:
     name = text.removeprefix("./").removesuffix(".nsg")
     if name not in names():
         return None, None
-    return f"the library that ships is '{name}'", Fix(f"write '{name}'", (Edit(span, f'"{name}"'),))
+    return f"the library that ships is `{name}`", Fix(f"write `{name}`", (Edit(span, f'"{name}"'),))

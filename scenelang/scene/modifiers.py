@@ -51,7 +51,7 @@ def _with_unit(cls: type[Frozen], args: tuple[Any, ...], data: dict[str, Any]) -
 def _decoded(text: str) -> tuple[float, float, float]:
     """The colour that ``#d33`` or ``#dd3333`` is."""
     if not re.fullmatch(r"#([0-9a-fA-F]{3}){1,2}", text):
-        raise ValueError(f"Color: {text!r} is not a colour such as '#d33' or '#dd3333'")
+        raise ValueError(f"Color: `{text}` is not a colour such as `#d33` or `#dd3333`")
     digits = text[1:] if len(text) == 7 else "".join(digit * 2 for digit in text[1:])
     red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
     return red, green, blue

@@ -35,7 +35,7 @@ def load_tensors(path: Path, device: str = "cpu") -> tuple[dict[str, Tensor], di
         found = read_tensors(data, _MOST_BYTES)
         arrays = found.arrays(finite=False)
     except TensorError as error:
-        raise ModelError(f"'{path}' is damaged: {error}") from None
+        raise ModelError(f"`{path}` is damaged: {error}") from None
     return {name: torch.from_numpy(array).to(device) for name, array in arrays.items()}, found.header
 
 

@@ -141,7 +141,7 @@ class Easel:
             raise SceneError(found) from None
         painter = Painter(clip, wish.backend, wish.device, wish.threads, self._kept)
         if wish.target is not None and wish.target.kind == "video" and not clip.animates:
-            found.add("E0337", f"'{wish.out}' is for animations, and the scene has no animate(…)", None)
+            found.add("E0337", f"`{wish.out}` is for animations, and the scene has no animate(…)", None)
             raise SceneError(found)
         if wish.target is not None and (clip.animates or wish.target.kind == "sequence"):
             self._film(painter, wish.target, numbers, outcome, before)

@@ -63,7 +63,7 @@ def test_nothing_skipped_is_the_same_picture() -> None:
 
 
 def test_unknown_samples_are_refused() -> None:
-    with pytest.raises(ValueError, match="unknown samples 'two'; there are 'adaptive', 'four' and 'one'"):
+    with pytest.raises(ValueError, match="unknown samples `two`; there are `adaptive`, `four` and `one`"):
         scenelang.render(scene(), samples="two")  # type: ignore[arg-type]
 
 

@@ -37,7 +37,7 @@ def test_names_of_sequences(folder: Folder) -> None:
     assert "out/a-0001.png … a-0002.png: 2 frames" in result.stderr
     assert sorted(os.listdir("out")) == ["a-0001.png", "a-0002.png"]
     result = folder.run("render", name, "-o", "out/a-%04d.png", "--frames", "0..<1")
-    assert "also holds 2 such files of another run, 'a-0001.png' among them" in result.stderr
+    assert "also holds 2 such files of another run, `a-0001.png` among them" in result.stderr
     assert sorted(os.listdir("out")) == ["a-0000.png", "a-0001.png", "a-0002.png"]
 
 
@@ -98,7 +98,7 @@ def test_params_and_reference(folder: Folder) -> None:
         (("a.nsg", "-o", "a.gif", "--frame", "1", "--frames", "2"), 2, "--frame asks for a picture"),
         (("a.nsg", "b.nsg", "-o", "out", "--fps", "3"), 2, "take one scene"),
         (("a.nsg", "b.nsg", "-o", "a.mp4"), 2, "names an animation"),
-        (("a.nsg", "-o", "none/a.gif"), 2, "no folder 'none'"),
+        (("a.nsg", "-o", "none/a.gif"), 2, "no folder `none`"),
         (("a.nsg", "-o", "a-%d-%d.png"), 2, "more than one place"),
         (("a.nsg", "-o", "a.gif", "--fps", "0"), 2, "--fps"),
         (("b.nsg", "-o", "a.gif", "--fps", "3"), 1, "scene without animate"),

@@ -94,7 +94,7 @@ def test_usage(folder: Folder, arguments: tuple[str, ...]) -> None:
 
 
 def test_a_misspelt_command(folder: Folder) -> None:
-    assert "Did you mean 'check'?" in folder.run("chekc").stderr
+    assert "Did you mean `check`?" in folder.run("chekc").stderr
 
 
 def test_defines(folder: Folder) -> None:
@@ -103,7 +103,7 @@ def test_defines(folder: Folder) -> None:
     assert "E0309" in folder.run("check", name, "-D", "width=7").stdout
     unused = folder.run("check", name, "-D", "widht=0.7")
     assert unused.exit_code == 1
-    assert "did you mean 'width'?" in unused.stdout
+    assert "did you mean `width`?" in unused.stdout
 
 
 def test_a_define_is_unused_only_if_no_file_uses_it(folder: Folder) -> None:

@@ -34,7 +34,7 @@ def test_what_is_left_is_reported(folder: Folder) -> None:
     name = folder.write("a.nsg", BAD + "square { scale(nothing); }\n")
     result = folder.run("check", name, "--fix", "--format", "concise")
     assert result.exit_code == 1
-    assert result.stdout == "a.nsg:3:16: error[E0201] unknown name 'nothing'\n"
+    assert result.stdout == "a.nsg:3:16: error[E0201] unknown name `nothing`\n"
     assert read(folder, name) == GOOD + "square { scale(nothing); }\n"
 
 

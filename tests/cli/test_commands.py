@@ -58,7 +58,7 @@ def test_explain(folder: Folder) -> None:
 def test_old_names_answer_with_the_new_ones(folder: Folder, name: str) -> None:
     result = folder.run(name, "shapes2d")
     assert result.exit_code == 2
-    assert f"'{name}' is now 'scenelang lab {name}'." in result.stderr
+    assert f"`{name}` is now `scenelang lab {name}`." in result.stderr
     assert folder.run("lab", name, "--help").exit_code == 0
     assert name not in folder.run("--help").stdout
 

@@ -122,7 +122,7 @@ def test_scenes_with_mistakes_are_shown_as_far_as_they_go(folder: Folder) -> Non
 def test_unknown_stages(folder: Folder) -> None:
     result = folder.run("dump", folder.write("a.nsg", TEXT), "--after", "linearize")
     assert result.exit_code == 2
-    assert "Did you mean 'linearise'?" in result.stderr
+    assert "Did you mean `linearise`?" in result.stderr
     assert folder.run("graph", "a.nsg", "--after", "syntax").exit_code == 2
 
 
@@ -162,7 +162,7 @@ def test_dot_draws(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(folder.path))
     missing = folder.run("graph", name, "-o", "a.svg")
     assert missing.exit_code == 2
-    assert "install the package 'graphviz'" in missing.stderr
+    assert "install the package `graphviz`" in missing.stderr
     dot = folder.path / "dot"
     dot.write_text("#!/bin/sh\necho picture $1\n/bin/cat\n")
     dot.chmod(dot.stat().st_mode | stat.S_IXUSR)

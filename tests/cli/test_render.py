@@ -69,13 +69,13 @@ def test_threads_agree(folder: Folder) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("a.nsg", "-o", "a.xyz"), "suffix '.xyz'"),
+        (("a.nsg", "-o", "a.xyz"), "suffix `.xyz`"),
         (("a.nsg", "-o", "a"), "a folder ends in a slash"),
-        (("a.nsg", "-o", "none/a.png"), "no folder 'none'"),
+        (("a.nsg", "-o", "none/a.png"), "no folder `none`"),
         (("a.nsg", "b/a.nsg", "-o", "out"), "both be drawn to"),
         (("a.nsg", "b.nsg", "-o", "a.nsg"), "is a file"),
         (("a.nsg", "b.nsg", "-o", "out.png"), "names a picture"),
-        (("a.nsg", "-o", "a.png", "--size", "3"), "no size such as"),
+        (("a.nsg", "-o", "a.png", "--size", "3"), "not a size such as"),
         (("a.nsg", "-o", "a.png", "--size", "9000x1"), "outside 1..8192"),
         (("a.nsg", "-o", "a.png", "--threads", "0"), "--threads"),
     ],
@@ -128,7 +128,7 @@ def test_what_cannot_be_written(folder: Folder, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(os, "replace", full)
     result = folder.run("render", folder.write("a.nsg"), "-o", "a.png", "--size", "16x16")
     assert result.exit_code == 2
-    assert result.stderr == "Error: cannot write 'a.png': no space left on device\n"
+    assert result.stderr == "Error: cannot write `a.png`: no space left on device\n"
     assert os.listdir() == ["a.nsg"]
 
 

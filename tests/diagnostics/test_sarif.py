@@ -90,7 +90,7 @@ ONE = SourceFile("dir/a b.nsg", "square {\n  rotate(45)\n}\n")
 OTHER = SourceFile("lib.nsg", "fn f(x) = x;\n")
 AT, END = Span(ONE, 18, 20), Span(ONE, 21, 21)
 ALL = [
-    Diagnostic("E0302", "a bare number", AT, fix=Fix("add 'deg'", (Edit(Span(ONE, 20, 20), "deg"),))),
+    Diagnostic("E0302", "a bare number", AT, fix=Fix("add `deg`", (Edit(Span(ONE, 20, 20), "deg"),))),
     Diagnostic("E0102", "missing `;`", END, (Label(Span(OTHER, 3, 4), "here"),), "help"),
     Diagnostic("W0501", "too many", None),
     Diagnostic("E0330", "over lines", Span(ONE, 0, 23)),

@@ -169,9 +169,9 @@ def test_several_files() -> None:
 
 def test_labels_without_a_primary_place() -> None:
     """`-D` has no place in a text, the param that it nearly names has one."""
-    found = Diagnostic("E0211", "no param 'k' to set", None, (Label(at("bb"), "this param"),))
+    found = Diagnostic("E0211", "no param `k` to set", None, (Label(at("bb"), "this param"),))
     assert render_text([found], summary=False).splitlines() == [
-        "error[E0211]: no param 'k' to set",
+        "error[E0211]: no param `k` to set",
         " --> a.nsg:1:6",
         "  |",
         "1 | aa + bb - cc",

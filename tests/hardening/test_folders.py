@@ -115,7 +115,7 @@ def test_an_output_that_is_the_input(scenes: Folder, name: str, link: object) ->
     result = scenes.run(*arguments)
     assert result.exit_code == 2
     assert result.stderr.splitlines()[-1].endswith(
-        f"cannot write '{arguments[3]}': it is an input of the same command"
+        f"cannot write `{arguments[3]}`: it is an input of the same command"
     )
     assert source.read_bytes() == before
     assert leavings(scenes.path) == there

@@ -102,7 +102,7 @@ def test_a_target_that_is_a_folder(scenes: Folder, name: str) -> None:
 
 def test_a_full_device(folder: Folder) -> None:
     said = one_line(run("schema", "-o", "/dev/full"))
-    assert said == "cannot write '/dev/full': no space left on device"
+    assert said == "cannot write `/dev/full`: no space left on device"
     with open("/dev/full", "w") as device:
         for arguments in (("schema",), ("--help",), ("models",), ("check", folder.write("a.nsg"))):
             assert one_line(run(*arguments, stdout=device)) == "no space left on device"

@@ -124,7 +124,7 @@ def test_a_seed_that_diverged_is_told() -> None:
 def test_what_is_not_there_is_refused(tmp_path: Path) -> None:
     unknown = CliRunner().invoke(cli, ["lab", "experiment", "nothing", "-o", str(tmp_path), "--budget", "1"])
     assert unknown.exit_code == 2
-    assert "no experiment 'nothing'" in unknown.output
+    assert "no experiment `nothing`" in unknown.output
     empty = CliRunner().invoke(cli, ["lab", "chart", str(tmp_path)])
     assert empty.exit_code == 2
     assert "no experiments in" in empty.output

@@ -46,7 +46,7 @@ def test_what_evaluation_found_stays_in_place_while_typing_goes_on(client: Clien
 def test_a_mistake_in_an_imported_file_stands_at_what_led_there(client: Client, uri: str) -> None:
     client.replace(uri, SCENE.replace("at = [0.1, 0.2]", "at = 3"))
     (found,) = client.diagnostics(uri)
-    assert found["message"].startswith("in 'lib.nsg': ")
+    assert found["message"].startswith("in `lib.nsg`: ")
     assert client.shown(uri, found["range"]) == "lib.dot"
     assert found["relatedInformation"][0]["location"]["uri"].endswith("lib.nsg")
 
@@ -86,7 +86,7 @@ def test_a_buffer_without_a_file_is_a_scene_too(client: Client) -> None:
     uri = client.open("untitled:Untitled-1", "squar { scale(0.5); }\n")
     (found,) = client.diagnostics(uri)
     assert found["code"] == "E0204"
-    assert "did you mean 'square'?" in found["message"]
+    assert "did you mean `square`?" in found["message"]
     client.close(uri)
 
 

@@ -60,7 +60,7 @@ def test_short_forms(short: object, long: object) -> None:
         (lambda: nsg.Object("star", nsg.Flip()), "`transforms[0]` is a Flip"),  # type: ignore[arg-type]
         (lambda: nsg.Object("two words"), "`geometry`: not a possible name"),
         (lambda: nsg.Scale(0), "a scale by 0"),
-        (lambda: nsg.Color("red"), "'red' is not a colour such as '#d33'"),
+        (lambda: nsg.Color("red"), "`red` is not a colour such as `#d33`"),
         (lambda: nsg.Scene((STAR,)), "Scene takes its arguments by name"),  # type: ignore[call-arg, arg-type]
     ],
 )

@@ -126,7 +126,7 @@ def test_labels_show_both_places() -> None:
 @pytest.mark.parametrize(
     ("text", "labels"),
     [
-        ("let k = 45;\nsquare { rotate(k); }", [("k", "'k' is defined here")]),
+        ("let k = 45;\nsquare { rotate(k); }", [("k", "`k` is defined here")]),
         ('square { translate("a" + 1, 0); }', [("1", "a number")]),
         ('square { translate(1 - "a", 0); }', [("1", "a number")]),
         ("square { translate([1, 2] + [1, 2, 3]); }", [("[1, 2]", "2 items"), ("[1, 2, 3]", "3 items")]),

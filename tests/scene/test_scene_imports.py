@@ -145,7 +145,7 @@ def test_unknown_names_of_a_file(tmp_path: Path) -> None:
     write(tmp_path, main=f'import "lib.nsg" as lib; {use}')
     outcome = load(tmp_path / "main.nsg")
     assert outcome.codes == ["E0212", "E0212", "E0212", "E0213"]
-    assert outcome.diagnostics.items[0].help == "did you mean 'size'?"
+    assert outcome.diagnostics.items[0].help == "did you mean `size`?"
 
 
 def test_large_and_odd_files(tmp_path: Path) -> None:

@@ -86,7 +86,7 @@ def test_python_values() -> None:
 def test_unused_values_are_errors() -> None:
     outcome = run_text("param size = 1; square { scale(size); }", defines={"sise": "2"})
     assert outcome.codes == ["E0211"]
-    assert outcome.only().help == "did you mean 'size'?"
+    assert outcome.only().help == "did you mean `size`?"
     assert run_text("square {}", defines={"k": "2"}).codes == ["E0211"]
 
 

@@ -83,7 +83,7 @@ def test_one_fix_mends(bad: str, good: str | None) -> None:
 @pytest.mark.parametrize(
     ("text", "help"),
     [
-        ("difference { square {} star {} }", "it is called 'subtract' here"),
+        ("difference { square {} star {} }", "it is called `subtract` here"),
         ("square { translate(vec2(1, 2)); }", "write [x, y]"),
         (
             "legs(side, paint) { square { scale(side); } }",
@@ -107,7 +107,7 @@ def test_ranking() -> None:
     assert [name for _, name in ranked("tranlsate", ["translate", "transpose"])] == ["translate"]
     assert ranked("Size", ["size", "sizes"])[0][1] == "size"
     assert ranked("scal", ["scale", "scan"])[0][0] == ranked("scal", ["scan"])[0][0] == 1
-    assert did_you_mean("scal", ["scale", "scan"], SPAN) == ("did you mean 'scale' or 'scan'?", None)
+    assert did_you_mean("scal", ["scale", "scan"], SPAN) == ("did you mean `scale` or `scan`?", None)
     assert did_you_mean("x", ["y", "z"], SPAN) == (None, None)
     assert did_you_mean("foo", ["bar", "baz"], SPAN) == (None, None)
 

@@ -67,7 +67,7 @@ def bind(
                 surplus = Misfit(
                     "E0308",
                     ("surplus",),
-                    f"'{name}' takes {takes}",
+                    f"`{name}` takes {takes}",
                     span,
                     arg.span,
                     everywhere="but all its calls give more",
@@ -95,11 +95,11 @@ def bind(
             foreign = Misfit(
                 "E0206",
                 ("foreign", arg.name.text),
-                f"'{name}' has no argument '{arg.name.text}'",
+                f"`{name}` has no argument `{arg.name.text}`",
                 span,
                 arg.name.span,
                 everywhere="but all its calls give it",
-                here=f"no argument '{arg.name.text}'",
+                here=f"no argument `{arg.name.text}`",
                 help=hint,
                 fix=fix,
                 labels=labels,
@@ -112,7 +112,7 @@ def bind(
             twice = Misfit(
                 "E0308",
                 ("twice", params[index]),
-                f"argument '{params[index]}' of '{name}' is given twice",
+                f"argument `{params[index]}` of `{name}` is given twice",
                 span,
                 arg.span,
                 everywhere="in all its calls",
@@ -129,14 +129,14 @@ def bind(
         return bound
     missing = [p for p, may, arg in zip(params, optional, bound, strict=True) if not may and arg is None]
     if missing:
-        names = " and ".join(f"'{p}'" for p in missing)
+        names = " and ".join(f"`{p}`" for p in missing)
         needy = [places[indices[p]] for p in missing] if places else []
         if needy:
             labels = tuple([Label(place, "needs a value") for place in needy])
         lacking = Misfit(
             "E0308",
             ("missing", *missing),
-            f"'{name}' needs {names}",
+            f"`{name}` needs {names}",
             span,
             span,
             everywhere=f"but no call gives {'them' if missing[1:] else 'it'}",

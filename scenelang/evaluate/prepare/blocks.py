@@ -172,7 +172,7 @@ def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
         labels = (Label(earlier.span, "first defined here"),) if earlier.span else ()
         unit.session.report.error(
             "E0202",
-            f"'{name.text}' is already defined in this scope",
+            f"`{name.text}` is already defined in this scope",
             name.span,
             labels=labels,
             help="names are bound once; an inner block may bind them anew",
@@ -205,7 +205,7 @@ def declare(stmt: nodes.Fn | nodes.Module, place: Place) -> Callable[[], None] |
     unit, scope = place.unit, place.scope
     name = stmt.name
     if isinstance(stmt, nodes.Module) and name.text in LANGUAGE:
-        message = f"'{name.text}' is a word of the language and names no module"
+        message = f"`{name.text}` is a word of the language and names no module"
         unit.session.report.error("E0209", message, name.span, help="rename it")
         return None
     frame = Frame(scope.frame)
@@ -230,7 +230,7 @@ def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: 
             defaults.append(prepare(param.default, unit, scope).run)
         else:
             if optional:
-                message = f"'{param.name.text}' has no default but follows one that has"
+                message = f"`{param.name.text}` has no default but follows one that has"
                 unit.session.report.error(
                     "E0308", message, param.span, help="put it first, or give it a default"
                 )

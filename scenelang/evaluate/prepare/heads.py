@@ -92,7 +92,7 @@ def _lacks_module(stmt: nodes.Call, place: Place) -> bool:
     prepare_block(stmt.body.statements, body, stmt.body.span)
     written = ", ".join(arg.span.text for arg in stmt.args)
     help = f"to define it write module {name.text}({written}) {{ … }}"
-    message = f"unknown geometry or module '{name.text}'"
+    message = f"unknown geometry or module `{name.text}`"
     report_unknown(name, unit, scope, "E0204", message, advise=lambda: (help, None), kinds=("module",))
     return True
 
@@ -120,20 +120,20 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         return  # it may be a geometry of the model that is not at hand
     later = scope.defined_later(name.text)
     if later is not None:
-        help = f"move the definition of '{name.text}' above this line"
+        help = f"move the definition of `{name.text}` above this line"
         labels = (Label(later, "defined here"),)
         session.report.error(
-            "E0203", f"'{name.text}' is used before its line", name.span, labels=labels, help=help
+            "E0203", f"`{name.text}` is used before its line", name.span, labels=labels, help=help
         )
         return
     owner = words.owner(name.text)
     if owner is not None and words.chosen is not None:
-        message = f"geometry '{name.text}' belongs to model '{owner}', not '{words.chosen.name}'"
-        help = f"model '{words.chosen.name}' draws {listing(words.geometries)}"
+        message = f"geometry `{name.text}` belongs to model `{owner}`, not `{words.chosen.name}`"
+        help = f"model `{words.chosen.name}` draws {listing(words.geometries)}"
         session.report.error("E0205", message, name.span, help=help, labels=session.model_label())
         return
     if name.text in FUNCTIONS:
-        message = f"'{name.text}' is a function, not an object or a module"
+        message = f"`{name.text}` is a function, not an object or a module"
         session.report.error("E0213", message, name.span)
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
@@ -153,7 +153,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         if hint is None and place.kind == "object" and meant in words.material_ops - words.transforms:
             from scenelang.evaluate.report.habits import in_material  # only mistakes need it
 
-            hint = f"it is called '{meant}' here and stands in a material: material flat {{ {meant}(…); }}"
+            hint = f"it is called `{meant}` here and stands in a material: material flat {{ {meant}(…); }}"
             fix = in_material(stmt, place.unit.session, meant)
         if hint is None and foreign_words.STATEMENTS.get(name.text):
             hint = foreign_words.STATEMENTS[name.text]
@@ -161,7 +161,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
             hint = f"the model draws {listing(words.geometries)}"
         return hint, fix
 
-    message = f"unknown {what} '{name.text}'"
+    message = f"unknown {what} `{name.text}`"
     report_unknown(name, unit, scope, "E0204", message, advise=advise, kinds=("module", *VALUES))
 
 

@@ -126,16 +126,16 @@ def member(code: Code, name: nodes.Name, unit: Unit, of: nodes.Expr | None = Non
             hint, fix = did_you_mean(name.text, COMPONENTS, name.span)
         hint = hint or "vectors have .x .y .z, or .r .g .b, or [i]"
         unit.session.report.error(
-            "E0212", f"no value has a member '{name.text}'", name.span, help=hint, fix=fix
+            "E0212", f"no value has a member `{name.text}`", name.span, help=hint, fix=fix
         )
         return POISONED
     at = index
 
     def pick(value: Any) -> Any:
         if value.__class__ is not Vec:
-            raise Problem("E0301", f"'.{name.text}' of {describe(value)}, which is not a vector")
+            raise Problem("E0301", f"`.{name.text}` of {describe(value)}, which is not a vector")
         if at >= len(value.items):
-            raise Problem("E0307", f"'.{name.text}' of {describe(value)}")
+            raise Problem("E0307", f"`.{name.text}` of {describe(value)}")
         return value.items[at]
 
     def run(env: Env) -> Any:

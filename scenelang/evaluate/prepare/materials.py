@@ -92,19 +92,19 @@ def _unknown(name: nodes.Name, unit: Unit, scope: Scope, known: set[str]) -> Non
     if binding is not None and binding.kind in ("let", "argument", "loop"):
         head = Span(name.span.source, name.span.start, name.span.start)
         start = name.span.source.text.rfind("material", 0, head.start)
-        away = Fix("remove 'material'", (Edit(Span(head.source, start, head.start), ""),))
-        help = f"to use the value write {name.text}; without 'material'"
-        message = f"'{name.text}' is a value, not a material's name"
+        away = Fix("remove `material`", (Edit(Span(head.source, start, head.start), ""),))
+        help = f"to use the value write {name.text}; without `material`"
+        message = f"`{name.text}` is a value, not a material's name"
         session.report.error("E0213", message, name.span, help=help, fix=away if start >= 0 else None)
         return
     if owner is not None and words.chosen is not None:
-        message = f"material '{name.text}' belongs to model '{owner}', not '{words.chosen.name}'"
-        help = f"model '{words.chosen.name}' has {listing(known)}"
+        message = f"material `{name.text}` belongs to model `{owner}`, not `{words.chosen.name}`"
+        help = f"model `{words.chosen.name}` has {listing(known)}"
         session.report.error("E0205", message, name.span, help=help, labels=session.model_label())
         return
     hint, fix = did_you_mean(name.text, known, name.span)
     help = hint or f"there is {listing(known)}"
-    session.report.error("E0208", f"unknown material '{name.text}'", name.span, help=help, fix=fix)
+    session.report.error("E0208", f"unknown material `{name.text}`", name.span, help=help, fix=fix)
 
 
 def give(material: Material, span: Span, out: Builder, place: Place) -> None:
@@ -124,12 +124,12 @@ def prepare_value_use(stmt: nodes.Call, binding: Binding, place: Place) -> Actio
     get = value_of(name, binding, unit, place.scope).run
     session = unit.session
     if stmt.args:
-        session.report.error("E0308", f"'{name.text}' is a value and takes no arguments", stmt.args[0].span)
+        session.report.error("E0308", f"`{name.text}` is a value and takes no arguments", stmt.args[0].span)
         return None
     if place.kind in ("file", "material"):
         where = "at top level" if place.kind == "file" else "inside a material"
         help = "materials stand in the block of an object or a group"
-        misplaced(place, name.span, f"value '{name.text}' {where}", help)
+        misplaced(place, name.span, f"value `{name.text}` {where}", help)
         return None
     unit.weight += MATERIAL_VALUE
     labels = (Label(binding.span, "defined here"),) if binding.span else ()

@@ -71,7 +71,7 @@ def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
     """``GEOMETRY { … }`` with a geometry that the model has."""
     unit = place.unit
     name, session = stmt.name.text, unit.session
-    fits = holds_children(place, stmt.name.span, f"object '{name}'")
+    fits = holds_children(place, stmt.name.span, f"object `{name}`")
     body = Body((), 1)
     if stmt.body is not None:
         body = prepare_block(stmt.body.statements, inner(place, "object"), stmt.body.span)
@@ -83,7 +83,7 @@ def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
         help = f"size it in its block: {name} {{ scale(0.5); }}"
         if name == "square":
             help += f'; its sides are sqrt(2) long, those of rect(w, h) in "{library.SHAPES}" as written'
-        session.report.error("E0308", f"'{name}' takes no arguments", stmt.args[0].span, help=help)
+        session.report.error("E0308", f"`{name}` takes no arguments", stmt.args[0].span, help=help)
         return None
     if not fits:
         return None
@@ -166,9 +166,9 @@ def _check_first(stmt: nodes.Node, place: Place) -> None:
         if isinstance(child, nodes.Combined):
             word = child.keyword
             edit = Edit(Span(word.source, word.start, child.child.span.start), "")
-            fix = Fix(f"remove '{child.op}'", (edit,)) if child.op in ("union", "smooth") else None
+            fix = Fix(f"remove `{child.op}`", (edit,)) if child.op in ("union", "smooth") else None
             help = None if fix else "what it is taken from or cut with stands before it"
-            message = f"'{child.op}' on the first child of a chain joins it to nothing"
+            message = f"`{child.op}` on the first child of a chain joins it to nothing"
             place.unit.session.report.error("E0335", message, word, help=help, fix=fix)
             return
         if isinstance(child, nodes.Call | nodes.Node | nodes.For | nodes.If):
@@ -179,11 +179,11 @@ def prepare_combined(stmt: nodes.Combined, place: Place) -> Action | None:
     session, op = place.unit.session, stmt.op
     if place.kind not in ("chain", "unknown"):
         help = "put the children into chain { … }, or write a boolean node: " + op + " { … }"
-        misplaced(place, stmt.keyword, f"'{op}' before a child outside a chain", help)
+        misplaced(place, stmt.keyword, f"`{op}` before a child outside a chain", help)
         prepare_statement(stmt.child, Place(place.unit, place.scope, "unknown", place.nested))
         return None
     if not _makes_child(stmt.child, place):
-        message = f"'{op}' before a statement that makes no object"
+        message = f"`{op}` before a statement that makes no object"
         misplaced(place, stmt.keyword, message, "the word joins one object or node to those before it")
         return None
     child = prepare_statement(stmt.child, place)
@@ -195,7 +195,7 @@ def prepare_combined(stmt: nodes.Combined, place: Place) -> Action | None:
         if not isinstance(out, ChainBuilder):
             return
         if not out.children and op in ("subtract", "intersect"):
-            session.report.error("E0335", f"'{op}' with nothing before it", stmt.keyword)
+            session.report.error("E0335", f"`{op}` with nothing before it", stmt.keyword)
         out.op = op if out.children else "union"
         act(env, out)
         out.op = "union"
@@ -217,7 +217,7 @@ def _makes_child(stmt: nodes.Stmt, place: Place) -> bool:
 def prepare_module_call(stmt: nodes.Call, definition: Definition, place: Place) -> Action | None:
     """``NAME(1);`` or ``NAME(1) { transforms }``: one child, whatever the module holds."""
     unit, session = place.unit, place.unit.session
-    fits = holds_children(place, stmt.name.span, f"a call of module '{stmt.name.text}'")
+    fits = holds_children(place, stmt.name.span, f"a call of module `{stmt.name.text}`")
     codes = {id(arg): prepare(arg.value, unit, place.scope) for arg in stmt.args or ()}
     block = None
     if stmt.body is not None:

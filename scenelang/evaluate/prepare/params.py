@@ -79,7 +79,7 @@ def _checked_default(value: Any, allowed: Any, stmt: nodes.Param, session: Sessi
     try:
         if not within(value, allowed):
             labels = (Label(stmt.range.span, "the range"),)
-            message = f"default of '{stmt.name.text}' is outside {stmt.range.span.text}"
+            message = f"default of `{stmt.name.text}` is outside {stmt.range.span.text}"
             advice, fix = _range_meant(value, allowed, stmt.range)
             session.report.error("E0309", message, stmt.default.span, labels=labels, help=advice, fix=fix)
     except Problem as problem:
@@ -99,7 +99,7 @@ def _range_meant(value: Any, allowed: Any, range: nodes.Expr) -> tuple[str | Non
     if not isinstance(range, nodes.Vector):
         return help, None
     text = "..".join(item.span.text for item in range.items)
-    return help, Fix(f"write '{text}'", (Edit(range.span, text),))
+    return help, Fix(f"write `{text}`", (Edit(range.span, text),))
 
 
 def within(value: Any, allowed: Any) -> bool:

@@ -49,7 +49,7 @@ def value_of(name: nodes.Name, binding: Binding, unit: Unit, scope: Scope) -> Co
         if value is UNBOUND:
             label = (Label(binding.span, "defined here"),) if binding.span else ()
             session.report.error(
-                "E0203", f"'{name.text}' is used before its line has run", span, labels=label
+                "E0203", f"`{name.text}` is used before its line has run", span, labels=label
             )
             return POISON
         return value
@@ -93,7 +93,7 @@ def wrong_kind(name: nodes.Name, binding: Binding, unit: Unit, wanted: str, help
     kinds = {"fn": "a function", "module": "a module", "import": "an imported file"}
     kind = kinds.get(binding.kind, "a value")
     labels = (Label(binding.span, "defined here"),) if binding.span else ()
-    message = f"'{name.text}' is {kind}, not {wanted}"
+    message = f"`{name.text}` is {kind}, not {wanted}"
     where = id(unit.source), binding.span.start if binding.span else -1
     unit.session.report.error_once(
         ("E0213", message, *where), "E0213", message, name.span, help=help, labels=labels
@@ -125,7 +125,7 @@ def _own_name(name: nodes.Name, unit: Unit, scope: Scope) -> Code:
         return constant(CONSTANTS[text])
     if text not in ANIMATED:
         if text in FUNCTIONS:
-            message = f"'{text}' is a function, not a value"
+            message = f"`{text}` is a function, not a value"
             session.report.error("E0213", message, name.span, help=f"call it: {text}(…)")
         else:
             unknown(name, unit, scope)
@@ -141,7 +141,7 @@ def _own_name(name: nodes.Name, unit: Unit, scope: Scope) -> Code:
         value = session.animated[index]
         if value is UNBOUND:
             help = "move the line that needs it below animate(…)"
-            session.report.error("E0203", f"'{text}' is used before animate(…)", name.span, help=help)
+            session.report.error("E0203", f"`{text}` is used before animate(…)", name.span, help=help)
             return POISON
         return value
 
@@ -213,7 +213,7 @@ def prepare_call(expr: nodes.CallExpr, unit: Unit, scope: Scope) -> Code:
         return POISONED
     if builtin.variadic:
         if not expr.args or any(arg.name for arg in expr.args):
-            message = f"'{name.text}' takes one or more arguments without names"
+            message = f"`{name.text}` takes one or more arguments without names"
             unit.session.report.error("E0308", message, name.span)
             return POISONED
         ordered: Bound = list(expr.args)

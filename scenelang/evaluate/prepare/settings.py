@@ -46,7 +46,7 @@ def once(session: Session, what: str, span: Span) -> bool:
     if first is span:
         return True
     session.report.error(
-        "E0333", f"'{what}' is given twice", span, labels=(Label(first, "first given here"),)
+        "E0333", f"`{what}` is given twice", span, labels=(Label(first, "first given here"),)
     )
     return False
 
@@ -87,7 +87,7 @@ def prepare_model(stmt: nodes.Model, place: Place) -> Action | None:
         span = stmt.name.span
         help, fix = did_you_mean(stmt.name.value, known, Span(span.source, span.start + 1, span.end - 1))
         help = help or f"there is {listing(known)}"
-        session.report.error("E0210", f"unknown model '{stmt.name.value}'", span, help=help, fix=fix)
+        session.report.error("E0210", f"unknown model `{stmt.name.value}`", span, help=help, fix=fix)
     return None
 
 
@@ -99,7 +99,7 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
     if not at_top_level(place, span, f"'{name}'") or not once(session, name, span):
         return None
     if stmt.body is not None:
-        session.report.error("E0330", f"'{name}' takes no block", span, help=f"write {name}(…);")
+        session.report.error("E0330", f"`{name}` takes no block", span, help=f"write {name}(…);")
         return None
     params, required = _PARAMS[name]
     optional = [index >= required for index in range(len(params))]
@@ -141,7 +141,7 @@ def _canvas(session: Session, span: Span, width: Any, height: Any) -> None:
             raise Problem("E0301", f"expected a vector of 2 numbers, found {describe(width)}", operand=0)
         width, height = width.items
     if height is LEFT_OUT:
-        raise Problem("E0308", "'canvas' needs 'w' and 'h'", "it is called canvas(w, h)")
+        raise Problem("E0308", "`canvas` needs `w` and `h`", "it is called canvas(w, h)")
     sides = []
     for operand, value in enumerate((width, height)):
         side = number(value, operand)
@@ -154,7 +154,7 @@ def _canvas(session: Session, span: Span, width: Any, height: Any) -> None:
 
 def _background(session: Session, span: Span, value: Any) -> None:
     if session.vocabulary.chosen is not None and session.vocabulary.dimension == 3:
-        message = f"model '{session.vocabulary.chosen.name}' brings its own background"
+        message = f"model `{session.vocabulary.chosen.name}` brings its own background"
         help = "in 3D the background belongs to the model"
         session.report.error("E0336", message, span, help=help, labels=session.model_label())
         return

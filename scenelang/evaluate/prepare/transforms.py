@@ -31,7 +31,7 @@ def prepare_move(stmt: nodes.Call, place: Place) -> Action | None:
     if stmt.body is not None:
         help = f"put {name}(…); into the block of what it moves, as in square {{ {name}(…); }}"
         fix = _grouped(stmt, place)
-        unit.session.report.error("E0330", f"'{name}' takes no block", stmt.name.span, help=help, fix=fix)
+        unit.session.report.error("E0330", f"`{name}` takes no block", stmt.name.span, help=help, fix=fix)
         return None
     if name == "scale" and len(args) == 1 and (args[0].name is None or args[0].name.text == "s"):
         spec = EVEN_SCALE
@@ -54,18 +54,18 @@ def _spec(stmt: nodes.Call, place: Place) -> Spec | None:
     if place.kind == "material":
         if name in TEXTURE:
             return TEXTURE[name]
-        misplaced(place, span, f"'{name}' does not move textures", "put it into the object's block")
+        misplaced(place, span, f"`{name}` does not move textures", "put it into the object's block")
         return None
     if name not in GEOMETRY and place.kind != "unknown":
         help = f"put it into a material's block, as in material flat {{ {name}(…); }}"
         from scenelang.evaluate.report.habits import in_material  # only mistakes need it
 
         fix = _grouped(stmt, place) or in_material(stmt, place.unit.session, name)
-        misplaced(place, span, f"'{name}' stands outside a material", help, fix)
+        misplaced(place, span, f"`{name}` stands outside a material", help, fix)
         return None
     if place.kind == "file":
         help = "put what it moves and the transform into group { … }"
-        misplaced(place, span, f"transform '{name}' at top level", help, _grouped(stmt, place))
+        misplaced(place, span, f"transform `{name}` at top level", help, _grouped(stmt, place))
         return None
     return GEOMETRY.get(name) or TEXTURE[name]
 
@@ -87,10 +87,10 @@ def _offered(stmt: nodes.Call, place: Place) -> bool:
     if name in known or words.blind:
         return True
     owner = words.owner(name)
-    model = f"model '{words.chosen.name}' has" if words.chosen else "the models here have"
-    help = f"model '{owner}' has it" if owner else None
+    model = f"model `{words.chosen.name}` has" if words.chosen else "the models here have"
+    help = f"model `{owner}` has it" if owner else None
     session = place.unit.session
-    message = f"{model} no transform '{name}'"
+    message = f"{model} no transform `{name}`"
     session.report.error("E0205", message, stmt.name.span, help=help, labels=session.model_label())
     return False
 

@@ -33,7 +33,7 @@ def angle_advice(
     inner = expr.operand if isinstance(expr, nodes.Unary) else expr
     if isinstance(inner, nodes.Number):
         unit = _unit(abs(inner.value), hue)
-        return _GLUED, Fix(f"add '{unit}'", (Edit(_at(inner, inner.span.end), unit),))
+        return _GLUED, Fix(f"add `{unit}`", (Edit(_at(inner, inner.span.end), unit),))
     if expr is None:
         return _GLUED, None
     if _power_of_pi(expr, variables) != 1:
@@ -46,7 +46,7 @@ def angle_advice(
     if before[-1:] not in _OPENS:
         head, tail = f"({head}", f"{tail})"
     edits = (Edit(_at(expr, expr.span.start), head),) if head else ()
-    return _RADIANS, Fix("multiply by '1rad'", (*edits, Edit(_at(expr, expr.span.end), tail)))
+    return _RADIANS, Fix("multiply by `1rad`", (*edits, Edit(_at(expr, expr.span.end), tail)))
 
 
 def _unit(size: float, hue: bool) -> str:

@@ -106,7 +106,7 @@ def _report_definition(
     first, name, items = calls[0], definition.name, report.diagnostics.items
     alike = len({(call.code, *call.way) for call in calls}) == 1
     labels = shown_places([call.span for call in calls], [call.here for call in calls], "in")
-    message = f"{first.message}, {first.everywhere}" if alike else f"no call of '{name.text}' fits it"
+    message = f"{first.message}, {first.everywhere}" if alike else f"no call of `{name.text}` fits it"
     if lost is None:
         code = first.code if alike else "E0308"
         place = (first.blamed or name.span) if alike else name.span
@@ -116,7 +116,7 @@ def _report_definition(
         return
     index, missing = lost
     inside = items[index]
-    help = f"'{missing}' is used inside: add it to the parameters"
+    help = f"`{missing}` is used inside: add it to the parameters"
     used = (Label(inside.span, "it is not a parameter"),) if inside.span else ()
     items[index] = Diagnostic("E0308", message, name.span, (*used, *labels), help)
 

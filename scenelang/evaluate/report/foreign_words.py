@@ -142,8 +142,8 @@ WORDS: Final = {
 
 STATEMENTS: Final = {
     "children": "what is called has no children: put what it draws into its block",
-    "blend": "it is called 'smooth' here, and always blends over a distance of 0.15",
-    "smooth_union": "it is called 'smooth' here, and always blends over a distance of 0.15",
+    "blend": "it is called `smooth` here, and always blends over a distance of 0.15",
+    "smooth_union": "it is called `smooth` here, and always blends over a distance of 0.15",
     "hull": "there is no hull; smooth { … } blends objects into each other",
     "minkowski": "there is no Minkowski sum; smooth { … } blends objects into each other",
     "linear_extrude": "a 2D scene is not extruded",

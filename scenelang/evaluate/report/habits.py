@@ -23,7 +23,7 @@ _NEAR: Final = 500
 
 def write(span: Span, text: str) -> Fix:
     """A fix that puts a text in the place of another."""
-    return Fix(f"write '{text}'" if len(text) <= 60 else "write it so", (Edit(span, text),))
+    return Fix(f"write `{text}`" if len(text) <= 60 else "write it so", (Edit(span, text),))
 
 
 def call_advice(name: str, call: nodes.CallExpr | None) -> Advice:

@@ -79,7 +79,7 @@ def in_library(stmt: nodes.Call, unit: Unit, scope: Scope) -> tuple[str | None, 
     edit = _edit(stmt, shape, alias)
     if edit is None:
         return help, None
-    message = f"write '{edit.replacement}'"
+    message = f"write `{edit.replacement}`"
     if imported:
         return help, Fix(message, (edit,))
     return help, Fix(f"import it and {message}", _with_import(edit, unit, text))

@@ -79,7 +79,7 @@ def report_problem(
     if isinstance(operand, nodes.NameRef):
         defined = report.defined.get((id(operand.span.source), operand.span.start))
         if defined is not None:
-            labels.append(Label(defined, f"'{operand.name.text}' is defined here"))
+            labels.append(Label(defined, f"`{operand.name.text}` is defined here"))
     found = report.error(problem.code, problem.message, place, help=help, fix=fix, labels=tuple(labels))
     if found is not None:
         remember(report, found, problem.code, problem.message, blamed)
@@ -155,7 +155,7 @@ def origins(report: Reporter, operands: tuple[nodes.Expr, ...]) -> dict[Origin, 
 def _add(report: Reporter, shared: Shared, definition: Span, place: Span) -> None:
     """Show a further place of a report, and what it has in common with the others."""
     if all(label.span != definition for label in shared.own):
-        shared.own = (*shared.own, Label(definition, f"'{definition.text}' is defined here"))
+        shared.own = (*shared.own, Label(definition, f"`{definition.text}` is defined here"))
     report.share(shared, place, "in")
     if len(shared.again) + 1 >= _OFTEN:
         report.blamed.setdefault((id(definition.source), definition.start, ""), shared)

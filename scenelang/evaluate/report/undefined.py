@@ -45,10 +45,10 @@ def told_at_definition(
         return False
     report.error(
         _CODES.get(kind, "E0201"),
-        f"'{name}' is defined here, '{text}' is used",
+        f"`{name}` is defined here, `{text}` is used",
         span,
-        help=f"did you mean to define '{text}'?",
-        fix=Fix(f"rename to '{text}'", (Edit(span, text),)) if is_slip(text, name, near[0][0]) else None,
+        help=f"did you mean to define `{text}`?",
+        fix=Fix(f"rename to `{text}`", (Edit(span, text),)) if is_slip(text, name, near[0][0]) else None,
         labels=shown_places(places, "used here"),
     )
     return True
@@ -112,7 +112,7 @@ def within_effort(report: Reporter, scope: Scope, kinds: Sequence[str]) -> list[
 
 def _suggested(help: str | None, around: list[tuple[str, Binding]]) -> Binding | None:
     """The binding whose name a help text suggests."""
-    return next((b for n, b in around if help == f"did you mean '{n}'?"), None)
+    return next((b for n, b in around if help == f"did you mean `{n}`?"), None)
 
 
 def unknown_member(name: nodes.Name, unit: Unit, exported: Unit) -> None:
@@ -128,7 +128,7 @@ def unknown_member(name: nodes.Name, unit: Unit, exported: Unit) -> None:
         return help or (f"it has {listing(known)}" if known else "it defines nothing"), fix
 
     end = nodes.Name(rest, last)
-    report_unknown(end, unit, Scope(unit.frame), "E0212", f"'{alias}' has no '{rest}'", advise=advise)
+    report_unknown(end, unit, Scope(unit.frame), "E0212", f"`{alias}` has no `{rest}`", advise=advise)
 
 
 def unknown(name: nodes.Name, unit: Unit, scope: Scope, call: nodes.CallExpr | None = None) -> None:
@@ -144,8 +144,8 @@ def unknown(name: nodes.Name, unit: Unit, scope: Scope, call: nodes.CallExpr | N
     later = scope.defined_later(text)
     if later is not None:
         message, advice = (
-            f"'{text}' is used before its line",
-            f"move the definition of '{text}' above this line",
+            f"`{text}` is used before its line",
+            f"move the definition of `{text}` above this line",
         )
         labels = (Label(later, "defined here"),)
         report.error("E0203", message, name.span, labels=labels, help=advice)
@@ -166,16 +166,16 @@ def unknown(name: nodes.Name, unit: Unit, scope: Scope, call: nodes.CallExpr | N
         colour = None if call else foreign_words.COLOURS.get(text.lower())
         if text in foreign_words.LIBRARIES and unit.source.text[name.span.end : name.span.end + 1] == ".":
             prefix = Span(name.span.source, name.span.start, name.span.end + 1)
-            help, fix = "functions and constants stand alone", Fix(f"remove '{text}.'", (Edit(prefix, ""),))
+            help, fix = "functions and constants stand alone", Fix(f"remove `{text}.`", (Edit(prefix, ""),))
         elif here is not None and here.lower() != text.lower():
-            help, fix = f"it is called '{here}' here", Fix(f"write '{here}'", (Edit(name.span, here),))
+            help, fix = f"it is called `{here}` here", Fix(f"write `{here}`", (Edit(name.span, here),))
         elif help is None and colour is not None:
             help = f"colours have no names; {text.lower()} is {colour}"
-            fix = Fix(f"write '{colour}'", (Edit(name.span, colour),))
+            fix = Fix(f"write `{colour}`", (Edit(name.span, colour),))
         return help, fix
 
     code, what = ("E0207", "function") if call else ("E0201", "name")
-    report_unknown(name, unit, scope, code, f"unknown {what} '{text}'", advise=advise, kinds=kinds)
+    report_unknown(name, unit, scope, code, f"unknown {what} `{text}`", advise=advise, kinds=kinds)
 
 
 def tell_bound(report: Reporter, name: nodes.Name, known: Binding | None) -> None:

@@ -168,7 +168,7 @@ def spread(values: Sequence[Any], spec: Spec) -> list[Any]:
     if any(v is not None for v in values[1:]):
         return list(values)
     if first.__class__ is float:
-        missing = " and ".join(f"'{name}'" for name in spec.params[1 : spec.required])
+        missing = " and ".join(f"`{name}`" for name in spec.params[1 : spec.required])
         raise Problem("E0308", f"{missing} is missing, or a vector of all components")
     if first.__class__ is not Vec:
         message = f"expected a vector or its components, found {describe(first)}"

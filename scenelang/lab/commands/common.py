@@ -62,6 +62,6 @@ def model_to_measure(name: str, weights: Path | None) -> Model:
     try:
         return load_model(name, path=weights)
     except KeyError:
-        raise click.UsageError(f"no model '{name}'") from None
+        raise click.UsageError(f"no model `{name}`") from None
     except ModelError as error:
         raise RenderError(str(error)) from None

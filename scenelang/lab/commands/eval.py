@@ -41,7 +41,7 @@ def command(
     chosen = tuple(SETS) if all_sets else sets or ("shapes2d",)
     unknown = [name for name in chosen if name not in SETS]
     if unknown:
-        raise click.UsageError(f"no set '{unknown[0]}'; the sets are {', '.join(SETS)}")
+        raise click.UsageError(f"no set `{unknown[0]}`; the sets are {', '.join(SETS)}")
     need_metrics()
     import torch
 

@@ -63,7 +63,7 @@ def command(
     wanted = list(EXPERIMENTS) if "all" in names else list(dict.fromkeys(names))
     unknown = [name for name in wanted if name not in EXPERIMENTS]
     if unknown:
-        raise click.UsageError(f"no experiment '{unknown[0]}'; they are {', '.join(EXPERIMENTS)}, all")
+        raise click.UsageError(f"no experiment `{unknown[0]}`; they are {', '.join(EXPERIMENTS)}, all")
     keep_memory()
     torch.set_num_threads(threads or 1)
     settings = Settings(out, scenes, choose_device(device))

@@ -59,14 +59,14 @@ def command(
         raise click.UsageError("--promises goes with --verify.")
     known = available()
     if model not in known:
-        raise click.UsageError(f"no model '{model}'; there is {', '.join(known)}")
+        raise click.UsageError(f"no model `{model}`; there is {', '.join(known)}")
     base = load_manifest(model).set
     if base not in known:
-        raise click.UsageError(f"no model is named like the set '{base}'")
+        raise click.UsageError(f"no model is named like the set `{base}`")
     from scenelang.measure.sets import SETS
 
     if base not in SETS:
-        raise click.UsageError(f"no scenes of the set '{base}' can be made; there are {', '.join(SETS)}")
+        raise click.UsageError(f"no scenes of the set `{base}` can be made; there are {', '.join(SETS)}")
     need_metrics()
     out.mkdir(parents=True, exist_ok=True)
     if verify:
@@ -121,9 +121,9 @@ def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path 
     try:
         frontier = Frontier.from_json(read_regular(path, MOST_BYTES))
     except FileNotFoundError:
-        raise click.UsageError(f"'{base}' ships no frontier; measure one and give --promises") from None
+        raise click.UsageError(f"`{base}` ships no frontier; measure one and give --promises") from None
     except ValueError as error:
-        raise click.UsageError(f"'{path}' is not a frontier: {error}") from None
+        raise click.UsageError(f"`{path}` is not a frontier: {error}") from None
     try:
         found = verify(frontier, base, scenes, VERIFY_SEED if seed is None else seed, common.reporter())
     except ValueError as error:

@@ -35,7 +35,7 @@ def command(
     known = [*PROBES, *INVARIANTS]
     unknown = [name for name in only if name not in known]
     if unknown:
-        raise click.UsageError(f"no probe '{unknown[0]}'; the probes are {', '.join(known)}")
+        raise click.UsageError(f"no probe `{unknown[0]}`; the probes are {', '.join(known)}")
     loaded = common.model_to_measure(model, weights)
     torch.set_num_threads(1)
     found = run_stability(loaded, scenes, seed, only, common.reporter())

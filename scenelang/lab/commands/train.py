@@ -41,7 +41,7 @@ def command(
     try:
         file = read_student(config)
     except ValidationError as error:
-        raise click.UsageError(f"bad configuration '{config}': {first_mistake(error)}") from None
+        raise click.UsageError(f"bad configuration `{config}`: {first_mistake(error)}") from None
     keep_memory()
     torch.set_num_threads(threads or 1)
     try:
