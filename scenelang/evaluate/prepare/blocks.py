@@ -147,7 +147,7 @@ def misplaced(
     if place.block is None:
         session.report.error("E0330", message, span, help=help, fix=fix)
     else:
-        sort = re.sub(r"'[^']*'", "", message)
+        sort = re.sub(r"`[^`]*`", "", message)
         session.report.error_once(("E0330", place.block, sort), "E0330", message, span, help=help, fix=fix)
     return True
 

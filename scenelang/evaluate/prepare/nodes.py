@@ -114,7 +114,7 @@ def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
 
 
 def prepare_node(stmt: nodes.Node, place: Place) -> Action | None:
-    fits = holds_children(place, stmt.keyword, f"'{stmt.kind}'")
+    fits = holds_children(place, stmt.keyword, f"`{stmt.kind}`")
     chain = stmt.kind == "chain"
     around = inner(place, "chain" if chain else "group")
     if chain:

@@ -96,7 +96,7 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
     unit, name, span = place.unit, stmt.name.text, stmt.name.span
     session = unit.session
     codes = {id(arg): prepare(arg.value, unit, place.scope) for arg in stmt.args or ()}
-    if not at_top_level(place, span, f"'{name}'") or not once(session, name, span):
+    if not at_top_level(place, span, f"`{name}`") or not once(session, name, span):
         return None
     if stmt.body is not None:
         session.report.error("E0330", f"`{name}` takes no block", span, help=f"write {name}(…);")
