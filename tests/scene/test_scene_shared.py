@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
+from scenelang.evaluate.values.functions import angle, number
+from scenelang.evaluate.values.operators import binary, compare
+from scenelang.evaluate.values.value import Angle, Problem, Time, Vec
 from tests.scene.scene_cases import run_text
 
 SPREAD = {
@@ -60,3 +65,25 @@ def test_independent_mistakes_are_told_apart(text: str) -> None:
 def test_ten_mistakes_are_ten_reports() -> None:
     text = "".join(f"fn f{i}(a) = a;\nsquare {{ scale(f{i}(1, 2)); }}\n" for i in range(10))
     assert len(run_text(text).diagnostics) == 10
+
+
+@pytest.mark.parametrize(
+    ("function", "values", "found"),
+    [
+        (number, ("a",), "a string"),
+        (angle, (2.0,), "a bare number"),
+        (angle, (Time(1.0),), "a time"),
+        (binary, ("+", 1.0, True), "a boolean"),
+        (binary, ("/", 1.0, True), ""),
+        (binary, ("-", "a", True), ""),
+        (binary, ("+", 1.0, Angle(1.0)), "an angle"),
+        (compare, ("<", Vec((1.0,)), 2.0), "a vector of 1 item"),
+    ],
+    ids=str,
+)
+def test_a_problem_says_what_it_found(
+    function: Callable[..., object], values: tuple[object, ...], found: str
+) -> None:
+    with pytest.raises(Problem) as raised:
+        function(*values)
+    assert raised.value.found == found

@@ -17,7 +17,7 @@ from scenelang.evaluate.prepare.expressions import VARIES, guarded, prepare, wat
 from scenelang.evaluate.prepare.operations import condition
 from scenelang.evaluate.replay import Still
 from scenelang.evaluate.report.undefined import tell_bound
-from scenelang.evaluate.values.value import POISON, Problem, RangeValue, Vec, describe
+from scenelang.evaluate.values.value import POISON, Problem, RangeValue, Vec, unexpected
 from scenelang.evaluate.vocabulary import LANGUAGE, SETTINGS
 from scenelang.syntax import nodes
 
@@ -284,7 +284,7 @@ def prepare_for(stmt: nodes.For, place: Place) -> Action | None:
             value.count()
             return value
         advice = "write 0..<n for n passes" if value.__class__ is float else None
-        raise Problem("E0301", f"expected a range or a vector, found {describe(value)}", advice)
+        raise unexpected("a range or a vector", value, advice)
 
     check = guarded(unit, items, span, (), item_steps=0)
     get = iterable.run

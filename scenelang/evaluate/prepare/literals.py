@@ -28,6 +28,7 @@ from scenelang.evaluate.values.value import (
     Time,
     Vec,
     describe,
+    unexpected,
     unpack,
 )
 from scenelang.syntax import nodes
@@ -94,7 +95,7 @@ def prepare_range(expr: nodes.Range, unit: Unit, scope: Scope) -> Code:
     def make(start: Any, stop: Any, step: Any = None) -> RangeValue:
         for index, value in enumerate((start, stop, step)):
             if value.__class__ not in UNITS and (index < 2 or value is not None):
-                raise Problem("E0301", f"expected a number, found {describe(value)}", operand=index)
+                raise unexpected("a number", value, operand=index)
         (a, ua), (b, ub) = unpack(start), unpack(stop)
         kind = operators.same_unit(a, ua, b, ub)
         if step is None:
@@ -133,7 +134,9 @@ def member(code: Code, name: nodes.Name, unit: Unit, of: nodes.Expr | None = Non
 
     def pick(value: Any) -> Any:
         if value.__class__ is not Vec:
-            raise Problem("E0301", f"`.{name.text}` of {describe(value)}, which is not a vector")
+            kind = describe(value)
+            message = f"`.{name.text}` of {kind}, which is not a vector"
+            raise Problem("E0301", message, found=kind)
         if at >= len(value.items):
             raise Problem("E0307", f"`.{name.text}` of {describe(value)}")
         return value.items[at]
@@ -157,7 +160,7 @@ def prepare_index(expr: nodes.Index, unit: Unit, scope: Scope) -> Code:
         elif value.__class__ is RangeValue:
             length = value.count()
         else:
-            raise Problem("E0301", f"expected a vector or a range, found {describe(value)}", operand=0)
+            raise unexpected("a vector or a range", value, operand=0)
         if not at.is_integer():
             raise Problem("E0307", f"index {at:.6g} is not a whole number", "round it with floor(…)", 1)
         if not 0 <= at < length:

@@ -11,7 +11,7 @@ from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Env, Scope
 from scenelang.evaluate.prepare.expressions import POISONED, Code, Run, folded, guarded, prepare
 from scenelang.evaluate.values import operators
-from scenelang.evaluate.values.value import POISON, Problem, describe
+from scenelang.evaluate.values.value import POISON, unexpected
 from scenelang.syntax import nodes
 
 _FAST: Final[dict[str, Callable[[Any, Any], Any]]] = {
@@ -82,7 +82,7 @@ def _truth(value: Any, operand: int = 0) -> bool:
     if value.__class__ is bool:
         return value
     help = "compare it with something, as in n != 0" if value.__class__ is float else None
-    raise Problem("E0301", f"expected a boolean, found {describe(value)}", help, operand)
+    raise unexpected("a boolean", value, help, operand)
 
 
 def condition(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:

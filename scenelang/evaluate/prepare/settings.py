@@ -18,7 +18,7 @@ from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import number
 from scenelang.evaluate.values.transforms import color
-from scenelang.evaluate.values.value import POISON, Problem, Time, Vec, describe, show
+from scenelang.evaluate.values.value import POISON, Problem, Time, Vec, show, unexpected
 from scenelang.scene.schema import MAX_FRAMES, Animation
 from scenelang.syntax import nodes
 
@@ -138,7 +138,7 @@ def _unknown_time(session: Session) -> Action:
 def _canvas(session: Session, span: Span, width: Any, height: Any) -> None:
     if width.__class__ is Vec and height is LEFT_OUT:
         if len(width.items) != 2:
-            raise Problem("E0301", f"expected a vector of 2 numbers, found {describe(width)}", operand=0)
+            raise unexpected("a vector of 2 numbers", width, operand=0)
         width, height = width.items
     if height is LEFT_OUT:
         raise Problem("E0308", "`canvas` needs `w` and `h`", "it is called canvas(w, h)")
@@ -175,7 +175,7 @@ def _animate(session: Session, span: Span, seconds: Any, fps: Any, loop: Any) ->
         if value <= 0.0:
             raise Problem("E0311", f"a {what} of {show(value)} is not above 0", operand=operand)
     if loop is not LEFT_OUT and loop.__class__ is not bool:
-        raise Problem("E0301", f"expected a boolean, found {describe(loop)}", operand=2)
+        raise unexpected("a boolean", loop, operand=2)
     rate = session.fps or rate
     if length * rate > MAX_FRAMES:
         raise Problem("E0311", f"an animation of more than {MAX_FRAMES:,} frames", operand=0)

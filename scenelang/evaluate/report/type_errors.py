@@ -6,7 +6,6 @@ words and share a variable or function, directly or by way of others, are places
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from typing import Final
 
@@ -27,24 +26,7 @@ Origin = tuple[int, int]
 """A definition: its file and where its name starts."""
 
 
-_FOUND: Final = re.compile(r"found (?!a number$)(.*)$|of (.*), which is not a vector$")
-_PAIR: Final = re.compile(r"^cannot \w+ (.*) and (.*)$")
-_ANGLE: Final = "a bare number beside an angle"
 _OUTSIDE: Final = "outside"
-
-
-def _complaint(message: str) -> str:
-    """What a message says is odd about a value, whatever was going to be done with it."""
-    if _OUTSIDE in message:
-        return _OUTSIDE
-    if message == _ANGLE:
-        return "an angle"
-    pair = _PAIR.match(message)
-    if pair is not None:
-        odd = [kind for kind in pair.groups() if kind != "a number"]
-        return odd[0] if len(odd) == 1 else message
-    found = _FOUND.search(message)
-    return message if found is None else found[1] or found[2]
 
 
 def report_problem(
@@ -62,9 +44,7 @@ def report_problem(
         return
     alone = operand is not None and problem.code == "E0301"
     blamed = tuple([one for one in ((operand,) if alone else operands) if one is not None])
-    if not report.follows(problem.code, place) and joined(
-        report, problem.code, problem.message, blamed, place
-    ):
+    if not report.follows(problem.code, place) and joined(report, problem, blamed, place):
         return
     help, fix = problem.help, None
     if problem.fix:
@@ -82,51 +62,49 @@ def report_problem(
             labels.append(Label(defined, f"`{operand.name.text}` is defined here"))
     found = report.error(problem.code, problem.message, place, help=help, fix=fix, labels=tuple(labels))
     if found is not None:
-        remember(report, found, problem.code, problem.message, blamed)
+        remember(report, found, problem, blamed)
 
 
-def joined(report: Reporter, code: str, message: str, operands: tuple[nodes.Expr, ...], place: Span) -> bool:
+def joined(report: Reporter, problem: Problem, operands: tuple[nodes.Expr, ...], place: Span) -> bool:
     """Whether a problem is one more place of an earlier report, which then shows it.
 
     Args:
         report: has the reports.
-        code, message: the problem.
+        problem: the problem.
         operands: what may be to blame.
         place: where it shows.
     """
-    if code not in _KINDS:
+    if problem.code not in _KINDS:
         return False
     for origin, definition in origins(report, operands).items():
-        for words in (_complaint(message), ""):
+        for words in (problem.found or problem.message, ""):
             shared = report.blamed.get((*origin, words))
             if shared is not None:
                 _add(report, shared, definition, place)
                 return True
-    direct = _direct(report, operands[0]) if len(operands) == 1 and code == "E0301" else None
-    shared = report.blamed.get((*direct, code)) if direct else None
+    direct = _direct(report, operands[0]) if len(operands) == 1 and problem.code == "E0301" else None
+    shared = report.blamed.get((*direct, problem.code)) if direct else None
     if shared is None or direct is None:
         return False
     _add(report, shared, report.defined[id(operands[0].span.source), operands[0].span.start], place)
     return True
 
 
-def remember(
-    report: Reporter, shared: Shared, code: str, message: str, operands: tuple[nodes.Expr, ...]
-) -> None:
+def remember(report: Reporter, shared: Shared, problem: Problem, operands: tuple[nodes.Expr, ...]) -> None:
     """Note the origins of a problem that was reported."""
-    if code not in _KINDS:
+    if problem.code not in _KINDS:
         return
-    complaint = _complaint(message)
+    complaint = problem.found or problem.message
     direct = _direct(report, operands[0]) if operands else None
     if complaint == _OUTSIDE:
         # One wrong index is one; of a second on, it is the vector that is too short.
-        if direct is not None and report.blamed.setdefault((*direct, code), shared) is not shared:
+        if direct is not None and report.blamed.setdefault((*direct, problem.code), shared) is not shared:
             report.blamed.setdefault((*direct, complaint), shared)
         return
     for origin in origins(report, operands):
         report.blamed.setdefault((*origin, complaint), shared)
-    if direct is not None and code == "E0301" and len(operands) == 1:
-        report.blamed.setdefault((*direct, code), shared)
+    if direct is not None and problem.code == "E0301" and len(operands) == 1:
+        report.blamed.setdefault((*direct, problem.code), shared)
 
 
 def origins(report: Reporter, operands: tuple[nodes.Expr, ...]) -> dict[Origin, Span]:

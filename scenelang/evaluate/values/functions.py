@@ -19,6 +19,7 @@ from scenelang.evaluate.values.value import (
     describe,
     pack,
     show,
+    unexpected,
     unpack,
 )
 
@@ -48,7 +49,7 @@ def number(value: Any, operand: int = 0) -> float:
         return value
     unit = {"an angle": "1deg", "a time": "1s"}.get(describe(value))
     help = f"divide by {unit} for a bare number" if unit else None
-    raise Problem("E0301", f"expected a number, found {describe(value)}", help, operand)
+    raise unexpected("a number", value, help, operand)
 
 
 def angle(value: Any, operand: int = 0, fix: Literal["angle", "hue"] = "angle") -> float:
@@ -58,8 +59,10 @@ def angle(value: Any, operand: int = 0, fix: Literal["angle", "hue"] = "angle") 
     if value.__class__ is float:
         if value == 0.0:
             return 0.0
-        raise Problem("E0302", "expected an angle, found a bare number", operand=operand, fix=fix)
-    raise Problem("E0301", f"expected an angle, found {describe(value)}", None, operand)
+        raise Problem(
+            "E0302", "expected an angle, found a bare number", operand=operand, fix=fix, found="a bare number"
+        )
+    raise unexpected("an angle", value, None, operand)
 
 
 def _each(function: Callable[[Any], Any], value: Any) -> Any:
@@ -97,7 +100,7 @@ def _atan2(y: Any, x: Any) -> Angle:
 def _scalar(value: Any, operand: int = 0) -> tuple[float, str]:
     if value.__class__ in UNITS:
         return unpack(value)
-    raise Problem("E0301", f"expected a number, found {describe(value)}", None, operand)
+    raise unexpected("a number", value, None, operand)
 
 
 def _abs(value: Any) -> Any:
@@ -202,7 +205,7 @@ def _len(value: Any) -> float:
         return float(value.count())
     if value.__class__ is str:
         return float(len(value))
-    raise Problem("E0301", f"expected a vector, a range or a string, found {describe(value)}", operand=0)
+    raise unexpected("a vector, a range or a string", value, operand=0)
 
 
 def _splitmix64(state: int) -> int:

@@ -103,7 +103,7 @@ def same_unit(a: float, ua: str, b: float, ub: str) -> str:
     if (a, b)[bare] == 0.0:
         return "angle"
     notes = {1 - bare: "an angle"}
-    raise Problem("E0302", "a bare number beside an angle", operand=bare, fix="angle", notes=notes)
+    raise Problem("E0302", "a bare number beside an angle", None, bare, "angle", notes, "an angle")
 
 
 def _unit_of(op: str, a: float, ua: str, b: float, ub: str) -> str:
@@ -133,6 +133,12 @@ def _unit_of(op: str, a: float, ua: str, b: float, ub: str) -> str:
     )
 
 
+def _odd(a: Any, b: Any) -> str:
+    """The kind of the one of two values that is not a number; empty where both are or neither is."""
+    odd = [kind for kind in (describe(a), describe(b)) if kind != "a number"]
+    return odd[0] if len(odd) == 1 else ""
+
+
 def binary(op: str, a: Any, b: Any) -> Any:
     """``a op b`` for the arithmetic operators, componentwise on vectors.
 
@@ -160,6 +166,7 @@ def binary(op: str, a: Any, b: Any) -> Any:
         f"cannot {_VERBS[op]} {describe(a)} {_PREPOSITIONS[op]} {describe(b)}",
         operand=operand,
         notes={1 - operand: describe((a, b)[1 - operand])},
+        found=_odd(a, b) if op in "+-*" else "",
     )
 
 
@@ -189,7 +196,13 @@ def compare(op: str, a: Any, b: Any) -> bool:
     if a.__class__ not in UNITS or b.__class__ not in UNITS:
         operand = 0 if a.__class__ not in UNITS else 1
         notes = {1 - operand: describe((a, b)[1 - operand])}
-        raise Problem("E0303", f"cannot order {describe(a)} and {describe(b)}", operand=operand, notes=notes)
+        raise Problem(
+            "E0303",
+            f"cannot order {describe(a)} and {describe(b)}",
+            operand=operand,
+            notes=notes,
+            found=_odd(a, b),
+        )
     x, ua = unpack(a)
     y, ub = unpack(b)
     same_unit(x, ua, y, ub)

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from scenelang.evaluate.builder import make
 from scenelang.evaluate.values.functions import angle, number
-from scenelang.evaluate.values.value import Problem, Vec, describe
+from scenelang.evaluate.values.value import Problem, Vec, describe, unexpected
 from scenelang.scene.modifiers import (
     Bend,
     Color,
@@ -51,8 +51,7 @@ class Spec:
 def vector(value: Any, length: int, operand: int = 0, what: str = "a vector") -> tuple[float, ...]:
     """``length`` numbers; raises Problem for anything else."""
     if value.__class__ is not Vec or len(value.items) != length:
-        message = f"expected {what} of {length} numbers, found {describe(value)}"
-        raise Problem("E0301", message, operand=operand)
+        raise unexpected(f"{what} of {length} numbers", value, operand=operand)
     return tuple([number(item, operand) for item in value.items])
 
 
@@ -60,7 +59,7 @@ def color(value: Any, operand: int = 0) -> tuple[float, float, float]:
     """A colour's three numbers."""
     if value.__class__ is not Vec:
         help = "write #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)"
-        raise Problem("E0301", f"expected a colour, found {describe(value)}", help, operand, fix="colour")
+        raise unexpected("a colour", value, help, operand, fix="colour")
     r, g, b = vector(value, 3, operand, "a colour")
     return r, g, b
 
@@ -73,7 +72,7 @@ def _translate(x: Any, y: Any, z: Any) -> Translate:
 def _rotate(turn: Any, axis: Any) -> Rotate:
     if turn.__class__ is Vec:
         help = "it turns by one angle about one axis: rotate(45deg), or rotate(45deg, axis = X)"
-        raise Problem("E0301", f"expected an angle, found {describe(turn)}", help, 0, fix="turns")
+        raise unexpected("an angle", turn, help, 0, fix="turns")
     rad = angle(turn, 0)
     direction = (0.0, 0.0, 1.0) if axis is None else vector(axis, 3, 1, "an axis")
     if not any(direction):
@@ -104,7 +103,7 @@ def _shear(*terms: Any) -> Shear:
 
 def _matrix(rows: Any) -> Matrix:
     if rows.__class__ is not Vec or len(rows.items) != 4:
-        raise Problem("E0301", f"expected 4 rows of 4 numbers, found {describe(rows)}", operand=0)
+        raise unexpected("4 rows of 4 numbers", rows, operand=0)
     values = tuple([vector(row, 4, 0, "a row") for row in rows.items])
     if values[3] != (0.0, 0.0, 0.0, 1.0):
         raise Problem("E0311", "the last row of a matrix is not 0, 0, 0, 1", operand=0)
@@ -117,7 +116,7 @@ def _warp(cls: type[Twirl] | type[Bend] | type[Twist], kind: str) -> Callable[[A
     def build(k: Any) -> Any:
         if describe(k) == "an angle":
             help = "k is radians per unit length, a bare number: divide by 1rad"
-            raise Problem("E0301", "expected a number, found an angle", help, 0)
+            raise unexpected("a number", k, help, 0)
         return make(cls, {"kind": kind, "k": number(k, 0)})
 
     return build
@@ -171,14 +170,11 @@ def spread(values: Sequence[Any], spec: Spec) -> list[Any]:
         missing = " and ".join(f"`{name}`" for name in spec.params[1 : spec.required])
         raise Problem("E0308", f"{missing} is missing, or a vector of all components")
     if first.__class__ is not Vec:
-        message = f"expected a vector or its components, found {describe(first)}"
-        raise Problem("E0301", message, operand=0)
+        raise unexpected("a vector or its components", first, operand=0)
     count = len(first.items)
     if not spec.required <= count <= len(spec.params):
-        message = (
-            f"expected a vector of {spec.required} or {len(spec.params)} numbers, found {describe(first)}"
-        )
-        raise Problem("E0301", message, operand=0)
+        numbers = f"{spec.required} or {len(spec.params)} numbers"
+        raise unexpected(f"a vector of {numbers}", first, operand=0)
     return [*first.items, *[None] * (len(spec.params) - count)]
 
 

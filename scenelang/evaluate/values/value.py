@@ -28,6 +28,8 @@ class Problem(Exception):
         fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, for which the help comes
             with the fix; a ``colour`` of a string; of three ``turns`` the last.
         notes: words for further operands, by their numbers.
+        found: what is odd about a value, whatever was going to be done with it: its kind, or ``outside`` of
+            an index; empty where only the message tells. Problems that found the same may have one cause.
     """
 
     def __init__(
@@ -38,6 +40,7 @@ class Problem(Exception):
         operand: int | None = None,
         fix: str = "",
         notes: Mapping[int, str] = MappingProxyType({}),
+        found: str = "",
     ) -> None:
         super().__init__(message)
         self.code = code
@@ -46,6 +49,7 @@ class Problem(Exception):
         self.operand = operand
         self.fix = fix
         self.notes = notes
+        self.found = found
 
 
 class Poison:
@@ -222,6 +226,15 @@ def describe(value: Any) -> str:
         type(None): "none",
     }
     return names.get(cls, "another value")
+
+
+def unexpected(
+    expected: str, value: Any, help: str | None = None, operand: int | None = None, fix: str = ""
+) -> Problem:
+    """A value of another kind than is expected; arguments as of `Problem`."""
+    kind = describe(value)
+    found = "" if kind == "a number" else kind  # which is odd in no way of its own
+    return Problem("E0301", f"expected {expected}, found {kind}", help, operand, fix, found=found)
 
 
 def show(number: float) -> str:
