@@ -79,7 +79,6 @@ def test_ten_mistakes_are_ten_reports() -> None:
         (binary, ("+", 1.0, Angle(1.0)), "an angle"),
         (compare, ("<", Vec((1.0,)), 2.0), "a vector of 1 item"),
     ],
-    ids=str,
 )
 def test_a_problem_says_what_it_found(
     function: Callable[..., object], values: tuple[object, ...], found: str
