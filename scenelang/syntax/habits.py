@@ -78,7 +78,7 @@ class Habits(Slips):
             for start in anchors[_anchor(habit.pattern)]:
                 match = find(habit.pattern, tokens, start)
                 new = match and change(match, habit.meant, {"material": self._materials[1] or "…"})
-                if match and new and self._reads_on(stack, first, at, match, new):
+                if match and new and self._reads_on(stack, first, at, match, new, habit.meant):
                     self._tell(habit, match, new)
                     return True
         return False
@@ -99,17 +99,19 @@ class Habits(Slips):
                 break
         return found
 
-    def _reads_on(self, stack: list[int], first: int, at: int, match: Match, new: Change) -> bool:
-        """Whether a change lets the rest of the statement read, or the head of one that it makes."""
+    def _reads_on(self, stack: list[int], first: int, at: int, match: Match, new: Change, meant: str) -> bool:
+        """Whether a change lets the rest of the statement read, or the head of one with a block."""
         if new.first > at:
             return False
         old = self._reach(stack, first, new.first, ([], [], []), new.first, at)
         reached = self._reach(stack, first, new.first, new.columns, new.stop, at)
         end = match.stop
-        while end < match.stop + FOLLOWED and not self._is(end - 1, ";", "{", "}") and not self._at_end(end):
+        whole = meant[-1:] in (";", "}", "{", "")
+        while not whole and end < match.stop + FOLLOWED and not self._at_end(end):
             end += 1
-        headed = match.parts[0][0] == "for" and reached == match.stop
-        return reached > max(old, at) and (reached >= end or headed)
+            whole = self._is(end - 1, ";", "{", "}")
+        head = "BODY" in meant or (match.parts[0][0] == "for" and reached == match.stop)
+        return reached > max(old, at) and (reached >= end or head)
 
     def _reach(self, stack: list[int], first: int, begin: int, columns: Columns, stop: int, at: int) -> int:
         """The first token after a mistake that does not fit where others stand for ``[begin, stop)``."""

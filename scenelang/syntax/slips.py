@@ -13,7 +13,7 @@ from scenelang.syntax.lexer import UNIT_ALIASES, UNITS
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 
-_FAR = 5000  # tokens that the statement of a loop without braces may have
+_FAR = 1000  # tokens that the statement of a loop without braces may have
 
 _IMPORT = re.compile(
     r"""(?P<word>use|include|require)[ \t]*

@@ -110,3 +110,8 @@ def test_a_range_may_be_computed() -> None:
 )
 def test_declarations_that_are_wrong(text: str, code: str) -> None:
     assert run_text(text).codes == [code]
+
+
+def test_a_colour_by_its_name_is_told_its_number() -> None:
+    outcome = run_text("param main = #d33;", defines={"main": "red"})
+    assert outcome.only().help == "colours have no names; red is #f00"

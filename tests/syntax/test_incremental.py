@@ -37,6 +37,7 @@ SNIPPETS = [
         "scale(0.5)\n",
         "\r\n",
         "// ok\n",
+        *("translate(1, 0) ", "for (i = [0:3]) { ", "k = 1;\n", "material { color(#f00); }", "x if y else "),
     ),
 ]
 

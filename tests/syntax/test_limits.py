@@ -73,7 +73,23 @@ def test_index_chains_are_bounded() -> None:
     assert depth(tree) <= 3 * MAX_DEPTH + 10
 
 
-GARBAGE = ["}", ")", ";", "@ ", '"', "'", "/*", "let ", "a$", "1 ", "{", "let = 1\n", "1."]
+GARBAGE = [
+    "}",
+    ")",
+    ";",
+    "@ ",
+    '"',
+    "'",
+    "/*",
+    "let ",
+    "a$",
+    "1 ",
+    "{",
+    "let = 1\n",
+    "1.",
+    "k = ",
+    "scale(2) ",
+]
 
 
 @pytest.mark.parametrize("text", GARBAGE)
