@@ -142,12 +142,13 @@ class Names:
                 self._define(Symbol(name.text, "loop", name.span, stmt, loop, stmt.body.span.start))
                 self._inner(stmt.body, loop, kind)
             case nodes.If():
-                self._expr(stmt.condition, scope)
-                self._inner(stmt.then, scope, kind)
-                if isinstance(stmt.otherwise, nodes.If):
-                    self._statement(stmt.otherwise, scope, kind)
-                elif stmt.otherwise is not None:
-                    self._inner(stmt.otherwise, scope, kind)
+                at: nodes.If | nodes.Block | None = stmt
+                while isinstance(at, nodes.If):  # there may be very many arms
+                    self._expr(at.condition, scope)
+                    self._inner(at.then, scope, kind)
+                    at = at.otherwise
+                if at is not None:
+                    self._inner(at, scope, kind)
             case nodes.Node():
                 self._inner(stmt.body, scope, "chain" if stmt.kind == "chain" else "group")
             case nodes.Combined():
