@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from typing import Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -15,12 +16,17 @@ from scenelang.deep import deep_stack
 from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.files import followed, read_regular, write_whole
 
+if TYPE_CHECKING:
+    from scenelang.diagnostics.diagnostic import Diagnostic
+
 STDIN: Final = "-"
 
 
 @click.command("fmt")
 @click.argument("paths", nargs=-1, required=True, metavar="PATH…")
-@click.option("--check", is_flag=True, help="Write nothing; name the files that are laid out otherwise.")
+@click.option(
+    "--check", is_flag=True, help="Write nothing; name the files that are laid out otherwise, on a line each."
+)
 @click.option("--diff", is_flag=True, help="Write nothing; print what would change.")
 @click.pass_context
 def command(ctx: click.Context, paths: tuple[str, ...], check: bool, diff: bool) -> None:
@@ -73,7 +79,10 @@ class _Run:
                 return
             result = format_text(text, name=_shown(name))
         except SceneError as error:
-            say_diagnostics(error.diagnostics)
+            if self.check:
+                _say_briefly(error.diagnostics)
+            else:
+                say_diagnostics(error.diagnostics)
             self.mistaken += 1
             return
         except OSError as error:
@@ -135,6 +144,14 @@ class _Run:
         parts = [f"{n} scene{'s' * (n != 1)} {what}" for n, what in counts if n]
         if parts:
             click.echo(", ".join(parts), err=True)
+
+
+def _say_briefly(found: Sequence[Diagnostic]) -> None:
+    """Print the first mistake of a file and the number of the others, on one line."""
+    from scenelang.diagnostics.render_machine import render_concise
+
+    more = f", and {len(found) - 1:,} more" if found[1:] else ""
+    click.echo(f"{render_concise(found[:1]).rstrip()}{more}", err=True)
 
 
 def _shown(name: str) -> str:

@@ -184,6 +184,9 @@ class _Lowering:
             step = self.steps.get(id(transform))  # the Scene holds it, so that its id stays its own
             if step is None:
                 step = self.steps[id(transform)] = step_of(transform, self.space)
+                if idle := self.space.idle(transform):
+                    help = "a 2D model has no z: leave the third factor out"
+                    self.say("W0508", f"{idle} has no effect in the plane", transform, help)
             if isinstance(step, Refusal):
                 self.say(step.code, step.message, transform, step.help)
             else:

@@ -49,6 +49,11 @@ class Plane(Space):
             return Refusal("E0505", "`matrix` mixes z with x and y", help)
         return flattened(rows)
 
+    def idle(self, transform: schema.Transform) -> str | None:
+        if not isinstance(transform, schema.Scale) or transform.z in (1.0, transform.x):
+            return None  # `scale(s)` has the same factor along all axes
+        return f"`scale` by {transform.z:g} along z"
+
     def holds(self, rows: Rows) -> bool:
         return not rows[2] and not rows[6] and rows[8:] == IDENTITY[8:]
 

@@ -53,6 +53,10 @@ class Space(ABC):
     def fitted(self, transform: AffineTransform, rows: Rows) -> Rows | Refusal:
         """The map as this space has it, or why the transform leaves the space."""
 
+    def idle(self, transform: schema.Transform) -> str | None:
+        """The part of a transform that was asked for and has no effect here, if there is one."""
+        return None
+
     @abstractmethod
     def holds(self, rows: Rows) -> bool:
         """Whether a map is one that `fitted` gives."""

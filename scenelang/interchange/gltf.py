@@ -28,6 +28,8 @@ _MOST_LETTERS: Final = 200
 _FLAT: Final = 1e-6
 """How far the entries of a matrix that mix z with x and y may be from 0: they are written in float32."""
 _MOST_NAME: Final = 40
+DIGITS: Final = 6
+"""Digits of what is written: files hold float32, whose eighth is noise."""
 
 
 @dataclass(slots=True)
@@ -89,13 +91,13 @@ def geometry_of(names: Iterable[str | None], geometries: Iterable[str]) -> str |
 
 
 def srgb(linear: float) -> float:
-    """The sRGB-encoded value of a linear one, both in [0, 1]; snapped to 8 bits where float32 cannot tell.
+    """The sRGB-encoded value of a linear one, both in [0, 1]: a level of 8 bits, or four decimals.
 
     Source: IEC 61966-2-1.
     """
     value = 12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1 / 2.4) - 0.055
     level = round(255 * value)
-    return level / 255 if abs(255 * value - level) < 1e-4 else value
+    return level / 255 if abs(255 * value - level) < 1e-4 else round(value, 4)
 
 
 def _manifest(gltf: Gltf, model: str | None) -> Manifest:
@@ -274,7 +276,7 @@ class _Import:
             raise GltfError(f"{path}: a quaternion of length 0")
         if abs(length - 1.0) > 1e-3:
             self.left_out.append(f"{path}: the length of its quaternion, {length:g}, is taken as 1")
-        angle, axis = _turn(i, j, k, w)
+        angle, axis = affine.turn(i, j, k, w)
         rows = affine.compose(affine.rotation(angle, axis), affine.scaling(u, v, s))
         rows = affine.compose(affine.translation(x, y, z), rows)
         if self.flat and any(axis[:2]):
@@ -283,18 +285,21 @@ class _Import:
         if (u, v, s) != (1.0, 1.0, 1.0) and all((u, v, s)):
             steps.append(_scale(u, v, 1.0 if self.flat else s, self.flat))
         if angle != 0.0:
-            steps.append(schema.Rotate(angle=angle, axis=axis))
+            turn = math.radians(_short(math.degrees(angle)))
+            steps.append(schema.Rotate(angle=turn, axis=(_short(axis[0]), _short(axis[1]), _short(axis[2]))))
         steps += self.shift(x, y, z)
         return _Local(rows, tuple(steps))
 
     def matrix(self, rows: Rows) -> tuple[schema.Transform, ...]:
-        """A map as the simplest transforms that are exactly it, in the plane for a 2D model."""
+        """A map as the simplest transforms that are it, in the plane for a 2D model."""
         if self.flat:
             rows = flattened(rows)
         linear = (rows[1], rows[2], rows[4], rows[6], rows[8], rows[9])
         if any(linear) or not all((rows[0], rows[5], rows[10])):
             if not SPACES[3].usable(rows):
                 return ()  # left out by whoever asks for it
+            short: Rows = tuple(map(_short, rows))  # type: ignore[assignment]
+            rows = short if SPACES[3].usable(short) else rows
             return (schema.Matrix(rows=(rows[0:4], rows[4:8], rows[8:12], (0.0, 0.0, 0.0, 1.0))),)
         scale = (rows[0], rows[5], rows[10])
         return (
@@ -304,7 +309,7 @@ class _Import:
 
     def shift(self, x: float, y: float, z: float) -> tuple[schema.Transform, ...]:
         z = 0.0 if self.flat else z
-        return (schema.Translate(x=x, y=y, z=z),) if x or y or z else ()
+        return (schema.Translate(x=_short(x), y=_short(y), z=_short(z)),) if x or y or z else ()
 
 
 _UP: Final[Rows] = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
@@ -312,21 +317,13 @@ _UP: Final[Rows] = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 _DOWN: Final[Rows] = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0)
 
 
-def _turn(i: float, j: float, k: float, w: float) -> tuple[float, tuple[float, float, float]]:
-    """Angle (radians) and axis of a quaternion; about an axis of the world it is that axis itself."""
-    sine = math.hypot(i, j, k)
-    if sine < 1e-9 * max(abs(w), 1e-300):
-        return 0.0, (0.0, 0.0, 1.0)
-    axis = (i / sine, j / sine, k / sine)
-    for at in range(3):
-        if abs(abs(axis[at]) - 1.0) < 1e-12:
-            sine = math.copysign(sine, axis[at])
-            axis = (float(at == 0), float(at == 1), float(at == 2))
-    angle = 2.0 * math.atan2(sine, w)
-    return math.remainder(angle, math.tau), axis
+def _short(number: float) -> float:
+    """A number in `DIGITS` digits."""
+    return float(f"{number:.{DIGITS}g}")
 
 
 def _scale(x: float, y: float, z: float, flat: bool) -> schema.Scale:
+    x, y, z = _short(x), _short(y), _short(z)
     return schema.Scale.uniform(x) if x == y and (flat or x == z) else schema.Scale(x=x, y=y, z=z)
 
 

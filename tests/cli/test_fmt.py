@@ -150,3 +150,17 @@ def test_nothing_heavy_is_loaded(tmp_path: Path) -> None:
     heavy = {"torch", "numpy", "pydantic", "lark", "rich", "pygls"}
     assert not heavy & set(done.stdout.split())
     assert text(scene) == NEAT
+
+
+def test_check_says_a_line_a_file(folder: Folder) -> None:
+    folder.write("all/bad.nsg", "square { scale(0.5 }\nstar { rotate(30deg) }\n")
+    folder.write("all/one.nsg", "star { rotate(30deg) }\n")
+    folder.write("all/two.nsg", "square   {}\n")
+    result = folder.run("fmt", "--check", "all")
+    assert result.exit_code == 1
+    assert result.stdout == "would format all/two.nsg\n"
+    assert result.stderr.splitlines() == [
+        "all/bad.nsg:1:19: error[E0103] missing `);`, and 1 more",
+        "all/one.nsg:1:21: error[E0102] missing `;`",
+        "1 scene would be formatted, 2 scenes with syntax errors",
+    ]

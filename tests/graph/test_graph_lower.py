@@ -38,7 +38,7 @@ def matrix(*block):
 def test_transforms_become_steps() -> None:
     steps, codes = lowered(
         schema.Translate(x=1, y=2),
-        schema.Scale(x=2, y=3, z=4),
+        schema.Scale(x=2, y=3, z=1),
         schema.Shear(axes="xy", k=0.5),
         schema.Twirl(k=0.3),
         schema.Bend(k=0.4),
@@ -83,16 +83,19 @@ def test_what_a_plane_refuses(transform, code: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "transform",
+    ("transform", "codes"),
     [
-        schema.Scale(x=1, y=1, z=1e-20),
-        schema.Shear(axes="xz", k=0),
-        schema.Rotate(angle=0, axis=(1, 0, 0)),
-        matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -3, 0)),
+        (schema.Scale(x=1, y=1, z=1e-20), ["W0508"]),
+        (schema.Scale(x=3, y=2, z=-3), ["W0508"]),
+        (schema.Scale(x=3, y=2, z=1), []),
+        (schema.Scale.uniform(3), []),
+        (schema.Shear(axes="xz", k=0), []),
+        (schema.Rotate(angle=0, axis=(1, 0, 0)), []),
+        (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -3, 0)), []),
     ],
 )
-def test_what_stays_in_the_plane(transform) -> None:
-    assert lowered(transform)[1] == []
+def test_what_stays_in_the_plane(transform, codes: list[str]) -> None:
+    assert lowered(transform)[1] == codes
 
 
 def test_space_has_room_for_all_of_them() -> None:

@@ -31,6 +31,12 @@ def solids(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "load_manifest", lambda n: SOLIDS if n == "solids3d" else load_manifest(n))
 
 
+@pytest.fixture
+def exact(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numbers as they are computed, not as they are written."""
+    monkeypatch.setattr(module, "DIGITS", 17)
+
+
 def random_tree(rng: random.Random, leaf: str, flat: bool) -> list[Json]:
     """Nodes of a random hierarchy; every node without children has a mesh."""
     nodes: list[Json] = [{"name": "root"}]
@@ -59,7 +65,7 @@ def random_tree(rng: random.Random, leaf: str, flat: bool) -> list[Json]:
     return nodes
 
 
-@pytest.mark.usefixtures("solids")
+@pytest.mark.usefixtures("solids", "exact")
 @pytest.mark.parametrize("seed", range(25))
 def test_world_matrices_in_space(seed: int, tmp_path: Path) -> None:
     nodes = random_tree(random.Random(seed), "Sphere", flat=False)
@@ -77,6 +83,7 @@ def test_world_matrices_in_space(seed: int, tmp_path: Path) -> None:
         assert np.allclose(left.pop(name), matrix, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.usefixtures("exact")
 @pytest.mark.parametrize("seed", range(25))
 def test_world_matrices_in_the_plane(seed: int, tmp_path: Path) -> None:
     nodes = random_tree(random.Random(seed), "star", flat=True)
@@ -93,6 +100,7 @@ def test_world_matrices_in_the_plane(seed: int, tmp_path: Path) -> None:
     assert again == found.scene
 
 
+@pytest.mark.usefixtures("exact")
 @pytest.mark.parametrize("seed", range(15))
 def test_drawings_on_the_ground(seed: int, tmp_path: Path) -> None:
     """A drawing in x, z with y up, seen from above, is the drawing in x, -z."""
@@ -115,6 +123,30 @@ def test_drawings_on_the_ground(seed: int, tmp_path: Path) -> None:
         name = min(left, key=lambda n: np.abs(left[n] - own).max())
         assert np.allclose(left.pop(name), own, rtol=1e-9, atol=1e-9)
     assert not left
+
+
+def test_numbers_are_short() -> None:
+    """What a program writes as float32 is read as the number that was meant."""
+    third, half = float(np.float32(1 / 3)), np.float32(math.radians(15))
+    star = {
+        "name": "star",
+        "scale": [float(np.float32(0.2)), float(np.float32(0.2000000149)), 1],
+        "rotation": [0, 0, float(np.sin(half)), float(np.cos(half))],
+        "translation": [float(np.float32(0.3)), third, 0],
+        "mesh": 0,
+    }
+    steep = [1, 1, 0, 0, third, 1.3333333, 0, 0, 0, 0, 1, 0, 0, float(np.float32(-0.1)), 0, 1]
+    text = "".join(
+        read(document([node])).scene.to_nsg() for node in (star, {"name": "star", "matrix": steep, "mesh": 0})
+    )
+    assert "scale(0.2); rotate(30deg); translate(0.3, 0.333333);" in text
+    assert "matrix([[1, 0.333333, 0, 0], [1, 1.33333, 0, -0.1]," in text
+
+
+def test_a_matrix_that_few_digits_would_flatten_keeps_them() -> None:
+    steep = [1, 1, 0, 0, 1, 1.0000001, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+    (star,) = read(document([{"name": "star", "matrix": steep, "mesh": 0}])).scene.nodes
+    assert star.transforms[0].rows[1][1] == 1.0000001
 
 
 def test_quaternions_turn_counter_clockwise() -> None:

@@ -18,4 +18,5 @@ CODES: dict[str, str] = {
     "W0505": "more smooth unions than the model was measured with",
     "W0506": "an object thinner than the model was measured with",
     "W0507": "a blend of bright and dark larger than the model was measured with",
+    "W0508": "a scale along z in a 2D model",
 }
