@@ -154,7 +154,7 @@ def manifests_of_any_names_and_ranges_are_read(data: st.DataObject) -> None:
         "transforms": data.draw(_WORDS | st.just(list(shipped.transforms))),
         "material_ops": data.draw(_WORDS | st.just(list(shipped.material_ops))),
         "limits": data.draw(
-            st.dictionaries(st.sampled_from(["inner_warps", "outer_warps", "canvas"]), st.integers(0, 9))
+            st.dictionaries(st.sampled_from(["inner_warps", "outer_warps", "canvas"]), st.integers(0, 2))
         ),
         "trained": data.draw(st.dictionaries(st.sampled_from(["objects", "twirl", "bend", "scale"]), span)),
         "measured": data.draw(st.dictionaries(line.filter(lambda key: key != "stability"), st.integers())),

@@ -34,7 +34,7 @@ def test_findings_are_told_apart_and_their_smallest_inputs_kept(tmp_path: Path) 
     findings = keeper.state.findings
     assert {(f.kind, f.signature, f.times, f.bytes) for f in findings.values()} == {
         ("oracle", "no a", 3, 2),
-        ("crash", "Problem in scene/operators.py:divide", 1, 1),
+        ("crash", "Problem in evaluate/values/operators.py:divide", 1, 1),
         ("crash", "ZeroDivisionError in outside", 2, 2),
     }
     assert (tmp_path / "findings" / findings["no a"].file).read_bytes() == b"xa"
@@ -62,7 +62,7 @@ def test_minimise_leaves_what_matters() -> None:
 def test_signatures_name_the_innermost_place_in_the_library() -> None:
     with pytest.raises(Problem) as caught:
         check(b"b")
-    assert signature_of(caught.value) == ("crash", "Problem in scene/operators.py:divide")
+    assert signature_of(caught.value) == ("crash", "Problem in evaluate/values/operators.py:divide")
     assert signature_of(Failure("an oracle", "detail")) == ("oracle", "an oracle")
 
 
