@@ -106,7 +106,10 @@ def test_manifests_miss_nothing() -> None:
 @pytest.mark.parametrize("shape", [[1e308, 10**400], "ab", None, [-1], [1 << 40], [True], {}], ids=str)
 def test_shapes_in_weights_are_shapes(shape: object, monkeypatch: pytest.MonkeyPatch) -> None:
     """The size of a tensor of 10^400 numbers has no float64."""
-    outer = {"__metadata__": {"scenelang": '{"format": 1}'}, "codes": {"dtype": "F32", "shape": shape, "data_offsets": [0, 4]}}
+    outer = {
+        "__metadata__": {"scenelang": '{"format": 1}'},
+        "codes": {"dtype": "F32", "shape": shape, "data_offsets": [0, 4]},
+    }
     text = json.dumps(outer).encode()
     data = struct.pack("<Q", len(text)) + text
     monkeypatch.setattr("scenelang.models.weights.read_weights", lambda path: data)
