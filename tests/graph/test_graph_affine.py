@@ -33,6 +33,10 @@ def similarity(rows: Rows) -> tuple[float, float] | None:
     return None if found is None else (abs(found.twirl), 1.0 if found.twirl > 0 else -1.0)
 
 
+def test_spaces_know_their_dimension() -> None:
+    assert {dimension: space.dimension for dimension, space in SPACES.items()} == {2: 2, 3: 3}
+
+
 def test_maps_compose_and_invert_as_matrices_do() -> None:
     for outer, inner in itertools.pairwise(MAPS):
         np.testing.assert_allclose(matrix(affine.compose(outer, inner)), matrix(outer) @ matrix(inner))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from test_graph_chain import random_step
 
+from scenelang.graph import affine
 from scenelang.graph.affine import composed
 from scenelang.graph.bounds import leaf_box, overlap
 from scenelang.graph.chain import normal
@@ -16,7 +17,7 @@ from scenelang.graph.looks import Look
 from scenelang.graph.nodes import Leaf, Move
 from scenelang.graph.space import EVERYWHERE
 from scenelang.graph.spaces import PLANE, SPACES
-from scenelang.graph.steps import Affine, Warp
+from scenelang.graph.steps import Affine, Step, Warp
 
 CORNERS = {
     "square": np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / np.sqrt(2),
@@ -70,6 +71,24 @@ def test_boxes_contain_the_leaf(name: str, level: float) -> None:
         extent = np.ptp(points, axis=0)
         shares.append(np.prod(extent) / ((box[2] - box[0]) * (box[3] - box[1])))
     assert np.median(shares) > 0.4, "boxes are far too wide"
+
+
+def test_boxes_contain_leaves_that_are_bent_away_from_the_origin() -> None:
+    """There a leaf is a sector of a ring, narrow enough for the direction of a bend to count."""
+    rng, draw = random.Random(9), np.random.default_rng(9)
+    for _ in range(300):
+        chain: list[Step] = []
+        for _ in range(rng.choice([1, 1, 2])):
+            angle, away = rng.uniform(-4, 4), rng.uniform(0.8, 3)
+            shift = affine.translation(away * np.cos(angle), away * np.sin(angle))
+            size = rng.uniform(0.05, 0.4)
+            chain.append(Affine(affine.compose(shift, affine.scaling(size, size * rng.uniform(0.5, 1)))))
+            chain.append(Warp(rng.uniform(-0.5, 0.5), (rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5))))
+        moves = normal(map(Move, chain), PLANE)
+        box = leaf_box(Leaf("square", Look("flat"), moves), 0.0, PLANE)
+        points = forward(hull_points("square", 0.0, draw), [move.step for move in moves])
+        assert (points >= np.array(box[:2])).all()
+        assert (points <= np.array(box[2:])).all()
 
 
 def test_boxes_of_straight_leaves_are_tight() -> None:

@@ -83,6 +83,22 @@ def test_what_a_plane_refuses(transform, code: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("x", "y", "words"),
+    [
+        (1e-31, 1e-31, "singular in float32: it stretches by 1e-31 to 1e-31"),
+        (1e31, 1e31, "singular in float32: it stretches by 1e+31 to 1e+31"),
+        (1e-15, 1.0, "it flattens everything to a line or a point"),
+    ],
+)
+def test_what_is_said_of_singular_ones(x: float, y: float, words: str) -> None:
+    found = Diagnostics()
+    scene = schema.Scene(nodes=(schema.Object(geometry="star", transforms=(schema.Scale(x=x, y=y, z=1),)),))
+    lower(scene, SHAPES, None, found)
+    (only,) = found
+    assert words in only.message
+
+
+@pytest.mark.parametrize(
     ("transform", "codes"),
     [
         (schema.Scale(x=1, y=1, z=1e-20), ["W0508"]),

@@ -24,10 +24,13 @@ def random_rows(rng: np.random.Generator) -> Rows:
     return tuple(a.ravel().tolist())
 
 
-def random_levels(rng: np.random.Generator, inner: int, outer: int) -> Levels:
+def random_levels(rng: np.random.Generator, inner: int, outer: int, strength: float = 1.0) -> Levels:
     def warps(count: int) -> tuple[Warp, ...]:
         return tuple(
-            Warp(float(rng.uniform(-1, 1)), (float(rng.uniform(-1, 1)), float(rng.uniform(-1, 1))))
+            Warp(
+                float(rng.uniform(-strength, strength)),
+                (float(rng.uniform(-strength, strength)), float(rng.uniform(-strength, strength))),
+            )
             for _ in range(count)
         )
 
@@ -62,10 +65,13 @@ def test_vector_carries_points_back_as_the_reference_does(inner: int, outer: int
     assert frame.scale == pytest.approx(distance_scale(steps_of(levels)), rel=1e-9)
 
 
+@pytest.mark.parametrize("strength", [1.0, 1e-3])
 @pytest.mark.parametrize(("inner", "outer"), [(0, 0), (1, 0), (2, 3), (0, 2)])
-def test_points_near_the_leaf_move_no_faster_than_the_frame_says(inner: int, outer: int) -> None:
+def test_points_near_the_leaf_move_no_faster_than_the_frame_says(
+    inner: int, outer: int, strength: float
+) -> None:
     rng = np.random.default_rng(inner + outer)
-    levels = random_levels(rng, inner, outer)
+    levels = random_levels(rng, inner, outer, strength)
     frame = read_frame(lift_many([levels], [CODE])[0])
     x, y = rng.uniform(-4, 4, (2, 20000))
     step = 1e-5

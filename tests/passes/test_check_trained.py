@@ -53,7 +53,7 @@ def blend(first: str, second: str) -> str:
         ("star { scale(1.5); }", "star { scale(1.6, 1); }", "W0504 a scale of 1.6 of `star`"),
         ("star { scale(1, 0.2); }", "star { scale(1, 0.19); }", "W0506 `star`, 5.26 times as long as wide,"),
         (stars(3), stars(4), "W0501 4 objects are outside the measured range 1 to 3"),
-        (blend("", ""), "smooth { star { } square { } pentagon { } }", "W0505 2 smooth unions are outside"),
+        (blend(DARK, DARK), "smooth { star { } square { } pentagon { } }", "W0505 2 smooth unions are"),
         (blend(DARK, "material flat { color([0.7, 0.7, 1]); }"), blend(DARK, "scale(0.9);"),
             "W0507 a `smooth` of colours 0.8 apart at a scale of 1: the product 0.8 is outside the measured"),
         (blend(DARK + "scale(0.6);", "scale(0.5);"), blend(DARK + "scale(0.6);", "scale(1.5, 0.8);"),

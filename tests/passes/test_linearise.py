@@ -21,6 +21,9 @@ LEAVES = {
     "q": "star { scale(0.1); translate(-0.8, 0.05); }",
     "r": "pentagon { scale(0.1); translate(0.8, 0); }",
     "s": "triangle { scale(0.1); translate(0.8, 0.05); }",
+    # near p and q, and apart from them
+    "x": "pentagon { scale(0.1); translate(-0.5, 0); }",
+    "y": "triangle { scale(0.1); translate(-0.5, 0.05); }",
     # long bars: from q to r, and from s to p
     "u": "square { scale(0.02, 1); rotate(90deg); }",
     "v": "square { scale(0.02, 1.2); rotate(90deg); translate(0, 0.05); }",
@@ -92,6 +95,7 @@ REWRITES = {
     # an operator of the second reaches the first, none of the first the second
     "U{S{p q} S{r v}}": "r-vp-q",
     "U{S{p q} I{r s}}": "r&sp-q",
+    "U{S{p q} I{x y}}": "x&yp-q",
 }
 
 REFUSALS = {

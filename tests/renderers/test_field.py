@@ -251,7 +251,16 @@ def test_what_stays_is_taken_over(network) -> None:
     assert 0 < costs[5] < 0.75 * costs[4]
 
 
-@pytest.mark.parametrize("shift", np.linspace(0, 0.2, 21))
+def test_what_reaches_everywhere_is_not_taken_over(network) -> None:
+    """An intersection changes tiles that its leaf is far from; other tiles, or another count of them, too."""
+    kept = Kept()
+    for y, split in ((-0.6, 4), (0.6, 4), (0.6, 9), (-0.6, 9), (-0.6, 4)):
+        p = program(f"intersect {{ square {{ scale(1.2); }} star {{ scale(0.3); translate(0, {y}); }} }}")
+        alone, _ = drawn(network, p, split=split)
+        np.testing.assert_array_equal(drawn(network, p, split=split, kept=kept)[0], alone)
+
+
+@pytest.mark.parametrize("shift", np.linspace(0, 0.2, 9))
 def test_a_tile_is_drawn_again_when_something_comes_near(network, shift: float) -> None:
     """Objects that move in and out of rows by parts of a pixel, past the edges of tiles."""
     kept = Kept()
@@ -284,9 +293,20 @@ def test_vectors_that_nobody_can_draw(network, at: slice, numbers: object) -> No
         draw(network, vectors, p.tokens, p.canvas, None)
 
 
-def test_vectors_at_the_edge_of_what_can_be_drawn(network) -> None:
+@pytest.mark.parametrize(
+    ("at", "numbers"),
+    [
+        (slice(5, 11), (1e30, 0, 0, 0, 1e30, 0)),
+        (slice(5, 11), (1e-30, 0, 0, 0, 1e-30, 0)),
+        (slice(5, 11), (1e-30, 0, 0, 0, 1e30, 0)),
+        (slice(5, 11), (1e-24, 0, 1e15, 0, 1e-24, 0)),
+        (slice(5, 14), (1, 0, 1e25, 0, 1, 1e25, 0.5, 1, 0)),
+    ],
+)
+def test_vectors_at_the_edge_of_what_can_be_drawn(network, at: slice, numbers: tuple[float, ...]) -> None:
     p = program(LEAVES[0])
-    for frame in ((1e30, 0, 0, 0, 1e30, 0), (1e-30, 0, 0, 0, 1e-30, 0), (1e-30, 0, 0, 0, 1e30, 0)):
-        vectors = p.vectors.copy()
-        vectors[0, 5:11] = frame
-        assert np.isfinite(drawn(network, dataclasses.replace(p, vectors=vectors))[0]).all()
+    vectors = p.vectors.copy()
+    vectors[0, at] = numbers
+    for skip in (True, False):
+        edge = dataclasses.replace(p, vectors=vectors)
+        assert np.isfinite(drawn(network, edge, skip=skip)[0]).all()
