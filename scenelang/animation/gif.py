@@ -1,5 +1,7 @@
 """GIF, written frame by frame. Pillow compresses each; the container is ours, so that only two are held.
 
+Pillow's own writer holds every frame until the last has come, and gives each a palette of its own.
+
 Source: CompuServe, Graphics Interchange Format, version 89a.
 """
 

@@ -1,4 +1,7 @@
-"""Colours of pictures for formats that hold 256 of them."""
+"""Colours of pictures for formats that hold 256 of them.
+
+Pillow chooses a palette for one picture; one that is exact for all frames of a film is found here.
+"""
 
 from __future__ import annotations
 
