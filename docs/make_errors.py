@@ -59,7 +59,11 @@ and goes to standard output.
 ```sh
 scenelang check scene.nsg --ignore W0201,W05
 scenelang check scene.nsg --select W03 --strict
+scenelang check film.nsg --all-frames
 ```
+
+Of an animation the first, second, middle and last frame are looked at, or all, or one (`--frame N`). What
+another frame than the first has names it. Together they may take as many steps and objects as one.
 
 Errors always count. Warnings can be left out or chosen by their codes or beginnings of them, and `--strict`
 lets them fail the check. The exit code is 0 without errors, 1 with, 2 where a file cannot be read.
