@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from fuzz.target import PROPERTIES, TARGETS, load_target
+from fuzz.target import PROPERTIES, PUMPED, TARGETS, load_target
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -40,7 +40,7 @@ def main(arguments: list[str] | None = None) -> int:
     if wanted.minimise is not None:
         return _minimise(wanted.target, wanted.minimise)
     try:
-        if wanted.target != PROPERTIES:
+        if wanted.target not in (PROPERTIES, PUMPED):
             import atheris  # type: ignore[import-untyped]  # noqa: F401
     except ImportError:
         print("fuzzing needs atheris: pip install 'scenelang[fuzz]'", file=sys.stderr)
@@ -48,7 +48,12 @@ def main(arguments: list[str] | None = None) -> int:
     from fuzz.runner import RECORDS, fuzz
 
     records = RECORDS if wanted.record else None
-    record = fuzz(wanted.target, wanted.minutes, wanted.work, wanted.seed, records)
+    if wanted.target == PUMPED:
+        from fuzz.hunt import hunt
+
+        record = hunt(wanted.minutes, wanted.work, wanted.seed, records)
+    else:
+        record = fuzz(wanted.target, wanted.minutes, wanted.work, wanted.seed, records)
     print(f"{record.executions:,} executions in {record.wall_s:.0f} s, {record.edges} edges")
     for finding in record.findings:
         print(f"{finding['kind']}: {finding['signature']} ({finding['times']} times), {finding['file']}")

@@ -69,7 +69,7 @@ def fuzz(name: str, minutes: float, work: Path, seed: int = 1, records: Path | N
     for index, data in enumerate(seeds):
         (folder / "corpus" / f"seed-{index:04}").write_bytes(data[: target.most_bytes])
     now = datetime.now(UTC)
-    record = Record(name, now.isoformat(timespec="seconds"), _revision(), 60 * minutes, seeds=len(seeds))
+    record = Record(name, now.isoformat(timespec="seconds"), revision(), 60 * minutes, seeds=len(seeds))
     start_s = time.monotonic()
     with (folder / "log.txt").open("ab") as log:
         while (left_s := record.asked_s - (time.monotonic() - start_s)) > 1:
@@ -104,11 +104,11 @@ def _one_process(target: Target, folder: Path, log: Any, left_s: int, seed: int,
         command = [sys.executable, "-m", "fuzz.properties", str(folder), str(left_s), str(seed)]
     begin = log.tell()
     before = {path.name for path in (folder / "findings").glob("*")}
-    cpu_s = _children_s()
+    cpu_s = children_s()
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
     done = subprocess.run(command, cwd=ROOT, stdout=log, stderr=log, env=environment, check=False)
     record.processes += 1
-    record.cpu_s = round(record.cpu_s + _children_s() - cpu_s, 1)
+    record.cpu_s = round(record.cpu_s + children_s() - cpu_s, 1)
     with (folder / "log.txt").open("rb") as lines:
         lines.seek(begin)
         text = lines.read().decode("utf-8", "replace")
@@ -169,12 +169,12 @@ def _seconds(target: Target, data: bytes) -> float:
     return time.process_time() - before
 
 
-def _children_s() -> float:
+def children_s() -> float:
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
 
 
-def _revision() -> str:
+def revision() -> str:
     """The commit that was fuzzed, with a plus where files differ from it; unknown outside a checkout."""
     try:
         commit = _git("rev-parse", "--short=12", "HEAD")

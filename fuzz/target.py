@@ -18,8 +18,11 @@ TARGETS: Final = (
     "formatting",
     "incremental",
     "gltf",
+    "slow",
 )
 """Names of the modules in `fuzz.targets`."""
+PUMPED: Final = "slow"
+"""The target that `fuzz.hunt` drives, without atheris."""
 PROPERTIES: Final = "properties"
 """What Hypothesis drives, in `fuzz.properties`."""
 

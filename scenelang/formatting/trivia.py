@@ -14,7 +14,7 @@ from typing import NamedTuple
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Tokens
 
-_COMMENT = re.compile(r"//[^\n]*|/\*[\s\S]*?\*/")
+_COMMENT = re.compile(r"//[^\n]*|/\*(?:[\s\S]*?\*/|[\s\S]*)")
 
 
 class Comment(NamedTuple):

@@ -16,7 +16,7 @@ from scenelang.syntax.tables import tables
 BlockKind = Literal["file", "group", "chain", "object", "material"]
 COMBINE: Final = ("union", "smooth", "subtract", "intersect")
 _NODES: Final = {"group": "group", "chain": "chain", **dict.fromkeys(COMBINE, "group"), "module": "group"}
-_COMMENTS: Final = re.compile(r"//[^\n]*\n|/\*[\s\S]*?\*/")
+_COMMENTS: Final = re.compile(r"//[^\n]*+\n?|/\*(?:[\s\S]*?\*/|[\s\S]*)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +145,11 @@ def cursor_at(parsed: Parsed, offset: int, values: frozenset[str] = frozenset())
 
 def _in_comment(read: _Reader, index: int, offset: int) -> bool:
     gap = read.source_text[read.ends[index - 1] if index else 0 : offset]
-    rest = _COMMENTS.sub(" ", gap)
-    return "//" in rest or "/*" in rest
+    found = list(_COMMENTS.finditer(gap))
+    if not found or found[-1].end() < len(gap):
+        return False
+    comment = found[-1][0]
+    return not (comment.endswith("\n") if comment[1] == "/" else comment[2:].endswith("*/"))
 
 
 def _call(read: _Reader, head: int, index: int) -> Call | None:

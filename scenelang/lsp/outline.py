@@ -20,7 +20,10 @@ _DEFINES: Final = {
     nodes.Fn: Kind.Function,
     nodes.Module: Kind.Module,
 }
-_COMMENT: Final = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"|/\*[\s\S]*?\*/|(?:^[ \t]*//[^\n]*\n?)+', re.MULTILINE)
+# Possessive: a string or comment without end is read once, not once for each of its characters.
+_COMMENT: Final = re.compile(
+    r'"(?:[^"\\\n]|\\[^\n])*+"?|/\*(?:[\s\S]*?\*/|[\s\S]*)|(?:^[ \t]*+//[^\n]*+\n?)++', re.MULTILINE
+)
 
 
 def document_symbols(document: Document) -> list[types.DocumentSymbol]:
@@ -81,12 +84,12 @@ def _has_children(stmt: nodes.Stmt) -> bool:
 
 def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol]:
     """Definitions at the top of all files whose names have the letters of a query, in order."""
-    wanted = re.compile(".*".join(re.escape(letter) for letter in query), re.IGNORECASE)
-    found = []
+    query, found = query.lower(), []
     for document in docs.known():
         for stmt in document.parsed.file.statements:
             if isinstance(stmt, nodes.Param | nodes.Let | nodes.Fn | nodes.Module):
-                if not wanted.search(stmt.name.text):
+                letters = iter(stmt.name.text.lower())
+                if not all(letter in letters for letter in query):
                     continue
                 place = types.Location(document.uri, document.lines.span(stmt.name.span))
                 container = document.path.name if document.path is not None else document.uri

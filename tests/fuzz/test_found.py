@@ -27,7 +27,7 @@ from scenelang.scene.fields import RESERVED
 from scenelang.scene.schema import Scene
 from scenelang.syntax import parse
 from scenelang.syntax.tables import tables
-from tests.work import lines_run
+from tests.work import ends, lines_run
 
 
 def illegal(count: int, around: int) -> list[Diagnostic]:
@@ -242,3 +242,18 @@ def test_a_dot_behind_a_number_behind_a_comment_is_no_decimal_point(
     done = format_text(f"let a = {before}{number} . {between}a;")
     assert f"{number} ." in done
     assert format_text(done) == done
+
+
+@pytest.mark.parametrize(
+    ("reader", "unit", "head", "tail"),
+    [
+        ("fmt", "/* ", "", ""),
+        ("edit", "//", "", ""),
+        ("edit", "/* ", "", ""),
+        ("edit", '\\"', "", ""),
+        ("edit", "a", "let ", " = 1;"),
+    ],
+)
+def test_text_without_end_is_read_once(reader: str, unit: str, head: str, tail: str) -> None:
+    """Patterns that met no end began again one letter further on."""
+    ends(f"from fuzz import pumps; pumps.READERS[{reader!r}]({head!r} + {unit!r} * 300_000 + {tail!r})")
