@@ -189,7 +189,7 @@ def test_animations(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("none.nsg",), "there is no file 'none.nsg'"),
+        (("none.nsg",), "there is no file `none.nsg`"),
         (("a.nsg", "-o", "none/a.png"), "no folder `none`"),
         (("a.nsg", "-o", "a.xyz"), "suffix `.xyz`"),
         (("a.nsg", "-o", "a.png", "--frames", "0..3"), "holds one picture"),
