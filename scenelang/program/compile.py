@@ -11,11 +11,11 @@ from scenelang.graph.lower import Memory, Spans
 from scenelang.graph.nodes import Graph
 from scenelang.models.choose import apart, best_of_sets, choose_model
 from scenelang.models.manifest import Manifest, available, load_manifest
-from scenelang.models.weights import Codes
 from scenelang.passes import check_scene
 from scenelang.scene.schema import Scene
 
 if TYPE_CHECKING:
+    from scenelang.models.weights import Codes
     from scenelang.program.program import Program
 
 

@@ -11,8 +11,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from scenelang.scene.wording import refusal
-
 _NOT_0: dict[str, Any] = {"not": {"const": 0}}
 _NOT_000: dict[str, Any] = {"not": {"const": [0, 0, 0]}}
 
@@ -116,6 +114,8 @@ class Frozen(BaseModel):
         try:
             super().__init__(**given)
         except ValidationError as error:
+            from scenelang.scene.wording import refusal  # only mistakes need it
+
             raise refusal(type(self).__name__, error, self._names()) from None
 
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # data is validated without it

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from scenelang.notebook import bundle
 from scenelang.scene.fields import Combine as Combine
 from scenelang.scene.modifiers import Bend as Bend
 from scenelang.scene.modifiers import Color as Color
@@ -43,6 +42,8 @@ class Scene(SceneData):
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
         count = len(self.nodes)
+        from scenelang.notebook import bundle
+
         return bundle(self, self.canvas, f"Scene of {count:,} node{'s' * (count != 1)}")
 
     def to_nsg(self) -> str:
