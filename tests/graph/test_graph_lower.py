@@ -12,11 +12,11 @@ import pytest
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.dump import dump
 from scenelang.graph.looks import Look, coloured
-from scenelang.graph.lower import lower
+from scenelang.graph.lower import Memory, lower
 from scenelang.graph.nodes import Fold, Leaf, Link, Move
 from scenelang.graph.steps import Affine, Warp
 from scenelang.graph.verify import InternalError, Invariant, verify
-from scenelang.models.manifest import load_manifest
+from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.scene import schema
 
 SHAPES = load_manifest("shapes2d")
@@ -219,3 +219,24 @@ def test_a_constant_look_folds_to_its_colour() -> None:
     assert folded.folded() is folded
     bark = Look.of("bark", ops)  # a texture is not one colour
     assert bark.folded() is bark
+
+
+def test_objects_that_stay_keep_their_leaves() -> None:
+    """Where object, material and model are the very same; the leaf then keeps its notes."""
+    red, blue = (schema.Material(name="flat", ops=(schema.Color(rgb=rgb),)) for rgb in ((1, 0, 0), (0, 0, 1)))
+    star, square = schema.Object(geometry="star"), schema.Object(geometry="square")
+
+    def leaves(memory: Memory, material: schema.Material, manifest: Manifest = SHAPES) -> list[object]:
+        group = schema.Group(children=(star, square.model_copy()), material=material)
+        graph = lower(schema.Scene(nodes=(group,)), manifest, None, Diagnostics(), memory)
+        (fold,) = (link.node for link in graph.root.links)
+        assert isinstance(fold, Fold)
+        return [link.node for link in fold.links]
+
+    memory = Memory()
+    first, again = leaves(memory, red), leaves(memory, red)
+    assert first == again
+    assert [a is b for a, b in zip(first, again, strict=True)] == [True, False]
+    for other in (leaves(memory, blue), leaves(memory, blue, replace(SHAPES, name="other"))):
+        assert not any(a is b for a, b in zip(again, other, strict=True))
+        again = other
