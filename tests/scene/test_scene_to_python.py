@@ -86,8 +86,8 @@ def test_deep_scenes_become_parts() -> None:
     scene = nsg.Scene.model_construct(nodes=(node,))
     code = scene.to_python()
     assert "part_1 = nsg.Chain(" in code
+    assert run(code).to_json() == scene.to_json()  # Python 3.12 compares no trees as deep as these
     with deep_stack():
-        assert run(code).nodes == scene.nodes
         assert "…" in repr(scene) or repr(scene)
 
 
