@@ -15,8 +15,8 @@ import click
 from scenelang.backend.errors import RenderError
 from scenelang.files import NotWritten, inputs_kept
 
-# Command -> what `--help` says. Each lies in a file of its name as `command`, imported when it is called;
-# a keyword's file ends in an underscore, and a dash is one.
+# Command -> what `--help` says. Each is `command` in a file of its name, imported when it is called; the file
+# of a Python keyword ends in an underscore, and a dash is one.
 COMMANDS: Final = {
     "render": "Draw scenes or compiled programs.",
     "watch": "Draw a scene again whenever it is saved.",
@@ -148,7 +148,7 @@ def describe(error: OSError) -> str:
 
 @click.group(
     cls=_Commands,
-    package="scenelang.cli",
+    package="scenelang.cli.commands",
     table=COMMANDS,
     elsewhere=ELSEWHERE,
     moved=MOVED,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli.train import begin, first_mistake, training
+from scenelang.cli.commands.train import begin, first_mistake, training
 
 if TYPE_CHECKING:
     from scenelang.lab.designs.config import StudentFile
