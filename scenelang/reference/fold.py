@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from scenelang.reference.distance import namespace
+from scenelang.reference.leaves import Array, namespace
 
-UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
 BLEND = 0.15  # k of the smooth union, world units
-
-Array = Any
 
 
 def fold(

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from scenelang.reference.distance import SECTORS, carry_back_affine, carry_back_warp, sector_distance
+from scenelang.reference.field import map_back, warp_back
 from scenelang.reference.fold import fold
+from scenelang.reference.leaves import SECTORS, sector_distance
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")
 FAR = 1e3  # translation of the objects that pad a stream: off every point
@@ -209,7 +210,7 @@ def leaf_batch(p: int, g: torch.Generator) -> LeafBatch:
     even = torch.stack([radius * angle.cos(), radius * angle.sin()], -1)
     q = torch.where((torch.arange(p, device=g.device) % 2 == 0)[:, None], near, even)
     shape = (v[:, None] for v in sectors(g.device).unbind(-1))
-    return LeafBatch(q.mT, sector_distance(q[..., 0], q[..., 1], *shape))
+    return LeafBatch(q.mT, sector_distance(q.unbind(-1), *shape))
 
 
 def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Batch:
@@ -238,11 +239,10 @@ def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Bat
     singular = torch.linalg.svdvals(world[..., :2])[..., 1]
 
     points = points_of(world, leaf, count, twirl, bend, singular, config, g)
-    x, y = points[:, None, :, 0], points[:, None, :, 1]  # (B, 1, pool)
-    qx, qy = carry_back_affine(frame[..., None].permute(2, 3, 0, 1, 4), x, y)
-    qx, qy = carry_back_warp(twirl[..., None], bend[..., None], torch.zeros((), device=device), qx, qy)
+    q = map_back(frame[..., None].permute(2, 3, 0, 1, 4), points[:, None].unbind(-1))  # two of (B, N, pool)
+    q = warp_back(twirl[..., None], [bend[..., None]], q)
     shape = sectors(device)[leaf]
-    d = sector_distance(qx, qy, *(v[..., None] for v in shape.unbind(-1))) * singular[..., None]
+    d = sector_distance(q, *(v[..., None] for v in shape.unbind(-1))) * singular[..., None]
     steps = list(fold(d.unbind(1), rgb[:, :, None].unbind(1), tokens.T[..., None]))
     # of the points that are not on an edge keep those near the boundary of the whole stream
     gumbel = -torch.log(
@@ -252,11 +252,11 @@ def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Bat
     order[:, : _edges(config)] = math.inf
     keep = order.topk(p, dim=1).indices  # (B, P)
     keep_n = keep[:, None].expand(b, n, p)
-    q = torch.stack([qx, qy], 2).gather(3, keep_n[:, :, None].expand(b, n, 2, p))
+    chosen = torch.stack(q, 2).gather(3, keep_n[:, :, None].expand(b, n, 2, p))
     colour = torch.stack([c.expand(*big_d.shape, 3) for big_d, c in steps], 1)
     depth = torch.stack([big_d for big_d, _ in steps], 1)
     return Batch(
-        q=q,
+        q=chosen,
         scale=singular,
         leaf=leaf,
         rgb=rgb,

@@ -20,7 +20,8 @@ from scenelang.graph.nodes import Graph
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
-from scenelang.reference.image import evaluate, reference_image, sample_points
+from scenelang.reference.field import evaluate
+from scenelang.reference.image import reference_image, sample_points
 
 FOLDER = Path(__file__).parent / "cases"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.nsg"))
@@ -99,9 +100,9 @@ def stream_digest(program: Program) -> str:
 
 def is_stable(graph: Graph, by: float = 1e-9) -> bool:
     """Whether moving all samples by a little changes nothing that shows."""
-    x, y = (v.ravel() for v in sample_points(graph.canvas, range(graph.canvas[1]), 2))
+    points = sample_points(graph.canvas, range(graph.canvas[1]), 2)
     pictures = []
     for dx, dy in ((0.0, 0.0), (by, by), (-by, by), (by, -by), (-by, -by)):
-        d, c = evaluate(graph.root, x + dx, y + dy)
+        d, c = evaluate(graph.root, points + np.array([[dx], [dy]]))
         pictures.append(np.where((d < 0)[:, None], c, -1.0))
     return all(np.abs(p - pictures[0]).max() < 1e-6 for p in pictures)

@@ -10,7 +10,7 @@ from scenelang.graph.levels import Levels
 from scenelang.graph.steps import Affine, Rows, Step, Warp
 from scenelang.lifting.exact import leaf_vector, lift_colours, lift_many, matrices
 from scenelang.lifting.layout import PLANE_LAYOUT, Layout
-from scenelang.reference.image import carry_back, distance_scale
+from scenelang.reference.field import carry_back, distance_scale
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.arrays_torch import TORCH
 from scenelang.renderers.frames import local_points, read_frame
@@ -59,7 +59,7 @@ def test_vector_carries_points_back_as_the_reference_does(inner: int, outer: int
     levels = random_levels(rng, inner, outer)
     p = rng.uniform(-2, 2, (2, 50))
     frame = read_frame(lift_many([levels], [CODE])[0])
-    want = carry_back(steps_of(levels), *p)
+    want = carry_back(steps_of(levels), p)
     np.testing.assert_allclose(local_points(NUMPY, frame, p), want, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(local_points(TORCH, frame, torch.from_numpy(p)), want, rtol=1e-9, atol=1e-9)
     assert frame.scale == pytest.approx(distance_scale(steps_of(levels)), rel=1e-9)
@@ -75,9 +75,9 @@ def test_points_near_the_leaf_move_no_faster_than_the_frame_says(
     frame = read_frame(lift_many([levels], [CODE])[0])
     x, y = rng.uniform(-4, 4, (2, 20000))
     step = 1e-5
-    qx, qy = carry_back(steps_of(levels), x, y)
+    qx, qy = carry_back(steps_of(levels), (x, y))
     for dx, dy in ((step, 0.0), (0.0, step)):
-        rx, ry = carry_back(steps_of(levels), x + dx, y + dy)
+        rx, ry = carry_back(steps_of(levels), (x + dx, y + dy))
         speed = np.hypot(rx - qx, ry - qy) / step
         near = np.hypot(qx, qy) <= 1
         assert near.any()
@@ -92,7 +92,7 @@ def test_boxes_hold_discs(inner: int, outer: int, radius: float) -> None:
     frame = read_frame(lift_many([levels], [CODE])[0])
     xmin, ymin, xmax, ymax = frame.box(radius)
     x, y = rng.uniform(-2, 2, (2, 20000)) * max(xmax - xmin, ymax - ymin)
-    within = np.hypot(*carry_back(steps_of(levels), x, y)) <= radius
+    within = np.hypot(*carry_back(steps_of(levels), (x, y))) <= radius
     outside = (x < xmin) | (x > xmax) | (y < ymin) | (y > ymax)
     assert within.any()
     assert not (within & outside).any()

@@ -30,8 +30,9 @@ from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
 from scenelang.passes.context import Context
 from scenelang.program.program import TOKENS
-from scenelang.reference.distance import leaf_distance
-from scenelang.reference.image import carry_back, distance_scale, evaluate, sample_points
+from scenelang.reference.field import carry_back, distance_scale, evaluate
+from scenelang.reference.image import sample_points
+from scenelang.reference.leaves import leaf_distance
 from scenelang.scene.schema import Scene
 from tests.passes.random_scenes import full_scene
 
@@ -106,9 +107,9 @@ def stages(scene: Scene) -> list[tuple[str, Graph]] | None:
     return None if diagnostics.errors else found
 
 
-def nearest_outline(graph: Graph, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """World distance (M,) of points to the outline of the nearest leaf, drawn or not."""
-    nearest = np.full(x.shape, np.inf)
+def nearest_outline(graph: Graph, p: np.ndarray) -> np.ndarray:
+    """World distance (M,) of points (2, M) to the outline of the nearest leaf, drawn or not."""
+    nearest = np.full(p.shape[1], np.inf)
 
     def leaves(node: Any, outer: tuple[Step, ...]) -> Iterator[tuple[Leaf, tuple[Step, ...]]]:
         steps = (*(move.step for move in node.moves), *outer)
@@ -119,7 +120,7 @@ def nearest_outline(graph: Graph, x: np.ndarray, y: np.ndarray) -> np.ndarray:
                 yield from leaves(link.node, steps)
 
     for leaf, steps in leaves(graph.root, ()):
-        d = leaf_distance(leaf.geometry, *carry_back(steps, x, y)) * distance_scale(steps)
+        d = leaf_distance(leaf.geometry, carry_back(steps, p)) * distance_scale(steps)
         nearest = np.minimum(nearest, np.abs(d))
     return nearest
 
@@ -141,16 +142,16 @@ def prove(scenes: int, first: int = 0) -> Proof:
 def _compare(found: list[tuple[str, Graph]], seed: int, proof: Proof) -> None:
     graph = found[0][1]
     _, height = graph.canvas
-    x, y = (v.ravel() for v in sample_points(graph.canvas, range(height), 2))
-    distance, colour = evaluate(graph.root, x, y)
-    clear = nearest_outline(graph, x, y) > EDGE
+    points = sample_points(graph.canvas, range(height), 2)
+    distance, colour = evaluate(graph.root, points)
+    clear = nearest_outline(graph, points) > EDGE
     size = count(graph)
     covered = int((distance < 0).sum())
-    if size.objects < 2 or covered < LEAST * len(x):
+    if size.objects < 2 or covered < LEAST * len(distance):
         proof.bare += 1
         return
     proof.scenes += 1
-    proof.samples += len(x)
+    proof.samples += len(distance)
     proof.covered += covered
     proof.aside += int((~clear).sum())
     proof.objects += size.objects
@@ -167,7 +168,7 @@ def _compare(found: list[tuple[str, Graph]], seed: int, proof: Proof) -> None:
         tally.matrices += size.matrices - smaller.matrices
         tally.folds += size.folds - smaller.folds
         size = smaller
-        now, painted = evaluate(after.root, x, y)
+        now, painted = evaluate(after.root, points)
         look = clear & (np.abs(distance) > EDGE) & (np.abs(now) > EDGE)
         differing = int(((distance < 0) != (now < 0))[look].sum())
         largest = float(np.abs(colour - painted)[look & (distance < 0) & (now < 0)].max(initial=0.0))

@@ -11,8 +11,8 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.manifest import load_manifest
-from scenelang.reference.distance import SECTORS, leaf_distance
 from scenelang.reference.image import reference_image
+from scenelang.reference.leaves import SECTORS, leaf_distance
 from scenelang.scene.schema import Chain, Color, Grayscale, Hue, Link, Material, Object, Rotate, Scale, Scene
 from tests.reference import oracle
 
@@ -26,7 +26,7 @@ def test_distance_equals_a_loop_over_edges(geometry: str) -> None:
     points = np.random.default_rng(1).uniform(-2.5, 2.5, (2000, 2))
     corners = oracle.outline(geometry)
     slow = [oracle.polygon_distance(corners, *p) for p in points.tolist()]
-    np.testing.assert_allclose(leaf_distance(geometry, *points.T), slow, atol=1e-12)
+    np.testing.assert_allclose(leaf_distance(geometry, points.T), slow, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["shapes2d", "chains", "groups", "twelve", "shuffled", "tree", "wide"])

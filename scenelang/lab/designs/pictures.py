@@ -15,8 +15,9 @@ import torch
 from torch import Tensor
 
 from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH
-from scenelang.reference.distance import carry_back_affine, carry_back_warp, sector_distance
+from scenelang.reference.field import map_back, warp_back
 from scenelang.reference.fold import fold
+from scenelang.reference.leaves import sector_distance
 from scenelang.training.scenes import sectors
 
 
@@ -106,19 +107,17 @@ def frames(scenes: Scenes) -> Tensor:
     return torch.cat([linear, -linear @ scenes.affine[..., :2, 3:]], -1)
 
 
-def local_points(scenes: Scenes, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
+def local_points(scenes: Scenes, x: Tensor, y: Tensor) -> list[Tensor]:
     """Exact leaf coordinates, two of (B, N, P), of world points x, y, each (B or 1, P)."""
     rows = frames(scenes)[..., None].permute(2, 3, 0, 1, 4)
-    qx, qy = carry_back_affine(rows, x[:, None], y[:, None])
-    zero = torch.zeros((), device=x.device)
-    q: tuple[Tensor, Tensor] = carry_back_warp(scenes.twirl[..., None], scenes.bend[..., None], zero, qx, qy)
-    return q
+    q = map_back(rows, (x[:, None], y[:, None]))
+    return warp_back(scenes.twirl[..., None], [scenes.bend[..., None]], q)
 
 
 def trace_exactly(scenes: Scenes, x: Tensor, y: Tensor) -> tuple[Tensor, list[tuple[Tensor, Tensor]]]:
     """Exact distances (B, N, P) of the objects, and distance (B, P) and colour (B, P, 3) after each."""
     shape = sectors(x.device)[scenes.leaf]  # (B, N, 4)
-    d = sector_distance(*local_points(scenes, x, y), *(v[..., None] for v in shape.unbind(-1)))
+    d = sector_distance(local_points(scenes, x, y), *(v[..., None] for v in shape.unbind(-1)))
     d = d * stretch(scenes)[..., None]
     return d, list(fold(d.unbind(1), scenes.rgb[:, :, None].unbind(1), scenes.tokens.T[..., None]))
 
