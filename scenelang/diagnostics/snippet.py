@@ -18,14 +18,14 @@ from dataclasses import dataclass
 
 from scenelang.diagnostics.cells import LONGEST, Canvas, Line, in_cells, left_out, paint, printable, window
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.records import Record
 
 _LEAST_WIDTH = 30
 _HEAD, _TAIL = 2, 1
 """Of a mark over many lines so many are shown after its first line and before its last."""
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
+class Mark(Record):
     """A place in a text.
 
     Args:
