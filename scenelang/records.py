@@ -1,4 +1,4 @@
-"""Records: frozen values with named fields, like `dataclass(frozen=True, slots=True)` but cheap to define.
+"""Records: values with named fields, like `dataclass(frozen=True, slots=True)` but cheap to define.
 
 A dataclass writes and compiles six methods when its module is imported, which takes half a millisecond. A
 record compiles `__init__` alone and inherits the others. Type checkers hold it to be frozen and nothing does
@@ -7,37 +7,51 @@ at run time, so that making one takes a quarter of the time.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import MISSING, Field, dataclass, field
 from operator import attrgetter
-from typing import Any, dataclass_transform
+from typing import Any, ClassVar, dataclass_transform
 
-_register = dataclass(init=False, repr=False, eq=False, match_args=False)
+_register: Callable[[type], type] = dataclass(init=False, repr=False, eq=False, match_args=False)
 
 
-@dataclass_transform(frozen_default=True)
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
 class _RecordType(type):
-    """Makes the slots and `__init__` of a record from its annotations."""
+    """Makes the slots and `__init__` of a record from its annotations.
 
-    def __new__(cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]) -> _RecordType:
+    Args:
+        frozen: one that may change is equal to itself alone.
+    """
+
+    def __new__(
+        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any], frozen: bool = True
+    ) -> _RecordType:
         hints = namespace.get("__annotations__", {})
-        own = [field for field, hint in hints.items() if "ClassVar" not in str(hint)]
-        fields = [*(f for base in bases for f in getattr(base, "__match_args__", ())), *own]
-        defaults = [value for base in bases for value in getattr(base.__init__, "__defaults__", None) or ()]
-        defaults += [namespace.pop(field) for field in own if field in namespace]
+        own = {n: namespace.pop(n, MISSING) for n, hint in hints.items() if "ClassVar" not in str(hint)}
+        fields = {n: value for base in bases for n, value in getattr(base, "_defaults", {}).items()} | own
         if fields:
-            lines = [f"def __init__(self, {', '.join(fields)}):", *(f" self.{f} = {f}" for f in fields)]
-            exec("\n".join(lines), {}, namespace)
-            namespace["__init__"].__defaults__ = tuple(defaults)
+            head, lines = [], []
+            for n, default in fields.items():
+                head.append(n if default is MISSING else f"{n}=_{n}")
+                build = f"_{n}.default_factory() if {n} is _{n} else " if isinstance(default, Field) else ""
+                lines.append(f" self.{n} = {build}{n}")
+            code = "\n".join([f"def __init__(self, {', '.join(head)}):", *lines])
+            exec(code, {f"_{n}": default for n, default in fields.items()}, namespace)
             namespace.setdefault("_key", attrgetter(*fields))
-        namespace |= {"__slots__": own, "__match_args__": tuple(fields)}
+        if not frozen:
+            namespace |= {"__eq__": object.__eq__, "__hash__": object.__hash__}
+        namespace |= {"__slots__": tuple(own), "__match_args__": tuple(fields), "_defaults": fields}
         namespace.setdefault("__doc__", name)
         # Registered, so that `dataclasses.fields` and `replace` take it.
-        return _register(super().__new__(cls, name, bases, namespace))
+        record = super().__new__(cls, name, bases, namespace)
+        _register(record)
+        return record
 
 
 class Record(metaclass=_RecordType):
     """Base of records; two are equal where their classes and all fields are."""
 
+    _defaults: ClassVar[dict[str, Any]] = {}  # of all fields; MISSING where there is none
     _key = attrgetter("__class__")  # what equality and the hash are about
 
     def __eq__(self, other: object) -> bool:
@@ -49,5 +63,5 @@ class Record(metaclass=_RecordType):
         return hash(self._key(self))
 
     def __repr__(self) -> str:
-        fields = ", ".join(f"{name}={getattr(self, name)!r}" for name in self.__match_args__)
+        fields = ", ".join(f"{name}={getattr(self, name)!r}" for name in self._defaults)
         return f"{self.__class__.__qualname__}({fields})"
