@@ -20,7 +20,6 @@ ORDER = (
     "scenelang.deep",
     "scenelang.files",
     "scenelang.notebook",
-    "scenelang.records",
     "scenelang.tensors",
     "scenelang.diagnostics",
     "scenelang.syntax",

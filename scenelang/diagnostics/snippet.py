@@ -14,17 +14,18 @@ otherwise. A mark over several lines has a bar at the left from where it begins 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from scenelang.diagnostics.cells import LONGEST, Canvas, Line, in_cells, left_out, paint, printable, window
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.records import Record
 
 _LEAST_WIDTH = 30
 _HEAD, _TAIL = 2, 1
 """Of a mark over many lines so many are shown after its first line and before its last."""
 
 
-class Mark(Record):
+@dataclass(frozen=True, slots=True)
+class Mark:
     """A place in a text.
 
     Args:
@@ -38,7 +39,8 @@ class Mark(Record):
     primary: bool = False
 
 
-class _Bar(Record, frozen=False):
+@dataclass(slots=True)
+class _Bar:
     """A mark over several lines: where it begins and ends, and its column of the margin."""
 
     mark: Mark
@@ -50,7 +52,8 @@ class _Bar(Record, frozen=False):
     slash: bool = False
 
 
-class _Note(Record, frozen=False):
+@dataclass(slots=True)
+class _Note:
     """What one line has to show of a mark, in cells ``[left, right)``."""
 
     left: int

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from scenelang.records import Record
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Tokens
 
@@ -40,7 +39,8 @@ def texts_of(comments: Iterable[Comment]) -> list[str]:
     return [comment.text for comment in comments]
 
 
-class Notes(Record, frozen=False):
+@dataclass(slots=True)
+class Notes:
     """What stands around one token.
 
     Args:

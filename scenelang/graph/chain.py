@@ -14,10 +14,7 @@ Moves = tuple[Move, ...]
 
 def is_identity(move: Move) -> bool:
     """Whether a move leaves every point where it is, exactly."""
-    step = move.step
-    if isinstance(step, Affine):
-        return step.rows == IDENTITY
-    return step.twirl == 0.0 and step.bend == (0.0, 0.0)
+    return move.step.idle
 
 
 def merged(moves: Iterable[Move]) -> Moves:
@@ -51,8 +48,10 @@ def normal(moves: Iterable[Move], space: Space) -> Moves:
     for move in moves:
         if isinstance(move.step, Warp):
             _append_warp(out, move.step, move, space)
-        else:
+        elif isinstance(move.step, Affine):
             _append_affine(out, move.step.rows, move)
+        elif not move.step.idle:
+            out.append(move)
     return tuple(out)
 
 
@@ -74,7 +73,7 @@ def _append_warp(out: list[Move], warp: Warp, move: Move, space: Space) -> None:
     if out and isinstance(inner := out[-1].step, Warp) and inner.bend == (0.0, 0.0):
         move = out.pop()
         warp = Warp(inner.twirl + warp.twirl, warp.bend)
-    if warp.twirl != 0.0 or warp.bend != (0.0, 0.0):
+    if not warp.idle:
         out.append(Move(warp, move.span))
     if held is not None and isinstance(held.step, Affine):
         _append_affine(out, held.step.rows, held)

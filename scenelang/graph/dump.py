@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
 from scenelang.graph.space import Space
-from scenelang.graph.steps import IDENTITY, Affine
+from scenelang.graph.steps import IDENTITY, Affine, Warp
 
 
 def dump(graph: Graph) -> str:
@@ -42,8 +42,10 @@ def _push(stack: list[tuple[Link, int, bool]], fold: Fold, depth: int) -> None:
 def move_text(move: Move, space: Space) -> str:
     """``warp(twirl; bend)``, or the rows of a matrix."""
     step = move.step
-    if not isinstance(step, Affine):
+    if isinstance(step, Warp):
         return f"warp({step.twirl:.6g}; {step.bend[0]:.6g} {step.bend[1]:.6g})"
+    if not isinstance(step, Affine):
+        return repr(step)
     if step.rows == IDENTITY:
         return "[identity]"
     rows = (" ".join(f"{step.rows[i] + 0.0:.6g}" for i in row) for row in space.shown)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from scenelang.graph.steps import IDENTITY, Rows, Step, Warp
+from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Warp
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +53,11 @@ def split_levels(steps: Sequence[Step], limits: Mapping[str, int]) -> Levels:
     for step in steps:
         if isinstance(step, Warp):
             runs[-1].append(step)
-        else:
+        elif isinstance(step, Affine):
             maps.append(step.rows)
             runs.append([])
+        else:
+            raise LevelsError(f"a {type(step).__name__.lower()} does not fit")
     # w… | w… A | w… A w… | w… A w… A, where the first run may be empty and the last one is if A is last.
     first = runs[0]
     if len(maps) == 0 or (len(maps) == 1 and not runs[1]):

@@ -16,6 +16,8 @@ from scenelang.graph.space import Space
 from scenelang.graph.steps import Step
 from scenelang.scene.schema import Combine
 
+BLEND = 0.15
+
 
 @dataclass(frozen=True, slots=True)
 class Move:
@@ -62,10 +64,14 @@ class Leaf:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A child of a fold with the operator that joins it to what came before; the first is a union."""
+    """A child of a fold with the operator that joins it to what came before; the first is a union.
+
+    ``k`` is the width of a ``smooth`` blend, in world units, over 0.
+    """
 
     op: Combine
     node: Node
+    k: float = BLEND
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from enum import Enum
 
 from scenelang.graph.nodes import Fold, Graph, Leaf, Move
 from scenelang.graph.space import Space
-from scenelang.graph.steps import IDENTITY, Affine
+from scenelang.graph.steps import Affine
 
 
 class Invariant(Enum):
@@ -114,16 +114,11 @@ class _Check:
         for move in moves:
             step = move.step
             if isinstance(step, Affine):
-                rows = step.rows
-                if not self.space.holds(rows):
+                if not self.space.holds(step.rows):
                     return "a map stays within the space of its model"
                 if self.merged and after_map:
                     return Invariant.MERGED.value
-                still = self.tidy and rows == IDENTITY
-                after_map = True
-            else:
-                still = self.tidy and step.twirl == 0.0 and step.bend == (0.0, 0.0)
-                after_map = False
-            if still:
+            after_map = isinstance(step, Affine)
+            if self.tidy and step.idle:
                 return Invariant.NO_IDENTITIES.value
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from scenelang.deep import deep_stack
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 def graph_data(graph: Graph) -> dict[str, Any]:
     """A graph: leaves and folds with their moves, nearest the leaf first.
 
-    An affine move is the upper three rows of its matrix, a warp its ``twirl`` and ``bend``.
+    An affine move is the upper three rows of its matrix; the others are their fields.
     """
     with deep_stack():
         root = _node(graph.root)
@@ -40,7 +41,7 @@ def _move(move: Move) -> dict[str, Any]:
     step = move.step
     if isinstance(step, Affine):
         return {"affine": [list(step.rows[at : at + 4]) for at in (0, 4, 8)]}
-    return {"twirl": step.twirl, "bend": list(step.bend)}
+    return asdict(step)
 
 
 def program_data(program: Program) -> dict[str, Any]:

@@ -102,9 +102,11 @@ def show_chain(transforms: tuple[Any, ...], space: Space) -> list[str]:
         step = step_of(transform, space)
         if isinstance(step, Affine | Warp):
             moves.append(Move(step))
+    steps = [move.step for move in merged(moves)]
     return [
-        show_matrix(move.step.rows, space) if isinstance(move.step, Affine) else show_warp(move.step)
-        for move in merged(moves)
+        show_matrix(step.rows, space) if isinstance(step, Affine) else show_warp(step)
+        for step in steps
+        if isinstance(step, Affine | Warp)
     ]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.graph.nodes import Fold, Leaf, Node
-from scenelang.graph.steps import Affine, Step
+from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.program.program import TOKENS
 from scenelang.reference.fold import combine
 from scenelang.reference.leaves import Array, leaf_distance, namespace
@@ -40,7 +40,7 @@ def carry_back(steps: Sequence[Step], p: Array) -> Array:
             inverse = np.linalg.inv(linear := _linear(step, len(p)))
             shift = -inverse @ np.reshape(step.rows, (3, 4))[: len(linear), 3]
             p = map_back(np.column_stack([inverse, shift]), p)
-        else:
+        elif isinstance(step, Warp):
             p = warp_back(step.twirl, step.bend, p)
     return p
 

@@ -1,4 +1,4 @@
-"""Exact signed distances of the plane's leaves.
+"""Exact signed distances of the leaves of the plane and of the solid world.
 
 Works on numpy arrays and torch tensors alike, here as in `fold.py` and `field.py`: only names that both offer
 are used, so that training makes its data on any device by the formulas of the reference image. Points are one
@@ -23,6 +23,8 @@ SECTORS: dict[str, tuple[int, float, float, float]] = {
     "star": (5, math.pi / 2, 1.0, 0.381966),
     "pentagon": (5, math.pi / 2, 1.0, math.cos(math.pi / 5)),
 }
+
+TORUS = (0.7, 0.3)  # radii of the circle about y and of the tube
 
 
 def namespace(x: Array) -> Any:
@@ -60,5 +62,17 @@ def sector_distance(p: Array, n: Array, phase: Array, outer: Array, inner: Array
 
 
 def leaf_distance(geometry: str, p: Array) -> Array:
-    """Exact Euclidean signed distance of a leaf in its own space; raises KeyError if unknown."""
+    """Exact Euclidean signed distance of a leaf in its own space; raises KeyError if unknown.
+
+    Args:
+        geometry: name of a leaf.
+        p: points in leaf units, (2, …), or (3, …) for the sphere and the torus.
+    """
+    if geometry in ("sphere", "torus"):
+        x, y, z = p
+        xp = namespace(x)
+        if geometry == "sphere":
+            return xp.sqrt(x * x + y * y + z * z) - 1.0
+        ring = xp.sqrt(x * x + z * z) - TORUS[0]
+        return xp.sqrt(ring * ring + y * y) - TORUS[1]
     return sector_distance(p, *SECTORS[geometry])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
-from scenelang.records import Record
 
-
-class Habit(Record):
+@dataclass(frozen=True, slots=True)
+class Habit:
     """One habit.
 
     Args:

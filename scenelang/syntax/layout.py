@@ -8,9 +8,9 @@ with its depth costs 1. The cheapest path is the fewest slips that explain the l
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
 from itertools import pairwise
 
-from scenelang.records import Record
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Tokens
 
@@ -20,7 +20,8 @@ _NEVER = 1e9
 _FAR = 200  # tokens in which a statement shows whether it is one
 
 
-class Slip(Record):
+@dataclass(frozen=True, slots=True)
+class Slip:
     """Between the tokens ``first`` and ``stop`` the depth meant goes ``shift`` away from the one written.
 
     ``depth`` is the one meant on that line, which is less by 1 than before its `}` if it begins with one.
@@ -32,7 +33,8 @@ class Slip(Record):
     depth: int
 
 
-class _Line(Record):
+@dataclass(frozen=True, slots=True)
+class _Line:
     """A line that begins with a statement or a closing brace."""
 
     first: int  # index of its first token

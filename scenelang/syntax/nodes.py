@@ -6,13 +6,14 @@ a diagnostic has been given; later stages skip such nodes silently.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 from scenelang.diagnostics.span import Span
-from scenelang.records import Record
 
 
-class Name(Record):
+@dataclass(frozen=True, slots=True)
+class Name:
     """An identifier with its place; dotted for imported ones (``lib.name``)."""
 
     text: str
@@ -22,7 +23,8 @@ class Name(Record):
 # ---------------------------------------------------------------- expressions
 
 
-class Number(Record):
+@dataclass(frozen=True, slots=True)
+class Number:
     """A literal number with its unit glued on: '', 'deg', 'rad', 'turn', 's', 'ms'."""
 
     value: float
@@ -31,29 +33,34 @@ class Number(Record):
     is_integer: bool = False
 
 
-class String(Record):
+@dataclass(frozen=True, slots=True)
+class String:
     value: str
     span: Span
 
 
-class Bool(Record):
+@dataclass(frozen=True, slots=True)
+class Bool:
     value: bool
     span: Span
 
 
-class Color(Record):
+@dataclass(frozen=True, slots=True)
+class Color:
     """A ``#rgb`` or ``#rrggbb`` literal, as three numbers in [0, 1]."""
 
     rgb: tuple[float, float, float]
     span: Span
 
 
-class Vector(Record):
+@dataclass(frozen=True, slots=True)
+class Vector:
     items: tuple[Expr, ...]
     span: Span
 
 
-class Range(Record):
+@dataclass(frozen=True, slots=True)
+class Range:
     """``a..b`` (inclusive), ``a..<b`` (exclusive), with an optional step."""
 
     start: Expr
@@ -63,18 +70,21 @@ class Range(Record):
     span: Span
 
 
-class NameRef(Record):
+@dataclass(frozen=True, slots=True)
+class NameRef:
     name: Name
     span: Span
 
 
-class Unary(Record):
+@dataclass(frozen=True, slots=True)
+class Unary:
     op: Literal["-", "+", "!"]
     operand: Expr
     span: Span
 
 
-class Binary(Record):
+@dataclass(frozen=True, slots=True)
+class Binary:
     op: str  # + - * / % ^ < <= > >= == != && ||
     left: Expr
     right: Expr
@@ -82,14 +92,16 @@ class Binary(Record):
     span: Span
 
 
-class Conditional(Record):
+@dataclass(frozen=True, slots=True)
+class Conditional:
     condition: Expr
     then: Expr
     otherwise: Expr
     span: Span
 
 
-class Argument(Record):
+@dataclass(frozen=True, slots=True)
+class Argument:
     """A call's argument; ``name`` is None for a positional one."""
 
     name: Name | None
@@ -97,7 +109,8 @@ class Argument(Record):
     span: Span
 
 
-class CallExpr(Record):
+@dataclass(frozen=True, slots=True)
+class CallExpr:
     """A function call inside an expression."""
 
     name: Name
@@ -105,7 +118,8 @@ class CallExpr(Record):
     span: Span
 
 
-class Member(Record):
+@dataclass(frozen=True, slots=True)
+class Member:
     """``v.x``; on a module alias ``lib.name`` it is a qualified name (the evaluator decides)."""
 
     value: Expr
@@ -113,13 +127,15 @@ class Member(Record):
     span: Span
 
 
-class Index(Record):
+@dataclass(frozen=True, slots=True)
+class Index:
     value: Expr
     index: Expr
     span: Span
 
 
-class MaterialExpr(Record):
+@dataclass(frozen=True, slots=True)
+class MaterialExpr:
     """``material NAME`` or ``material NAME { … }`` used as a value."""
 
     name: Name
@@ -127,7 +143,8 @@ class MaterialExpr(Record):
     span: Span
 
 
-class BadExpr(Record):
+@dataclass(frozen=True, slots=True)
+class BadExpr:
     """What recovery could not read as an expression."""
 
     span: Span
@@ -154,14 +171,16 @@ Expr = (
 # ---------------------------------------------------------------- statements
 
 
-class Block(Record):
+@dataclass(frozen=True, slots=True)
+class Block:
     """``{ … }``; the span includes the braces."""
 
     statements: tuple[Stmt, ...]
     span: Span
 
 
-class Parameter(Record):
+@dataclass(frozen=True, slots=True)
+class Parameter:
     """A formal parameter of a fn or module."""
 
     name: Name
@@ -169,61 +188,70 @@ class Parameter(Record):
     span: Span
 
 
-class Version(Record):
+@dataclass(frozen=True, slots=True)
+class Version:
     """``nsg 1;``"""
 
     number: Number
     span: Span
 
 
-class Model(Record):
+@dataclass(frozen=True, slots=True)
+class Model:
     """``model "name";``"""
 
     name: Expr
     span: Span
 
 
-class Param(Record):
+@dataclass(frozen=True, slots=True)
+class Param:
     name: Name
     default: Expr
     range: Expr | None
     span: Span
 
 
-class Let(Record):
+@dataclass(frozen=True, slots=True)
+class Let:
     name: Name
     value: Expr
     span: Span
 
 
-class Fn(Record):
+@dataclass(frozen=True, slots=True)
+class Fn:
     name: Name
     params: tuple[Parameter, ...]
     body: Expr
     span: Span
 
 
-class Module(Record):
+@dataclass(frozen=True, slots=True)
+class Module:
     name: Name
     params: tuple[Parameter, ...]
     body: Block
     span: Span
 
 
-class Import(Record):
+@dataclass(frozen=True, slots=True)
+class Import:
     path: String
     alias: Name
     span: Span
 
 
-class For(Record):
+@dataclass(frozen=True, slots=True)
+class For:
     variable: Name
     iterable: Expr
     body: Block
     span: Span
 
 
-class If(Record):
+@dataclass(frozen=True, slots=True)
+class If:
     condition: Expr
     then: Block
     otherwise: Block | If | None
@@ -233,7 +261,8 @@ class If(Record):
 Combine = Literal["union", "smooth", "subtract", "intersect"]
 
 
-class Call(Record):
+@dataclass(frozen=True, slots=True)
+class Call:
     """Any statement headed by a name, with arguments, a block, both, or neither.
 
     Geometries (``square { … }``), transforms (``scale(2);``), settings (``canvas(w, h);``,
@@ -248,7 +277,8 @@ class Call(Record):
     span: Span
 
 
-class Node(Record):
+@dataclass(frozen=True, slots=True)
+class Node:
     """``group``, ``union``, ``smooth``, ``subtract``, ``intersect`` or ``chain`` with its block."""
 
     kind: Literal["group", "union", "smooth", "subtract", "intersect", "chain"]
@@ -257,7 +287,8 @@ class Node(Record):
     keyword: Span
 
 
-class Combined(Record):
+@dataclass(frozen=True, slots=True)
+class Combined:
     """A chain child with its word: ``subtract star { … }``, ``smooth dot(1);``."""
 
     op: Combine
@@ -266,7 +297,8 @@ class Combined(Record):
     keyword: Span
 
 
-class MaterialUse(Record):
+@dataclass(frozen=True, slots=True)
+class MaterialUse:
     """``material NAME;`` or ``material NAME { … }`` as a statement."""
 
     name: Name
@@ -274,7 +306,8 @@ class MaterialUse(Record):
     span: Span
 
 
-class BadStmt(Record):
+@dataclass(frozen=True, slots=True)
+class BadStmt:
     """What recovery could not read as a statement."""
 
     span: Span
@@ -298,7 +331,8 @@ Stmt = (
 )
 
 
-class File(Record):
+@dataclass(frozen=True, slots=True)
+class File:
     """A whole file."""
 
     statements: tuple[Stmt, ...]

@@ -20,10 +20,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
-from scenelang.records import Record
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Tokens
 
@@ -57,7 +57,8 @@ Columns = tuple[list[int], list[int], list[int]]
 """Kinds, starts and ends of tokens."""
 
 
-class Piece(Record):
+@dataclass(frozen=True, slots=True)
+class Piece:
     """A hole or a literal text of a pattern.
 
     Args:
@@ -88,7 +89,8 @@ def pieces(pattern: str) -> tuple[Piece, ...]:
     return tuple(found)
 
 
-class Match(Record):
+@dataclass(frozen=True, slots=True)
+class Match:
     """Where the pieces of a pattern were found.
 
     Args:
@@ -223,7 +225,8 @@ def without_types(text: str) -> str:
     return _TYPED.sub("", text)
 
 
-class Change(Record):
+@dataclass(frozen=True, slots=True)
+class Change:
     """What a replacement makes of a match, less what both have in common at their ends.
 
     Args:

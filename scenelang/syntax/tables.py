@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import contextlib
 import json
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 from zlib import crc32
-
-from scenelang.records import Record
 
 PACKAGE: Final = Path(__file__).resolve().parent.parent
 PLACE: Final = PACKAGE / "syntax" / "tables.json"
@@ -22,7 +21,8 @@ END = 0
 """The kind of the end of the text."""
 
 
-class Tables(Record):
+@dataclass(frozen=True, slots=True)
+class Tables:
     """The LALR automaton and the terminals of the language.
 
     Token kinds are small integers, indices into ``kinds``.

@@ -21,12 +21,12 @@ import re
 import shlex
 import textwrap
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Final, Literal
 
 from scenelang.diagnostics.codes import CODES
-from scenelang.records import Record
 
 AREAS: Final = {
     "01": "syntax",
@@ -41,7 +41,8 @@ _FENCE: Final = re.compile(
 )
 
 
-class Example(Record):
+@dataclass(frozen=True, slots=True)
+class Example:
     """A scene of a page.
 
     Args:
@@ -59,7 +60,8 @@ class Example(Record):
     limits: tuple[tuple[str, int], ...] = ()
 
 
-class Page(Record):
+@dataclass(frozen=True, slots=True)
+class Page:
     """What there is to know about a code.
 
     Args:

@@ -1,0 +1,103 @@
+"""The stage of a 3D scene: camera, light, ground and sky, with the language's defaults; linear colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan, degrees, hypot, pi
+
+Triple = tuple[float, float, float]
+
+HORIZON: Triple = (0.80, 0.86, 0.92)
+ZENITH: Triple = (0.30, 0.50, 0.85)
+
+AMBIENT = (0.12, 0.06)
+"""What a surface of normal n receives without the light: ``AMBIENT[0] + AMBIENT[1] n.y``; media the first."""
+
+EXTINCTION = 3.0  # of media, per world unit
+FADE = 64.0  # the ground fades into the horizon by exp(-(x² + z²) / FADE)
+NEAREST = 1e-3  # the light counts as at least this far away
+LIFT = 1e-4  # how far off its surface a ray to the light starts
+
+
+def decoded(srgb: Triple) -> Triple:
+    """The linear colour of an sRGB-encoded one (IEC 61966-2-1)."""
+    r, g, b = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in srgb)
+    return r, g, b
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """Where the picture is taken from.
+
+    Args:
+        eye, target: world points.
+        fov_rad: angle of view across the shorter side of the canvas, in (0, pi).
+    """
+
+    eye: Triple = (0.0, 1.2, 6.0)
+    target: Triple = (0.0, 0.0, 0.0)
+    fov_rad: float = 2.0 * atan(1.0 / 3.0)
+
+    def fault(self) -> str | None:
+        """Why there is no picture from here, if there is none."""
+        if self.eye == self.target:
+            return "the eye is the target"
+        if not 0.0 < self.fov_rad < pi:
+            return f"a field of view of {degrees(self.fov_rad):g}° is not between 0° and 180°"
+        return None
+
+    def axes(self) -> tuple[Triple, Triple, Triple]:
+        """Unit vectors forward, right and up; seen straight along y, up is -z."""
+        f = _unit(self.target[0] - self.eye[0], self.target[1] - self.eye[1], self.target[2] - self.eye[2])
+        upright = hypot(f[0], f[2]) > 1e-9
+        right = _unit(*_cross(f, (0.0, 1.0, 0.0) if upright else (0.0, 0.0, -1.0)))
+        return f, right, _cross(right, f)
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """A point light: at distance r it sends ``power rgb / r²``."""
+
+    position: Triple = (2.5, 4.0, 3.0)
+    power: float = 28.0
+    rgb: Triple = (1.0, 1.0, 1.0)
+
+    def fault(self) -> str | None:
+        """Why there is no such light, if there is none."""
+        return f"a power of {self.power:g} is negative" if self.power < 0.0 else None
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """A diffuse plane at height ``y``."""
+
+    y: float = -1.0
+    rgb: Triple = (0.50, 0.48, 0.45)
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """All of a 3D scene that is not an object.
+
+    Args:
+        camera, light: as they say.
+        ground: None for a scene without one.
+        horizon, zenith: colours of the sky; the ground fades into the first. A plain background is both.
+        transparent: the sky is not drawn and the picture has alpha.
+    """
+
+    camera: Camera = Camera()
+    light: Light = Light()
+    ground: Ground | None = Ground()
+    horizon: Triple = HORIZON
+    zenith: Triple = ZENITH
+    transparent: bool = False
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _unit(x: float, y: float, z: float) -> Triple:
+    length = hypot(x, y, z)
+    return x / length, y / length, z / length
