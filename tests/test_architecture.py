@@ -20,6 +20,7 @@ ORDER = (
     "scenelang.deep",
     "scenelang.files",
     "scenelang.notebook",
+    "scenelang.records",
     "scenelang.tensors",
     "scenelang.diagnostics",
     "scenelang.syntax",

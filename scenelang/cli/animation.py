@@ -2,51 +2,75 @@
 
 from __future__ import annotations
 
+import re
 import time
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import click
 
 from scenelang.animation.clip import Clip
 from scenelang.animation.targets import PICTURES, Target, TargetError, find_target, is_animation
 from scenelang.animation.timing import FrameRange, FramesError
-from scenelang.cli.inputs import STDIN, Request, read_text
+from scenelang.cli.inputs import STDIN, Request, read_text, unused_defines
+from scenelang.cli.main import Trouble, describe
+from scenelang.cli.progress import Bar
+from scenelang.cli.say import say_diagnostics
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.diagnostics.suggest import listing
 
 if TYPE_CHECKING:
+    from scenelang.animation.gif import Palette
     from scenelang.animation.run import Made
+    from scenelang.backend.options import Backend, Device
 
 SIZES = ("B", "kB", "MB", "GB")
 
 
+@dataclass(frozen=True, slots=True)
 class Wanted:
     """What the command line says about animations.
 
     Args:
-        frames: which frames; None for all.
+        range: ``--frames``; None for all.
         fps: frames a second instead of the scene's.
         jobs: processes that draw.
         palette, dither: of a GIF.
+        backend, device, threads: how frames are drawn.
+        strict: count warnings as errors.
+        verbose: say where the time went.
     """
 
-    def __init__(
-        self,
-        frames: str | None,
-        fps: float | None,
-        jobs: int | None,
-        palette: Literal["auto", "global", "frame"],
-        dither: bool,
-    ) -> None:
+    range: str | None
+    fps: float | None
+    jobs: int | None = None
+    palette: Palette = "auto"
+    dither: bool = False
+    backend: Backend = "neural"
+    device: Device = "auto"
+    threads: int | None = None
+    strict: bool = False
+    verbose: bool = False
+
+    @property
+    def certain(self) -> bool:
+        """Whether nothing but an animation will do."""
+        return self.range is not None or self.fps is not None
+
+    @property
+    def frames(self) -> FrameRange:
+        """Which frames.
+
+        Raises:
+            click.UsageError: the range is not one.
+        """
         try:
-            self.frames = FrameRange() if frames is None else FrameRange.parse(frames)
+            return FrameRange() if self.range is None else FrameRange.parse(self.range)
         except FramesError as error:
             raise click.BadParameter(str(error), param_hint="--frames") from None
-        self.fps, self.jobs, self.palette, self.dither = fps, jobs, palette, dither
-        self.certain = frames is not None or fps is not None
 
 
 def wanted_target(name: str, out: str, wanted: Wanted) -> Target | None:
@@ -127,7 +151,61 @@ def frames_of(clip: Clip, wanted: Wanted) -> range | None:
         return None
 
 
-def summary(made: Made, target: Target, clip: Clip, started: float) -> str:
+def animate(name: str, out: str, target: Target, request: Request, wanted: Wanted) -> int | SourceFile:
+    """Draw an animation; the exit code, or the scene's text if it is to be drawn as one picture.
+
+    Raises:
+        OSError: the scene cannot be read.
+        Trouble: a file cannot be written.
+    """
+    from scenelang.animation.painting import Painter
+    from scenelang.animation.run import make, ready
+
+    started = time.perf_counter()
+    found = Diagnostics()
+    source, clip = open_input(name, request, wanted, found)
+    if source is not None and clip is not None and still_picture(clip, target, wanted, out):
+        return source
+    if source is not None:
+        found.items.extend(unused_defines(request))
+    numbers = frames_of(clip, wanted) if clip is not None and not found.errors else None
+    if clip is None or numbers is None or found.errors or (found.items and wanted.strict):
+        say_diagnostics(found)
+        return 1
+    ready(target)
+    painter = Painter(clip, wanted.backend, wanted.device, wanted.threads)
+    try:
+        with Bar() as bar:
+            made = make(
+                painter,
+                target,
+                numbers,
+                jobs=wanted.jobs,
+                palette=wanted.palette,
+                dither=wanted.dither,
+                strict=wanted.strict,
+                progress=lambda now: bar(now.told, now.done, now.total),
+            )
+    except SceneError:
+        say_diagnostics(found)
+        return 1
+    except KeyboardInterrupt:
+        if target.work.exists():
+            told = f"\nframes are kept in `{target.work}`; the same command goes on with the rest"
+            click.echo(told, err=True)
+        raise
+    except OSError as error:
+        raise Trouble(f"cannot write `{out}`: {describe(error)}") from None
+    say_diagnostics(found)
+    click.echo(summary(made, time.perf_counter() - started), err=True)
+    if (others := strays(target, made)) is not None:
+        click.echo(f"note: {others}", err=True)
+    for line in made.lines() if wanted.verbose else ():
+        click.echo(f"  {line}", err=True)
+    return 0
+
+
+def summary(made: Made, seconds: float) -> str:
     """A line about what was written."""
     first, last = made.files[0], made.files[-1]
     name = f"{first} … {last.name}" if len(made.files) > 1 else str(first)
@@ -135,42 +213,29 @@ def summary(made: Made, target: Target, clip: Clip, started: float) -> str:
     parts = [f"{made.frames} frame{'s' * (made.frames != 1)}", size]
     if made.resumed:
         parts.append(f"{made.resumed} kept from a run before")
-    same = made.frames - made.drawn - made.resumed
-    if same:
+    if same := made.frames - made.drawn - made.resumed:
         parts.append(f"{same} the same as others")
-    return f"{name}: {', '.join(parts)}, {time.perf_counter() - started:.1f} s"
+    return f"{name}: {', '.join(parts)}, {seconds:.1f} s"
 
 
 def strays(target: Target, made: Made) -> str | None:
     """A line about files of a sequence that this run did not write."""
     if target.kind != "sequence":
         return None
-    head, tail = made_pattern(target)
-    mine = {file.name for file in made.files}
-    others = [
-        p.name
-        for p in target.path.iterdir()
-        if p.name not in mine
-        and p.name.startswith(head)
-        and p.name.endswith(tail)
-        and p.name[len(head) : len(p.name) - len(tail)].isdigit()
-    ]
+    number = 1_234_567_890
+    head, tail = target.file(number).name.split(str(number))
+    named = re.compile(rf"{re.escape(head)}\d+{re.escape(tail)}")
+    others = {path.name for path in target.path.iterdir() if named.fullmatch(path.name)}
+    others -= {file.name for file in made.files}
     if not others:
         return None
     return f"`{target.path}` also holds {len(others)} such files of another run, `{min(others)}` among them"
 
 
-def made_pattern(target: Target) -> tuple[str, str]:
-    """What stands before and after the number in the names of a sequence."""
-    probe = [target.file(n).name for n in (111111, 222222)]
-    at = probe[0].index("111111")
-    return probe[0][:at], probe[0][at + 6 :]
-
-
 def readable(size: float) -> str:
-    """Bytes as people read them."""
+    """Human-readable byte count."""
     for unit in SIZES:
         if size < 1000 or unit == SIZES[-1]:
-            return f"{size:.0f} {unit}" if size >= 100 or unit == "B" else f"{size:.1f} {unit}"
+            break
         size /= 1000
-    raise AssertionError
+    return f"{size:.0f} {unit}" if size >= 100 or unit == "B" else f"{size:.1f} {unit}"

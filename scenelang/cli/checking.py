@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from scenelang.cli.clock import Clock
 from scenelang.cli.inputs import STDIN, Request, merged, read_input, read_text, unused_defines
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import Settled, settle
@@ -116,7 +115,7 @@ def _place(name: str) -> str:
 
 def _find(name: str, source: SourceFile, request: Request, frames: Frames) -> tuple[list[Diagnostic], int]:
     """What there is to say of one scene, and how many of its frames were to be looked at and were not."""
-    found = read_input(name, request, Clock(), source)
+    found = read_input(name, request, source=source)
     left = check_evaluated(
         found.tree,
         found.evaluation,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
@@ -10,10 +9,7 @@ import click
 from scenelang.cli.jobs import Job, program_notes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from scenelang.backend.options import Samples
-    from scenelang.measure.choose import Choice, Offer
+    from scenelang.measure.choose import Choice
     from scenelang.measure.frontier import Frontier, Limits, Point
     from scenelang.program.program import Program
 
@@ -34,112 +30,80 @@ def check_options(ctx: click.Context, limits: Limits, device: str) -> None:
         raise click.UsageError(f"{asked} knows processors only; leave out --device cuda.")
 
 
-@dataclass(frozen=True, slots=True)
-class Way:
-    """How one job is drawn.
+def choose_point(job: Job, limits: Limits, model: str | None, here_ms: float) -> Point | None:
+    """Choose how to draw a job, and compile it for the model that does; None leaves a trouble in it.
 
     Args:
-        exact: by the reference.
-        samples: of the network.
-    """
-
-    exact: bool
-    samples: Samples
-
-
-class Chooser:
-    """Chooses for one scene after the other.
-
-    Args:
+        job: compiled, without errors.
         limits: what a picture may take.
         model: the only model to choose, where the command line names one.
+        here_ms: the yardstick's time on this machine.
     """
+    from scenelang.measure.choose import NothingFits, machine_scale
+    from scenelang.measure.frontier import load_frontier
 
-    def __init__(self, limits: Limits, model: str | None) -> None:
-        self.limits, self.model = limits, model
-        self._scale: float | None = None
+    assert job.program is not None
+    name = job.program.model
+    try:
+        frontier = load_frontier(name)
+    except ValueError as error:
+        job.trouble = f"the frontier of `{name}` is damaged: {error}"
+        return None
+    if frontier is None:
+        job.trouble = f"model `{name}` ships no frontier to choose from"
+        return None
+    scale = machine_scale(frontier, here_ms)
+    try:
+        choice, job.program = _chosen(frontier, job, job.program, limits, model, scale)
+    except NothingFits as error:
+        job.trouble = str(error)
+        return None
+    point = choice.offer.point
+    notes = program_notes(job.program, "chosen by the frontier") if point.backend == "neural" else []
+    told = f"this machine takes {scale:.2f} times as long as the one that was measured"
+    refused = [f"not in question: {name}: {why}" for name, why in choice.refused.items()]
+    job.notes = [*choice.notes, f"times are for one thread; {told}", *refused, *notes]
+    return point
 
-    def choose(self, job: Job) -> Way | None:
-        """Choose how to draw a job, and compile it for the model that does; None leaves a trouble in it.
 
-        Args:
-            job: compiled, without errors.
-        """
-        from scenelang.measure.choose import NothingFits
-        from scenelang.measure.frontier import load_frontier
+def _chosen(
+    frontier: Frontier, job: Job, program: Program, limits: Limits, model: str | None, scale: float
+) -> tuple[Choice, Program]:
+    """The best choice whose model draws the scene without further warnings, and its Program."""
+    from scenelang.measure.choose import choose, offers
+    from scenelang.program.work import load_of
 
-        program = job.program
-        assert program is not None
-        try:
-            frontier = load_frontier(program.model)
-        except ValueError as error:
-            job.trouble = f"the frontier of `{program.model}` is damaged: {error}"
-            return None
-        if frontier is None:
-            job.trouble = f"model `{program.model}` ships no frontier to choose from"
-            return None
-        try:
-            choice, drawn = self._chosen(frontier, job, program)
-        except NothingFits as error:
-            job.trouble = str(error)
-            return None
+    refused: dict[str, str] = {}
+    able = []
+    for point in frontier.points:
+        why = _refusal(point, job, program, model)
+        if why is None:
+            able.append(point)
+        elif point.offered:  # the others are for charts only
+            refused[point.name] = why
+    found = offers(able, load_of(program), program.canvas, scale)
+    while True:
+        choice = choose(found, limits, refused)
         point = choice.offer.point
-        job.program = drawn
-        notes = program_notes(drawn, "chosen by the frontier") if point.backend == "neural" else []
-        scale = f"this machine takes {self._machine(frontier):.2f} times as long as the one that was measured"
-        refused = [f"not in question: {name}: {why}" for name, why in choice.refused.items()]
-        job.notes = [*choice.notes, f"times are for one thread; {scale}", *refused, *notes]
-        return Way(point.backend == "reference", point.samples)
+        compiled = _compiled(job, program, point)
+        if not isinstance(compiled, str):
+            return choice, compiled
+        refused |= {o.point.name: compiled for o in found if o.point.model == point.model}
+        found = [offer for offer in found if offer.point.model != point.model]
 
-    def _chosen(self, frontier: Frontier, job: Job, program: Program) -> tuple[Choice, Program]:
-        """The best choice whose model draws the scene without further warnings, and its Program."""
-        from scenelang.measure.choose import choose
 
-        refused: dict[str, str] = {}
-        found = list(self._offers(frontier, job, program, refused))
-        while True:
-            choice = choose(found, self.limits, refused)
-            point = choice.offer.point
-            compiled = _compiled(job, program, point)
-            if not isinstance(compiled, str):
-                return choice, compiled
-            refused |= {o.point.name: compiled for o in found if o.point.model == point.model}
-            found = [offer for offer in found if offer.point.model != point.model]
+def _refusal(point: Point, job: Job, program: Program, model: str | None) -> str | None:
+    """Why a point is not in question."""
+    from scenelang.measure.choose import refusal
+    from scenelang.models.manifest import available, load_manifest
 
-    def _offers(
-        self, frontier: Frontier, job: Job, program: Program, refused: dict[str, str]
-    ) -> Iterator[Offer]:
-        from scenelang.measure.choose import offers, refusal
-        from scenelang.models.manifest import available, load_manifest
-        from scenelang.program.work import load_of
-
-        scene = job.source.scene if job.source is not None else None
-        known = available()
-        able = []
-        for point in frontier.points:
-            if not point.offered:
-                continue  # charts only
-            why = None
-            if self.model is not None and point.model != self.model:
-                why = f"--model {self.model}"
-            elif point.model is not None and point.model not in known:
-                why = "not installed"
-            else:
-                manifest = load_manifest(point.model) if point.model is not None else None
-                why = refusal(point, manifest, scene, program.model if scene is None else None)
-            if why is None:
-                able.append(point)
-            else:
-                refused[point.name] = why
-        yield from offers(able, load_of(program), program.canvas, self._machine(frontier))
-
-    def _machine(self, frontier: Frontier) -> float:
-        if self._scale is None:
-            from scenelang.measure.choose import machine_scale
-            from scenelang.measure.cost import yardstick
-
-            self._scale = machine_scale(frontier, yardstick())
-        return self._scale
+    if model is not None and point.model != model:
+        return f"--model {model}"
+    if point.model is not None and point.model not in available():
+        return "not installed"
+    manifest = load_manifest(point.model) if point.model is not None else None
+    scene = job.source.scene if job.source is not None else None
+    return refusal(point, manifest, scene, program.model if scene is None else None)
 
 
 def _compiled(job: Job, program: Program, point: Point) -> Program | str:

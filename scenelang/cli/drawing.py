@@ -38,25 +38,26 @@ def chosen(
         ready: compiled scenes and where their pictures go.
         code: the exit code so far.
     """
-    from scenelang.cli.choosing import Chooser
+    from scenelang.cli.choosing import choose_point
     from scenelang.cli.say import say_trouble
+    from scenelang.measure.cost import yardstick
 
     with clock("choose"):
-        chooser = Chooser(limits, request.model)
-        ways = {id(job): chooser.choose(job) for job, _ in ready}
+        here_ms = yardstick()
+        points = {id(job): choose_point(job, limits, request.model, here_ms) for job, _ in ready}
     for job, _ in ready:
-        if ways[id(job)] is None:
+        if points[id(job)] is None:
             say_trouble(f"{job.name}: {job.trouble}")
             code = 2
 
     def draw(job: Job, progress: Callable[[float], None]) -> Image:
-        way = ways[id(job)]
-        assert way is not None
-        if way.exact:
+        point = points[id(job)]
+        assert point is not None
+        if point.backend == "reference":
             return exact(request, clock)(job, progress)
-        return neural(clock, "cpu", threads, way.samples)(job, progress)
+        return neural(clock, "cpu", threads, point.samples)(job, progress)
 
-    return draw, [(job, path) for job, path in ready if ways[id(job)] is not None], code
+    return draw, [(job, path) for job, path in ready if points[id(job)] is not None], code
 
 
 def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) -> Draw:

@@ -82,7 +82,9 @@ def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
         return None
 
 
-def read_input(name: str, request: Request, clock: Clock, source: SourceFile | None = None) -> Input:
+def read_input(
+    name: str, request: Request, clock: Clock | None = None, source: SourceFile | None = None
+) -> Input:
     """Read one scene: text is evaluated, JSON (by its suffix, or `{` first in standard input) just read.
 
     Args:
@@ -94,6 +96,7 @@ def read_input(name: str, request: Request, clock: Clock, source: SourceFile | N
     Raises:
         OSError: it cannot be opened.
     """
+    clock = clock or Clock()
     found = Input(name)
     path = None if name == STDIN else Path(name)
     if source is None:
@@ -121,17 +124,6 @@ def read_input(name: str, request: Request, clock: Clock, source: SourceFile | N
         )
         scene, spans = evaluation.run(request.frame)
     return _with_scene(found, scene, spans, request)
-
-
-def read_scene(name: str, request: Request, clock: Clock | None = None) -> Input:
-    """Read the one scene of a command; a param that it does not have is reported too.
-
-    Raises:
-        OSError: it cannot be opened.
-    """
-    found = read_input(name, request, clock or Clock())
-    found.diagnostics.items += unused_defines(request)
-    return found
 
 
 def _from_json(

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
 from scenelang.cli.clock import Clock
-from scenelang.cli.inputs import Input, Request, read_input
+from scenelang.cli.inputs import Input, Request, read_input, unused_defines
+from scenelang.cli.say import say_diagnostics
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
@@ -29,24 +34,28 @@ class Job:
 
     Args:
         name: as the user wrote it.
-        diagnostics: of a scene.
+        source: the scene, where there is one.
         trouble: why a compiled program cannot be drawn.
         program: what the network draws.
-        source: the scene, where there is one.
+        graphs: the graph after ``lower`` and each pass, in order.
         notes: what to say about it on ``-v``.
     """
 
     name: str
-    diagnostics: list[Diagnostic] = field(default_factory=list)
+    source: Input | None = None
     trouble: str | None = None
     program: Program | None = None
-    source: Input | None = None
+    graphs: dict[str, Graph] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
-    def failed(self, strict: bool) -> bool:
+    @property
+    def diagnostics(self) -> list[Diagnostic]:
+        """What was found in a scene."""
+        return self.source.diagnostics.items if self.source is not None else []
+
+    def failed(self, strict: bool = False) -> bool:
         """Whether there is nothing to draw."""
-        wrong = any(d.severity == "error" or strict for d in self.diagnostics)
-        return wrong or self.trouble is not None
+        return self.trouble is not None or any(d.severity == "error" or strict for d in self.diagnostics)
 
 
 def prepare(
@@ -65,7 +74,7 @@ def prepare(
         request: what the command line says about every scene.
         clock: takes the time.
         compiled: whether a scene has to be compiled to be drawn.
-        verbose: make notes of what the passes did.
+        verbose: keep the graphs, and make notes of what the passes did.
         source: the scene's text, where it was read before.
 
     Raises:
@@ -74,24 +83,35 @@ def prepare(
     if name.endswith(PROGRAM):
         return _stored(name, request, clock)
     found = read_input(name, request, clock, source)
-    job = Job(name, source=found)
+    job = Job(name, found)
     if found.scene is not None and compiled:
-        passes = PassNotes()
-        try:
-            with clock("compile"):
-                job.program = compile_scene(
-                    found.scene,
-                    spans=found.spans,
-                    diagnostics=found.diagnostics,
-                    model=request.model,
-                    after=passes.after if verbose else None,
-                )
+        with suppress(SceneError), clock("compile"):  # its diagnostics are the input's
+            job.program = compile_scene(
+                found.scene,
+                spans=found.spans,
+                diagnostics=found.diagnostics,
+                model=request.model,
+                after=job.graphs.__setitem__ if verbose else None,
+            )
             why = why_chosen(found.scene, request.model is not None)
-            job.notes = [*program_notes(job.program, why), *passes.lines]
-        except SceneError:
-            pass  # its diagnostics are the input's
-    job.diagnostics = found.diagnostics.items
+            job.notes = [*program_notes(job.program, why), *_pass_notes(job.graphs)]
     return job
+
+
+def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> tuple[Job, Input]:
+    """Compile the one scene of a command, keep its graphs and report its mistakes.
+
+    Raises:
+        OSError: it cannot be read, or a model has no weights.
+        click.UsageError: it is a compiled program.
+    """
+    if name.endswith(PROGRAM):
+        raise click.UsageError(f"`{name}` is a compiled program already.")
+    job = prepare(name, request, clock or Clock(), verbose=True)
+    assert job.source is not None
+    job.diagnostics.extend(unused_defines(request))
+    say_diagnostics(job.diagnostics)
+    return job, job.source
 
 
 def _stored(name: str, request: Request, clock: Clock) -> Job:
@@ -139,23 +159,14 @@ def _counts(counts: dict[str, int]) -> str:
     return f" ({listed})" if listed else ""
 
 
-@dataclass(slots=True)
-class PassNotes:
-    """What each pass changed, told by the numbers of objects, folds and moves.
-
-    Args:
-        lines: one for each pass with an effect.
-    """
-
-    lines: list[str] = field(default_factory=list)
-    _before: tuple[int, int, int] | None = None
-
-    def after(self, name: str, graph: Graph) -> None:
-        """Look at the graph a pass left."""
+def _pass_notes(graphs: dict[str, Graph]) -> Iterator[str]:
+    """A line for each pass that changed the number of objects, folds or moves."""
+    before = None
+    for name, graph in graphs.items():
         found = [node for node, _ in nodes(graph.root)]
         objects = sum(isinstance(node, Leaf) for node in found)
         counts = (objects, len(found) - objects, sum(len(node.moves) for node in found))
-        if counts != self._before:
-            now = f"{counts[0]} objects, {counts[1]} folds, {counts[2]} moves"
-            self.lines.append(f"{name}: {now}" if self._before else f"as written: {now}")
-        self._before = counts
+        if counts != before:
+            told = f"{counts[0]} objects, {counts[1]} folds, {counts[2]} moves"
+            yield f"{name if before else 'as written'}: {told}"
+        before = counts

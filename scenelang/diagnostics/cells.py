@@ -6,10 +6,11 @@ Nothing in a scene may move the cursor or colour a terminal: what does not print
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
 from unicodedata import category, east_asian_width
+
+from scenelang.records import Record
 
 TAB = 4
 LONGEST = 4000
@@ -44,8 +45,7 @@ def paint(style: str, text: str, color: bool) -> str:
     return f"{STYLES[style]}{text}{STYLES['off']}" if color and style and text else text
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(Record):
     """One source line in cells.
 
     Args:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from scenelang.diagnostics.span import Span
+from scenelang.records import Record
 
 Severity = Literal["error", "warning"]
 MOST_CHARS: Final = 1000
@@ -17,32 +17,28 @@ MOST_EDITS: Final = 10_000
 _BEYOND: Final = {"E": ("E0121", "mistakes"), "W": ("W0102", "warnings")}
 
 
-@dataclass(frozen=True, slots=True)
-class Label:
+class Label(Record):
     """A further place that a diagnostic points at, with a few words of its own."""
 
     span: Span
     message: str
 
 
-@dataclass(frozen=True, slots=True)
-class Edit:
+class Edit(Record):
     """Replace the text of ``span`` by ``replacement``."""
 
     span: Span
     replacement: str
 
 
-@dataclass(frozen=True, slots=True)
-class Fix:
+class Fix(Record):
     """A change that mends the mistake and is safe to apply unseen."""
 
     message: str
     edits: tuple[Edit, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnostic:
+class Diagnostic(Record):
     """One mistake or doubt about a scene.
 
     Args:
@@ -70,13 +66,13 @@ def _cut(text: str) -> str:
     return text if len(text) <= MOST_CHARS else f"{text[:MOST_CHARS]}…"
 
 
-@dataclass(slots=True)
 class Diagnostics:
     """An ordered collector; the same code at the same place is kept once, and of a file at most `MOST`."""
 
-    items: list[Diagnostic] = field(default_factory=list)
-    _seen: set[tuple[str, str, int, int]] = field(default_factory=set, repr=False)
-    _counts: dict[tuple[str, str], int] = field(default_factory=dict, repr=False)
+    def __init__(self) -> None:
+        self.items: list[Diagnostic] = []
+        self._seen: set[tuple[str, str, int, int]] = set()
+        self._counts: dict[tuple[str, str], int] = {}
 
     def add(
         self,

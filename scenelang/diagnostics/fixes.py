@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.records import Record
 
 MAX_ROUNDS: Final = 50
 """A fix may uncover the next mistake; a text that still changes after so many rounds is left there."""
@@ -105,8 +105,7 @@ def _edited(text: str, edits: Iterable[Edit]) -> str:
 # ---------------------------------------------------------------- until nothing changes
 
 
-@dataclass(frozen=True, slots=True)
-class Settled(Generic[Key]):
+class Settled(Record, Generic[Key]):
     """Texts after all their fixes.
 
     Args:

@@ -14,18 +14,17 @@ otherwise. A mark over several lines has a bar at the left from where it begins 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from scenelang.diagnostics.cells import LONGEST, Canvas, Line, in_cells, left_out, paint, printable, window
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.records import Record
 
 _LEAST_WIDTH = 30
 _HEAD, _TAIL = 2, 1
 """Of a mark over many lines so many are shown after its first line and before its last."""
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
+class Mark(Record):
     """A place in a text.
 
     Args:
@@ -39,8 +38,7 @@ class Mark:
     primary: bool = False
 
 
-@dataclass(slots=True)
-class _Bar:
+class _Bar(Record, frozen=False):
     """A mark over several lines: where it begins and ends, and its column of the margin."""
 
     mark: Mark
@@ -52,8 +50,7 @@ class _Bar:
     slash: bool = False
 
 
-@dataclass(slots=True)
-class _Note:
+class _Note(Record, frozen=False):
     """What one line has to show of a mark, in cells ``[left, right)``."""
 
     left: int

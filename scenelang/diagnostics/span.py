@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from functools import cached_property
+from operator import attrgetter
+from typing import Final
+
+from scenelang.records import Record
 
 
-@dataclass(frozen=True, slots=True)
 class SourceFile:
     """One text a scene was read from.
 
@@ -15,42 +19,42 @@ class SourceFile:
         text: the whole text, decoded, newlines as they were.
     """
 
-    name: str
-    text: str
-    _starts: list[int] = field(default_factory=list, init=False, repr=False, compare=False)
+    def __init__(self, name: str, text: str) -> None:
+        self.name: Final = name
+        self.text: Final = text
 
-    def _line_starts(self) -> list[int]:
-        if not self._starts:
-            self._starts.append(0)
-            at = self.text.find("\n")
-            while at != -1:
-                self._starts.append(at + 1)
-                at = self.text.find("\n", at + 1)
-        return self._starts
+    @cached_property
+    def _starts(self) -> list[int]:
+        """Where each line begins."""
+        return [0, *(newline.end() for newline in re.finditer("\n", self.text))]
 
     def position(self, offset: int) -> tuple[int, int]:
         """Line and column of a code-point offset, both from 1."""
-        starts = self._line_starts()
+        starts = self._starts
         offset = min(max(offset, 0), len(self.text))
         line = bisect_right(starts, offset)
         return line, offset - starts[line - 1] + 1
 
     def line(self, number: int) -> str:
         """The text of line ``number`` (from 1) without its newline; empty past the end."""
-        starts = self._line_starts()
+        starts = self._starts
         if not 1 <= number <= len(starts):
             return ""
         end = starts[number] if number < len(starts) else len(self.text)
         return self.text[starts[number - 1] : end].rstrip("\r\n")
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
+class Span(Record):
     """A half-open range ``[start, end)`` of code points in one file."""
 
-    source: SourceFile = field(compare=False, repr=False)
+    source: SourceFile
     start: int
     end: int
+
+    _key = attrgetter("start", "end")
+
+    def __repr__(self) -> str:
+        return f"Span(start={self.start}, end={self.end})"
 
     def to(self, other: Span) -> Span:
         """The span from the start of this one to the end of ``other`` (same file)."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from heapq import nsmallest
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
+from scenelang.records import Record
 
 _CLEAR = 0.5  # by so much a name has to be nearer than the next for a fix to be safe
 _SWAPPED, _CASE, _JOINT, _FIRST = 0.9, 0.05, 0.3, 0.15
@@ -15,8 +15,7 @@ _LONGEST = 64  # letters of a name that others are compared with
 _MOST_SLIPS = 8
 
 
-@dataclass(slots=True)
-class Effort:
+class Effort(Record, frozen=False):
     """What looking for similar names may still cost, over all of a scene: it may hold thousands of both.
 
     Args:

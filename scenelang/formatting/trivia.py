@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
+from scenelang.records import Record
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Tokens
 
@@ -39,8 +40,7 @@ def texts_of(comments: Iterable[Comment]) -> list[str]:
     return [comment.text for comment in comments]
 
 
-@dataclass(slots=True)
-class Notes:
+class Notes(Record, frozen=False):
     """What stands around one token.
 
     Args:

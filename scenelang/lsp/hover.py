@@ -50,7 +50,7 @@ def _word(word: words.Word) -> str:
 
 def _keyword(node: Any, offset: int) -> tuple[int, int, str] | None:
     """The keyword that heads a node, if the cursor is on it."""
-    kinds = {
+    kinds: dict[type, str] = {
         nodes.Version: "nsg",
         nodes.Model: "model",
         nodes.Param: "param",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from scenelang.backend.neural import draw_program
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import Spans, lower
-from scenelang.graph.nodes import Fold, Graph, Leaf
+from scenelang.graph.nodes import Fold, Graph
 from scenelang.graph.steps import Affine
 from scenelang.graph.walk import nodes
 from scenelang.measure.metrics import MOST_DB, flip, over_white, psnr
@@ -26,43 +25,6 @@ from scenelang.scene.schema import Scene
 REPEATS = 3
 
 
-@dataclass(frozen=True, slots=True)
-class Counts:
-    """The size of a graph.
-
-    Args:
-        objects: leaves.
-        matrices: affine maps and deformations on leaves and folds: each is one matrix of the lifting.
-        affines, deformations: of these.
-        folds: groups, chains and boolean nodes.
-        tokens: children of folds by the word that joins each, of the words in use; of a stream the tokens
-            of its rows.
-    """
-
-    objects: int
-    matrices: int
-    affines: int
-    deformations: int
-    folds: int
-    tokens: Mapping[str, int]
-
-
-def count(graph: Graph) -> Counts:
-    """Count a graph's parts."""
-    found = [node for node, _ in nodes(graph.root)]
-    steps = [move.step for node in found for move in node.moves]
-    affines = sum(isinstance(step, Affine) for step in steps)
-    folds = [node for node in found if isinstance(node, Fold)]
-    return Counts(
-        objects=sum(isinstance(node, Leaf) for node in found),
-        matrices=len(steps),
-        affines=affines,
-        deformations=len(steps) - affines,
-        folds=len(folds),
-        tokens=token_counts(TOKENS[link.op] for fold in folds for link in fold.links),
-    )
-
-
 def token_counts(tokens: Iterable[int]) -> dict[str, int]:
     """How many rows join by each word, of the words in use."""
     values = list(tokens)
@@ -70,20 +32,30 @@ def token_counts(tokens: Iterable[int]) -> dict[str, int]:
 
 
 def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
-    """Sizes after ``lower`` and each pass, and whether the pass changed anything."""
-    out = []
+    """Sizes after ``lower`` and each pass, and whether the pass changed anything.
+
+    Returns:
+        Of each stage ``objects`` (leaves), ``matrices`` (affine maps and deformations on leaves and folds:
+        each is one matrix of the lifting), of these ``affines`` and ``deformations``, ``folds`` (groups,
+        chains and boolean nodes) and ``tokens`` (children of folds by the word that joins them, of the words
+        in use).
+    """
+    out: list[dict[str, Any]] = []
     before: Graph | None = None
     for name, graph in graphs.items():
-        now = count(graph)
+        found = [node for node, _ in nodes(graph.root)]
+        folds = [node for node in found if isinstance(node, Fold)]
+        steps = [move.step for node in found for move in node.moves]
+        affines = sum(isinstance(step, Affine) for step in steps)
         out.append(
             {
                 "stage": name,
-                "objects": now.objects,
-                "matrices": now.matrices,
-                "affines": now.affines,
-                "deformations": now.deformations,
-                "folds": now.folds,
-                "tokens": dict(now.tokens),
+                "objects": len(found) - len(folds),
+                "matrices": len(steps),
+                "affines": affines,
+                "deformations": len(steps) - affines,
+                "folds": len(folds),
+                "tokens": token_counts(TOKENS[link.op] for fold in folds for link in fold.links),
                 "changed": before is not None and graph != before,
             }
         )

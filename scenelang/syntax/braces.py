@@ -8,11 +8,11 @@ however it is laid out.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
+from scenelang.records import Record
 from scenelang.syntax.automaton import advance, fits, reach
 from scenelang.syntax.completion import completion
 from scenelang.syntax.layout import Slip, find_slips
@@ -36,8 +36,7 @@ def balance(tokens: Tokens, report: Report) -> None:
     mender.match_the_rest()
 
 
-@dataclass(frozen=True, slots=True)
-class _Mend:
+class _Mend(Record):
     """Put ``insert`` in the place of ``delete`` tokens at index ``at``."""
 
     at: int

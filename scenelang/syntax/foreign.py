@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
+from scenelang.records import Record
 
-@dataclass(frozen=True, slots=True)
-class Habit:
+
+class Habit(Record):
     """One habit.
 
     Args:

@@ -8,9 +8,9 @@ with its depth costs 1. The cheapest path is the fewest slips that explain the l
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from itertools import pairwise
 
+from scenelang.records import Record
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Tokens
 
@@ -20,8 +20,7 @@ _NEVER = 1e9
 _FAR = 200  # tokens in which a statement shows whether it is one
 
 
-@dataclass(frozen=True, slots=True)
-class Slip:
+class Slip(Record):
     """Between the tokens ``first`` and ``stop`` the depth meant goes ``shift`` away from the one written.
 
     ``depth`` is the one meant on that line, which is less by 1 than before its `}` if it begins with one.
@@ -33,8 +32,7 @@ class Slip:
     depth: int
 
 
-@dataclass(frozen=True, slots=True)
-class _Line:
+class _Line(Record):
     """A line that begins with a statement or a closing brace."""
 
     first: int  # index of its first token

@@ -6,14 +6,13 @@ a diagnostic has been given; later stages skip such nodes silently.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from scenelang.diagnostics.span import Span
+from scenelang.records import Record
 
 
-@dataclass(frozen=True, slots=True)
-class Name:
+class Name(Record):
     """An identifier with its place; dotted for imported ones (``lib.name``)."""
 
     text: str
@@ -23,8 +22,7 @@ class Name:
 # ---------------------------------------------------------------- expressions
 
 
-@dataclass(frozen=True, slots=True)
-class Number:
+class Number(Record):
     """A literal number with its unit glued on: '', 'deg', 'rad', 'turn', 's', 'ms'."""
 
     value: float
@@ -33,34 +31,29 @@ class Number:
     is_integer: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class String:
+class String(Record):
     value: str
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Bool:
+class Bool(Record):
     value: bool
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Color:
+class Color(Record):
     """A ``#rgb`` or ``#rrggbb`` literal, as three numbers in [0, 1]."""
 
     rgb: tuple[float, float, float]
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Vector:
+class Vector(Record):
     items: tuple[Expr, ...]
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Range:
+class Range(Record):
     """``a..b`` (inclusive), ``a..<b`` (exclusive), with an optional step."""
 
     start: Expr
@@ -70,21 +63,18 @@ class Range:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class NameRef:
+class NameRef(Record):
     name: Name
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Unary:
+class Unary(Record):
     op: Literal["-", "+", "!"]
     operand: Expr
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Binary:
+class Binary(Record):
     op: str  # + - * / % ^ < <= > >= == != && ||
     left: Expr
     right: Expr
@@ -92,16 +82,14 @@ class Binary:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Conditional:
+class Conditional(Record):
     condition: Expr
     then: Expr
     otherwise: Expr
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Argument:
+class Argument(Record):
     """A call's argument; ``name`` is None for a positional one."""
 
     name: Name | None
@@ -109,8 +97,7 @@ class Argument:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class CallExpr:
+class CallExpr(Record):
     """A function call inside an expression."""
 
     name: Name
@@ -118,8 +105,7 @@ class CallExpr:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Member:
+class Member(Record):
     """``v.x``; on a module alias ``lib.name`` it is a qualified name (the evaluator decides)."""
 
     value: Expr
@@ -127,15 +113,13 @@ class Member:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Index:
+class Index(Record):
     value: Expr
     index: Expr
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class MaterialExpr:
+class MaterialExpr(Record):
     """``material NAME`` or ``material NAME { … }`` used as a value."""
 
     name: Name
@@ -143,8 +127,7 @@ class MaterialExpr:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class BadExpr:
+class BadExpr(Record):
     """What recovery could not read as an expression."""
 
     span: Span
@@ -171,16 +154,14 @@ Expr = (
 # ---------------------------------------------------------------- statements
 
 
-@dataclass(frozen=True, slots=True)
-class Block:
+class Block(Record):
     """``{ … }``; the span includes the braces."""
 
     statements: tuple[Stmt, ...]
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Parameter:
+class Parameter(Record):
     """A formal parameter of a fn or module."""
 
     name: Name
@@ -188,70 +169,61 @@ class Parameter:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Version:
+class Version(Record):
     """``nsg 1;``"""
 
     number: Number
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Model:
+class Model(Record):
     """``model "name";``"""
 
     name: Expr
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Param:
+class Param(Record):
     name: Name
     default: Expr
     range: Expr | None
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Let:
+class Let(Record):
     name: Name
     value: Expr
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Fn:
+class Fn(Record):
     name: Name
     params: tuple[Parameter, ...]
     body: Expr
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Module:
+class Module(Record):
     name: Name
     params: tuple[Parameter, ...]
     body: Block
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Import:
+class Import(Record):
     path: String
     alias: Name
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class For:
+class For(Record):
     variable: Name
     iterable: Expr
     body: Block
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class If:
+class If(Record):
     condition: Expr
     then: Block
     otherwise: Block | If | None
@@ -261,8 +233,7 @@ class If:
 Combine = Literal["union", "smooth", "subtract", "intersect"]
 
 
-@dataclass(frozen=True, slots=True)
-class Call:
+class Call(Record):
     """Any statement headed by a name, with arguments, a block, both, or neither.
 
     Geometries (``square { … }``), transforms (``scale(2);``), settings (``canvas(w, h);``,
@@ -277,8 +248,7 @@ class Call:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Node:
+class Node(Record):
     """``group``, ``union``, ``smooth``, ``subtract``, ``intersect`` or ``chain`` with its block."""
 
     kind: Literal["group", "union", "smooth", "subtract", "intersect", "chain"]
@@ -287,8 +257,7 @@ class Node:
     keyword: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Combined:
+class Combined(Record):
     """A chain child with its word: ``subtract star { … }``, ``smooth dot(1);``."""
 
     op: Combine
@@ -297,8 +266,7 @@ class Combined:
     keyword: Span
 
 
-@dataclass(frozen=True, slots=True)
-class MaterialUse:
+class MaterialUse(Record):
     """``material NAME;`` or ``material NAME { … }`` as a statement."""
 
     name: Name
@@ -306,8 +274,7 @@ class MaterialUse:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class BadStmt:
+class BadStmt(Record):
     """What recovery could not read as a statement."""
 
     span: Span
@@ -331,8 +298,7 @@ Stmt = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class File:
+class File(Record):
     """A whole file."""
 
     statements: tuple[Stmt, ...]

@@ -20,10 +20,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
+from scenelang.records import Record
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Tokens
 
@@ -57,8 +57,7 @@ Columns = tuple[list[int], list[int], list[int]]
 """Kinds, starts and ends of tokens."""
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
+class Piece(Record):
     """A hole or a literal text of a pattern.
 
     Args:
@@ -89,8 +88,7 @@ def pieces(pattern: str) -> tuple[Piece, ...]:
     return tuple(found)
 
 
-@dataclass(frozen=True, slots=True)
-class Match:
+class Match(Record):
     """Where the pieces of a pattern were found.
 
     Args:
@@ -225,8 +223,7 @@ def without_types(text: str) -> str:
     return _TYPED.sub("", text)
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
+class Change(Record):
     """What a replacement makes of a match, less what both have in common at their ends.
 
     Args:

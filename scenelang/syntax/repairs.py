@@ -7,9 +7,9 @@ make. Only repairs after which at least three tokens or a whole statement fit ar
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import cache
 
+from scenelang.records import Record
 from scenelang.syntax.automaton import LOOKAHEAD, advance, fits, reach
 from scenelang.syntax.completion import completion
 from scenelang.syntax.layout import leaves_open
@@ -29,8 +29,7 @@ MAX_REPLAY = 400
 """A statement with more tokens before the mistake is not tried again from its start."""
 
 
-@dataclass(frozen=True, slots=True)
-class Repair:
+class Repair(Record):
     """Put ``insert`` in the place of ``delete`` tokens at index ``at``."""
 
     at: int

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import contextlib
 import json
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 from zlib import crc32
+
+from scenelang.records import Record
 
 PACKAGE: Final = Path(__file__).resolve().parent.parent
 PLACE: Final = PACKAGE / "syntax" / "tables.json"
@@ -21,8 +22,7 @@ END = 0
 """The kind of the end of the text."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tables:
+class Tables(Record):
     """The LALR automaton and the terminals of the language.
 
     Token kinds are small integers, indices into ``kinds``.

@@ -32,7 +32,7 @@ def test_version(folder: Folder) -> None:
 def test_models(folder: Folder) -> None:
     assert folder.run("models").stdout.startswith("shapes2d  2D  ")
     said = folder.run("models", "shapes2d").stdout
-    for words in ("square, triangle, star, pentagon", "sha256", "seed", "revision", "numbers"):
+    for words in ("square, triangle, star, pentagon", "digest", "seed", "revision", "parameters"):
         assert words in said
     assert folder.run("models", "shapes").exit_code == 2
     listed = json.loads(folder.run("models", "--format", "json").stdout)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from scenelang.cli import fmt
+from scenelang.cli.commands import fmt
 from tests.cli.conftest import Folder
 
 ROUGH = "square   { scale( 0.5 ); }\n"

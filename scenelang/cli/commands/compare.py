@@ -32,34 +32,23 @@ def command(
 
     Prints PSNR (at most 50 dB), SSIM and FLIP. Transparent pictures are compared over white.
     """
-    from scenelang.cli.inputs import read_scene
+    from scenelang.cli.jobs import prepare_scene
     from scenelang.cli.outputs import composed
-    from scenelang.cli.say import need_metrics, say_diagnostics
-    from scenelang.diagnostics.error import SceneError
+    from scenelang.cli.say import need_metrics
 
     need_metrics()
     stem = "stdin" if scene == "-" else Path(scene).stem
     target = out if out is not None else composed(Path(f"{stem}-compare.png"))
-    found = read_scene(scene, request)
-    if found.scene is None or found.diagnostics.errors:
-        say_diagnostics(found.diagnostics)
+    job, found = prepare_scene(scene, request)
+    if job.program is None or found.scene is None or job.failed():
         ctx.exit(1)
     from scenelang.backend.exact import draw_exact
     from scenelang.backend.neural import choose_device, draw_program, open_model
     from scenelang.measure.metrics import compare, over_white
     from scenelang.measure.sheet import side_by_side
-    from scenelang.program.compile import compile_scene
 
-    try:
-        program = compile_scene(
-            found.scene, spans=found.spans, diagnostics=found.diagnostics, model=request.model
-        )
-    except SceneError:
-        say_diagnostics(found.diagnostics)
-        ctx.exit(1)
-    say_diagnostics(found.diagnostics)
-    opened = open_model(program.model, choose_device(device))
-    picture = over_white(draw_program(program, opened, threads=threads).image)
+    opened = open_model(job.program.model, choose_device(device))
+    picture = over_white(draw_program(job.program, opened, threads=threads).image)
     exact = over_white(draw_exact(found.scene, spans=found.spans, model=request.model))
     figures = compare(picture, exact)
     text = f"PSNR {figures['psnr']:.2f} dB  SSIM {figures['ssim']:.4f}  FLIP {figures['flip']:.4f}"

@@ -32,18 +32,12 @@ def command(
     FILE is a scene, or - for standard input. `scenelang dump` shows what the compiler made of it.
     """
     from scenelang.cli.clock import Clock
-    from scenelang.cli.inputs import unused_defines
-    from scenelang.cli.jobs import PROGRAM, prepare
-    from scenelang.cli.say import say_diagnostics
+    from scenelang.cli.jobs import PROGRAM, prepare_scene
 
-    if file.endswith(PROGRAM):
-        raise click.UsageError(f"`{file}` is a compiled program already.")
     if not out.endswith(PROGRAM):
         raise click.UsageError(f"A program's file ends in {PROGRAM}, `{out}` does not.")
     clock = Clock()
-    job = prepare(file, request, clock, verbose=verbose)
-    job.diagnostics = [*job.diagnostics, *unused_defines(request)]
-    say_diagnostics(job.diagnostics)
+    job, _ = prepare_scene(file, request, clock)
     if job.failed(strict) or job.program is None:
         ctx.exit(1)
     with clock("save"):

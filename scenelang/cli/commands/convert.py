@@ -11,7 +11,6 @@ from scenelang.cli import options
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
-    from scenelang.scene.schema import Scene
 
 Kind = Literal["nsg", "json", "python"]
 SUFFIXES: Final[dict[str, Kind]] = {".nsg": "nsg", ".json": "json", ".py": "python"}
@@ -40,24 +39,19 @@ def command(
     FILE is a scene, as text or JSON (.json), or - for standard input. What is written has no params,
     loops or imports left, only objects and numbers, which are kept exactly: it reads back as the same scene.
     """
-    from scenelang.cli.inputs import read_scene
+    from scenelang.cli.inputs import read_input, unused_defines
     from scenelang.cli.say import put_out, say_diagnostics
 
     wanted = kind or SUFFIXES.get(Path(out or "").suffix.lower())
     if wanted is None:
         raise click.UsageError("Say what to write: --to nsg, json or python, or -o with such a suffix.")
-    found = read_scene(file, request)
+    found = read_input(file, request)
+    found.diagnostics.items += unused_defines(request)
     say_diagnostics(found.diagnostics)
     if found.scene is None or found.diagnostics.errors:
         ctx.exit(1)
-    put_out(_written(found.scene, wanted), out)
+    from scenelang.scene.json import to_readable_json
+    from scenelang.scene.schema import Scene
 
-
-def _written(scene: Scene, kind: Kind) -> str:
-    if kind == "json":
-        from scenelang.scene.json import to_readable_json
-
-        return to_readable_json(scene)
-    if kind == "python":
-        return scene.to_python()
-    return scene.to_nsg()
+    writers = {"json": to_readable_json, "python": Scene.to_python, "nsg": Scene.to_nsg}
+    put_out(writers[wanted](found.scene), out)

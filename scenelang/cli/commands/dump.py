@@ -11,8 +11,8 @@ import click
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-    from scenelang.cli.inputs import Request
-    from scenelang.cli.stages import Stages
+    from scenelang.cli.inputs import Input, Request
+    from scenelang.cli.jobs import Job
 
 
 @click.command("dump")
@@ -44,36 +44,33 @@ def command(
     written), the passes in their order (`--after help` lists them) and program. A scene with mistakes is
     shown as far as it goes; then the exit code is 1.
     """
-    from scenelang.cli.say import put_out, say_diagnostics
-    from scenelang.cli.stages import known_stages, run_stages, stage_names
+    from scenelang.cli.jobs import prepare_scene
+    from scenelang.cli.say import put_out
+    from scenelang.cli.stages import STAGES, check_stages
 
     if stages == ("help",):
-        click.echo("\n".join(stage_names()))
+        click.echo("\n".join(STAGES))
         return
-    wanted = known_stages(stages)
-    made = run_stages(file, request)
-    say_diagnostics(made.diagnostics)
-    shown = list(_changes(made, wanted) if diff else _whole(made, wanted or ("program",), kind))
+    check_stages(stages)
+    job, source = prepare_scene(file, request)
+    shown = list(_changes(job, stages) if diff else _whole(job, source, stages or ("program",), kind))
     if kind == "json":
         put_out(json.dumps({"version": 1, "stages": shown}, indent=2, ensure_ascii=False) + "\n", out)
     else:
         titled = len(shown) > 1 or diff
         parts = [(f"after {each['stage']}:\n" if titled else "") + each["text"] for each in shown]
         put_out("\n".join(parts), out)
-    ctx.exit(int(bool(made.diagnostics.errors)))
+    ctx.exit(int(job.failed()))
 
 
-def _changes(made: Stages, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
+def _changes(job: Job, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
     """The differences that the passes made, of those that made any; all passes, or the wanted."""
     from scenelang.graph.dump import dump
     from scenelang.interchange.changes import changes
 
     before, old = "", "nothing"
-    for name, graph in made.graphs.items():
-        if before and made.graphs[old] is graph:
-            text = before
-        else:
-            text = dump(graph)
+    for name, graph in job.graphs.items():
+        text = before if before and job.graphs[old] is graph else dump(graph)
         if not wanted or name in wanted:
             said = changes(before, text, old, name) if before else text
             if said or wanted:
@@ -81,19 +78,18 @@ def _changes(made: Stages, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
         before, old = text, name
 
 
-def _whole(made: Stages, wanted: tuple[str, ...], kind: str) -> Iterator[dict[str, Any]]:
+def _whole(job: Job, source: Input, wanted: tuple[str, ...], kind: str) -> Iterator[dict[str, Any]]:
     """The stages that were reached, as text or as data."""
     from scenelang.graph.dump import dump
     from scenelang.interchange.graph_data import graph_data, program_data, program_table
     from scenelang.interchange.tree import tree_data, tree_text
 
-    source = made.source
     known: dict[str, tuple[str, Any, Callable[[Any], Any], Callable[[Any], str]]] = {
-        name: ("graph", graph, graph_data, dump) for name, graph in made.graphs.items()
+        name: ("graph", graph, graph_data, dump) for name, graph in job.graphs.items()
     }
     known["syntax"] = ("tree", source.tree, tree_data, tree_text)
     known["scene"] = ("scene", source.scene, lambda s: json.loads(s.to_json()), lambda s: str(s.to_nsg()))
-    known["program"] = ("program", made.program, program_data, program_table)
+    known["program"] = ("program", job.program, program_data, program_table)
     for name in wanted:
         key, value, data, text = known.get(name, ("", None, str, str))
         if value is not None:

@@ -34,26 +34,24 @@ def command(
     and the next best, how many pixels an object reached, how many samples met how many objects, the
     parameters, the time of a frame, and the error against the exact picture.
     """
-    from scenelang.cli.say import say_diagnostics
-    from scenelang.cli.stages import run_stages
+    from scenelang.cli.jobs import prepare_scene
 
-    made = run_stages(file, request)
-    say_diagnostics(made.diagnostics)
-    if made.program is None or made.source.scene is None or made.diagnostics.errors:
+    job, source = prepare_scene(file, request)
+    scene, program = source.scene, job.program
+    if program is None or scene is None or job.failed():
         ctx.exit(1)
     from scenelang.backend.neural import choose_device, open_model, usable_cores
     from scenelang.measure.plan import choice, drawing_cost, stages, token_counts
 
-    scene, program = made.source.scene, made.program
     opened = open_model(program.model, choose_device(device))
     plan: dict[str, Any] = {
         "version": 1,
         "file": file,
         **choice(scene, program.model, asked=request.model is not None),
-        "stages": stages(made.graphs),
+        "stages": stages(job.graphs),
         "rows": len(program),
         "tokens": token_counts(program.tokens.tolist()),
-        "drawing": drawing_cost(scene, program, opened, made.source.spans, threads or usable_cores()),
+        "drawing": drawing_cost(scene, program, opened, source.spans, threads or usable_cores()),
     }
     click.echo(json.dumps(plan, indent=2) if kind == "json" else _text(plan))
 

@@ -13,8 +13,6 @@ from scenelang.cli import options
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
-    from scenelang.cli.stages import Stages
-    from scenelang.interchange.drawing import Drawing
 
 _PATIENCE_S: Final = 60
 _SUFFIXES: Final = (".mmd", ".dot", ".svg", ".png")
@@ -56,24 +54,28 @@ def command(
     FILE is a scene, or - for standard input. Mermaid and DOT are text; .svg and .png need the program `dot`
     of Graphviz. Large scenes are cut, and a box says how many nodes are left out.
     """
-    from scenelang.cli.say import put_out, say_diagnostics
-    from scenelang.cli.stages import known_stages, run_stages
-    from scenelang.interchange.drawing import to_dot, to_mermaid
+    from scenelang.cli.jobs import prepare_scene
+    from scenelang.cli.say import put_out
+    from scenelang.cli.stages import STAGES, check_stages
+    from scenelang.interchange.drawing import draw_graph, draw_program, draw_scene, to_dot, to_mermaid
 
     wanted = _kind(out, kind)
-    known_stages((stage,), without=("syntax",))
+    check_stages((stage,), STAGES[1:])
     dot = _find_dot(wanted)
-    made = run_stages(file, request)
-    say_diagnostics(made.diagnostics)
-    drawing = _drawing(made, stage, most)
-    if drawing is None or made.diagnostics.errors:
+    job, source = prepare_scene(file, request)
+    if job.failed() or source.scene is None or job.program is None:
         ctx.exit(1)
+    if stage == "scene":
+        drawing = draw_scene(source.scene, most)
+    elif stage == "program":
+        drawing = draw_program(job.program, most)
+    else:
+        drawing = draw_graph(job.graphs[stage], most)
     if wanted == "mmd":
         put_out(to_mermaid(drawing), out)
-    elif dot is None:
-        put_out(to_dot(drawing), out)
     else:
-        put_out(_picture(dot, wanted, to_dot(drawing)), out)
+        text = to_dot(drawing)
+        put_out(text if dot is None else _picture(dot, wanted, text), out)
 
 
 def _kind(out: str | None, kind: str | None) -> str:
@@ -98,16 +100,6 @@ def _find_dot(kind: str) -> str | None:
             "or write .dot or .mmd, which need nothing."
         )
     return found
-
-
-def _drawing(made: Stages, stage: str, most: int) -> Drawing | None:
-    from scenelang.interchange.drawing import draw_graph, draw_program, draw_scene
-
-    if stage == "scene":
-        return None if made.source.scene is None else draw_scene(made.source.scene, most)
-    if stage == "program":
-        return None if made.program is None else draw_program(made.program, most)
-    return draw_graph(made.graphs[stage], most) if stage in made.graphs else None
 
 
 def _picture(dot: str, kind: str, text: str) -> bytes:

@@ -51,42 +51,29 @@ def _facts(manifest: Manifest) -> dict[str, Any]:
 
 
 def _text(facts: dict[str, Any]) -> str:
-    manifest, weights = facts["manifest"], facts["weights"]
+    manifest, weights = facts["manifest"], facts["weights"] or {"weights": "missing or damaged"}
     lines = [f"{manifest['name']}: {manifest['summary']}", ""]
-    lines += [f"{key:12} {manifest[key]}" for key in ("dimension", "renderer", "lifting")]
-    words = ("geometries", "materials", "transforms", "material_ops")
-    lines += [f"{key.replace('_', ' '):12} {', '.join(manifest[key])}" for key in words]
-    lines += [f"{'limits':12} {_pairs(manifest['limits'])}", "", "trained or measured in"]
-    lines += [f"  {key:10} {low:g} to {high:g}" for key, (low, high) in manifest["trained"].items()]
-    if manifest["measured"]:
-        lines += ["", "measured", *_tree(manifest["measured"], "  ")]
-    lines.append("")
-    if weights is None:
-        return "\n".join([*lines, "weights      missing or damaged"])
-    lines += [
-        f"weights      {weights['parameters']:,} numbers, {weights['bytes']:,} bytes",
-        f"sha256       {weights['digest']}",
-        "",
-        "training",
-        *_tree(weights["training"], "  "),
-    ]
-    return "\n".join(lines)
-
-
-def _pairs(values: dict[str, Any]) -> str:
-    return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in values.items())
+    lines += _tree({k: v for k, v in manifest.items() if v and k not in ("name", "summary")}, "")
+    return "\n".join([*lines, "", "weights", *_tree(weights, "  ")])
 
 
 def _tree(values: dict[str, Any], indent: str) -> list[str]:
     """A line for each value; dictionaries within are indented."""
     lines = []
     for key, value in values.items():
-        if isinstance(value, dict) and any(isinstance(v, dict | list) for v in value.values()):
-            lines += [f"{indent}{key}", *_tree(value, indent + "  ")]
-        elif isinstance(value, dict):
-            lines.append(f"{indent}{key:10} {_pairs(value)}")
-        elif isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
-            lines += [f"{indent}{key:10} {_pairs(v)}" for v in value]
+        title = f"{indent}{key.replace('_', ' '):12} "
+        if isinstance(value, dict) and any(isinstance(v, dict | list | tuple) for v in value.values()):
+            lines += [title.rstrip(), *_tree(value, indent + "  ")]
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], dict):
+            lines += [title + _line(v) for v in value]
         else:
-            lines.append(f"{indent}{key:10} {value}")
+            lines.append(title + _line(value))
     return lines
+
+
+def _line(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key.replace('_', ' ')} {each}" for key, each in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(map(str, value))
+    return f"{value:,}" if type(value) is int else str(value)

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from scenelang.cli import options
 
 if TYPE_CHECKING:
-    from scenelang.animation.targets import Target
     from scenelang.backend.options import Samples
-    from scenelang.cli.animation import Wanted
     from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import Job
@@ -119,7 +116,7 @@ def command(
     With --max-ms or --max-flip each scene is drawn by what was measured to suffice, model and samples; -v
     says which, why, and what was next.
     """
-    from scenelang.cli.animation import Wanted, wanted_target
+    from scenelang.cli.animation import Wanted, animate, wanted_target
     from scenelang.cli.choosing import check_options
     from scenelang.cli.clock import Clock
     from scenelang.cli.drawing import chosen, exact, neural
@@ -130,7 +127,8 @@ def command(
     from scenelang.measure.frontier import Limits
 
     clock = Clock()
-    wanted = Wanted(frames, fps, jobs, palette, dither)
+    wanted = Wanted(frames, fps, jobs, palette, dither, backend, device, threads, strict, verbose)
+    _ = wanted.frames
     if frame is not None and wanted.certain:
         raise click.UsageError("--frame asks for a picture, --frames and --fps for an animation.")
     if len(files) > 1 and wanted.certain:
@@ -143,10 +141,10 @@ def command(
         target = wanted_target(files[0], out, wanted)
         if target is not None:
             _only_stills(limits, samples)
-            painting = _Painting(backend, device, threads, strict, verbose)
-            code, source = _animate(files[0], out, target, request, wanted, painting)
-            if source is None:
-                ctx.exit(code)
+            done = animate(files[0], out, target, request, wanted)
+            if isinstance(done, int):
+                ctx.exit(done)
+            source = done
     elif wanted.certain:
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
     paths = targets(files, out)
@@ -157,7 +155,8 @@ def command(
     if limits:
         draw, ready, code = chosen(limits, request, clock, threads, ready, code)
     elif backend == "reference":
-        _only_network(samples)
+        if samples != "adaptive":
+            raise click.UsageError("--samples is for the network, not for the reference.")
         draw = exact(request, clock)
     else:
         draw = neural(clock, device, threads, samples)
@@ -167,82 +166,11 @@ def command(
             with clock("save"):
                 image.save(path)
             if verbose:
-                _tell(job, path)
+                lines = "".join(f"\n  {note}" for note in job.notes)
+                click.echo(f"{job.name} -> {path}{lines}", err=True)
     if verbose:
         click.echo(clock.report(), err=True)
     ctx.exit(code)
-
-
-class _Painting(NamedTuple):
-    """How pictures are drawn, and what is said about them."""
-
-    backend: options.Backend
-    device: Literal["auto", "cpu", "cuda"]
-    threads: int | None
-    strict: bool
-    verbose: bool
-
-
-def _animate(
-    name: str, out: str, target: Target, request: Request, wanted: Wanted, painting: _Painting
-) -> tuple[int, SourceFile | None]:
-    """Draw an animation; the exit code, and the scene's text if it is to be drawn as one picture."""
-    import time
-
-    from scenelang.animation.painting import Painter
-    from scenelang.animation.run import make, ready
-    from scenelang.cli.animation import frames_of, open_input, still_picture, strays, summary
-    from scenelang.cli.inputs import unused_defines
-    from scenelang.cli.main import Trouble, describe
-    from scenelang.cli.progress import Bar
-    from scenelang.cli.say import say_diagnostics
-    from scenelang.diagnostics.diagnostic import Diagnostics
-    from scenelang.diagnostics.error import SceneError
-
-    started = time.perf_counter()
-    found = Diagnostics()
-    source, clip = open_input(name, request, wanted, found)
-    if clip is not None and still_picture(clip, target, wanted, out):
-        return 0, source
-    if source is not None:
-        found.items.extend(unused_defines(request))
-    numbers = frames_of(clip, wanted) if clip is not None and not found.errors else None
-    if clip is None or numbers is None or found.errors or (found.items and painting.strict):
-        say_diagnostics(found)
-        return 1, None
-    ready(target)
-    painter = Painter(clip, painting.backend, painting.device, painting.threads)
-    try:
-        with Bar() as bar:
-            made = make(
-                painter,
-                target,
-                numbers,
-                jobs=wanted.jobs,
-                palette=wanted.palette,
-                dither=wanted.dither,
-                strict=painting.strict,
-                progress=lambda now: bar(now.told, now.done, now.total),
-            )
-    except SceneError:
-        say_diagnostics(found)
-        return 1, None
-    except KeyboardInterrupt:
-        if target.work.exists():
-            click.echo(
-                f"\nframes are kept in `{target.work}`; the same command goes on with the rest", err=True
-            )
-        raise
-    except OSError as error:
-        raise Trouble(f"cannot write `{out}`: {describe(error)}") from None
-    say_diagnostics(found)
-    click.echo(summary(made, target, clip, started), err=True)
-    if (others := strays(target, made)) is not None:
-        click.echo(f"note: {others}", err=True)
-    if painting.verbose:
-        for line in made.lines():
-            click.echo(f"  {line}", err=True)
-    return 0, None
 
 
 def _prepared(
@@ -292,13 +220,3 @@ def _only_stills(limits: Limits, samples: str) -> None:
     if limits or samples != "adaptive":
         what = "--max-ms and --max-flip are" if limits else "--samples is"
         raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")
-
-
-def _only_network(samples: str) -> None:
-    if samples != "adaptive":
-        raise click.UsageError("--samples is for the network, not for the reference.")
-
-
-def _tell(job: Job, path: Path) -> None:
-    lines = "".join(f"\n  {note}" for note in job.notes)
-    click.echo(f"{job.name} -> {path}{lines}", err=True)

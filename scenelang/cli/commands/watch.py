@@ -70,7 +70,7 @@ def command(
     from scenelang.watching.screen import Screen
 
     out = str(composed(Path(f"{file.stem}.png"))) if out is None else out
-    wanted = Wanted(frames, fps, None, "auto", False)
+    wanted = Wanted(frames, fps)
     target = None
     if frame is None and (is_animation(out) or wanted.certain or out.endswith(("/", "\\"))):
         target = wanted_target(str(file), out, wanted)

@@ -21,12 +21,12 @@ import re
 import shlex
 import textwrap
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Final, Literal
 
 from scenelang.diagnostics.codes import CODES
+from scenelang.records import Record
 
 AREAS: Final = {
     "01": "syntax",
@@ -41,8 +41,7 @@ _FENCE: Final = re.compile(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Example:
+class Example(Record):
     """A scene of a page.
 
     Args:
@@ -60,8 +59,7 @@ class Example:
     limits: tuple[tuple[str, int], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Page:
+class Page(Record):
     """What there is to know about a code.
 
     Args:

@@ -1,0 +1,67 @@
+"""Records: values with named fields, like `dataclass(frozen=True, slots=True)` but cheap to define.
+
+A dataclass writes and compiles six methods when its module is imported, which takes half a millisecond. A
+record compiles `__init__` alone and inherits the others. Type checkers hold it to be frozen and nothing does
+at run time, so that making one takes a quarter of the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import MISSING, Field, dataclass, field
+from operator import attrgetter
+from typing import Any, ClassVar, dataclass_transform
+
+_register: Callable[[type], type] = dataclass(init=False, repr=False, eq=False, match_args=False)
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+class _RecordType(type):
+    """Makes the slots and `__init__` of a record from its annotations.
+
+    Args:
+        frozen: one that may change is equal to itself alone.
+    """
+
+    def __new__(
+        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any], frozen: bool = True
+    ) -> _RecordType:
+        hints = namespace.get("__annotations__", {})
+        own = {n: namespace.pop(n, MISSING) for n, hint in hints.items() if "ClassVar" not in str(hint)}
+        fields = {n: value for base in bases for n, value in getattr(base, "_defaults", {}).items()} | own
+        if fields:
+            head, lines = [], []
+            for n, default in fields.items():
+                head.append(n if default is MISSING else f"{n}=_{n}")
+                build = f"_{n}.default_factory() if {n} is _{n} else " if isinstance(default, Field) else ""
+                lines.append(f" self.{n} = {build}{n}")
+            code = "\n".join([f"def __init__(self, {', '.join(head)}):", *lines])
+            exec(code, {f"_{n}": default for n, default in fields.items()}, namespace)
+            namespace.setdefault("_key", attrgetter(*fields))
+        if not frozen:
+            namespace |= {"__eq__": object.__eq__, "__hash__": object.__hash__}
+        namespace |= {"__slots__": tuple(own), "__match_args__": tuple(fields), "_defaults": fields}
+        namespace.setdefault("__doc__", name)
+        # Registered, so that `dataclasses.fields` and `replace` take it.
+        record = super().__new__(cls, name, bases, namespace)
+        _register(record)
+        return record
+
+
+class Record(metaclass=_RecordType):
+    """Base of records; two are equal where their classes and all fields are."""
+
+    _defaults: ClassVar[dict[str, Any]] = {}  # of all fields; MISSING where there is none
+    _key = attrgetter("__class__")  # what equality and the hash are about
+
+    def __eq__(self, other: object) -> bool:
+        if self.__class__ is not other.__class__:
+            return NotImplemented
+        return bool(self._key(self) == self._key(other))
+
+    def __hash__(self) -> int:
+        return hash(self._key(self))
+
+    def __repr__(self) -> str:
+        fields = ", ".join(f"{name}={getattr(self, name)!r}" for name in self._defaults)
+        return f"{self.__class__.__qualname__}({fields})"
