@@ -1,13 +1,12 @@
-"""GIF, written frame by frame. Pillow compresses each; the container is ours, so that only two are held.
+"""GIF, written frame by frame: Pillow writes each, and only two are held.
 
-Pillow's own writer holds every frame until the last has come, and gives each a palette of its own.
+Pillow's own writer of films holds every frame until the last has come, and gives each a palette of its own.
 
 Source: CompuServe, Graphics Interchange Format, version 89a.
 """
 
 from __future__ import annotations
 
-import io
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import BinaryIO, Literal
 
 import numpy as np
 import numpy.typing as npt
+from PIL import GifImagePlugin, Image
 
 from scenelang.animation.palette import Census, Colours, Mapper
 from scenelang.animation.pictures import Box, Film, changed
@@ -76,7 +76,7 @@ def _head(out: BinaryIO, film: Film, common: Colours | None) -> None:
     flags = 0x70 | (0x80 | (bits - 1) if common is not None else 0)
     out.write(b"GIF89a" + struct.pack("<HHBBB", *film.size, flags, 0, 0))
     if common is not None:
-        out.write(_table(common, bits))
+        out.write(common.tobytes().ljust(3 << bits, b"\0"))
     if film.loop:
         out.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
 
@@ -95,66 +95,31 @@ def _frame(
     clear = len(colours)  # the index after the palette's own
     index = mapper(pixels)
     now = colours[index]
+    box: Box = (0, 0, *film.size)
     if film.alpha:
-        visible = pixels[..., 3] >= 128
-        index[~visible] = clear
-        box: Box = (0, 0, *film.size)
-    else:
+        index[pixels[..., 3] < 128] = clear
+    elif shown is not None:
         box = changed(shown, now)
-        if shown is not None:
-            index = np.where((now == shown).all(axis=2), np.uint8(clear), index)
+        index = np.where((now == shown).all(axis=2), np.uint8(clear), index)
     left, top, right, bottom = box
-    part = np.ascontiguousarray(index[top:bottom, left:right])
-    disposal = _CLEAR if film.alpha else _KEEP
-    bits = _bits(colours)
-    first = True
-    while length > 0 or first:  # a longer time than the format holds is a second picture of nothing
-        now_for = min(length, _LONGEST)
-        out.write(b"!\xf9\x04" + struct.pack("<BHBB", disposal << 2 | 1, now_for, clear, 0))
-        size = right - left, bottom - top
-        out.write(b"," + struct.pack("<HHHHB", left, top, *size, (0x80 | (bits - 1)) if own else 0))
-        if own:
-            out.write(_table(colours, bits))
-        out.write(_compressed(part))
-        length -= now_for
-        first = False
+    part = index[top:bottom, left:right]
+    while True:  # a longer time than the format holds is a second picture of nothing
+        image = Image.fromarray(np.ascontiguousarray(part))
+        image.putpalette(np.append(colours, [[0, 0, 0]], axis=0).astype(np.uint8).tobytes())
+        options = {
+            "duration": 10 * min(length, _LONGEST),  # Pillow takes milliseconds
+            "disposal": _CLEAR if film.alpha else _KEEP,
+            "transparency": clear,
+            "include_color_table": own,
+        }
+        out.writelines(GifImagePlugin.getdata(image, (left, top), **options))
+        length -= _LONGEST
+        if length <= 0:
+            return now
         if not film.alpha:
             part = np.full((1, 1), clear, np.uint8)
-            left, top, right, bottom = 0, 0, 1, 1
-    return now
 
 
 def _bits(colours: Colours) -> int:
     """Bits of an index; the colour after the last is the transparent one."""
     return max(1, len(colours).bit_length())
-
-
-def _table(colours: Colours, bits: int) -> bytes:
-    return colours.tobytes().ljust(3 << bits, b"\0")
-
-
-def _compressed(index: npt.NDArray[np.uint8]) -> bytes:
-    """The image data of indices: Pillow writes a picture of its own, whose data is taken out."""
-    from PIL import Image
-
-    image = Image.fromarray(index, "L")
-    data = io.BytesIO()
-    image.save(data, "GIF", optimize=False, interlace=0)
-    return _image_data(data.getvalue())
-
-
-def _image_data(data: bytes) -> bytes:
-    """Code size and blocks of the first image of a GIF."""
-    at = 13 + (3 << ((data[10] & 7) + 1) if data[10] & 0x80 else 0)
-    while data[at] == 0x21:
-        at = _after_blocks(data, at + 2)
-    assert data[at] == 0x2C
-    flags = data[at + 9]
-    start = at + 10 + (3 << ((flags & 7) + 1) if flags & 0x80 else 0)
-    return data[start : _after_blocks(data, start + 1)]
-
-
-def _after_blocks(data: bytes, at: int) -> int:
-    while data[at]:
-        at += data[at] + 1
-    return at + 1
