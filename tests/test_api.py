@@ -48,7 +48,7 @@ def test_one_object() -> None:
 
 
 def test_200_objects() -> None:
-    scene = nsg.loads("background(#000);" + MANY)
+    scene = nsg.loads("canvas(128, 128); background(#000);" + MANY)
     drawn, exact = nsg.render(scene), nsg.render(scene, backend="reference")
     assert len(nsg.compile(scene)) == 200
     assert np.abs(drawn - exact).mean() < 0.01

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.image import Image
+from scenelang.lab.about import Report, silent
 from scenelang.measure.metrics import MOST_DB, compare
 from scenelang.measure.scenes import draw_scene, reference_of, scenes_of, spread
 from scenelang.measure.sheet import contact_sheet, side_by_side
@@ -58,7 +58,7 @@ def evaluate_set(
     seed: int,
     *,
     threads: int = 1,
-    report: Callable[[str, int, int], None] | None = None,
+    report: Report = silent,
 ) -> tuple[dict[str, Any], list[Case]]:
     """Draw a set and compare.
 
@@ -81,8 +81,7 @@ def evaluate_set(
         program, picture = draw_scene(model, scene, threads)
         figures = compare(picture, reference_of(scene, model.manifest))
         cases.append(Case(index, _last_word(program.tokens), len(program), figures))
-        if report is not None:
-            report(name, index + 1, count)
+        report(name, index + 1, count)
     summary = {
         "set": name,
         "scenes": count,

@@ -12,18 +12,16 @@ from typing import Any
 import torch
 
 from scenelang.backend.neural import open_model
-from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.evaluate.api import load
-from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
 from scenelang.lab.about import about
 from scenelang.lab.charts import FAINT, INK, LINE, WARN, figure_png, pyplot
 from scenelang.measure.metrics import over_white, psnr
 from scenelang.measure.plan import choice, drawing_cost, stages, token_counts
+from scenelang.measure.scenes import reference_of
 from scenelang.models.load import Model
 from scenelang.passes import OPTIONAL
 from scenelang.program.compile import compile_scene
-from scenelang.reference.image import reference_image
 from scenelang.renderers.draw import draw
 from scenelang.scene.schema import Scene
 
@@ -68,7 +66,7 @@ def example_plan(path: Path) -> dict[str, Any]:
 
 def ways_of(scene: Scene, model: Model) -> dict[str, dict[str, float]]:
     """``meetings``, ``ms`` (the better of two) and ``psnr`` (dB) of a scene by each of `WAYS`."""
-    exact = over_white(reference_image(lower(scene, model.manifest, None, Diagnostics())))
+    exact = over_white(reference_of(scene, model.manifest))
     found = {}
     for name, options in WAYS.items():
         arguments = dict(options)

@@ -9,17 +9,16 @@ from typing import Any
 import numpy as np
 
 from scenelang.backend.neural import draw_program
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.lower import Spans, lower
+from scenelang.graph.lower import Spans
 from scenelang.graph.nodes import Fold, Graph
 from scenelang.graph.steps import Affine
 from scenelang.graph.walk import nodes
 from scenelang.measure.metrics import MOST_DB, flip, over_white, psnr
+from scenelang.measure.scenes import reference_of
 from scenelang.models.choose import WHITE, choose_model, lacking, uses, why_chosen
 from scenelang.models.load import Model
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.program.program import TOKENS, Program
-from scenelang.reference.image import reference_image
 from scenelang.scene.schema import Scene
 
 REPEATS = 3
@@ -118,7 +117,7 @@ def drawing_cost(
         started = time.perf_counter()
         drawing = draw_program(program, model, threads=threads)
         times.append(1000 * (time.perf_counter() - started))
-    exact = over_white(reference_image(lower(scene, model.manifest, spans, Diagnostics())))
+    exact = over_white(reference_of(scene, model.manifest, spans=spans))
     width, height = program.canvas
     samples = width * height + 4 * drawing.refined
     if model.manifest.renderer != "framed":  # which take every sample, and meet every object there

@@ -8,7 +8,7 @@ import numpy as np
 
 from scenelang.backend.neural import draw_program
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.lower import lower
+from scenelang.graph.lower import Spans, lower
 from scenelang.image import Image
 from scenelang.measure.sets import scenes
 from scenelang.models.load import Model
@@ -21,9 +21,16 @@ from scenelang.scene.schema import Scene
 PROBE = 48  # pixels along a side of the picture that tells how much a scene covers
 
 
-def reference_of(scene: Scene, manifest: Manifest) -> Image:
-    """The exact picture of a scene over its background."""
-    return reference_image(lower(scene, manifest, None, Diagnostics()))
+def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: Spans | None = None) -> Image:
+    """The exact picture of a scene over its background.
+
+    Args:
+        scene: what is drawn.
+        manifest: of the model that its names are known by.
+        per_side: samples along each side of a pixel; 2 is the definition.
+        spans: where it was written.
+    """
+    return reference_image(lower(scene, manifest, spans, Diagnostics()), per_side=per_side)
 
 
 def coverage(scene: Scene, manifest: Manifest) -> float:

@@ -71,7 +71,7 @@ def test_a_small_run(measured: Frontier) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("nothing",), "no model `nothing`; there is "),
+        (("nothing",), "no model `nothing`; there are "),
         (("shapes2d", "--promises", "shipped.json"), "--promises goes with --verify"),
         (("shapes2d", "--verify", "--seed", "1"), "seed 1 made the promises"),
         (("shapes2d", "--scenes", "0"), "0 is not in the range"),

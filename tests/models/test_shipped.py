@@ -19,7 +19,7 @@ def test_it_draws_unseen_scenes_better_than_nothing_does(name: str) -> None:
     """A white picture is not an easy rival: most of a picture is white."""
     model = open_model(name)
     scene_at = scenes_of(model, "unions", 77)
-    size = model.manifest.sizes[0] if model.manifest.sizes else (64, 64)
+    size = model.manifest.sizes[0] if model.manifest.sizes else (32, 32)
     ours, white = [], []
     for index in range(16):
         scene = scene_at(index).model_copy(update={"canvas": size})

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from scenelang.cli import options
 
-if TYPE_CHECKING:
-    from pydantic import ValidationError
-
 
 def training(made: Callable[..., None]) -> Callable[..., None]:
     """The arguments and options of commands that train."""
     for option in (
-        click.pass_context,
         click.option(
             "--save-every",
             type=click.FloatRange(0),
@@ -35,7 +31,9 @@ def training(made: Callable[..., None]) -> Callable[..., None]:
         options.device,
         click.option(
             "--budget",
+            "budget_s",
             type=click.FloatRange(0, min_open=True),
+            callback=lambda ctx, param, minutes: math.inf if minutes is None else 60 * minutes,
             metavar="MINUTES",
             help="Stop after this time, with a checkpoint.",
         ),
@@ -56,10 +54,9 @@ def training(made: Callable[..., None]) -> Callable[..., None]:
 @click.command("train")
 @training
 def command(
-    ctx: click.Context,
     config: str,
     out: Path,
-    budget: float | None,
+    budget_s: float,
     device: str,
     threads: int | None,
     every: int,
@@ -70,54 +67,37 @@ def command(
     CONFIG is a JSON file or the name of a shipped configuration. By default one thread computes, as for
     the shipped weights. Exits with 0 also when the budget ends first.
     """
-    import torch
-    from pydantic import ValidationError
-
-    from scenelang.backend.memory import keep_memory
-    from scenelang.backend.neural import choose_device
     from scenelang.cli.progress import Bar
     from scenelang.training.config import config_data, is_study, read_config
     from scenelang.training.loop import train
 
     if is_study(config_data(config)):
         raise click.UsageError(f"`{config}` configures a study; scenelang lab train trains it.")
-    try:
-        wanted = read_config(config)
-    except ValidationError as error:
-        raise click.UsageError(f"bad configuration `{config}`: {first_mistake(error)}") from None
-    keep_memory()
-    torch.set_num_threads(threads or 1)
-    place = choose_device(device)
     last: dict[str, float] = {}
-    try:
-        with Bar() as bar:
+    with mistakes_told(config, out), Bar() as bar:
+        wanted = read_config(config)
+        place = prepare_torch(device, threads)
 
-            def note(done: int, total: int, seconds: float, parts: dict[str, float]) -> None:
-                if not parts:
-                    begin(wanted.model, f"step {done:,} of {total:,}", done, place, out)
-                    return
-                last.clear()
-                last.update(parts)
-                if sys.stderr.isatty():
-                    bar(_losses(parts), done, total)
-                else:
-                    told = f"{done:,} of {total:,} steps, {seconds:.0f} s, {_losses(parts)}"
-                    click.echo(told, err=True)
+        def note(done: int, total: int, seconds: float, parts: dict[str, float]) -> None:
+            if not parts:
+                begin(wanted.model, f"step {done:,} of {total:,}", done, place, out)
+                return
+            last.clear()
+            last.update(parts)
+            if sys.stderr.isatty():
+                bar(_losses(parts), done, total)
+            else:
+                click.echo(f"{done:,} of {total:,} steps, {seconds:.0f} s, {_losses(parts)}", err=True)
 
-            finished = train(
-                wanted,
-                out,
-                budget_s=math.inf if budget is None else 60 * budget,
-                device=place,
-                report=note,
-                save_every_s=save_every,
-                report_every=every,
-            )
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
-    except KeyboardInterrupt:
-        click.echo(f"interrupted; the same command goes on from the checkpoint in {out}", err=True)
-        raise
+        finished = train(
+            wanted,
+            out,
+            budget_s=budget_s,
+            device=place,
+            report=note,
+            save_every_s=save_every,
+            report_every=every,
+        )
     reached = f", mean loss {_losses(last)}" if last else ""
     if finished:
         from scenelang.measure.record import record_measured
@@ -128,7 +108,37 @@ def command(
         click.echo(f"done{reached}; PSNR of unseen scenes (dB): {means}: {weights}")
     else:
         click.echo(f"out of time{reached}: the same command goes on from the checkpoint in {out}")
-    ctx.exit(0)
+
+
+@contextmanager
+def mistakes_told(config: str, out: Path) -> Iterator[None]:
+    """Tell what is wrong with a configuration or a checkpoint, and how an interrupted training goes on."""
+    from pydantic import ValidationError
+
+    try:
+        yield
+    except ValidationError as error:
+        mistake = error.errors(include_url=False)[0]
+        where = "".join(f"{part}." for part in mistake["loc"])[:-1]
+        told = f"{where}: {mistake['msg']}" if where else mistake["msg"]
+        raise click.UsageError(f"bad configuration `{config}`: {told}") from None
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    except KeyboardInterrupt:
+        click.echo(f"interrupted; the same command goes on from the checkpoint in {out}", err=True)
+        raise
+
+
+def prepare_torch(device: str, threads: int | None) -> str:
+    """Set torch up for a long computation; returns the device."""
+    import torch
+
+    from scenelang.backend.memory import keep_memory
+    from scenelang.backend.neural import choose_device
+
+    keep_memory()
+    torch.set_num_threads(threads or 1)
+    return choose_device(device)
 
 
 def begin(model: str, reached: str, done: int, device: str, out: Path) -> None:
@@ -139,10 +149,3 @@ def begin(model: str, reached: str, done: int, device: str, out: Path) -> None:
 
 def _losses(parts: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.4g}" for name, value in parts.items())
-
-
-def first_mistake(error: ValidationError) -> str:
-    """The first mistake that was found, in a line."""
-    mistake = error.errors(include_url=False)[0]
-    where = ".".join(str(part) for part in mistake["loc"])
-    return f"{where}: {mistake['msg']}" if where else mistake["msg"]

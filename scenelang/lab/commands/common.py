@@ -1,10 +1,9 @@
-"""What the laboratory's commands share: the model, reports of progress, files."""
+"""What the laboratory's commands share: options, the model, files."""
 
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,7 +13,6 @@ if TYPE_CHECKING:
     from scenelang.models.load import Model
 
 DEFAULT_SEED: Final = 2021
-Report = Callable[[str, int, int], None]
 
 out = click.option(
     "-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True, metavar="FOLDER"
@@ -26,14 +24,16 @@ threads = click.option("--threads", default=1, show_default=True, type=click.Int
 seed = click.option("--seed", default=DEFAULT_SEED, show_default=True, type=click.IntRange(0, 2**31 - 1))
 
 
-def reporter() -> Report | None:
-    """Says on a terminal what is done of a stage; None elsewhere."""
-    return _report if sys.stderr.isatty() else None
+def check_names(what: str, wanted: Iterable[str], known: Iterable[str]) -> None:
+    """Refuse names that are not known.
 
-
-def _report(name: str, done: int, count: int) -> None:
-    end = "\n" if done == count else ""
-    click.echo(f"\r{name}: {done}/{count}{end}", nl=False, err=True)
+    Raises:
+        click.UsageError: one is not.
+    """
+    known = list(known)
+    for name in wanted:
+        if name not in known:
+            raise click.UsageError(f"no {what} `{name}`; there are {', '.join(known)}")
 
 
 def write_json(path: Path, value: Any) -> None:

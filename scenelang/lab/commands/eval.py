@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from scenelang.cli.progress import Bar
 from scenelang.cli.say import need_metrics
 from scenelang.lab.commands import common
 
@@ -39,9 +40,7 @@ def command(
     from scenelang.measure.sets import SETS
 
     chosen = tuple(SETS) if all_sets else sets or ("shapes2d",)
-    unknown = [name for name in chosen if name not in SETS]
-    if unknown:
-        raise click.UsageError(f"no set `{unknown[0]}`; the sets are {', '.join(SETS)}")
+    common.check_names("set", chosen, SETS)
     need_metrics()
     import torch
 
@@ -52,7 +51,8 @@ def command(
     keep_memory()
     torch.set_num_threads(threads)
     for name in chosen:
-        summary, cases = evaluate_set(loaded, name, scenes, seed, threads=threads, report=common.reporter())
+        with Bar() as bar:
+            summary, cases = evaluate_set(loaded, name, scenes, seed, threads=threads, report=bar)
         common.write_json(out / f"{name}.json", summary)
         worst_sheet(loaded, name, seed, cases).save(out / f"{name}-worst.png")
         p, s, f = summary["psnr"], summary["ssim"], summary["flip"]

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import click
 
 from scenelang.cli import options
+from scenelang.cli.commands.train import prepare_torch
 from scenelang.cli.say import need_metrics
-from scenelang.lab.commands.common import write_json
+from scenelang.lab.commands.common import check_names, write_json
 
 if TYPE_CHECKING:
     from scenelang.lab.designs.studies import Study
@@ -53,20 +54,12 @@ def command(
     NAME is one or more of overfit, compare, table1, table2, table3, table4, seeds, parts, or all.
     """
     need_metrics()
-    import torch
-
-    from scenelang.backend.memory import keep_memory
-    from scenelang.backend.neural import choose_device
     from scenelang.lab.experiments.experiment import Settings, run_experiment
     from scenelang.lab.experiments.runs import EXPERIMENTS
 
     wanted = list(EXPERIMENTS) if "all" in names else list(dict.fromkeys(names))
-    unknown = [name for name in wanted if name not in EXPERIMENTS]
-    if unknown:
-        raise click.UsageError(f"no experiment `{unknown[0]}`; they are {', '.join(EXPERIMENTS)}, all")
-    keep_memory()
-    torch.set_num_threads(threads or 1)
-    settings = Settings(out, scenes, choose_device(device))
+    check_names("experiment", wanted, [*EXPERIMENTS, "all"])
+    settings = Settings(out, scenes, prepare_torch(device, threads))
     for name in wanted:
         try:
             found = run_experiment(name, 60 * budget, seed, settings, _report)

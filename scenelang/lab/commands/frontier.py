@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from scenelang.cli.progress import Bar
 from scenelang.cli.say import need_metrics
 from scenelang.lab.commands import common
 
@@ -53,20 +54,15 @@ def command(
     With --verify draws other scenes and counts in how many the promised errors of the shipped frontier are
     kept, writes verified.json, and exits with 1 if that is under 95 %.
     """
+    from scenelang.measure.sets import SETS
     from scenelang.models.manifest import available, load_manifest
 
     if promises is not None and not verify:
         raise click.UsageError("--promises goes with --verify.")
-    known = available()
-    if model not in known:
-        raise click.UsageError(f"no model `{model}`; there is {', '.join(known)}")
+    common.check_names("model", [model], available())
     base = load_manifest(model).set
-    if base not in known:
-        raise click.UsageError(f"no model is named like the set `{base}`")
-    from scenelang.measure.sets import SETS
-
-    if base not in SETS:
-        raise click.UsageError(f"no scenes of the set `{base}` can be made; there are {', '.join(SETS)}")
+    common.check_names("model named like the set", [base], available())
+    common.check_names("scenes of the set", [base], SETS)
     need_metrics()
     out.mkdir(parents=True, exist_ok=True)
     if verify:
@@ -82,7 +78,8 @@ def _measure(base: str, out: Path, scenes: int, seed: int, threads: int) -> None
     from scenelang.lab.frontier.page import frontier_page
     from scenelang.measure.frontier import NAME
 
-    measured = measure_frontier(base, scenes, seed, threads, common.reporter())
+    with Bar() as bar:
+        measured = measure_frontier(base, scenes, seed, threads, bar)
     frontier = measured.frontier
     write_whole(out / NAME, frontier.to_json().encode())
     page = frontier_page(frontier, measured.pictures, measured.exact)
@@ -125,7 +122,8 @@ def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path 
     except ValueError as error:
         raise click.UsageError(f"`{path}` is not a frontier: {error}") from None
     try:
-        found = verify(frontier, base, scenes, VERIFY_SEED if seed is None else seed, common.reporter())
+        with Bar() as bar:
+            found = verify(frontier, base, scenes, VERIFY_SEED if seed is None else seed, bar)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     common.write_json(out / "verified.json", found)

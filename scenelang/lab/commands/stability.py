@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from scenelang.cli.progress import Bar
 from scenelang.cli.say import need_metrics
 from scenelang.lab.commands import common
 
@@ -32,13 +33,11 @@ def command(
     from scenelang.lab.stability.probes import PROBES
     from scenelang.lab.stability.suite import INVARIANTS, run_stability
 
-    known = [*PROBES, *INVARIANTS]
-    unknown = [name for name in only if name not in known]
-    if unknown:
-        raise click.UsageError(f"no probe `{unknown[0]}`; the probes are {', '.join(known)}")
+    common.check_names("probe", only, [*PROBES, *INVARIANTS])
     loaded = common.model_to_measure(model, weights)
     torch.set_num_threads(1)
-    found = run_stability(loaded, scenes, seed, only, common.reporter())
+    with Bar() as bar:
+        found = run_stability(loaded, scenes, seed, only, bar)
     common.write_json(out / "stability.json", found)
     for name, probe in found["probes"].items():
         figures = [(row["value"], row["psnr"]["mean"], row["psnr"]["worst"]) for row in probe["rows"]]

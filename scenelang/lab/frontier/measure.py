@@ -11,7 +11,7 @@ import math
 import platform
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
@@ -21,9 +21,8 @@ import torch
 
 from scenelang.backend.memory import keep_memory
 from scenelang.backend.neural import open_model
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.lower import lower
 from scenelang.image import Image, from_samples
+from scenelang.lab.about import Report, silent
 from scenelang.lab.frontier.fit import fit_cost
 from scenelang.lab.frontier.ways import Draw, Way, ways_of
 from scenelang.measure.cost import yardstick
@@ -33,7 +32,6 @@ from scenelang.measure.scenes import reference_of, scenes_of
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.work import Load, load_of
-from scenelang.reference.image import reference_image
 from scenelang.scene.schema import Scene
 from scenelang.training.loop import revision
 
@@ -49,8 +47,6 @@ MANY = "many"  # set of more objects that times are fitted on
 FITTED = 6  # scenes of each of these
 PROMISED = 0.975
 MARGIN = 1.25  # of 40 scenes without it, one scene in ten of another seed was worse than promised
-
-Report = Callable[[str, int, int], None]
 
 
 @dataclass(slots=True)
@@ -91,9 +87,7 @@ class Measured:
     exact: list[Image]
 
 
-def measure_frontier(
-    base: str, scenes: int, seed: int, threads: int, report: Report | None = None
-) -> Measured:
+def measure_frontier(base: str, scenes: int, seed: int, threads: int, report: Report = silent) -> Measured:
     """Measure all ways to draw the scenes of a set.
 
     Args:
@@ -117,8 +111,7 @@ def measure_frontier(
         wanted = [way for way in ways if index < quota[way.name]]
         turn = index % len(wanted)
         _one_scene(scene, wanted[turn:] + wanted[:turn], records, manifest, index, threads)
-        if report is not None:
-            report("scenes", index + 1, scenes)
+        report("scenes", index + 1, scenes)
     _other_loads(base, [way for way in ways if way.offered], records, seed, threads, report)
     paper = next((records[w.name] for w in ways if w.name.startswith("the paper's")), None)
     points = [_point(way, records[way.name], paper) for way in ways]
@@ -149,7 +142,7 @@ def measure_frontier(
 
 def _timed(run: Draw, threads: int) -> tuple[float, Image]:
     """Milliseconds and the picture. One thread's processor time is its time on an idle machine."""
-    clock = time.process_time if threads == 1 else time.perf_counter
+    clock = time.thread_time if threads == 1 else time.perf_counter
     started = clock()
     image = run()
     return 1000 * (clock() - started), image
@@ -174,9 +167,7 @@ def _one_scene(
 ) -> None:
     exact = reference_of(scene, manifest)
     load = load_of(compile_scene(scene, model=manifest.name))
-    many = None
-    if index < CONVERGED:
-        many = _converged(scene, manifest)
+    many = reference_of(scene, manifest, per_side=8) if index < CONVERGED else None
     runs = [(way, way.prepare(scene)) for way in ways]
     best: dict[str, float] = {}
     shown: dict[str, Image] = {}
@@ -201,10 +192,6 @@ def _one_scene(
             record.converged.append(flip(picture, many))
 
 
-def _converged(scene: Scene, manifest: Manifest) -> Image:
-    return reference_image(lower(scene, manifest, None, Diagnostics()), per_side=8)
-
-
 def enlarged(picture: Image, width: int, height: int) -> Image:
     """A picture at another size, each channel by bilinear interpolation; the same where it has that size."""
     if picture.shape[:2] == (height, width):
@@ -226,7 +213,7 @@ def _other_loads(
     records: dict[str, Record],
     seed: int,
     threads: int,
-    report: Report | None,
+    report: Report,
 ) -> None:
     """Time offered ways on other canvases and on more objects, so that their cost can be told from them."""
     manifest = load_manifest(base)
@@ -245,8 +232,7 @@ def _other_loads(
             ms = min(_timed(run, threads)[0] for _ in range(REPEATS + 1))
             record.loads.append(load)
             record.fitted.append(ms)
-        if report is not None:
-            report("other canvases and counts", done + 1, len(cases))
+        report("other canvases and counts", done + 1, len(cases))
 
 
 def promised(values: Sequence[float]) -> float:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
 import torch
 
 from scenelang.backend.neural import open_model
+from scenelang.lab.about import Report, silent
 from scenelang.lab.frontier.ways import ways_of
 from scenelang.measure.choose import error_scale
 from scenelang.measure.frontier import Frontier
@@ -56,7 +56,7 @@ def verify(
     base: str,
     scenes: int,
     seed: int,
-    report: Callable[[str, int, int], None] | None = None,
+    report: Report = silent,
 ) -> dict[str, Any]:
     """Draw unseen scenes by every offered point and count in how many the promised FLIP is kept.
 
@@ -101,8 +101,7 @@ def verify(
                 promise = found.bound * scale
                 error = flip(way.prepare(scene)(), exact)
                 ratios[way.name].append(error / promise if promise > 0 else (1.0 if error <= 0 else 2.0))
-            if report is not None:
-                report(case.name, index + 1, count)
+            report(case.name, index + 1, count)
         cases[case.name] = {name: _summary(values) for name, values in ratios.items() if values}
     return {
         "format": 1,

@@ -20,23 +20,21 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.backend.neural import draw_program
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.lower import lower
 from scenelang.graph.spaces import PLANE
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.graph.transforms import step_of
 from scenelang.image import Image
+from scenelang.lab.about import Report, silent
 from scenelang.lab.stability.probes import PROBES, Probe, animated, apart, rng_of, union_of
 from scenelang.lifting import exact
 from scenelang.lifting.layout import PLANE_LAYOUT
 from scenelang.lifting.learned import lift_geometry
 from scenelang.measure.metrics import flip, psnr
-from scenelang.measure.scenes import coverage, sized, spread
+from scenelang.measure.scenes import coverage, reference_of, sized, spread
 from scenelang.models.load import Model
 from scenelang.passes import OPTIONAL
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
-from scenelang.reference.image import reference_image
 from scenelang.renderers.draw import draw
 from scenelang.renderers.framed import Framed
 from scenelang.scene.schema import Chain, Object, Scene
@@ -48,7 +46,6 @@ SIZES = {"canvas"}  # probes that only models of any size can take
 IDEAL = 8  # samples along a pixel's side of a picture whose own sampling hardly shows
 
 Array = npt.NDArray[np.float64]
-Report = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +78,7 @@ def exact_picture(
         per_side: samples along each side of a pixel; 2 is the definition.
     """
     clear = scene.model_copy(update={"background": None})
-    graph = lower(clear, model.manifest, None, Diagnostics())
-    found = np.asarray(reference_image(graph, per_side=per_side), np.float64)
+    found = np.asarray(reference_of(clear, model.manifest, per_side=per_side), np.float64)
     alpha = found[..., 3:]
     picture = found[..., :3] * alpha + (1 - alpha)
     edge = np.zeros(alpha.shape[:2], bool)
@@ -168,9 +164,7 @@ def scene_of(probe: Probe, value: float, index: int, seed: int, model: Model) ->
     return scene
 
 
-def run_probe(
-    model: Model, name: str, scenes: int, seed: int, report: Report | None = None
-) -> dict[str, Any]:
+def run_probe(model: Model, name: str, scenes: int, seed: int, report: Report = silent) -> dict[str, Any]:
     """A curve: errors at every value of a probe; none for one that the model's canvas rules out."""
     probe = PROBES[name]
     rows = []
@@ -195,8 +189,7 @@ def run_probe(
         )
         if name in SIZES:
             rows[-1]["per_edge_ideal"] = round(float(np.mean(ideal)), 6)
-        if report is not None:
-            report(name, at + 1, len(probe.values))
+        report(name, at + 1, len(probe.values))
     return {
         "title": probe.title,
         "quantity": probe.quantity,
@@ -280,7 +273,7 @@ def run_stability(
     scenes: int,
     seed: int,
     only: tuple[str, ...] = (),
-    report: Report | None = None,
+    report: Report = silent,
 ) -> dict[str, Any]:
     """The whole suite, or the probes and invariants named.
 
@@ -301,8 +294,7 @@ def run_stability(
     for name, measure in INVARIANTS.items():
         if not only or name in only:
             invariants[name] = measure(model, scenes, seed)
-            if report is not None:
-                report(name, 1, 1)
+            report(name, 1, 1)
     return {
         "model": model.manifest.name,
         "weights": model.digest,
