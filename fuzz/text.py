@@ -8,10 +8,10 @@ from pathlib import Path
 from random import Random
 from typing import Final
 
-from scenelang.evaluate.values.functions import ANIMATED, CONSTANTS, FUNCTIONS
-from scenelang.evaluate.vocabulary import LANGUAGE
+from scenelang.evaluate.values.functions import CONSTANTS, FUNCTIONS
 from scenelang.syntax.lexer import FOREIGN, UNIT_ALIASES
 from scenelang.syntax.tables import tables
+from scenelang.words import ANIMATED, LANGUAGE
 
 ROOT: Final = Path(__file__).resolve().parent.parent
 FOLDERS: Final = ("examples", "examples/lib", "tests/syntax", "tests/scene", "tests/conformance/cases")

@@ -21,6 +21,7 @@ ORDER = (
     "scenelang.files",
     "scenelang.notebook",
     "scenelang.records",
+    "scenelang.words",
     "scenelang.tensors",
     "scenelang.diagnostics",
     "scenelang.syntax",

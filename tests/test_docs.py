@@ -22,7 +22,7 @@ from scenelang.evaluate.evaluation import load_source
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import check_scene
 from scenelang.program.compile import find_model
-from scenelang.program.program import TOKENS
+from scenelang.words import TOKENS
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "tests").rglob("*.md")])

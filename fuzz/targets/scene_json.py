@@ -13,11 +13,11 @@ from fuzz.target import Failure, Target, hold, sampled
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.api import loads
-from scenelang.evaluate.vocabulary import MATERIAL_OPS, TRANSFORMS
 from scenelang.models.manifest import available, load_manifest
 from scenelang.scene.json import to_readable_json
 from scenelang.scene.python import to_python
 from scenelang.scene.schema import Scene
+from scenelang.words import OPERATIONS, TRANSFORMS
 
 _PLAIN = (
     *(
@@ -232,7 +232,7 @@ def dictionary() -> list[bytes]:
         "subtract",
         "intersect",
         *TRANSFORMS,
-        *MATERIAL_OPS,
+        *OPERATIONS,
         "x",
         "y",
         "z",

@@ -140,7 +140,7 @@ def _stored(name: str, request: Request, clock: Clock) -> Job:
 
 def program_notes(program: Program, why: str) -> list[str]:
     """Lines about a compiled scene."""
-    from scenelang.program.program import TOKENS
+    from scenelang.words import TOKENS
 
     names = {value: word for word, value in TOKENS.items()}
     shapes = Counter(program.objects)

@@ -7,7 +7,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel
 
 from scenelang.diagnostics.span import Span
-from scenelang.scene.schema import Combine, Link, Material
+from scenelang.scene.schema import Link, Material
+from scenelang.words import Combine
 
 M = TypeVar("M", bound=BaseModel)
 

@@ -5,25 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
 
 from scenelang.models.manifest import Manifest, available, load_manifest
-
-TRANSFORMS: Final = (
-    "translate",
-    "rotate",
-    "scale",
-    "shear",
-    "matrix",
-    "twirl",
-    "bend",
-    "twist",
-    "displace",
-)
-MATERIAL_OPS: Final = ("translate", "rotate", "scale", "shear", "flip", "color", "grayscale", "hue")
-SETTINGS: Final = ("canvas", "background", "animate")
-LANGUAGE: Final = frozenset((*TRANSFORMS, *MATERIAL_OPS, *SETTINGS))
-"""Words that head a statement of the language; no module, material or geometry can have such a name."""
 
 
 @dataclass(frozen=True)

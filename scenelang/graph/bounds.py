@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from scenelang.graph.nodes import Leaf
 from scenelang.graph.space import Box, Space
-from scenelang.scene.schema import Combine
+from scenelang.words import Combine
 
 BLEND = 0.15
 """The k of `smooth`: it blends where two distances differ by less, and lowers them by at most k/4."""

@@ -17,6 +17,7 @@ from scenelang.graph.steps import Step
 from scenelang.graph.transforms import step_of
 from scenelang.models.manifest import Manifest
 from scenelang.scene import schema
+from scenelang.words import Combine
 
 MAX_OBJECTS = 100_000
 MAX_DEPTH = 1_000
@@ -98,10 +99,10 @@ def lower(
 class _Open:
     """A composite whose children are being lowered, and the operator that joins it to what came before."""
 
-    op: schema.Combine
+    op: Combine
     node: schema.Group | schema.Boolean | schema.Chain | None
     kind: str
-    todo: Iterator[tuple[schema.Combine, schema.SceneNode]]
+    todo: Iterator[tuple[Combine, schema.SceneNode]]
     material: schema.Material | None
     links: list[Link] = field(default_factory=list)
 
@@ -151,7 +152,7 @@ class _Lowering:
 
     def children(
         self, node: schema.Group | schema.Boolean | schema.Chain
-    ) -> Iterator[tuple[schema.Combine, schema.SceneNode]]:
+    ) -> Iterator[tuple[Combine, schema.SceneNode]]:
         if isinstance(node, schema.Group):
             return _unions(node.children)
         if isinstance(node, schema.Boolean):
@@ -230,5 +231,5 @@ class _Lowering:
 
 def _unions(
     nodes: Sequence[schema.SceneNode],
-) -> Iterator[tuple[schema.Combine, schema.SceneNode]]:
+) -> Iterator[tuple[Combine, schema.SceneNode]]:
     return (("union", node) for node in nodes)

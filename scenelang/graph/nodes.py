@@ -14,7 +14,7 @@ from scenelang.diagnostics.span import Span
 from scenelang.graph.looks import Look
 from scenelang.graph.space import Space
 from scenelang.graph.steps import Step
-from scenelang.scene.schema import Combine
+from scenelang.words import Combine
 
 BLEND = 0.15
 

@@ -27,7 +27,7 @@ from scenelang.graph.bounds import BLEND, leaf_box
 from scenelang.graph.grid import Grid
 from scenelang.graph.nodes import Leaf
 from scenelang.graph.space import Space
-from scenelang.scene.schema import Combine
+from scenelang.words import Combine
 
 Row = tuple[Combine, Leaf]
 

@@ -8,23 +8,16 @@ from __future__ import annotations
 import re
 from typing import Any, ClassVar
 
+from pygments import token
 from pygments.lexer import RegexLexer, bygroups, words
-from pygments.token import (
-    Comment,
-    Error,
-    Keyword,
-    Name,
-    Number,
-    Operator,
-    Punctuation,
-    String,
-    Whitespace,
-)
+from pygments.token import Comment, Keyword, Name, Number, String, Whitespace
 
-from scenelang.highlighting import words as nsg
+from scenelang import words as nsg
+from scenelang.syntax.tables import tables
 
-_RESERVED = "|".join((*nsg.DECLARING, *nsg.CONTROL, *nsg.NODES, *nsg.MATERIAL, *nsg.TRUTH))
-_FREE = rf"(?!(?:{_RESERVED})\b){nsg.NAME}"
+_NAME, _STRING = tables().patterns["NAME"], tables().patterns["STRING"]
+OPERATORS = [text for text in tables().literals if not text[0].isalpha() and text not in "()[]{},;"]
+_FREE = rf"(?!(?:{'|'.join(nsg.KEYWORDS)})\b){_NAME}"
 
 
 class NsgLexer(RegexLexer):  # type: ignore[misc]  # Pygments has no types
@@ -42,10 +35,10 @@ class NsgLexer(RegexLexer):  # type: ignore[misc]  # Pygments has no types
             (r"[\s\ufeff]+", Whitespace),
             (r"//[^\n]*", Comment.Single),
             (r"/\*[\s\S]*?\*/", Comment.Multiline),
-            (r"/\*[\s\S]*", Error),
+            (r"/\*[\s\S]*", token.Error),
             (rf"(fn)(\s+)({_FREE})", bygroups(Keyword.Declaration, Whitespace, Name.Function)),
             (rf"(module)(\s+)({_FREE})", bygroups(Keyword.Declaration, Whitespace, Name.Class)),
-            (rf"(import)(\s+)({nsg.STRING})", bygroups(Keyword.Namespace, Whitespace, String.Double)),
+            (rf"(import)(\s+)({_STRING})", bygroups(Keyword.Namespace, Whitespace, String.Double)),
             (words(nsg.DECLARING, r"\b", r"\b"), Keyword.Declaration),
             (words(nsg.CONTROL, r"\b", r"\b"), Keyword),
             (words(nsg.NODES, r"\b", r"\b"), Keyword.Reserved),
@@ -53,16 +46,16 @@ class NsgLexer(RegexLexer):  # type: ignore[misc]  # Pygments has no types
             (words(nsg.TRUTH, r"\b", r"\b"), Keyword.Constant),
             (words(nsg.CONSTANTS, r"\b", r"\b"), Name.Constant),
             (words(nsg.ANIMATED, r"\b", r"\b(?!\s*[({])"), Name.Variable.Magic),
-            (words((*nsg.SETTINGS, *nsg.TRANSFORMS, *nsg.TEXTURE), r"\b", r"\b(?=\s*\()"), Name.Builtin),
+            (words(nsg.LANGUAGE, r"\b", r"\b(?=\s*\()"), Name.Builtin),
             (words(nsg.FUNCTIONS, r"\b", r"\b(?=\s*\()"), Name.Builtin.Pseudo),
-            (rf"{nsg.NAME}(?=\s*\{{)", Name.Class),
-            (rf"{nsg.NAME}(?=\s*\()", Name.Function),
-            (nsg.NAME, Name),
-            (nsg.NUMBER, Number),
-            (nsg.COLOR, Number.Hex),
-            (nsg.STRING, String.Double),
-            (words(nsg.OPERATORS), Operator),
-            (words(nsg.PUNCTUATION), Punctuation),
-            (r"\.?[0-9][\w°]*|#\w*|\w+|\"[^\n\"]*", Error),
+            (rf"{_NAME}(?=\s*\{{)", Name.Class),
+            (rf"{_NAME}(?=\s*\()", Name.Function),
+            (_NAME, Name),
+            (tables().patterns["NUMBER"], Number),
+            (tables().patterns["COLOR"], Number.Hex),
+            (_STRING, String.Double),
+            (words(OPERATORS), token.Operator),
+            (r"[()\[\]{},;]", token.Punctuation),
+            (r"\.?[0-9][\w°]*|#\w*|\w+|\"[^\n\"]*", token.Error),
         ]
     }

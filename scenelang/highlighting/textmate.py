@@ -1,8 +1,6 @@
 """The TextMate grammar, made from the words and terminals of the language.
 
-    python -m scenelang.highlighting.textmate
-
-writes `grammar/scenelang.tmLanguage.json`; a test keeps that in step. A language server's semantic tokens
+``python docs/make_words.py`` writes `grammar/scenelang.tmLanguage.json`. A language server's semantic tokens
 say more where one runs: what a name stands for is beyond regular expressions.
 """
 
@@ -11,13 +9,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any, Final
 
-from scenelang.highlighting import words
+from scenelang import words
+from scenelang.highlighting.lexer import OPERATORS
+from scenelang.syntax.tables import tables
 
 SCOPE: Final = "source.nsg"
-PATH: Final = Path(__file__).parents[2] / "grammar" / "scenelang.tmLanguage.json"
+NAME: Final = tables().patterns["NAME"]
 
 _CAPTURES: Final = "punctuation.definition.{}.nsg"
 
@@ -41,12 +40,13 @@ def _words(texts: Iterable[str], scope: str, after: str = "") -> dict[str, Any]:
     return {"match": rf"\b(?:{_any(texts)})\b{after}", "name": f"{scope}.nsg"}
 
 
-def _named(word: str, scope: str, what: str = words.NAME) -> dict[str, Any]:
+def _named(word: str, scope: str, what: str = NAME) -> dict[str, Any]:
     """A keyword and the name after it."""
     captures = {"1": {"name": f"keyword.declaration.{word}.nsg"}, "2": {"name": f"{scope}.nsg"}}
     return {"match": rf"\b({word})\s+({what})", "captures": captures}
 
 
+_UNITS: Final = "|".join(words.UNITS)
 _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
     "comments": [
         {
@@ -92,23 +92,25 @@ _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
         _words(words.CONSTANTS, "constant.language"),
         _words(words.ANIMATED, "variable.language", r"(?!\s*[({])"),
         _words(words.SETTINGS, "support.function.setting", r"(?=\s*\()"),
-        _words((*words.TRANSFORMS, *words.TEXTURE), "support.function.transform", r"(?=\s*\()"),
+        _words(words.TRANSFORMS | words.OPERATIONS, "support.function.transform", r"(?=\s*\()"),
         _words(words.FUNCTIONS, "support.function", r"(?=\s*\()"),
-        {"match": rf"{words.NAME}(?=\s*\{{)", "name": "entity.name.type.nsg"},
-        {"match": rf"{words.NAME}(?=\s*\()", "name": "entity.name.function.call.nsg"},
-        {"match": rf"{words.NAME}(?=\s*=(?!=))", "name": "variable.parameter.nsg"},
-        {"match": words.NAME, "name": "variable.other.nsg"},
+        {"match": rf"{NAME}(?=\s*\{{)", "name": "entity.name.type.nsg"},
+        {"match": rf"{NAME}(?=\s*\()", "name": "entity.name.function.call.nsg"},
+        {"match": rf"{NAME}(?=\s*=(?!=))", "name": "variable.parameter.nsg"},
+        {"match": NAME, "name": "variable.other.nsg"},
     ],
     "numbers": [
         {
-            "match": words.NUMBER.replace("(?:deg|rad|turn|ms|s)", "(deg|rad|turn|ms|s)"),
+            "match": tables()
+            .patterns["NUMBER"]
+            .replace(f"(?:{_any(words.UNITS)})", f"({_any(words.UNITS)})"),
             "name": "constant.numeric.nsg",
             "captures": {"1": {"name": "keyword.other.unit.nsg"}},
         },
-        {"match": words.COLOR, "name": "constant.other.color.rgb-value.hex.nsg"},
+        {"match": tables().patterns["COLOR"], "name": "constant.other.color.rgb-value.hex.nsg"},
     ],
     "signs": [
-        {"match": _any(words.OPERATORS), "name": "keyword.operator.nsg"},
+        {"match": _any(sorted(OPERATORS, key=len, reverse=True)), "name": "keyword.operator.nsg"},
         {"match": r"[{}]", "name": "punctuation.section.block.nsg"},
         {"match": r"[()]", "name": "punctuation.section.parens.nsg"},
         {"match": r"[\[\]]", "name": "punctuation.section.brackets.nsg"},
@@ -121,7 +123,3 @@ _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
 def encode() -> str:
     """The text of the file."""
     return json.dumps(textmate(), indent=2, ensure_ascii=False) + "\n"
-
-
-if __name__ == "__main__":
-    PATH.write_text(encode(), encoding="utf-8")

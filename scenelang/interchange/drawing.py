@@ -121,7 +121,7 @@ def _graph_box(node: Node, space: Space) -> Box:
 
 def draw_program(program: Program, most: int = MOST_BOXES) -> Drawing:
     """The stream of a Program: each object and the token that joins it to what came before."""
-    from scenelang.program.program import TOKENS
+    from scenelang.words import TOKENS
 
     drawn = Drawing(sideways=True)
     width, height = program.canvas

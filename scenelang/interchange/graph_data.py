@@ -93,7 +93,7 @@ def program_table(program: Program) -> str:
 
 
 def _tokens(program: Program) -> list[str]:
-    from scenelang.program.program import TOKENS
+    from scenelang.words import TOKENS
 
     names = {value: word for word, value in TOKENS.items()}
     return [names[token] for token in program.tokens.tolist()]

@@ -16,7 +16,7 @@ from scenelang.measure.metrics import MOST_DB, compare
 from scenelang.measure.scenes import draw_scene, reference_of, scenes_of, spread
 from scenelang.measure.sheet import contact_sheet, side_by_side
 from scenelang.models.load import Model
-from scenelang.program.program import TOKENS
+from scenelang.words import TOKENS
 
 
 @dataclass(frozen=True, slots=True)

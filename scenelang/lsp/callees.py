@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from scenelang.lsp import words
+from scenelang import words
 from scenelang.lsp.context import Cursor
 from scenelang.lsp.describe import describe_symbol
 from scenelang.lsp.sight import sight_at
@@ -78,5 +78,4 @@ def callee_of_word(name: str, in_material: bool) -> Callee | None:
     if word is None:
         return None
     about = dict(zip(word.params, word.about, strict=False))
-    variadic = word.head.endswith("…)") and name in ("min", "max")
-    return Callee(name, word.head, word.params, about, word.text, name != "shear", variadic)
+    return Callee(name, word.head, word.params, about, word.text, name != "shear", word.variadic)

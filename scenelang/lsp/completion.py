@@ -8,11 +8,11 @@ from typing import Final
 
 from lsprotocol import types
 
+from scenelang import words
 from scenelang.evaluate.vocabulary import Vocabulary
-from scenelang.lsp import words
 from scenelang.lsp.callees import Callee, find_callee
 from scenelang.lsp.completion_items import Item, strings, units
-from scenelang.lsp.context import COMBINE, Cursor, cursor_at
+from scenelang.lsp.context import Cursor, cursor_at
 from scenelang.lsp.describe import describe_symbol
 from scenelang.lsp.sight import sight_at
 from scenelang.lsp.vocabulary import vocabulary_of
@@ -20,21 +20,10 @@ from scenelang.lsp.workspace import Document, Workspace
 from scenelang.resolve.names import Names
 from scenelang.resolve.symbols import Symbol
 from scenelang.syntax import nodes
+from scenelang.words import COMBINE
 
 Kind = types.CompletionItemKind
-_HEADS: Final = (
-    "let",
-    "fn",
-    "module",
-    "for",
-    "if",
-    "group",
-    "union",
-    "smooth",
-    "subtract",
-    "intersect",
-    "chain",
-)
+_HEADS: Final = ("let", "fn", "module", "for", "if", *words.NODES)
 _SYMBOLS: Final = {
     "let": Kind.Variable,
     "param": Kind.Property,
@@ -229,7 +218,7 @@ class _Maker:
         for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind != "module":
                 yield self._symbol(symbol)
-        for name, word in words.FUNCTION_WORDS.items():
+        for name, word in words.FUNCTIONS.items():
             yield Item(name, Kind.Function, word.snippet, "k", word.head, word.text, True)
         for known in (words.CONSTANTS, words.ANIMATED):
             for name, word in known.items():
@@ -269,7 +258,7 @@ class _Maker:
         elif callee in ("color", "background") and param == "c":
             yield Item("#d33", Kind.Color, "#${1:d33}", "0", "a colour", "", True)
             for name in ("rgb", "hsv"):
-                yield Item(name, Kind.Function, words.FUNCTION_WORDS[name].snippet, "0", "a colour", "", True)
+                yield Item(name, Kind.Function, words.FUNCTIONS[name].snippet, "0", "a colour", "", True)
             if callee == "background":
                 yield Item("none", Kind.EnumMember, "", "0", about=words.CONSTANTS["none"].text)
 

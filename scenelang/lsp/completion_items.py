@@ -13,7 +13,7 @@ from lsprotocol import types
 from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.scene import library
-from scenelang.syntax.lexer import UNITS
+from scenelang.words import UNITS
 
 Kind = types.CompletionItemKind
 _MAX_PATHS: Final = 200

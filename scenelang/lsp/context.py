@@ -12,10 +12,10 @@ from typing import Final, Literal
 
 from scenelang.syntax.incremental import Parsed
 from scenelang.syntax.tables import tables
+from scenelang.words import COMBINE, NODES
 
 BlockKind = Literal["file", "group", "chain", "object", "material"]
-COMBINE: Final = ("union", "smooth", "subtract", "intersect")
-_NODES: Final = {"group": "group", "chain": "chain", **dict.fromkeys(COMBINE, "group"), "module": "group"}
+_HOLDERS: Final = {*NODES, "module"}
 _COMMENTS: Final = re.compile(r"//[^\n]*+\n?|/\*(?:[\s\S]*?\*/|[\s\S]*)")
 
 
@@ -211,7 +211,7 @@ def _block(read: _Reader, index: int, values: frozenset[str]) -> Block:
         if first in ("for", "if", "else"):
             nested, index = True, head
             continue
-        if first in _NODES:
+        if first in _HOLDERS:
             kind: BlockKind = "chain" if first == "chain" else "group"
             return Block(kind, first, nested)
         if "material" in words[-2:] or "material" in words[-4:-1] or (first in values and len(words) == 1):

@@ -7,7 +7,8 @@ from typing import Any
 
 from lsprotocol import types
 
-from scenelang.lsp import values, words
+from scenelang import words
+from scenelang.lsp import values
 from scenelang.lsp.check import Seen
 from scenelang.lsp.describe import describe_symbol
 from scenelang.lsp.tree import path_to
@@ -83,7 +84,7 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
     word: words.Word | None = None
     match use.role:
         case "function":
-            word = words.FUNCTION_WORDS.get(text)
+            word = words.FUNCTIONS.get(text)
         case "constant":
             word = words.CONSTANTS.get(text)
         case "animated":

@@ -7,12 +7,11 @@ from typing import Final
 
 from lsprotocol import types
 
-from scenelang.evaluate.vocabulary import LANGUAGE
 from scenelang.lsp.workspace import Document, Workspace, uri_of
 from scenelang.resolve.symbols import Symbol, Use
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.syntax.tables import tables
+from scenelang.words import LANGUAGE, RESERVED
 
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -140,10 +139,9 @@ def _check_owner(where: Document, use: Use) -> None:
 
 
 def _check_name(new: str, symbol: Symbol) -> None:
-    keywords = {text for text in tables().literals if text[0].isalpha()} - {"step", "as"}
     if not _NAME.fullmatch(new):
         raise Refused(f"`{new}` is not a name: letters, digits and _, not beginning with a digit")
-    if new in keywords:
+    if new in RESERVED:
         raise Refused(f"`{new}` is a keyword")
     if symbol.kind == "module" and new in LANGUAGE:
         raise Refused(f"`{new}` is a word of the language and names no module")

@@ -12,8 +12,8 @@ from scenelang.graph.nodes import Move
 from scenelang.graph.space import Space
 from scenelang.graph.steps import Affine, Rows, Warp
 from scenelang.graph.transforms import step_of
-from scenelang.scene import schema
 from scenelang.scene import text as to_nsg
+from scenelang.words import TRANSFORMS
 
 _MOST_ITEMS = 8
 
@@ -74,25 +74,12 @@ def show_warp(warp: Warp) -> str:
 
 def show_transform(node: Any, space: Space) -> str | None:
     """The matrix or the formula of a geometry transform; None for what is neither."""
-    if not isinstance(node, Transform):
+    if node.kind not in TRANSFORMS:
         return None
     step = step_of(node, space)
     if isinstance(step, Affine):
         return show_matrix(step.rows, space)
     return show_warp(step) if isinstance(step, Warp) else None
-
-
-Transform = (
-    schema.Translate
-    | schema.Rotate
-    | schema.Scale
-    | schema.Shear
-    | schema.Matrix
-    | schema.Twirl
-    | schema.Bend
-    | schema.Twist
-    | schema.Displace
-)
 
 
 def show_chain(transforms: tuple[Any, ...], space: Space) -> list[str]:

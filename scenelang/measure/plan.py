@@ -18,8 +18,9 @@ from scenelang.measure.scenes import reference_of
 from scenelang.models.choose import WHITE, choose_model, lacking, uses, why_chosen
 from scenelang.models.load import Model
 from scenelang.models.manifest import Manifest, available, load_manifest
-from scenelang.program.program import TOKENS, Program
+from scenelang.program.program import Program
 from scenelang.scene.schema import Scene
+from scenelang.words import TOKENS
 
 REPEATS = 3
 

@@ -18,7 +18,6 @@ from scenelang.scene.schema import (
     Boolean,
     Chain,
     Color,
-    Combine,
     Group,
     Link,
     Material,
@@ -32,9 +31,9 @@ from scenelang.scene.schema import (
     Translate,
     Twirl,
 )
+from scenelang.words import COMBINE, Combine
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")
-WORDS: tuple[Combine, ...] = ("union", "smooth", "subtract", "intersect")
 Rng = np.random.Generator
 
 
@@ -143,7 +142,7 @@ def _tree(rng: Rng, leaves: list[SceneNode]) -> SceneNode:
         op: Combine = "subtract" if rng.random() < 0.5 else "union"
         rest = Boolean(op="union", children=tuple(leaves[cut:]))
         return Boolean(op=op, children=(_tree(rng, leaves[:cut]), rest))
-    word = WORDS[int(rng.integers(4))]
+    word = COMBINE[int(rng.integers(4))]
     return Boolean(op=word, children=(_tree(rng, leaves[:-1]), leaves[-1]))
 
 
@@ -154,7 +153,7 @@ def random_scene(rng: Rng, config: SetConfig) -> Scene:
     if config.nest == "tree":
         return Scene(model="shapes2d", canvas=config.canvas, nodes=(_tree(rng, list(objects)),))
     unions = rng.random() < config.unions
-    words = ["union", *(WORDS[0 if unions else int(rng.integers(4))] for _ in range(count - 1))]
+    words = ["union", *(COMBINE[0 if unions else int(rng.integers(4))] for _ in range(count - 1))]
     nodes: list[SceneNode] = list(objects)
     turn = Rotate(angle=_uniform(rng, -math.pi, math.pi))
     if config.nest == "groups":

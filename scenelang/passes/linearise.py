@@ -22,7 +22,7 @@ from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node
 from scenelang.graph.space import Space
 from scenelang.graph.stream import Stream
 from scenelang.passes.context import Context
-from scenelang.scene.schema import Combine
+from scenelang.words import Combine
 
 
 @dataclass(slots=True)

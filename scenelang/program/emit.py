@@ -15,8 +15,8 @@ from scenelang.lifting.layout import LAYOUTS, WIDTH
 from scenelang.lifting.learned import lift_geometry, lift_material
 from scenelang.models.manifest import Manifest
 from scenelang.models.weights import Codes
-from scenelang.program.program import TOKENS, Place, Program, ProgramError
-from scenelang.scene.schema import Combine
+from scenelang.program.program import Place, Program, ProgramError
+from scenelang.words import TOKENS, Combine
 
 Rows = list[tuple[Combine, Leaf]]
 

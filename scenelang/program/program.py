@@ -14,12 +14,11 @@ import numpy.typing as npt
 from scenelang.files import write_output
 from scenelang.notebook import bundle
 from scenelang.tensors import FORMAT
+from scenelang.words import TOKENS
 
 MOST_OBJECTS = 100_000
 MOST_PIXELS = 8192
 WIDTH = 64
-TOKENS: dict[str, int] = {"union": 0, "smooth": 1, "subtract": 2, "intersect": 3}
-"""Boolean tokens; the first row's is 0 whatever it was written as."""
 
 
 class ProgramError(ValueError):
@@ -42,7 +41,7 @@ class Program:
 
     Args:
         vectors: float32 (N, 64), geometry vector (32) then material vector (32) of each object.
-        tokens: int8 (N,), how each joins what came before; see `TOKENS`.
+        tokens: int8 (N,), how each joins what came before, as in `scenelang.words.TOKENS`; the first is 0.
         bounds: float32 (N, 4), world xmin, ymin, xmax, ymax: outside it the row makes no difference to
             the picture. An intersection, which reaches everything, has the whole canvas.
         canvas: width and height in pixels.

@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from scenelang.graph.nodes import Fold, Leaf, Node
 from scenelang.graph.steps import Affine, Step, Warp
-from scenelang.program.program import TOKENS
 from scenelang.reference.fold import combine
 from scenelang.reference.leaves import Array, leaf_distance, namespace
+from scenelang.words import TOKENS
 
 Floats = npt.NDArray[np.float64]
 

@@ -27,8 +27,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from scenelang.lifting.layout import PLANE_LAYOUT, Layout
-from scenelang.program.program import TOKENS as WORDS
 from scenelang.renderers.arrays import NUMPY, Array, Arrays, Layers
+from scenelang.words import TOKENS as WORDS
 
 TOKENS = len(WORDS)
 EMPTY = 1.0  # world units: the margin before the first object, out of reach of every blend

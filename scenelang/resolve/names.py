@@ -11,11 +11,9 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.evaluate.values.functions import ANIMATED, CONSTANTS, FUNCTIONS
-from scenelang.evaluate.values.transforms import GEOMETRY, TEXTURE
-from scenelang.evaluate.vocabulary import SETTINGS
 from scenelang.resolve.symbols import Kind, Role, Scope, Symbol, Use
 from scenelang.syntax import nodes
+from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, OPERATIONS, SETTINGS, TRANSFORMS
 
 
 class Names:
@@ -166,10 +164,10 @@ class Names:
         name = stmt.name.text
         if name in SETTINGS:
             head: Use | None = self._add(stmt.name.span, name, "setting")
-        elif kind == "material" and name in TEXTURE:
+        elif kind == "material" and name in OPERATIONS:
             head = self._add(stmt.name.span, name, "operation")
-        elif name in GEOMETRY or name in TEXTURE:
-            head = self._add(stmt.name.span, name, "transform" if name in GEOMETRY else "operation")
+        elif name in TRANSFORMS or name in OPERATIONS:
+            head = self._add(stmt.name.span, name, "transform" if name in TRANSFORMS else "operation")
         else:
             head = self._reference(stmt.name, scope, "geometry")
         self._arguments(stmt.args or (), scope, head)

@@ -11,6 +11,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
+from scenelang.words import RESERVED
+
 _NOT_0: dict[str, Any] = {"not": {"const": 0}}
 _NOT_000: dict[str, Any] = {"not": {"const": [0, 0, 0]}}
 
@@ -32,12 +34,6 @@ Share = Annotated[Finite, Field(ge=0, le=1)]
 Opaque = Annotated[
     tuple[Share, Share, Share], Field(description="red, green, blue as written (sRGB-encoded), in 0 to 1")
 ]
-_WORDS = (
-    "nsg model param let fn module import for in if else group chain "
-    "union smooth subtract intersect material true false"
-)
-RESERVED = tuple(_WORDS.split())
-"""The keywords of the language, which name nothing else."""
 
 
 def _is_free(word: str) -> str:
@@ -52,7 +48,6 @@ Word = Annotated[
     AfterValidator(_is_free),
 ]
 """A name that text can spell."""
-Combine = Literal["union", "smooth", "subtract", "intersect"]
 
 
 def _whole(value: Any) -> Any:

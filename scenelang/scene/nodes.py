@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, overload
 from pydantic import Field, field_validator, model_validator
 
 from scenelang.scene.fields import (
-    Combine,
     Finite,
     Frozen,
     Opaque,
@@ -18,6 +17,7 @@ from scenelang.scene.fields import (
     first_joins_by_union,
 )
 from scenelang.scene.modifiers import MaterialOp, Transform, Transforms
+from scenelang.words import Combine
 
 MAX_FRAMES = 1_000_000
 MAX_NODE_DEPTH = 400  # nodes within nodes

@@ -123,21 +123,16 @@ def _step(step: Transform | MaterialOp) -> _Code:
             return _Call("nsg.Shear", (f'"{step.axes}"', number(step.k)))
         case "matrix":
             return _Call("nsg.Matrix", (_tuple("", [_numbers("", row) for row in step.rows]),))
-        case "displace":
-            return _Call("nsg.Displace", (number(step.amount), number(step.frequency)))
-        case "flip":
-            return _Call("nsg.Flip", ())
         case "color":
             written = hex_colour(step.rgb)
             if written is not None:
                 return _Call("nsg.Color", (f'"{written}"',))
             return _Call("nsg.Color", (_numbers("", step.rgb),))
-        case "grayscale":
-            return _Call("nsg.Grayscale", (number(step.amount),))
         case "hue":
             return _Call("nsg.Hue", (f"angle={number(step.angle)}",))
         case _:
-            return _Call(f"nsg.{type(step).__name__}", (number(step.k),))
+            numbers = (number(value) for name, value in step if name != "kind")
+            return _Call(f"nsg.{type(step).__name__}", tuple(numbers))
 
 
 def _angle(rad: float) -> tuple[str, str]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from scenelang.scene.fields import Combine as Combine
 from scenelang.scene.modifiers import Bend as Bend
 from scenelang.scene.modifiers import Color as Color
 from scenelang.scene.modifiers import Displace as Displace

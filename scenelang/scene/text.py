@@ -122,27 +122,12 @@ def _axis(axis: tuple[float, float, float]) -> str:
 
 def material(value: Material) -> str:
     """A material statement."""
-    ops = " ".join(operation(op) for op in value.ops)
+    ops = " ".join(transform(op) for op in value.ops)
     return f"material {value.name} {{ {ops} }}" if ops else f"material {value.name};"
 
 
-def operation(op: MaterialOp) -> str:
-    """A statement in a material's block."""
-    match op.kind:
-        case "flip":
-            return "flip();"
-        case "color":
-            return f"color({rgb(op.rgb)});"
-        case "grayscale":
-            return f"grayscale({number(op.amount)});"
-        case "hue":
-            return f"hue({angle(op.angle)});"
-        case _:
-            return transform(op)
-
-
-def transform(t: Transform) -> str:
-    """A transform statement."""
+def transform(t: Transform | MaterialOp) -> str:
+    """A transform, or a statement in a material's block."""
     match t.kind:
         case "translate":
             return (
@@ -159,7 +144,9 @@ def transform(t: Transform) -> str:
             return f"shear({t.axes} = {number(t.k)});"
         case "matrix":
             return f"matrix([{', '.join(map(_vector, t.rows))}]);"
-        case "displace":
-            return f"displace({number(t.amount)}, {number(t.frequency)});"
+        case "color":
+            return f"color({rgb(t.rgb)});"
+        case "hue":
+            return f"hue({angle(t.angle)});"
         case _:
-            return f"{t.kind}({number(t.k)});"
+            return f"{t.kind}({', '.join(number(value) for name, value in t if name != 'kind')});"

@@ -13,7 +13,6 @@ from scenelang.syntax.automaton import reach
 from scenelang.syntax.foreign import HABITS, Habit
 from scenelang.syntax.patterns import (
     MOST,
-    NODES,
     Change,
     Columns,
     Match,
@@ -27,14 +26,13 @@ from scenelang.syntax.repairs import FOLLOWED
 from scenelang.syntax.slips import Slips
 from scenelang.syntax.spelling import word_for
 from scenelang.syntax.tables import tables
+from scenelang.words import NODES, TRANSFORMS
 
 _FLAT: Final = frozenset(("square", "triangle", "pentagon", "star"))
 _SOLID: Final = frozenset(("sphere", "torus"))
 """What is drawn in two and in three dimensions; the scene of a text tells which materials there are."""
 
-_MOVES: Final = frozenset(
-    ("translate", "rotate", "scale", "shear", "matrix", "twirl", "bend", "twist", "color")
-)
+_MOVES: Final = {*TRANSFORMS, "color"}
 _PREFIXES: Final = _MOVES | {
     "mirror",
     "resize",

@@ -15,8 +15,8 @@ from unicodedata import category
 from scenelang.diagnostics.span import SourceFile
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
+from scenelang.words import UNITS
 
-UNITS = ("deg", "rad", "turn", "ms", "s")
 UNIT_ALIASES = {
     "degree": "deg",
     "degrees": "deg",

@@ -10,6 +10,7 @@ from typing import Literal
 
 from scenelang.diagnostics.span import Span
 from scenelang.records import Record
+from scenelang.words import Combine
 
 
 class Name(Record):
@@ -228,9 +229,6 @@ class If(Record):
     then: Block
     otherwise: Block | If | None
     span: Span
-
-
-Combine = Literal["union", "smooth", "subtract", "intersect"]
 
 
 class Call(Record):

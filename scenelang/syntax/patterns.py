@@ -26,21 +26,18 @@ from typing import Final
 from scenelang.records import Record
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Tokens
+from scenelang.words import NODES, OPERATIONS, TRANSFORMS
 
 MOST: Final = 200
 """A hole takes no more tokens; a block twenty times as many."""
 
 TYPES: Final = ("float", "int", "bool", "double", "number", "string", *(f"vec{n}" for n in "234"), "color")
-NODES: Final = ("union", "smooth", "subtract", "intersect", "chain", "group")
 WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "type": TYPES,
     "fn": ("fn", "function", "func", "fun", "def"),
     "let": ("let", "var", "const"),
-    "node": NODES,
-    "call": (
-        *("translate", "rotate", "scale", "shear", "matrix", "twirl", "bend", "twist", "displace"),
-        *("color", "hue", "grayscale", "flip", "canvas", "background"),
-    ),
+    "node": tuple(NODES),
+    "call": (*(TRANSFORMS | OPERATIONS), "canvas", "background"),
     "control": ("for", "if"),
     "library": ("math", "numpy", "random", "sys", "os", "Math"),
 }

@@ -18,11 +18,9 @@ from scenelang.syntax.repairs import FOLLOWED, MAX_REPLAY, Repair, Search
 from scenelang.syntax.spelling import FOREIGN_HEADS, keywords_near
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
+from scenelang.words import DECLARING, NODES
 
-_WORDS = (
-    *("nsg", "model", "param", "let", "fn", "module", "import", "for", "if", "material"),
-    *("group", "chain", "union", "smooth", "subtract", "intersect"),
-)
+_WORDS = (*(word for word in DECLARING if word != "as"), "for", "if", "material", *NODES)
 _HEADS = ("let", "fn", "module", "param", "import", "for", "if", "group", "chain", "material", "union")
 
 

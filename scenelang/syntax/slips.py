@@ -9,9 +9,10 @@ from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import mistakes
 from scenelang.syntax.automaton import fits, reach
-from scenelang.syntax.lexer import UNIT_ALIASES, UNITS
+from scenelang.syntax.lexer import UNIT_ALIASES
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
+from scenelang.words import UNITS
 
 _FAR = 1000  # tokens that the statement of a loop without braces may have
 

@@ -23,10 +23,10 @@ from scenelang.models.manifest import ROOT, Manifest
 from scenelang.models.weights import ModelError, read_facts
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import ProgramError
-from scenelang.scene.fields import RESERVED
 from scenelang.scene.schema import Scene
 from scenelang.syntax import parse
 from scenelang.syntax.tables import tables
+from scenelang.words import RESERVED
 from tests.work import ends, lines_run
 
 

@@ -14,23 +14,9 @@ import pytest
 
 from scenelang.cli.main import COMMANDS
 from scenelang.formatting import format_text
-from scenelang.highlighting import words
 
 EDITORS = Path(__file__).parents[2] / "editors"
 VIM, VSCODE = EDITORS / "vim", EDITORS / "vscode"
-SYNTAX = (VIM / "syntax/nsg.vim").read_text("utf-8")
-GROUPS = {
-    "nsgDeclare": words.DECLARING,
-    "nsgControl": words.CONTROL,
-    "nsgNode": words.NODES,
-    "nsgMaterial": words.MATERIAL,
-    "nsgTruth": words.TRUTH,
-    "nsgConstant": words.CONSTANTS,
-    "nsgAnimated": words.ANIMATED,
-    "nsgSetting": words.SETTINGS,
-    "nsgTransform": (*words.TRANSFORMS, *words.TEXTURE),
-    "nsgFunction": words.FUNCTIONS,
-}
 SAMPLE = """// a comment TODO
 nsg 1;
 let mist = material flat { color(#d33); };
@@ -58,15 +44,6 @@ EXPECTED = [
     *[("mist {", "nsgObject"), ('"a', "nsgString"), ('\\"b', "nsgEscape"), ("subtract", "nsgNode")],
     *[("dot", "nsgCall"), ("axis", ""), ("X,", "nsgConstant"), ("u)", "nsgAnimated")],
 ]
-
-
-@pytest.mark.parametrize("group", GROUPS)
-def test_vim_knows_the_words(group: str) -> None:
-    lines = re.findall(rf"^syntax (keyword|match) {group} (.*)$", SYNTAX, re.MULTILINE)
-    found: list[str] = []
-    for kind, rest in lines:
-        found += rest.split() if kind == "keyword" else re.findall(r"\w+(?=\\[|)])", rest)
-    assert sorted(found) == sorted(GROUPS[group])
 
 
 def vim(folder: Path, script: str) -> str:

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
+from scenelang import words
 from scenelang.diagnostics.span import SourceFile
-from scenelang.highlighting import textmate, words
+from scenelang.highlighting import textmate
 from scenelang.syntax.lexer import scan
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report
@@ -37,11 +38,6 @@ def patterns(value: Any) -> list[str]:
         own = [text for key, text in value.items() if key in {"match", "begin", "end"}]
         return own + [found for inner in value.values() for found in patterns(inner)]
     return [found for inner in value for found in patterns(inner)] if isinstance(value, list) else []
-
-
-def test_file_is_in_step() -> None:
-    shipped = textmate.PATH.read_text("utf-8")
-    assert shipped == textmate.encode(), "run python -m scenelang.highlighting.textmate"
 
 
 def test_every_keyword_and_terminal_is_matched() -> None:
@@ -75,7 +71,7 @@ def test_vscode_reads_the_tokens_of_the_language() -> None:
     """Each token of every scene begins where the engine's does and has a scope of its class."""
     if shutil.which("node") is None or not (EXTENSION / "node_modules/vscode-textmate").exists():
         pytest.skip("NOT RUN: vscode-textmate is missing; run `npm ci` in editors/vscode")
-    command = ["node", "test/tokenize.cjs", str(textmate.PATH), *map(str, FILES)]
+    command = ["node", "test/tokenize.cjs", str(ROOT / "grammar/scenelang.tmLanguage.json"), *map(str, FILES)]
     done = subprocess.run(command, cwd=EXTENSION, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     for name, found in json.loads(done.stdout).items():

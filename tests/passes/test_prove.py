@@ -10,7 +10,7 @@ import pytest
 from scenelang.graph.nodes import Fold, Graph, Link
 from scenelang.passes import PASSES, Pass
 from scenelang.passes.context import Context
-from scenelang.program.program import TOKENS
+from scenelang.words import TOKENS
 from tests.passes import prove as module
 from tests.passes.prove import CHECKS, MOST, Proof, prove, stages
 from tests.passes.random_scenes import full_scene

@@ -10,7 +10,7 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import did_you_mean, ranked
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.values.functions import FUNCTIONS
-from scenelang.evaluate.vocabulary import LANGUAGE
+from scenelang.words import LANGUAGE
 from tests.syntax.reading import apply
 
 SPAN = Span(SourceFile("x", "x"), 0, 1)

@@ -1,10 +1,15 @@
-" Scenes of scenelang. The words are those of scenelang/highlighting/words.py; a test keeps them in step.
+" Scenes of scenelang.
 if exists('b:current_syntax')
   finish
 endif
 
 syntax iskeyword @,48-57,_
 
+" Calls: a name before `(` or `{`. Later rules win over earlier ones at the same place.
+syntax match nsgCall /\<[A-Za-z_]\w*\>\ze\s*(/
+syntax match nsgObject /\<[A-Za-z_]\w*\>\ze\s*{/
+syntax match nsgOperator /\.\.<\?\|||\|&&\|[=!<>]=\|[-+*%^!?:=<>.]\|\/[\/*]\@!/
+" Words, written by docs/make_words.py.
 syntax keyword nsgDeclare nsg model param let fn module import as
 syntax keyword nsgControl for in step if else
 syntax keyword nsgNode group chain union smooth subtract intersect
@@ -12,20 +17,13 @@ syntax keyword nsgMaterial material
 syntax keyword nsgTruth true false
 syntax keyword nsgConstant PI TAU X Y Z none
 syntax keyword nsgAnimated t u frame frames
-
-" Calls: a name before `(` or `{`. Later rules win over earlier ones at the same place.
-syntax match nsgCall /\<[A-Za-z_]\w*\>\ze\s*(/
-syntax match nsgObject /\<[A-Za-z_]\w*\>\ze\s*{/
 syntax match nsgSetting /\<\%(canvas\|background\|animate\)\>\ze\s*(/
-syntax match nsgTransform /\<\%(translate\|rotate\|scale\|shear\|matrix\|twirl\|bend\|twist\|displace\)\>\ze\s*(/
-syntax match nsgTransform /\<\%(flip\|color\|grayscale\|hue\)\>\ze\s*(/
-syntax match nsgFunction /\<\%(sin\|cos\|tan\|asin\|acos\|atan2\|abs\|min\|max\|clamp\|floor\|ceil\|round\)\>\ze\s*(/
-syntax match nsgFunction /\<\%(sqrt\|exp\|log\|mix\|smoothstep\|len\|rand\|rgb\|hsv\)\>\ze\s*(/
-syntax match nsgDefined /\%(\<\%(fn\|module\)\s\+\)\@<=[A-Za-z_]\w*/
-
-syntax match nsgOperator /\.\.<\?\|||\|&&\|[=!<>]=\|[-+*%^!?:=<>.]\|\/[\/*]\@!/
+syntax match nsgTransform /\<\%(translate\|rotate\|scale\|shear\|matrix\|twirl\|bend\|twist\|displace\|flip\|color\|grayscale\|hue\)\>\ze\s*(/
+syntax match nsgFunction /\<\%(sin\|cos\|tan\|asin\|acos\|atan2\|abs\|min\|max\|clamp\|floor\|ceil\|round\|sqrt\|exp\|log\|mix\|smoothstep\|len\|rand\|rgb\|hsv\)\>\ze\s*(/
 syntax match nsgNumber /\<\d\+\%(\.\.\@!\d*\)\?\%([eE][-+]\?\d\+\)\?\%(deg\|rad\|turn\|ms\|s\)\?\w\@!/
 syntax match nsgNumber /\w\@<!\.\d\+\%([eE][-+]\?\d\+\)\?\%(deg\|rad\|turn\|ms\|s\)\?\w\@!/
+" End of words
+syntax match nsgDefined /\%(\<\%(fn\|module\)\s\+\)\@<=[A-Za-z_]\w*/
 syntax match nsgColor /#\%(\x\{6}\|\x\{3}\)\w\@!/
 syntax match nsgEscape contained /\\["\\nt]/
 syntax region nsgString start=/"/ skip=/\\./ end=/"\|$/ contains=nsgEscape

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from scenelang.cli import options
+from scenelang.words import COMBINE
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
@@ -84,7 +85,7 @@ def _text(plan: dict[str, Any]) -> str:
 
 def _table(stages: list[dict[str, Any]]) -> list[str]:
     """A line for each stage; a column for each word that joins something in one of them."""
-    words = [w for w in ("union", "smooth", "subtract", "intersect") if any(w in s["tokens"] for s in stages)]
+    words = [w for w in COMBINE if any(w in s["tokens"] for s in stages)]
     heads = ["objects", "matrices", "affine", "deform", "folds", *words]
     lines = [f"{'after':16}" + "".join(f"{head:>10}" for head in heads) + "  (= as before)"]
     for row in stages:

@@ -18,8 +18,8 @@ from scenelang.evaluate.prepare.operations import condition
 from scenelang.evaluate.replay import Still
 from scenelang.evaluate.report.undefined import tell_bound
 from scenelang.evaluate.values.value import POISON, Problem, RangeValue, Vec, unexpected
-from scenelang.evaluate.vocabulary import LANGUAGE, SETTINGS
 from scenelang.syntax import nodes
+from scenelang.words import LANGUAGE, SETTINGS
 
 Kind = Literal["file", "group", "chain", "object", "material", "unknown"]
 """What a block may hold. ``unknown`` is the block of something misspelt: nothing is out of place there."""

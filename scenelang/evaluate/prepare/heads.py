@@ -17,19 +17,15 @@ from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice
 from scenelang.evaluate.report.shapes import in_library
 from scenelang.evaluate.report.undefined import VALUES, report_unknown, unknown, unknown_member, within_effort
-from scenelang.evaluate.values.functions import ANIMATED, CONSTANTS, FUNCTIONS
-from scenelang.evaluate.values.transforms import GEOMETRY, TEXTURE
-from scenelang.evaluate.vocabulary import SETTINGS
 from scenelang.syntax import nodes
-
-NODE_WORDS = ("group", "union", "smooth", "subtract", "intersect", "chain")
+from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, NODES, OPERATIONS, SETTINGS, TRANSFORMS
 
 
 def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
     name = stmt.name.text
     if name in SETTINGS:
         return prepare_setting(stmt, place)
-    if name in GEOMETRY or name in TEXTURE:
+    if name in TRANSFORMS or name in OPERATIONS:
         return prepare_move(stmt, place)
     binding = lookup(stmt.name, place.unit, place.scope)
     if binding is None:
@@ -146,7 +142,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         if fix is None:
             known, fix = instead(name.text, foreign_words.WORDS, candidates, name.span)
             hint = known or hint
-        if fix is not None and stmt.body is not None and fix.edits[0].replacement in NODE_WORDS:
+        if fix is not None and stmt.body is not None and fix.edits[0].replacement in NODES:
             span = Span(name.span.source, name.span.start, stmt.body.span.start)  # without parentheses
             fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
         meant = foreign_words.WORDS.get(name.text, "")
@@ -180,7 +176,7 @@ def _candidates(stmt: nodes.Call, place: Place, scope: Scope) -> set[str]:
         return {*names, "material"}
     found = words.geometries | names
     if not stmt.args and stmt.body is not None:
-        found.update((*NODE_WORDS, *(otherwise - {"else if"})))
+        found.update((*NODES, *(otherwise - {"else if"})))
     if stmt.args is not None and stmt.body is None:
         found.update(words.transforms if place.kind != "file" else SETTINGS)
     if stmt.args is not None and stmt.body is not None:

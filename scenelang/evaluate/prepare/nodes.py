@@ -22,10 +22,10 @@ from scenelang.evaluate.prepare.expressions import prepare
 from scenelang.evaluate.prepare.references import entering, lookup
 from scenelang.evaluate.report.undefined import VALUES
 from scenelang.evaluate.session import Session
-from scenelang.evaluate.vocabulary import LANGUAGE
 from scenelang.scene import library, spans
 from scenelang.scene.schema import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object
 from scenelang.syntax import nodes
+from scenelang.words import LANGUAGE
 
 HOLDERS = ("file", "group", "chain", "unknown")
 

@@ -24,10 +24,11 @@ from scenelang.evaluate.prepare.expressions import (
 )
 from scenelang.evaluate.prepare.literals import member
 from scenelang.evaluate.report.undefined import VALUES, unknown, unknown_member
-from scenelang.evaluate.values.functions import ANIMATED, CONSTANTS, FUNCTIONS, Builtin
+from scenelang.evaluate.values.functions import CONSTANTS, FUNCTIONS, Builtin
 from scenelang.evaluate.values.value import POISON
 from scenelang.scene.spans import Calls
 from scenelang.syntax import nodes
+from scenelang.words import ANIMATED
 
 
 def value_of(name: nodes.Name, binding: Binding, unit: Unit, scope: Scope) -> Code:
@@ -132,7 +133,7 @@ def _own_name(name: nodes.Name, unit: Unit, scope: Scope) -> Code:
         return POISONED
     if unit.damage and unit.damage.loses("animate"):
         return POISONED
-    index = ANIMATED.index(text)
+    index = [*ANIMATED].index(text)
     session.needs.frame |= text != "frames"
     if session.animated[index] is not UNBOUND:
         return constant(session.animated[index])

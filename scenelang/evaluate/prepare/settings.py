@@ -21,15 +21,10 @@ from scenelang.evaluate.values.transforms import color
 from scenelang.evaluate.values.value import POISON, Problem, Time, Vec, show, unexpected
 from scenelang.scene.schema import MAX_FRAMES, Animation
 from scenelang.syntax import nodes
+from scenelang.words import SETTINGS
 
 MAX_SIDE_PX: Final = 8192
 LEFT_OUT: Final = object()  # an argument that was not given; None is the value ``none``
-
-_PARAMS: Final[dict[str, tuple[tuple[str, ...], int]]] = {
-    "canvas": (("w", "h"), 2),
-    "background": (("c",), 1),
-    "animate": (("seconds", "fps", "loop"), 2),
-}
 
 
 def at_top_level(place: Place, span: Span, what: str) -> bool:
@@ -101,9 +96,8 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
     if stmt.body is not None:
         session.report.error("E0330", f"`{name}` takes no block", span, help=f"write {name}(…);")
         return None
-    params, required = _PARAMS[name]
-    optional = [index >= required for index in range(len(params))]
-    bound = bind(session, name, params, optional, stmt.args or (), span, spread=name == "canvas")
+    word = SETTINGS[name]
+    bound = bind(session, name, word.params, word.optional, stmt.args or (), span, spread=name == "canvas")
     if bound is None:
         return _unknown_time(session) if name == "animate" else None
     getters = [codes[id(arg)].run if arg is not None else None for arg in bound]

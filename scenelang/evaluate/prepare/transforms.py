@@ -35,9 +35,10 @@ def prepare_move(stmt: nodes.Call, place: Place) -> Action | None:
         return None
     if name == "scale" and len(args) == 1 and (args[0].name is None or args[0].name.text == "s"):
         spec = EVEN_SCALE
-    optional = [index >= spec.required for index in range(len(spec.params))]
-    span = stmt.name.span
-    bound = bind(unit.session, name, spec.params, optional, args, span, spread=spec.spread, help=spec.help)
+    span, word = stmt.name.span, spec.word
+    bound = bind(
+        unit.session, name, word.params, word.optional, args, span, spread=spec.spread, help=spec.help
+    )
     if bound is None:
         return None
     if name == "shear" and any(arg.name is None for arg in args):
@@ -115,7 +116,8 @@ def _action(
         try:
             node = spec.build(*spread(values, spec)) if spec.spread else spec.build(*values)
         except Problem as problem:
-            report_problem(session.report, problem, span, (one,) * len(spec.params) if alone else operands)
+            blamed = (one,) * len(spec.word.params) if alone else operands
+            report_problem(session.report, problem, span, blamed)
             return None
         _warn(node, unit, one.span if one else span)
         return node

@@ -12,9 +12,9 @@ from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.angles import angle_advice
 from scenelang.evaluate.report.reporter import Advice
 from scenelang.evaluate.session import Session
-from scenelang.evaluate.values.transforms import GEOMETRY
 from scenelang.evaluate.values.value import COMPONENTS, Problem
 from scenelang.syntax import nodes
+from scenelang.words import TRANSFORMS
 
 _SIMPLE: Final = re.compile(r"[\w.#]+(?:\([^()]*\)|\[[^\[\]]*\])?|\([^()]*\)|\[[^\[\]]*\]")
 _NEAR: Final = 500
@@ -128,7 +128,7 @@ def as_group(stmt: nodes.Call, session: Session) -> Fix | None:
     head = Span(source, stmt.span.start, body.span.start)
     last = body.statements[-1].span.end if body.statements else body.span.start + 1
     moved = f"{head.text.rstrip()};"
-    if stmt.name.text not in GEOMETRY:
+    if stmt.name.text not in TRANSFORMS:
         material = _material(session, source)
         if material is None or any(isinstance(one, nodes.MaterialUse) for one in body.statements):
             return None

@@ -12,8 +12,8 @@ from scenelang.evaluate.file_context import Unit
 from scenelang.evaluate.names import Binding, Scope
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice, Reporter, shown_places
-from scenelang.evaluate.values.functions import ANIMATED, CONSTANTS, FUNCTIONS
 from scenelang.syntax import nodes
+from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS
 
 VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of bindings that are values."""

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from scenelang import words
 from scenelang.evaluate.values.operators import binary, finite, same_unit
 from scenelang.evaluate.values.value import (
     UNITS,
@@ -241,31 +242,34 @@ def _doubt_hue(h: Any, s: Any, v: Any) -> Problem | None:
     return Problem("W0302", f"a hue of {show(h)} turns", help, operand=0)
 
 
-FUNCTIONS: Final[dict[str, Builtin]] = {
-    "sin": Builtin(("x",), _of_angle(math.sin)),
-    "cos": Builtin(("x",), _of_angle(math.cos)),
-    "tan": Builtin(("x",), _of_angle(math.tan)),
-    "asin": Builtin(("x",), _to_angle(math.asin)),
-    "acos": Builtin(("x",), _to_angle(math.acos)),
-    "atan2": Builtin(("y", "x"), _atan2),
-    "abs": Builtin(("x",), _abs),
-    "min": Builtin(("x",), _whole(_best(_less)), variadic=True),
-    "max": Builtin(("x",), _whole(_best(_greater)), variadic=True),
-    "clamp": Builtin(("x", "low", "high"), _whole(_clamp)),
-    "floor": Builtin(("x",), _of_number(lambda x: float(math.floor(x)), "")),
-    "ceil": Builtin(("x",), _of_number(lambda x: float(math.ceil(x)), "")),
-    "round": Builtin(("x",), _of_number(round_half_away, "")),
-    "sqrt": Builtin(("x",), _of_number(math.sqrt, "of at least 0")),
-    "exp": Builtin(("x",), _of_number(math.exp, "")),
-    "log": Builtin(("x",), _of_number(math.log, "above 0")),
-    "mix": Builtin(("a", "b", "t"), _whole(_mix)),
-    "smoothstep": Builtin(("low", "high", "x"), _whole(_smoothstep)),
-    "len": Builtin(("v",), _len),
-    "rand": Builtin(("seed",), rand),
-    "rgb": Builtin(("r", "g", "b"), _rgb),
-    "hsv": Builtin(("h", "s", "v"), _hsv, doubt=_doubt_hue),
+_MEANINGS: Final[dict[str, Callable[..., Any]]] = {
+    "sin": _of_angle(math.sin),
+    "cos": _of_angle(math.cos),
+    "tan": _of_angle(math.tan),
+    "asin": _to_angle(math.asin),
+    "acos": _to_angle(math.acos),
+    "atan2": _atan2,
+    "abs": _abs,
+    "min": _whole(_best(_less)),
+    "max": _whole(_best(_greater)),
+    "clamp": _whole(_clamp),
+    "floor": _of_number(lambda x: float(math.floor(x)), ""),
+    "ceil": _of_number(lambda x: float(math.ceil(x)), ""),
+    "round": _of_number(round_half_away, ""),
+    "sqrt": _of_number(math.sqrt, "of at least 0"),
+    "exp": _of_number(math.exp, ""),
+    "log": _of_number(math.log, "above 0"),
+    "mix": _whole(_mix),
+    "smoothstep": _whole(_smoothstep),
+    "len": _len,
+    "rand": rand,
+    "rgb": _rgb,
+    "hsv": _hsv,
 }
-
+FUNCTIONS: Final = {
+    name: Builtin(word.params, _MEANINGS[name], word.variadic, _doubt_hue if name == "hsv" else None)
+    for name, word in words.FUNCTIONS.items()
+}
 CONSTANTS: Final[dict[str, Any]] = {
     "PI": math.pi,
     "TAU": math.tau,
@@ -274,4 +278,3 @@ CONSTANTS: Final[dict[str, Any]] = {
     "Z": Vec((0.0, 0.0, 1.0)),
     "none": None,
 }
-ANIMATED: Final = ("t", "u", "frame", "frames")

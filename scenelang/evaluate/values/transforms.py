@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from scenelang.evaluate.builder import make
 from scenelang.evaluate.values.functions import angle, number
 from scenelang.evaluate.values.value import Problem, Vec, describe, unexpected
+from scenelang.scene.fields import Frozen
 from scenelang.scene.modifiers import (
     Bend,
     Color,
@@ -25,8 +26,7 @@ from scenelang.scene.modifiers import (
     Twist,
     singular,
 )
-
-AXES: Final = ("xy", "xz", "yx", "yz", "zx", "zy")
+from scenelang.words import OPERATIONS, TRANSFORMS, Word
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,15 +34,13 @@ class Spec:
     """One transform or operation.
 
     Args:
-        params: names of its arguments.
-        required: how many of them, from the left, have to be given.
+        word: its arguments.
         build: the node from one value an argument, None where left out; raises Problem.
         spread: whether one vector may stand for all arguments.
         help: advice for a wrong number of arguments; None prints the signature.
     """
 
-    params: tuple[str, ...]
-    required: int
+    word: Word
     build: Callable[..., Any]
     spread: bool = False
     help: str | None = None
@@ -90,7 +88,7 @@ def _scale(x: Any, y: Any, z: Any) -> Scale:
 
 def _scale_of_one(s: Any) -> Scale:
     """``scale(s)``, or ``scale([sx, sy])`` with its components in a vector."""
-    return _scale(*spread([s, None, None], _COMMON["scale"])) if s.__class__ is Vec else _scale(s, s, s)
+    return _scale(*spread([s, None, None], GEOMETRY["scale"])) if s.__class__ is Vec else _scale(s, s, s)
 
 
 def _shear(*terms: Any) -> Shear:
@@ -98,7 +96,8 @@ def _shear(*terms: Any) -> Shear:
     if len(given) != 1:
         help = "write one term a call, as in shear(xy = 0.5); several calls apply in order"
         raise Problem("E0308", f"shear takes one term, found {len(given)}", help)
-    return make(Shear, {"kind": "shear", "axes": AXES[given[0]], "k": number(terms[given[0]], given[0])})
+    at = given[0]
+    return make(Shear, {"kind": "shear", "axes": TRANSFORMS["shear"].params[at], "k": number(terms[at], at)})
 
 
 def _matrix(rows: Any) -> Matrix:
@@ -112,49 +111,51 @@ def _matrix(rows: Any) -> Matrix:
     return make(Matrix, {"kind": "matrix", "rows": values})
 
 
-def _warp(cls: type[Twirl] | type[Bend] | type[Twist], kind: str) -> Callable[[Any], Any]:
-    def build(k: Any) -> Any:
-        if describe(k) == "an angle":
-            help = "k is radians per unit length, a bare number: divide by 1rad"
-            raise unexpected("a number", k, help, 0)
-        return make(cls, {"kind": kind, "k": number(k, 0)})
+def _numbers(cls: type[Frozen], refused: str = "") -> Callable[..., Any]:
+    """A node whose fields are all numbers; ``refused`` says why an angle is not one of them."""
+    kind, *names = [cls.model_fields["kind"].default, *(name for name in cls.model_fields if name != "kind")]
+
+    def build(*values: Any) -> Any:
+        for operand, value in enumerate(values):
+            if refused and describe(value) == "an angle":
+                raise unexpected("a number", value, refused, operand)
+        found = {name: number(value, at) for at, (name, value) in enumerate(zip(names, values, strict=True))}
+        return make(cls, {"kind": kind, **found})
 
     return build
 
 
-def _displace(amount: Any, frequency: Any) -> Displace:
-    return make(
-        Displace, {"kind": "displace", "amount": number(amount, 0), "frequency": number(frequency, 1)}
-    )
+_RATE: Final = "k is radians per unit length, a bare number: divide by 1rad"
+_BUILDS: Final[dict[str, Callable[..., Any]]] = {
+    "translate": _translate,
+    "rotate": _rotate,
+    "scale": _scale,
+    "shear": _shear,
+    "matrix": _matrix,
+    "twirl": _numbers(Twirl, _RATE),
+    "bend": _numbers(Bend, _RATE),
+    "twist": _numbers(Twist, _RATE),
+    "displace": _numbers(Displace),
+    "flip": _numbers(Flip),
+    "color": lambda c: make(Color, {"kind": "color", "rgb": color(c)}),
+    "grayscale": _numbers(Grayscale),
+    "hue": lambda h: make(Hue, {"kind": "hue", "angle": angle(h, fix="hue")}),
+}
+_SPREAD: Final = ("translate", "scale")
+_HELP: Final = {
+    "shear": "name the term, as in shear(xy = 0.5)",
+    "color": "it is called color(c), with c as #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)",
+    **{name: f"it is called {TRANSFORMS[name].head}" for name in ("scale", "matrix")},
+}
 
 
-_COMMON: Final = {
-    "translate": Spec(("x", "y", "z"), 2, _translate, spread=True),
-    "rotate": Spec(("angle", "axis"), 1, _rotate),
-    "scale": Spec(("sx", "sy", "sz"), 2, _scale, True, "it is called scale(s) or scale(sx, sy[, sz])"),
-    "shear": Spec(AXES, 0, _shear, help="name the term, as in shear(xy = 0.5)"),
-}
-GEOMETRY: Final[dict[str, Spec]] = {
-    **_COMMON,
-    "matrix": Spec(("rows",), 1, _matrix, help="it is called matrix([[…4], […4], […4], […4]])"),
-    "twirl": Spec(("k",), 1, _warp(Twirl, "twirl")),
-    "bend": Spec(("k",), 1, _warp(Bend, "bend")),
-    "twist": Spec(("k",), 1, _warp(Twist, "twist")),
-    "displace": Spec(("amount", "frequency"), 2, _displace),
-}
-TEXTURE: Final[dict[str, Spec]] = {
-    **_COMMON,
-    "flip": Spec((), 0, lambda: make(Flip, {"kind": "flip"})),
-    "color": Spec(
-        ("c",),
-        1,
-        lambda c: make(Color, {"kind": "color", "rgb": color(c)}),
-        help="it is called color(c), with c as #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)",
-    ),
-    "grayscale": Spec(("a",), 1, lambda a: make(Grayscale, {"kind": "grayscale", "amount": number(a)})),
-    "hue": Spec(("angle",), 1, lambda h: make(Hue, {"kind": "hue", "angle": angle(h, fix="hue")})),
-}
-EVEN_SCALE: Final = Spec(("s",), 1, _scale_of_one)
+def _specs(known: Mapping[str, Word]) -> dict[str, Spec]:
+    return {name: Spec(word, _BUILDS[name], name in _SPREAD, _HELP.get(name)) for name, word in known.items()}
+
+
+GEOMETRY: Final = _specs(TRANSFORMS)
+TEXTURE: Final = _specs(OPERATIONS)
+EVEN_SCALE: Final = Spec(Word("scale", "scale(s)", "", ("s",), 1), _scale_of_one)
 
 
 def spread(values: Sequence[Any], spec: Spec) -> list[Any]:
@@ -167,15 +168,15 @@ def spread(values: Sequence[Any], spec: Spec) -> list[Any]:
     if any(v is not None for v in values[1:]):
         return list(values)
     if first.__class__ is float:
-        missing = " and ".join(f"`{name}`" for name in spec.params[1 : spec.required])
+        missing = " and ".join(f"`{name}`" for name in spec.word.params[1 : spec.word.required])
         raise Problem("E0308", f"{missing} is missing, or a vector of all components")
     if first.__class__ is not Vec:
         raise unexpected("a vector or its components", first, operand=0)
     count = len(first.items)
-    if not spec.required <= count <= len(spec.params):
-        numbers = f"{spec.required} or {len(spec.params)} numbers"
+    if not spec.word.required <= count <= len(spec.word.params):
+        numbers = f"{spec.word.required} or {len(spec.word.params)} numbers"
         raise unexpected(f"a vector of {numbers}", first, operand=0)
-    return [*first.items, *[None] * (len(spec.params) - count)]
+    return [*first.items, *[None] * (len(spec.word.params) - count)]
 
 
 def outside_unit(node: Any) -> float | None:

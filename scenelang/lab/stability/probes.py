@@ -17,7 +17,6 @@ from scenelang.scene.schema import (
     Bend,
     Chain,
     Color,
-    Combine,
     Link,
     Material,
     Object,
@@ -29,6 +28,7 @@ from scenelang.scene.schema import (
     Translate,
     Twirl,
 )
+from scenelang.words import Combine
 
 BASE = SETS["shapes2d"]
 LARGE = 3.0  # times the size of the base set's objects

@@ -1,0 +1,99 @@
+"""Writes what is made from the words of the language: ``python docs/make_words.py``; ``--check`` compares.
+
+- `grammar/scenelang.tmLanguage.json`, the grammar for VS Code and others;
+- the words of `editors/vim/syntax/nsg.vim`;
+- the tables of `docs/language.md` between comments that name them.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from scenelang import words
+from scenelang.highlighting import textmate
+
+ROOT = Path(__file__).parents[1]
+_OR = r"\|"
+TABLES = {
+    "Functions": words.FUNCTIONS,
+    "Definitions": {word: words.DECLARING[word] for word in ("let", "param", "fn", "module", "import")},
+    "Settings": {**{word: words.DECLARING[word] for word in ("nsg", "model")}, **words.SETTINGS},
+    "Transforms": words.TRANSFORMS,
+    "Texture": {name: word for name, word in words.OPERATIONS.items() if name not in words.TRANSFORMS},
+}
+KEYWORDS = {
+    "Declare": words.DECLARING,
+    "Control": words.CONTROL,
+    "Node": words.NODES,
+    "Material": words.MATERIAL,
+    "Truth": words.TRUTH,
+    "Constant": words.CONSTANTS,
+    "Animated": words.ANIMATED,
+}
+CALLS = {
+    "Setting": words.SETTINGS,
+    "Transform": words.TRANSFORMS | words.OPERATIONS,
+    "Function": words.FUNCTIONS,
+}
+
+
+def table(title: str) -> str:
+    """A table of words as Markdown."""
+    rows = [(f"`{'`, `'.join(word.head.split(' or '))}`", word.text) for word in TABLES[title].values()]
+    lines = [
+        "| word | meaning |",
+        "|---|---|",
+        *(f"| {head} | {text.replace('|', _OR)} |" for head, text in rows),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def vim() -> str:
+    """The lines of Vim's syntax that list words."""
+    exponent, end = r"\%([eE][-+]\?\d\+\)\?", rf"\%({_OR.join(words.UNITS)}\)\?\w\@!"
+    return "".join(
+        [
+            *(f"syntax keyword nsg{group} {' '.join(known)}\n" for group, known in KEYWORDS.items()),
+            *(f"syntax match nsg{group} {_called(known)}\n" for group, known in CALLS.items()),
+            rf"syntax match nsgNumber /\<\d\+\%(\.\.\@!\d*\)\?{exponent}{end}/" + "\n",
+            rf"syntax match nsgNumber /\w\@<!\.\d\+{exponent}{end}/" + "\n",
+        ]
+    )
+
+
+def _called(known: Iterable[str]) -> str:
+    return rf"/\<\%({_OR.join(known)}\)\>\ze\s*(/"
+
+
+def _between(text: str, start: str, end: str, new: str) -> str:
+    """A text with what stands between two lines replaced."""
+    head, found, rest = text.partition(f"{start}\n")
+    assert found, start
+    return head + found + new + rest[rest.index(end) :]
+
+
+def made() -> dict[Path, str]:
+    """The text of each file."""
+    grammar = ROOT / "grammar/scenelang.tmLanguage.json"
+    syntax, page = ROOT / "editors/vim/syntax/nsg.vim", ROOT / "docs/language.md"
+    text = page.read_text("utf-8")
+    for title in TABLES:
+        text = _between(text, f"<!-- words: {title} -->", "<!-- end -->", f"\n{table(title)}\n")
+    coloured = _between(
+        syntax.read_text("utf-8"), '" Words, written by docs/make_words.py.', '" End of words', vim()
+    )
+    return {grammar: textmate.encode(), syntax: coloured, page: text}
+
+
+def main() -> None:
+    for path, text in made().items():
+        if "--check" not in sys.argv:
+            path.write_text(text, "utf-8")
+        elif path.read_text("utf-8") != text:
+            raise SystemExit(f"{path.relative_to(ROOT)} is out of date: python docs/make_words.py")
+
+
+if __name__ == "__main__":
+    main()

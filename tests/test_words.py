@@ -1,0 +1,59 @@
+"""The words are those of grammar, evaluator and models, and what is made of them is current."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+from scenelang import words
+from scenelang.evaluate import vocabulary
+from scenelang.evaluate.values import functions, transforms
+from scenelang.highlighting.lexer import OPERATORS
+from scenelang.syntax.tables import tables
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_keywords_and_units_are_those_of_the_grammar() -> None:
+    assert sorted(words.KEYWORDS) == sorted(text for text in tables().literals if text[0].isalpha())
+    assert f"(?:{'|'.join(words.UNITS)})" in tables().patterns["NUMBER"]
+    assert words.TOKENS == {"union": 0, "smooth": 1, "subtract": 2, "intersect": 3}
+    assert [*"()[]{},;"] == [
+        sign for sign in "()[]{},;" if sign in tables().literals and sign not in OPERATORS
+    ]
+
+
+def test_everything_called_has_a_meaning() -> None:
+    assert functions.FUNCTIONS.keys() == words.FUNCTIONS.keys()
+    assert functions.CONSTANTS.keys() == words.CONSTANTS.keys()
+    assert transforms._BUILDS.keys() == words.TRANSFORMS.keys() | words.OPERATIONS.keys()
+    offered = {name for m in vocabulary.shipped() for name in (*m.transforms, *m.material_ops)}
+    assert offered <= words.LANGUAGE
+    for model in vocabulary.shipped():
+        assert words.GEOMETRIES.keys() >= {*model.geometries}
+        assert words.MATERIALS.keys() >= {*model.materials}
+
+
+CALLED = words.FUNCTIONS | words.TRANSFORMS | words.OPERATIONS | words.SETTINGS
+
+
+@pytest.mark.parametrize("word", CALLED.values(), ids=CALLED)
+def test_heads_show_the_parameters(word: words.Word) -> None:
+    """In their order, the optional ones in brackets or with a default, unless the head is an example."""
+    assert len(word.about) in (0, len(word.params))
+    assert 0 <= word.required <= len(word.params)
+    if word.name not in ("shear", "matrix"):
+        shown = re.sub(r" = \w+", "", word.head[word.head.rindex("(") :])
+        assert tuple(re.findall(r"\w+", shown)) == word.params
+        needed = re.split(r"\[|, \w+ = ", word.head[word.head.rindex("(") :])[0]
+        assert tuple(re.findall(r"\w+", needed)) == word.params[: word.required]
+        assert word.variadic == word.head.endswith("…)")
+
+
+def test_what_is_made_of_them_is_current() -> None:
+    """`python docs/make_words.py` would change nothing."""
+    for path, text in runpy.run_path(str(ROOT / "docs/make_words.py"))["made"]().items():
+        assert path.read_text("utf-8") == text, f"{path.name}: run python docs/make_words.py"
