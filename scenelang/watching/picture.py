@@ -8,9 +8,10 @@ import os
 import sys
 import threading
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from scenelang.animation.clip import Clip, open_clip
 from scenelang.animation.painting import Painter
@@ -31,36 +32,6 @@ if TYPE_CHECKING:
 
 class Outdated(Exception):
     """A file was saved while the scene was drawn."""
-
-
-@dataclass(frozen=True, slots=True)
-class Wish:
-    """What is watched and how it is drawn.
-
-    Args:
-        file: the scene.
-        out: the picture, or the animation.
-        target: of an animation; None for a picture.
-        frames: of an animation.
-        frame: of a picture.
-        defines: values for params.
-        model, root, size, fps, backend, device, threads, jobs: as for ``scenelang render``.
-    """
-
-    file: Path
-    out: Path
-    target: Target | None = None
-    frames: FrameRange | None = None
-    frame: int = 0
-    defines: dict[str, str] = field(default_factory=dict)
-    model: str | None = None
-    root: Path | None = None
-    size: tuple[int, int] | None = None
-    fps: float | None = None
-    backend: Backend = "neural"
-    device: Device = "auto"
-    threads: int | None = None
-    jobs: int | None = None
 
 
 @dataclass(slots=True)
@@ -87,27 +58,46 @@ class Outcome:
     files: list[Path] = field(default_factory=list)
 
 
+@dataclass(slots=True)
 class Easel:
     """Draws a scene as often as it changes; the model, the last picture and its key are kept.
 
     Args:
-        wish: what is watched.
+        file: the scene.
+        out: the picture, or the animation.
+        target: of an animation; None for a picture.
+        frames: of an animation.
+        frame: of a picture.
+        defines: values for params.
+        options: of `Clip`: model, root, size, fps.
+        backend, device, threads: as for `Painter`.
+        paths: the files that the picture depends on, the scene first.
+        seen: how they were when their names were found out.
     """
 
-    def __init__(self, wish: Wish) -> None:
-        self.wish = wish
-        self.paths: tuple[Path, ...] = (Path(os.path.abspath(wish.file)),)
-        """The files that the picture depends on, the scene first."""
-        self.seen: Stamps = {}
-        """How they were when their names were found out."""
-        self._key: str | None = None
-        self._image: Image | None = None
-        self._kept: Kept | None = None
+    file: Path
+    out: Path
+    target: Target | None
+    frames: FrameRange
+    frame: int
+    defines: Mapping[str, str]
+    options: Mapping[str, Any]
+    backend: Backend
+    device: Device
+    threads: int | None
+    paths: tuple[Path, ...] = ()
+    seen: Stamps = field(default_factory=dict)
+    _key: str | None = None
+    _image: Image | None = None
+    _kept: Kept | None = None
+
+    def __post_init__(self) -> None:
+        self.paths = (Path(os.path.abspath(self.file)),)
 
     def _warm(self) -> None:
         """Load torch in the background, so that a scene that is mended need not wait for it."""
         name = "scenelang.backend.neural"
-        if self.wish.backend == "neural" and name not in sys.modules:
+        if self.backend == "neural" and name not in sys.modules:
             threading.Thread(target=importlib.import_module, args=(name,), daemon=True).start()
 
     def draw(self, before: Stamps) -> Outcome:
@@ -131,25 +121,24 @@ class Easel:
         return outcome
 
     def _draw(self, found: Diagnostics, outcome: Outcome, before: Stamps) -> None:
-        wish = self.wish
         started = time.perf_counter()
         clip = self._open(found)
         try:
-            numbers = (wish.frames or FrameRange()).among(clip.animation.frames)
+            numbers = self.frames.among(clip.animation.frames)
         except FramesError as error:
             found.add("E0337", str(error), None)
             raise SceneError(found) from None
-        painter = Painter(clip, wish.backend, wish.device, wish.threads, self._kept)
-        if wish.target is not None and wish.target.kind == "video" and not clip.animates:
-            found.add("E0337", f"`{wish.out}` is for animations, and the scene has no animate(…)", None)
+        painter = Painter(clip, self.backend, self.device, self.threads, self._kept)
+        if self.target is not None and self.target.kind == "video" and not clip.animates:
+            found.add("E0337", f"`{self.out}` is for animations, and the scene has no animate(…)", None)
             raise SceneError(found)
-        if wish.target is not None and (clip.animates or wish.target.kind == "sequence"):
-            self._film(painter, wish.target, numbers, outcome, before)
+        if self.target is not None and (clip.animates or self.target.kind == "sequence"):
+            self._film(painter, self.target, numbers, outcome, before)
             return
-        frame = painter.prepare(clip.shot(wish.frame), single=True)
+        frame = painter.prepare(clip.shot(self.frame), single=True)
         outcome.load_s = painter.load_s
         outcome.compile_s = time.perf_counter() - started - painter.load_s
-        if frame.key == self._key and wish.out.exists():
+        if frame.key == self._key and self.out.exists():
             outcome.image, outcome.good, outcome.same = self._image, True, True
             return
         started = time.perf_counter()
@@ -157,25 +146,15 @@ class Easel:
         outcome.draw_s = time.perf_counter() - started
         self._kept, self._image = painter.kept, outcome.image
         started = time.perf_counter()
-        outcome.image.save(wish.out)
+        outcome.image.save(self.out)
         outcome.save_s = time.perf_counter() - started
-        outcome.good, outcome.files, self._key = True, [wish.out], frame.key
+        outcome.good, outcome.files, self._key = True, [self.out], frame.key
 
     def _open(self, found: Diagnostics) -> Clip:
-        wish = self.wish
-        defines = Defines(dict(wish.defines))
-        clip = open_clip(
-            wish.file,
-            diagnostics=found,
-            defines=defines,
-            model=wish.model,
-            root=wish.root,
-            size=wish.size,
-            fps=wish.fps,
-        )
-        broken = bool(found.errors)
+        defines = Defines(dict(self.defines))
+        clip = open_clip(self.file, diagnostics=found, defines=defines, **self.options)
         # what a broken scene imports is half known: go on watching what it did
-        known = self.paths[1:] if broken else ()
+        known = self.paths[1:] if found.errors else ()
         self.paths = tuple(dict.fromkeys((self.paths[0], *clip.wanted, *known)))
         self.seen = stamps(self.paths)
         defines.report_unused(found)
@@ -194,6 +173,6 @@ class Easel:
                 if stamps(before) != before:
                     raise Outdated
 
-        made = make(painter, target, numbers, jobs=self.wish.jobs, progress=check)
+        made = make(painter, target, numbers, progress=check)
         outcome.good, outcome.files = True, made.files
         outcome.compile_s, outcome.draw_s, outcome.save_s = made.compile_s, made.draw_s, made.encode_s

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scenelang.watching.changes import folders, settle, stamps
+from scenelang.watching.changes import settle, stamps
 from tests.cli.conftest import Folder
 
 LONG_S = 120  # on a busy machine
@@ -90,12 +90,10 @@ def save(path: Path, text: str) -> None:
     os.replace(part, path)
 
 
-@pytest.fixture(params=[(), ("--poll",)], ids=["notified", "polling"])
-def watcher(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Watcher]:
-    if not request.param:
-        pytest.importorskip("watchfiles")
+@pytest.fixture
+def watcher(tmp_path: Path) -> Iterator[Watcher]:
     (tmp_path / "a.nsg").write_text(HEAD + square(50))
-    found = Watcher(tmp_path, "a.nsg", "--backend", "reference", *request.param)
+    found = Watcher(tmp_path, "a.nsg", "--backend", "reference")
     yield found
     found.process.kill()
     found.process.communicate()
@@ -232,11 +230,6 @@ def test_terminals_that_misbehave(
     screen.show(picture)
     screen.show(picture)
     assert capsys.readouterr().out.count("cannot show pictures in this terminal") == 1
-
-
-def test_folders_that_are_not_there(tmp_path: Path) -> None:
-    (tmp_path / "b").mkdir()
-    assert folders([tmp_path / "a.nsg", tmp_path / "b/c/d.nsg"]) == {tmp_path, tmp_path / "b"}
 
 
 def test_settling_waits_for_a_file_that_comes_back(tmp_path: Path) -> None:

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     show_default=True,
     help="Show the picture in the terminal; always does with coloured characters if need be.",
 )
-@click.option("--poll", is_flag=True, help="Look for changes every now and then: for network folders.")
 @options.backend
 @options.device
 @options.threads
@@ -48,7 +47,6 @@ def command(
     fps: float | None,
     model: str | None,
     show: Literal["auto", "never", "always"],
-    poll: bool,
     backend: options.Backend,
     device: Literal["auto", "cpu", "cuda"],
     threads: int | None,
@@ -65,8 +63,8 @@ def command(
     from scenelang.cli.animation import Wanted, wanted_target
     from scenelang.cli.outputs import composed, targets
     from scenelang.cli.say import wants_color
-    from scenelang.watching.changes import Changes, stamps
-    from scenelang.watching.picture import Easel, Outdated, Wish
+    from scenelang.watching.changes import stamps, wait
+    from scenelang.watching.picture import Easel, Outdated
     from scenelang.watching.screen import Screen
 
     out = str(composed(Path(f"{file.stem}.png"))) if out is None else out
@@ -77,24 +75,21 @@ def command(
     path = Path(out) if target is not None else targets([str(file)], out)[0]
     if not file.is_file():
         raise click.UsageError(f"there is no file `{file}`.")
-    wish = Wish(
+    folder = None if root is None else Path(root)
+    options = {"model": model, "root": folder, "size": size, "fps": fps}
+    screen = Screen(show, wants_color(sys.stdout))
+    easel = Easel(
         file,
         path,
         target,
         wanted.frames,
         frame or 0,
-        dict(defines.values),
-        model,
-        None if root is None else Path(root),
-        size,
-        fps,
+        defines.values,
+        options,
         backend,
         device,
         threads,
     )
-    screen = Screen(show, wants_color(sys.stdout))
-    changes = Changes(polls=poll, say=screen.say)
-    easel = Easel(wish)
     while True:
         before = stamps(easel.paths)
         try:
@@ -102,7 +97,7 @@ def command(
         except Outdated:
             continue
         # what changed since it was read, even before it was known to be read, is drawn at once
-        changes.wait({path: before[path] if path in before else easel.seen[path] for path in easel.paths})
+        wait({path: before[path] if path in before else easel.seen[path] for path in easel.paths})
 
 
 def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] | None]) -> None:
@@ -113,13 +108,12 @@ def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] 
     from scenelang.diagnostics.render_text import plural
 
     clock = time.strftime("%H:%M:%S")
-    wish = easel.wish
     try:
         outcome = easel.draw(before)
     except (OSError, RenderError) as error:
         screen.clear()
-        if isinstance(error, FileNotFoundError) and error.filename and Path(error.filename) == wish.file:
-            screen.say(f"{clock} {wish.file} is gone; waiting for it")
+        if isinstance(error, FileNotFoundError) and error.filename and Path(error.filename) == easel.file:
+            screen.say(f"{clock} {easel.file} is gone; waiting for it")
         else:
             screen.say(f"{clock} Error: {describe(error) if isinstance(error, OSError) else error}")
         return
@@ -127,13 +121,13 @@ def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] 
     if outcome.diagnostics:
         screen.say_diagnostics(outcome.diagnostics)
     if outcome.good:
-        screen.say(f"{clock} {_told(outcome, wish.out)}")
+        screen.say(f"{clock} {_told(outcome, easel.out)}")
         if screen.shows and (picture := _shown(outcome)) is not None:
             screen.show(picture)
     else:
         errors = sum(d.severity == "error" for d in outcome.diagnostics)
-        stays = f"; {wish.out} stays as it was" if wish.out.exists() else ""
-        screen.say(f"{clock} {wish.file}: {plural(errors, 'error')}{stays}")
+        stays = f"; {easel.out} stays as it was" if easel.out.exists() else ""
+        screen.say(f"{clock} {easel.file}: {plural(errors, 'error')}{stays}")
 
 
 def _shown(outcome: Outcome) -> PIL.Image.Image | None:
