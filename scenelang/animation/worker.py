@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-import struct
 import sys
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any
 
 from scenelang.animation.painting import paint
 from scenelang.animation.store import put_frame
@@ -17,34 +16,27 @@ from scenelang.renderers.kept import Kept
 
 
 def main() -> None:
-    """Read a head and a Program, draw, answer in a line; again and again."""
+    """Read a line of JSON and a Program, draw, answer in a line; again and again."""
     # Answers go where standard output went; whatever prints goes to standard error.
     answers = os.fdopen(os.dup(1), "wb")
-    kept = Kept()
     os.dup2(2, 1)
-    source = sys.stdin.buffer
-    while sizes := source.read(8):
-        head_size, program_size = struct.unpack("<II", sizes)
-        head = json.loads(_exactly(source, head_size))
-        answer = _answer(head, _exactly(source, program_size), kept)
+    kept, source = Kept(), sys.stdin.buffer
+    while line := source.readline():
+        head = json.loads(line)
+        program = source.read(head["bytes"])
+        if len(program) < head["bytes"]:
+            return
         try:
-            answers.write(json.dumps(answer).encode() + b"\n")
+            answers.write(json.dumps(_answer(head, program, kept)).encode() + b"\n")
             answers.flush()
         except BrokenPipeError:  # whoever asked is gone
             os._exit(0)
 
 
-def _exactly(source: BinaryIO, size: int) -> bytes:
-    data = source.read(size)
-    if len(data) < size:
-        raise SystemExit(0)
-    return data
-
-
-def _answer(head: dict[str, object], data: bytes, kept: Kept) -> dict[str, object]:
-    file, split = Path(str(head["file"])), int(str(head["split"]))
+def _answer(head: dict[str, Any], data: bytes, kept: Kept) -> dict[str, Any]:
+    file = Path(head["file"])
     try:
-        put_frame(file, paint(parse_program(data), "cpu", threads=1, split=split, kept=kept))
+        put_frame(file, paint(parse_program(data), "cpu", threads=1, split=head["split"], kept=kept))
     except RenderError as error:
         return {"error": str(error)}
     except OSError as error:

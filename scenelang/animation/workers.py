@@ -1,13 +1,13 @@
 """Drawing frames in other processes.
 
-Each is a plain ``python -m scenelang.animation.worker`` that gets compiled Programs through a pipe, so that
-an embedder's main module is not run again, and ends when its pipe does, so that none outlives this process.
+Each is a plain ``python -m scenelang.animation.worker`` that gets compiled Programs through a pipe, and
+ends when its pipe does, so that none outlives this process. Processes of `concurrent.futures` would run an
+embedder's main module again, and stay behind where this one is killed.
 """
 
 from __future__ import annotations
 
 import json
-import struct
 import subprocess
 import sys
 from collections import deque
@@ -35,7 +35,11 @@ class Workers:
     def __init__(self, count: int, split: int) -> None:
         self.count, self.split = count, split
         self._free: SimpleQueue[subprocess.Popen[bytes]] = SimpleQueue()
-        self._all = [_start() for _ in range(count)]
+        # in sessions of their own: Ctrl-C reaches this process alone, which ends the others
+        command, pipe = [sys.executable, "-m", "scenelang.animation.worker"], subprocess.PIPE
+        self._all = [
+            subprocess.Popen(command, stdin=pipe, stdout=pipe, start_new_session=True) for _ in range(count)
+        ]
         for process in self._all:
             self._free.put(process)
         self._pool = ThreadPoolExecutor(count)
@@ -73,9 +77,9 @@ class Workers:
         try:
             assert process.stdin is not None
             assert process.stdout is not None
-            head = json.dumps({"file": str(file.absolute()), "split": self.split}).encode()
+            head = {"file": str(file.absolute()), "split": self.split, "bytes": len(program)}
             try:
-                process.stdin.write(struct.pack("<II", len(head), len(program)) + head + program)
+                process.stdin.write(json.dumps(head).encode() + b"\n" + program)
                 process.stdin.flush()
                 said = process.stdout.readline()
             except OSError:
@@ -100,13 +104,3 @@ class Workers:
         self._pool.shutdown()
         for process in self._all:
             process.communicate()
-
-
-def _start() -> subprocess.Popen[bytes]:
-    """Start a process, in a session of its own: Ctrl-C reaches this one alone, which ends the others."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "scenelang.animation.worker"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        start_new_session=True,
-    )

@@ -1,8 +1,8 @@
 """Waiting until files change.
 
-They are looked at often, by size, time and identity, which takes microseconds a file. So nothing is lost when
-an editor renames a new file over the old one, when a folder comes into being, between two waits, or on network
-folders, of whose changes the system gives no notice.
+They are looked at often, by size, time and identity, which takes microseconds a file. So nothing is lost
+when an editor renames a new file over the old one, when a folder comes into being, between two waits, or on
+network folders, of whose changes the system gives no notice.
 """
 
 from __future__ import annotations

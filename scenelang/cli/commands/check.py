@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -174,29 +175,16 @@ def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> se
     return lost
 
 
+@dataclass(frozen=True, slots=True)
 class _Output:
-    """Writes diagnostics and a summary.
+    """Writes diagnostics and a summary of scenes; to standard error where a scene goes to the output."""
 
-    Args:
-        kind: how.
-        most: so many at most; None for all.
-        quiet: without a summary.
-        color: whether in colours.
-        to_stderr: to standard error, because a scene goes to standard output.
-        scenes: where the diagnostics come from.
-    """
-
-    def __init__(
-        self,
-        kind: Format,
-        most: int | None,
-        quiet: bool,
-        color: options.Color,
-        to_stderr: bool,
-        scenes: Scenes,
-    ) -> None:
-        self.kind, self.most, self.quiet, self.color = kind, most, quiet, color
-        self.to_stderr, self.scenes = to_stderr, scenes
+    kind: Format
+    most: int | None
+    quiet: bool
+    color: options.Color
+    to_stderr: bool
+    scenes: Scenes
 
     def write(self, found: Sequence[Diagnostic]) -> None:
         """Print diagnostics, or that there are none."""
@@ -249,6 +237,9 @@ def _for_machines(found: Sequence[Diagnostic], kind: Format, most: int | None) -
     shown = in_order(found)[:most]
     if kind == "sarif":
         return render_machine.render_sarif(shown, version("scenelang"))
-    if kind == "json":
-        return render_machine.render_json(shown)
-    return render_machine.render_github(shown) if kind == "github" else render_machine.render_concise(shown)
+    renderers = {
+        "json": render_machine.render_json,
+        "github": render_machine.render_github,
+        "concise": render_machine.render_concise,
+    }
+    return renderers[kind](shown)
