@@ -24,12 +24,7 @@ def leaf_box(leaf: Leaf, level: float, space: Space) -> Box:
         level: world distance, at least 0; 0 for the leaf itself.
         space: the model's.
     """
-    if leaf.notes is None:
-        return space.box(leaf.geometry, leaf.steps, level)
-    box: Box | None = leaf.notes.get(level)
-    if box is None:
-        box = leaf.notes[level] = space.box(leaf.geometry, leaf.steps, level)
-    return box
+    return leaf.noted(level, lambda leaf: space.box(leaf.geometry, leaf.steps, level))
 
 
 def felt_level(op: Combine, smooths: int) -> float | None:

@@ -12,11 +12,6 @@ from scenelang.graph.steps import IDENTITY, Affine, Rows, Warp
 Moves = tuple[Move, ...]
 
 
-def is_identity(move: Move) -> bool:
-    """Whether a move leaves every point where it is, exactly."""
-    return move.step.idle
-
-
 def merged(moves: Iterable[Move]) -> Moves:
     """The same chain with neighbouring affine maps composed into one."""
     out: list[Move] = []

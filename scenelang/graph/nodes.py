@@ -7,8 +7,9 @@ new graph.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from scenelang.diagnostics.span import Span
 from scenelang.graph.looks import Look
@@ -17,6 +18,7 @@ from scenelang.graph.steps import Step
 from scenelang.words import Combine
 
 BLEND = 0.15
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +48,17 @@ class Leaf:
     span: Span | None = None
     notes: dict[Any, Any] | None = field(default=None, compare=False, repr=False)
 
-    def moved(self, moves: tuple[Move, ...]) -> Leaf:
-        """The same object with other moves."""
-        notes: dict[Any, Any] | None = None if self.notes is None else {}
-        return Leaf(self.geometry, self.look, moves, self.span, notes)
+    def changed(self, look: Look, moves: tuple[Move, ...]) -> Leaf:
+        """The same object with another look or other moves."""
+        return Leaf(self.geometry, look, moves, self.span, None if self.notes is None else {})
 
-    def wearing(self, look: Look) -> Leaf:
-        """The same object with another look."""
-        notes: dict[Any, Any] | None = None if self.notes is None else {}
-        return Leaf(self.geometry, look, self.moves, self.span, notes)
+    def noted(self, key: object, make: Callable[[Leaf], T]) -> T:
+        """What ``make`` gives for this leaf, noted under ``key`` where the leaf takes notes."""
+        if self.notes is None:
+            return make(self)
+        if key not in self.notes:
+            self.notes[key] = make(self)
+        return cast("T", self.notes[key])
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -113,6 +117,10 @@ class Graph:
     def rooted(self, root: Fold) -> Graph:
         """The same scene with another root."""
         return Graph(root, self.canvas, self.background, self.space)
+
+    def rows(self) -> list[tuple[Combine, Leaf]]:
+        """Operators and leaves of a graph that is one stream."""
+        return [(link.op, link.node) for link in self.root.links if isinstance(link.node, Leaf)]
 
     def window(self) -> tuple[float, float, float, float]:
         """The part of the 2D world that the canvas shows: (xmin, ymin, xmax, ymax)."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from enum import Enum
 
 from scenelang.graph.nodes import Fold, Graph, Leaf, Move
@@ -22,7 +21,11 @@ class Invariant(Enum):
     STREAM = "every child of the root is a leaf"
 
 
-Sound = dict["_Check", dict[int, Leaf]]
+Checked = tuple[Space, bool, bool, bool]
+"""What must hold of each leaf: its maps are the space's; NO_IDENTITIES, MERGED and LOOKS or not."""
+
+Sound = dict[Checked, dict[int, Leaf]]
+"""Leaves by identity, by what was checked of them."""
 
 
 class InternalError(RuntimeError):
@@ -44,81 +47,72 @@ def verify(graph: Graph, stage: str, holds: Collection[Invariant] = (), sound: S
     Raises:
         InternalError: an invariant is broken.
     """
-    fault = None
-    if graph.root.kind != "scene" or graph.root.moves:
-        fault = "the root is a scene without moves"
-    check = _Check(
-        graph.space,
-        Invariant.NO_IDENTITIES in holds,
-        Invariant.MERGED in holds,
-        Invariant.LOOKS in holds,
-    )
-    sound = {} if sound is None else sound
-    if check not in sound:
-        sound.clear()
-    leaves = sound.setdefault(check, {})
-    folds = [graph.root]
-    while folds and fault is None:
-        fold = folds.pop()
-        fault = _fold_fault(fold, fold is graph.root, holds) or check.moves_fault(fold.moves)
-        for link in fold.links:
-            node = link.node
-            if isinstance(node, Fold):
-                folds.append(node)
-                continue
-            if node.notes is not None:  # a leaf of a frame before, checked then
-                if check in node.notes:
-                    continue
-                node.notes[check] = True
-            elif leaves.get(id(node)) is node:
-                continue
-            else:
-                leaves[id(node)] = node
-            r, g, b = node.look.rgb
-            if not (0.0 <= r <= 1.0 and 0.0 <= g <= 1.0 and 0.0 <= b <= 1.0):
-                fault = "colours lie in [0, 1]"
-            elif check.folded and node.look.folded() is not node.look:
-                fault = Invariant.LOOKS.value
-            elif node.moves:
-                fault = fault or check.moves_fault(node.moves)
+    fault = _fault(graph, frozenset(holds), {} if sound is None else sound)
     if fault is not None:
         raise InternalError(f"internal error after pass `{stage}`: it does not hold that {fault}")
     return graph
 
 
-def _fold_fault(fold: Fold, root: bool, holds: Collection[Invariant]) -> str | None:
+def _fault(graph: Graph, holds: frozenset[Invariant], sound: Sound) -> str | None:
+    if graph.root.kind != "scene" or graph.root.moves:
+        return "the root is a scene without moves"
+    of_leaves = (i in holds for i in (Invariant.NO_IDENTITIES, Invariant.MERGED, Invariant.LOOKS))
+    checked: Checked = (graph.space, *of_leaves)  # type: ignore[assignment]
+    if checked not in sound:
+        sound.clear()
+    leaves = sound.setdefault(checked, {})
+    folds = [graph.root]
+    while folds:
+        fold = folds.pop()
+        fault = _fold_fault(fold, fold is graph.root, holds) or _moves_fault(fold.moves, checked)
+        if fault is not None:
+            return fault
+        for link in fold.links:
+            node = link.node
+            if isinstance(node, Fold):
+                folds.append(node)
+            elif leaves.get(id(node)) is not node:
+                leaves[id(node)] = node
+                fault = node.noted(checked, lambda leaf: _leaf_fault(leaf, checked))
+                if fault is not None:
+                    return fault
+    return None
+
+
+def _fold_fault(fold: Fold, root: bool, holds: frozenset[Invariant]) -> str | None:
     if fold.links and fold.links[0].op != "union":
         return "the first link of a fold is a union"
     if fold.moves and Invariant.AT_LEAVES in holds:
         return Invariant.AT_LEAVES.value
-    if root:
-        return None
-    if Invariant.STREAM in holds:
+    if not root and Invariant.STREAM in holds:
         return Invariant.STREAM.value
-    if Invariant.COMPOSITE in holds and len(fold.links) < 2:
+    if not root and Invariant.COMPOSITE in holds and len(fold.links) < 2:
         return Invariant.COMPOSITE.value
     return None
 
 
-@dataclass(frozen=True, slots=True)
-class _Check:
-    """What must hold of each leaf: maps of the space, no identities, no neighbouring maps, a folded look."""
+def _leaf_fault(leaf: Leaf, checked: Checked) -> str | None:
+    r, g, b = leaf.look.rgb
+    if not (0.0 <= r <= 1.0 and 0.0 <= g <= 1.0 and 0.0 <= b <= 1.0):
+        return "colours lie in [0, 1]"
+    if checked[3] and leaf.look.folded() is not leaf.look:
+        return Invariant.LOOKS.value
+    return _moves_fault(leaf.moves, checked)
 
-    space: Space
-    tidy: bool
-    merged: bool
-    folded: bool
 
-    def moves_fault(self, moves: tuple[Move, ...]) -> str | None:
-        after_map = False
-        for move in moves:
-            step = move.step
-            if isinstance(step, Affine):
-                if not self.space.holds(step.rows):
-                    return "a map stays within the space of its model"
-                if self.merged and after_map:
-                    return Invariant.MERGED.value
-            after_map = isinstance(step, Affine)
-            if self.tidy and step.idle:
-                return Invariant.NO_IDENTITIES.value
-        return None
+def _moves_fault(moves: tuple[Move, ...], checked: Checked) -> str | None:
+    space, tidy, merged, _ = checked
+    after_map = False
+    for move in moves:
+        step = move.step
+        if tidy and step.idle:
+            return Invariant.NO_IDENTITIES.value
+        if isinstance(step, Affine):
+            if not space.holds(step.rows):
+                return "a map stays within the space of its model"
+            if merged and after_map:
+                return Invariant.MERGED.value
+            after_map = True
+        else:
+            after_map = False
+    return None

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
-from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move, Node
+from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node
 
 T = TypeVar("T")
-Moves = tuple[Move, ...]
 
 
 def bottom_up(root: Node, leaf: Callable[[Leaf], T], fold: Callable[[Fold, list[T]], T]) -> T:
@@ -47,44 +46,20 @@ def leaves(root: Node) -> Iterator[Leaf]:
     return (node for node, _ in nodes(root) if isinstance(node, Leaf))
 
 
-def map_moves(graph: Graph, change: Callable[[Moves], Moves], name: str) -> Graph:
-    """The graph with ``change`` applied to the moves of every node.
-
-    Args:
-        graph: any graph.
-        change: depends on nothing but the moves and the graph's space.
-        name: of the change, under which leaves that stay note what became of them.
-    """
-
-    def leaf(node: Leaf) -> Leaf:
-        moves = change(node.moves) if node.moves else node.moves
-        return node if moves is node.moves else node.moved(moves)
-
-    return map_leaves(graph, leaf, name, change)
-
-
-def map_leaves(
-    graph: Graph, change: Callable[[Leaf], Leaf], name: str, moves: Callable[[Moves], Moves] | None = None
-) -> Graph:
-    """The graph with ``change`` applied to every leaf, and ``moves`` to the moves of folds.
+def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph:
+    """The graph with ``change`` applied to every leaf.
 
     Args:
         graph: any graph.
         change: depends on nothing but the leaf and the graph's space; gives the leaf itself where it stays.
-        moves: likewise of moves; without it folds keep theirs.
         name: of the change, under which leaves that stay from frame to frame note what became of them.
     """
 
     def leaf(node: Leaf) -> Node:
-        if node.notes is None:
-            return change(node)
-        made: Leaf | None = node.notes.get(name)
-        if made is None:
-            made = node.notes[name] = change(node)
-        return made
+        return change(node) if node.notes is None else node.noted(name, change)
 
     def fold(node: Fold, children: list[Node]) -> Fold:
         links = [Link(link.op, child) for link, child in zip(node.links, children, strict=True)]
-        return Fold(node.kind, tuple(links), moves(node.moves) if moves else node.moves, node.span)
+        return Fold(node.kind, tuple(links), node.moves, node.span)
 
     return graph.rooted(fold(graph.root, [bottom_up(link.node, leaf, fold) for link in graph.root.links]))

@@ -20,9 +20,7 @@ from scenelang.passes.check_trained import check_trained
 from scenelang.passes.context import Context
 from scenelang.passes.drop_empty import drop_empty
 from scenelang.passes.drop_hidden import drop_hidden
-from scenelang.passes.drop_identities import drop_identities
 from scenelang.passes.drop_unseen import drop_unseen
-from scenelang.passes.fold_affines import fold_affines
 from scenelang.passes.fold_looks import fold_looks
 from scenelang.passes.fold_warps import fold_warps
 from scenelang.passes.linearise import linearise
@@ -45,8 +43,6 @@ class Pass(NamedTuple):
 PASSES: tuple[Pass, ...] = (
     Pass(drop_empty, frozenset({Invariant.COMPOSITE})),
     Pass(fold_looks, frozenset({Invariant.LOOKS})),
-    Pass(drop_identities),
-    Pass(fold_affines),
     Pass(push_transforms, frozenset({Invariant.AT_LEAVES, Invariant.MERGED})),
     Pass(fold_warps, frozenset({Invariant.NO_IDENTITIES})),
     Pass(check_levels),
@@ -61,50 +57,6 @@ OPTIONAL = frozenset({"drop_unseen", "drop_hidden"})
 """Passes that only save work: no later stage needs what they do."""
 
 
-def run_passes(
-    graph: Graph,
-    context: Context,
-    after: Callable[[str, Graph], None] | None = None,
-    without: Collection[str] = (),
-) -> Graph:
-    """Run all passes in order, verifying the graph after each.
-
-    Args:
-        graph: as lowered.
-        context: the model and where mistakes go.
-        after: called with ``"lower"`` and each pass's name and the graph it left.
-        without: names of `OPTIONAL` passes to leave out.
-
-    Returns:
-        The graph after the last pass; if errors were reported on the way, what could be kept of it.
-
-    Raises:
-        ValueError: a pass that others need is to be left out.
-    """
-    if not OPTIONAL.issuperset(without):
-        raise ValueError(f"passes that cannot be left out: {', '.join(sorted(set(without) - OPTIONAL))}")
-    holds: frozenset[Invariant] = frozenset()
-    sound: Sound = {}
-    verify(graph, "lower", sound=sound)
-    if after is not None:
-        after("lower", graph)
-    for step in PASSES:
-        if step.name in without:
-            continue
-        before, graph = graph, step.run(graph, context)
-        if graph is not before or step.establishes:
-            holds |= step.establishes
-            verify(graph, step.name, holds, sound)
-        if after is not None:
-            after(step.name, graph)
-        if context.diagnostics.errors:
-            if step.run is linearise:
-                break  # every mistake is found, and what is left is not the scene
-            # Without sound chains no bound means anything: look for refusals only.
-            context = Context(context.manifest, context.diagnostics, whole=False)
-    return graph
-
-
 def check_scene(
     scene: Scene,
     spans: Spans | None,
@@ -114,21 +66,44 @@ def check_scene(
     without: Collection[str] = (),
     memory: Memory | None = None,
 ) -> Graph:
-    """Everything that can be said of a scene before it is lifted; imports no numpy.
+    """Everything that can be said of a scene before it is lifted: lower it and run all passes in order.
+
+    The graph is verified after each. No numpy is imported.
 
     Args:
         scene: a concrete scene.
         spans: where its nodes were written, None if it did not come from text.
         diagnostics: receives errors and warnings.
         manifest: of the model to draw with.
-        after, without: as for `run_passes`.
+        after: called with ``"lower"`` and each pass's name and the graph it left.
+        without: names of `OPTIONAL` passes to leave out.
         memory: as for `lower`.
 
     Returns:
         The stream; it stands for the scene only if no error was reported.
+
+    Raises:
+        ValueError: a pass that others need is to be left out.
     """
-    before = len(diagnostics.errors)
+    if not OPTIONAL.issuperset(without):
+        raise ValueError(f"passes that cannot be left out: {', '.join(sorted(set(without) - OPTIONAL))}")
+    after = after or (lambda name, graph: None)
+    before, holds, sound = len(diagnostics.errors), frozenset[Invariant](), Sound()
     with deep_stack():
-        graph = lower(scene, manifest, spans, diagnostics, memory)
-        whole = len(diagnostics.errors) == before
-        return run_passes(graph, Context(manifest, diagnostics, whole), after, without)
+        graph = verify(lower(scene, manifest, spans, diagnostics, memory), "lower", sound=sound)
+        context = Context(manifest, diagnostics, whole=len(diagnostics.errors) == before)
+        after("lower", graph)
+        for step in PASSES:
+            if step.name in without:
+                continue
+            given, graph = graph, step.run(graph, context)
+            if graph is not given or step.establishes:
+                holds |= step.establishes
+                verify(graph, step.name, holds, sound)
+            after(step.name, graph)
+            if diagnostics.errors:
+                if step.run is linearise:
+                    break  # every mistake is found, and what is left is not the scene
+                # Without sound chains no bound means anything: look for refusals only.
+                context = Context(manifest, diagnostics, whole=False)
+    return graph

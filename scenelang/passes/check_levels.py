@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import hypot
 
 from scenelang.diagnostics.diagnostic import Label
@@ -20,12 +21,9 @@ def check_levels(graph: Graph, context: Context) -> Graph:
 
     Before: the normal form of `fold_warps`.
     """
+    check = partial(_check, space=graph.space, context=context)
     for leaf in leaves(graph.root):
-        if leaf.notes is None:
-            _check(leaf, graph.space, context)
-        elif "check_levels" not in leaf.notes:
-            leaf.notes["check_levels"] = True
-            _check(leaf, graph.space, context)
+        leaf.noted("check_levels", check)
     return graph
 
 

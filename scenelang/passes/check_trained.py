@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import partial
 from math import hypot
+from operator import itemgetter
 
 from scenelang.graph import affine
 from scenelang.graph.nodes import Graph, Leaf
 from scenelang.graph.space import Space
 from scenelang.graph.steps import Warp
-from scenelang.graph.walk import leaves
-from scenelang.models.manifest import Manifest
 from scenelang.passes.context import Context
+from scenelang.scene.schema import Combine
+
+Measures = list[tuple[str, float]]
 
 _CODES = {
     "objects": "W0501",
@@ -32,16 +35,6 @@ _SUBJECTS = {
 _TOLERANCE = 1e-9
 
 
-@dataclass(slots=True)
-class _Worst:
-    """The object furthest outside one range, and how many there are."""
-
-    value: float
-    excess: float
-    leaf: Leaf
-    count: int = 0
-
-
 def check_trained(graph: Graph, context: Context) -> Graph:
     """Warn once for each quantity outside its trained or measured range, at the object furthest out.
 
@@ -50,30 +43,38 @@ def check_trained(graph: Graph, context: Context) -> Graph:
 
     Before: STREAM. After: unchanged.
     """
-    manifest, worst, count = context.manifest, dict[str, _Worst](), 0
-    for leaf in leaves(graph.root):
-        count += 1
-        for quantity, value in _noted(leaf, graph.space):
-            _note(worst, quantity, value, leaf, manifest)
+    rows, trained = graph.rows(), context.manifest.trained
+    measures = partial(_measures, space=graph.space)
+    outside: dict[str, list[tuple[float, float, Leaf]]] = {}  # (by how much, value, object)
+    for _, leaf in rows:
+        for quantity, value in leaf.noted("measures", measures):
+            if quantity in trained:
+                low, high = trained[quantity]
+                excess = max(low - value, value - high) / ((high - low) or 1.0)
+                if excess > _TOLERANCE:
+                    outside.setdefault(quantity, []).append((excess, value, leaf))
     for quantity, subject in _SUBJECTS.items():
-        if (found := worst.get(quantity)) is not None:
-            said = subject.format(name=f"`{found.leaf.geometry}`", value=f"{found.value:.3g}")
-            others = f", as {found.count - 1:,} more are" if found.count > 1 else ""
-            _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", found.leaf)
-    smooth = [link.node for link in graph.root.links if link.op == "smooth"]
-    if "smooth" in manifest.trained and len(smooth) > manifest.trained["smooth"][1]:
-        last = next((node for node in reversed(smooth) if isinstance(node, Leaf)), None)
-        _warn(context, "smooth", f"{len(smooth):,} smooth unions are outside the measured range {{}}", last)
-    if smooth and "blend" in manifest.trained:
-        _check_blends(graph, context)
-    limits = manifest.trained.get("objects")
-    if limits is not None and count > limits[1]:
-        last = next((link.node for link in reversed(graph.root.links) if isinstance(link.node, Leaf)), None)
-        _warn(context, "objects", f"{count:,} objects are outside the measured range {{}}", last)
+        if found := outside.get(quantity):
+            _, value, leaf = max(found, key=itemgetter(0))
+            more = len({id(leaf) for *_, leaf in found}) - 1
+            said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
+            others = f", as {more:,} more are" if more else ""
+            _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf)
+    smooth = [leaf for op, leaf in rows if op == "smooth"]
+    if "smooth" in trained and len(smooth) > trained["smooth"][1]:
+        fact = f"{len(smooth):,} smooth unions are outside the measured range {{}}"
+        _warn(context, "smooth", fact, smooth[-1])
+    if smooth and "blend" in trained:
+        _check_blends(rows, measures, context)
+    if "objects" in trained and len(rows) > trained["objects"][1]:
+        fact = f"{len(rows):,} objects are outside the measured range {{}}"
+        _warn(context, "objects", fact, rows[-1][1])
     return graph
 
 
-def _check_blends(graph: Graph, context: Context) -> None:
+def _check_blends(
+    rows: list[tuple[Combine, Leaf]], measures: Callable[[Leaf], Measures], context: Context
+) -> None:
     """Warn at the `smooth` whose colours lie furthest apart for its size.
 
     Where a blend's distances are off, by a share of the objects' scale, its colour is off by that share of
@@ -81,14 +82,13 @@ def _check_blends(graph: Graph, context: Context) -> None:
     """
     low, high, largest = [1.0] * 3, [0.0] * 3, 0.0
     worst: tuple[float, float, float, Leaf] | None = None
-    for link in graph.root.links:
-        leaf = link.node
-        if not isinstance(leaf, Leaf) or link.op not in ("union", "smooth"):
+    for op, leaf in rows:
+        if op not in ("union", "smooth"):
             continue
-        largest = max(largest, _noted(leaf, graph.space)[0][1])
+        largest = max(largest, leaf.noted("measures", measures)[0][1])
         rgb = leaf.look.colour()
         low, high = list(map(min, low, rgb)), list(map(max, high, rgb))
-        if link.op == "smooth":
+        if op == "smooth":
             contrast = max(max(c - a, b - c) for a, b, c in zip(low, high, rgb, strict=True))
             if worst is None or contrast * largest > worst[0]:
                 worst = contrast * largest, contrast, largest, leaf
@@ -98,16 +98,7 @@ def _check_blends(graph: Graph, context: Context) -> None:
         _warn(context, "blend", f"{said}: the product {product:.3g} is outside the measured range {{}}", leaf)
 
 
-def _noted(leaf: Leaf, space: Space) -> list[tuple[str, float]]:
-    if leaf.notes is None:
-        return _measures(leaf, space)
-    found: list[tuple[str, float]] | None = leaf.notes.get("measures")
-    if found is None:
-        found = leaf.notes["measures"] = _measures(leaf, space)
-    return found
-
-
-def _measures(leaf: Leaf, space: Space) -> list[tuple[str, float]]:
+def _measures(leaf: Leaf, space: Space) -> Measures:
     smallest, largest = space.stretches(affine.composed(leaf.steps))
     found = [("scale", smallest), ("scale", largest)]
     if smallest > 0:
@@ -121,31 +112,13 @@ def _measures(leaf: Leaf, space: Space) -> list[tuple[str, float]]:
     return found
 
 
-def _note(worst: dict[str, _Worst], quantity: str, value: float, leaf: Leaf, manifest: Manifest) -> None:
-    limits = manifest.trained.get(quantity)
-    if limits is None:
-        return
-    low, high = limits
-    excess = max(low - value, value - high) / ((high - low) or 1.0)
-    if excess <= _TOLERANCE:
-        return
-    seen = worst.get(quantity)
-    if seen is None:
-        worst[quantity] = _Worst(value, excess, leaf, 1)
-        return
-    if leaf is not seen.leaf:
-        seen.count += 1
-    if excess > seen.excess:
-        seen.value, seen.excess, seen.leaf = value, excess, leaf
-
-
-def _warn(context: Context, quantity: str, message: str, leaf: Leaf | None) -> None:
+def _warn(context: Context, quantity: str, message: str, leaf: Leaf) -> None:
     low, high = context.manifest.trained[quantity]
     figures = context.manifest.measured.get("stability", {}).get(quantity)
     context.diagnostics.add(
         _CODES[quantity],
         message.format(f"{low:g} to {high:g} of model `{context.manifest.name}`"),
-        leaf.span if leaf is not None else None,
+        leaf.span,
         help=f"measured there: {figures}"
         if figures
         else "the picture may be less exact than the model's figures",

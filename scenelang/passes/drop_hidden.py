@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from scenelang.graph.affine import composed
 from scenelang.graph.bounds import leaf_box
 from scenelang.graph.nodes import Graph, Leaf
@@ -33,9 +35,8 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
     keep = [True] * len(links)
     covers: list[Cover] = []
     drawn: set[tuple[str, tuple[Step, ...]]] = set()
-    for index in range(len(links) - 1, -1, -1):
-        op, leaf = links[index].op, links[index].node
-        assert isinstance(leaf, Leaf)
+    cover_of = partial(_cover, space=space)
+    for index, (op, leaf) in reversed(list(enumerate(graph.rows()))):
         if op == "smooth":
             break
         if op == "intersect":
@@ -45,19 +46,10 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
             keep[index] = False
         elif op == "union":
             drawn.add(key)
-            cover = _noted(leaf, space)
+            cover = leaf.noted("cover", cover_of)
             if cover is not None and (len(covers) < _MOST or cover > covers[-1]):
                 covers = sorted([*covers, cover], reverse=True)[:_MOST]
     return graph.rooted(begun(links, keep))
-
-
-def _noted(leaf: Leaf, space: Space) -> Cover | None:
-    if leaf.notes is None:
-        return _cover(leaf, space)
-    if "cover" not in leaf.notes:
-        leaf.notes["cover"] = _cover(leaf, space)
-    cover: Cover | None = leaf.notes["cover"]
-    return cover
 
 
 def _cover(leaf: Leaf, space: Space) -> Cover | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scenelang.graph.bounds import felt_level, leaf_box, overlap
-from scenelang.graph.nodes import Fold, Graph, Leaf, Link
+from scenelang.graph.nodes import Fold, Graph, Link
 from scenelang.passes.context import Context
 
 
@@ -18,9 +18,7 @@ def drop_unseen(graph: Graph, context: Context) -> Graph:
     links = graph.root.links
     keep = [False] * len(links)
     smooths = 0
-    for index in range(len(links) - 1, -1, -1):
-        op, leaf = links[index].op, links[index].node
-        assert isinstance(leaf, Leaf)
+    for index, (op, leaf) in reversed(list(enumerate(graph.rows()))):
         level = felt_level(op, smooths)
         if level is None or overlap(leaf_box(leaf, level, graph.space), window):
             keep[index] = True

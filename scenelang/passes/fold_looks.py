@@ -21,6 +21,6 @@ def fold_looks(graph: Graph, context: Context) -> Graph:
         look = folded.get(id(leaf.look))
         if look is None:
             look = folded[id(leaf.look)] = leaf.look.folded()
-        return leaf if look is leaf.look else leaf.wearing(look)
+        return leaf if look is leaf.look else leaf.changed(look, leaf.moves)
 
     return map_leaves(graph, change, "fold_looks")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from scenelang.graph.chain import Moves, normal
-from scenelang.graph.nodes import Graph
-from scenelang.graph.walk import map_moves
+from scenelang.graph.chain import merged, normal
+from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.walk import map_leaves
 from scenelang.passes.context import Context
-from scenelang.passes.drop_identities import drop_identities
 
 
 def fold_warps(graph: Graph, context: Context) -> Graph:
@@ -18,10 +17,15 @@ def fold_warps(graph: Graph, context: Context) -> Graph:
     A learned lifting knows twirls and bends by themselves, as they are written, and no merged ones: for it
     identities alone are dropped.
     """
-    if context.manifest.lifting != "exact":
-        return drop_identities(graph, context)
+    exact = context.manifest.lifting == "exact"
 
-    def change(moves: Moves) -> Moves:
-        return normal(moves, graph.space)
+    def change(leaf: Leaf) -> Leaf:
+        if not leaf.moves:
+            return leaf
+        if exact:
+            moves = normal(leaf.moves, graph.space)
+        else:
+            moves = merged([move for move in leaf.moves if not move.step.idle])
+        return leaf if moves == leaf.moves else leaf.changed(leaf.look, moves)
 
-    return map_moves(graph, change, "fold_warps")
+    return map_leaves(graph, change, "fold_warps")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from scenelang.graph.chain import Moves, merged
-from scenelang.graph.nodes import Fold, Graph, Leaf, Link
+from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node
 from scenelang.passes.context import Context
 
 
@@ -21,9 +21,11 @@ class _Open:
 def push_transforms(graph: Graph, context: Context) -> Graph:
     """Append to each leaf's moves those of all folds around it, from the inside out.
 
-    A leaf's world distance is defined by its whole chain, so nothing changes but where the chain is kept.
+    Moves that do nothing vanish and neighbouring affine maps compose, in float64, so that the chain which
+    each group hands down stays short however deep it stands. A leaf's world distance is defined by its
+    whole chain, so nothing changes but where the chain is kept.
 
-    Before: MERGED. After: AT_LEAVES, MERGED.
+    Before: any graph. After: AT_LEAVES, MERGED.
     """
     stack = [_Open(graph.root, graph.root.moves)]
     while True:
@@ -31,14 +33,14 @@ def push_transforms(graph: Graph, context: Context) -> Graph:
         if len(here.links) < len(here.fold.links):
             link = here.fold.links[len(here.links)]
             node = link.node
-            if isinstance(node, Leaf) and not here.outward:
-                here.links.append(link)
-                continue
-            moves = merged(node.moves + here.outward) if here.outward else node.moves
-            if isinstance(node, Leaf):
-                here.links.append(Link(link.op, node.moved(moves)))
+            if isinstance(node, Fold):
+                stack.append(_Open(node, _tidy(node, here.outward)))
             else:
-                stack.append(_Open(node, moves))
+                if here.outward:
+                    leaf = node.changed(node.look, _tidy(node, here.outward))
+                else:
+                    leaf = node.noted("push_transforms", _alone)
+                here.links.append(Link(link.op, leaf))
             continue
         stack.pop()
         fold = Fold(here.fold.kind, tuple(here.links), (), here.fold.span)
@@ -46,3 +48,12 @@ def push_transforms(graph: Graph, context: Context) -> Graph:
             return graph.rooted(fold)
         above = stack[-1]
         above.links.append(Link(above.fold.links[len(above.links)].op, fold))
+
+
+def _alone(leaf: Leaf) -> Leaf:
+    moves = _tidy(leaf, ())
+    return leaf if moves == leaf.moves else leaf.changed(leaf.look, moves)
+
+
+def _tidy(node: Node, outward: Moves) -> Moves:
+    return merged([move for move in node.moves + outward if not move.step.idle])

@@ -34,7 +34,7 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     """
     if manifest.lifting != "exact" and codes.lifting is None:
         raise ProgramError(f"model `{manifest.name}` needs the lifting `{manifest.lifting}`")
-    rows = [(link.op, link.node) for link in graph.root.links if isinstance(link.node, Leaf)]
+    rows = graph.rows()
     return Program(
         vectors=_vectors(rows, manifest, codes),
         tokens=np.array([TOKENS[op] for op, _ in rows], dtype=np.int8),

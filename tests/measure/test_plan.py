@@ -42,8 +42,8 @@ def test_counts_of_a_scene_by_hand() -> None:
     # scale, two rotations, a twirl; a translation; one on the group; a scale each
     assert (rows["lower"]["objects"], rows["lower"]["affines"], rows["lower"]["deformations"]) == (4, 7, 1)
     assert rows["lower"]["folds"] == 3  # the file, the group, the subtraction
-    assert rows["drop_identities"]["affines"] == 6
-    assert rows["drop_identities"]["changed"]
+    # the rotation by 0 goes, the other joins the scale, the translation goes to both, then past the twirl
+    assert (rows["push_transforms"]["affines"], rows["fold_warps"]["affines"]) == (5, 4)
     assert rows["drop_unseen"]["objects"] == 3  # the star is off the canvas
     assert not rows["check_trained"]["changed"]
     # the file joins the subtraction and the group, these two things each
