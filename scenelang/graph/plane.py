@@ -58,7 +58,7 @@ class Plane(Space):
         return not rows[2] and not rows[6] and rows[8:] == IDENTITY[8:]
 
     def stretches(self, rows: Rows) -> tuple[float, float]:
-        return stretches(rows)
+        return stretches(rows[0], rows[1], rows[4], rows[5])
 
     def before(self, rows: Rows, warp: Warp) -> Warp | None:
         """Similarities about the origin trade places with warps: `scenelang.graph.chain.normal` proves it."""
@@ -73,7 +73,7 @@ class Plane(Space):
     def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
         rows, reach = affine.composed(steps), 0.0
         if level > 0.0:
-            stretch = stretches(rows)[0]
+            stretch = self.stretches(rows)[0]
             if stretch == 0.0:
                 return EVERYWHERE
             reach = level / stretch
@@ -96,9 +96,8 @@ def flattened(rows: Rows) -> Rows:
     return (rows[0], rows[1], 0.0, rows[3], rows[4], rows[5], 0.0, rows[7], 0.0, 0.0, 1.0, 0.0)
 
 
-def stretches(rows: Rows) -> tuple[float, float]:
-    """The smallest and largest singular value of the linear block of a map of the plane."""
-    a, b, c, d = rows[0], rows[1], rows[4], rows[5]
+def stretches(a: float, b: float, c: float, d: float) -> tuple[float, float]:
+    """The smallest and largest singular value of the matrix [[a, b], [c, d]]."""
     largest = 0.5 * (hypot(a + d, c - b) + hypot(a - d, c + b))
     # |det| / largest keeps its digits where the difference of the two lengths would lose them.
     return (abs(a * d - b * c) / largest if largest else 0.0), largest
@@ -194,7 +193,7 @@ class _Sector:
     def mapped(self, rows: Rows) -> _Sector:
         """A sector around the image of this one under an affine map."""
         x, y = rows[3], rows[7]
-        smallest, largest = stretches(rows)
+        smallest, largest = stretches(rows[0], rows[1], rows[4], rows[5])
         away, radius = hypot(x, y), largest * self.far
         if away == 0.0:
             return _Sector(smallest * self.near, radius, 0.0, tau)

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
 
+from scenelang.graph.plane import stretches
 from scenelang.lifting.layout import PLANE_LAYOUT, Layout
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
@@ -93,53 +96,57 @@ class ObjectFrame:
 
 
 def read_frame(g: np.ndarray, layout: Layout = PLANE_LAYOUT) -> ObjectFrame:
-    """The frame of one geometry vector.
+    """The frame of one geometry vector of the plane, in plain floats, as a stream has one for each object.
 
     Raises:
         ProgramError: it leads from the world to no leaf, which no compiled scene has.
     """
-    g = g.astype(np.float64)
-    largest = float(np.abs(g[layout.frame.start :]).max())
-    last, middle = g[layout.frame], g[layout.middle]
-    outer, inner = (
-        g[group].reshape(-1, layout.strengths) for group in (layout.outer_warps, layout.inner_warps)
-    )
-    # from the leaf through the middle map, and on into the world; warps keep the distance to the origin
-    middle_linear, middle_shift = _invert(middle)
-    last_linear, last_shift = _invert(last)
-    reach, moved = float(np.linalg.norm(middle_linear, 2)), float(np.hypot(*middle_shift))
+    numbers = g.tolist()
+    last, outer, middle, inner = [numbers[part] for part in _parts(layout)]
     steps: list[Affine | Warp] = []
+    # from the leaf through the middle map, and on into the world; warps keep the distance to the origin
+    a, b, c, d, x, y = _inverse(middle)
+    e, f, g_, h, u, v = _inverse(last)
+    reach, moved = stretches(a, b, c, d)[1], hypot(x, y)
     stretch = 1.0
     for frame, warps, radius in ((last, outer, reach + moved), (middle, inner, 1.0)):
-        if not np.array_equal(frame, layout.identity):
-            steps.append(Affine(tuple(map(tuple, frame.reshape(2, 3).tolist()))))
-        for twirl, x, y in warps.tolist():
-            if twirl or x or y:
-                steps.append(Warp(twirl, (x, y)))
-                stretch *= 1.0 + radius * (abs(twirl) + float(np.hypot(x, y)))
-    total = last_linear @ middle_linear
-    rows = np.linalg.norm(last_linear if outer.any() else total, axis=1).tolist()
-    if outer.any():
-        centre, half = last_shift, tuple((r * reach, r * moved) for r in rows)
-    else:
-        centre, half = last_linear @ middle_shift + last_shift, tuple((r, 0.0) for r in rows)
-    scale = float(np.linalg.svd(total, compute_uv=False)[1])
+        if frame != [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]:
+            steps.append(Affine((tuple(frame[:3]), tuple(frame[3:]))))
+        for at in range(0, len(warps), layout.strengths):
+            twirl, *bend = warps[at : at + layout.strengths]
+            if twirl or any(bend):
+                steps.append(Warp(twirl, tuple(bend)))
+                stretch *= 1.0 + radius * (abs(twirl) + hypot(*bend))
+    p, q, r, s = e * a + f * c, e * b + f * d, g_ * a + h * c, g_ * b + h * d
+    scale = stretches(p, q, r, s)[0]
+    largest = max(map(abs, (*last, *outer, *middle, *inner)))
     if not (largest < MOST and 1 / MOST < scale < MOST):
         raise ProgramError("a frame beyond float32")
-    at = float(centre[0]), float(centre[1])
+    if any(outer):
+        centre, across, along = (u, v), hypot(e, f), hypot(g_, h)
+        half = (across * reach, across * moved), (along * reach, along * moved)
+    else:
+        centre = e * x + f * y + u, g_ * x + h * y + v
+        half = (hypot(p, q), 0.0), (hypot(r, s), 0.0)
     wild = largest > TAME or not 1 / TAME < scale < TAME
-    return ObjectFrame(tuple(steps), scale, min(stretch, MOST), at, (half[0], half[1]), wild)
+    return ObjectFrame(tuple(steps), scale, min(stretch, MOST), centre, half, wild)
 
 
-def _invert(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Linear part (2, 2) and shift (2,) of the map that a frame (6,) is the inverse of."""
-    try:
-        linear = np.linalg.inv(frame.reshape(2, 3)[:, :2])
-    except np.linalg.LinAlgError:
-        raise ProgramError("a frame without an inverse") from None
-    if not np.abs(linear).max() < MOST:  # before squares of it overflow
+@lru_cache
+def _parts(layout: Layout) -> tuple[slice, ...]:
+    return layout.frame, layout.outer_warps, layout.middle, layout.inner_warps
+
+
+def _inverse(frame: list[float]) -> tuple[float, ...]:
+    """Linear part (row by row) and shift of the map that a frame (6,) is the inverse of."""
+    a, b, x, c, d, y = frame
+    det = a * d - b * c
+    if det == 0.0:
+        raise ProgramError("a frame without an inverse")
+    a, b, c, d = d / det, -b / det, -c / det, a / det
+    if not max(abs(a), abs(b), abs(c), abs(d)) < MOST:  # before squares of it overflow
         raise ProgramError("a frame beyond float32")
-    return linear, -linear @ frame[[2, 5]]
+    return a, b, c, d, -(a * x + b * y), -(c * x + d * y)
 
 
 def local_points(xp: Arrays, frame: ObjectFrame, p: Array) -> Array:
