@@ -12,7 +12,7 @@ from scenelang.graph.nodes import Graph, Leaf
 from scenelang.graph.space import Space
 from scenelang.graph.steps import Warp
 from scenelang.passes.context import Context
-from scenelang.scene.schema import Combine
+from scenelang.words import Combine
 
 Measures = list[tuple[str, float]]
 

@@ -10,7 +10,6 @@ are those of less than two objects and those that cover less than `LEAST` of the
 from __future__ import annotations
 
 import argparse
-import itertools
 import json
 import platform
 from collections.abc import Iterator
@@ -25,7 +24,7 @@ from scenelang.files import write_whole
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph, Leaf
 from scenelang.graph.steps import Step
-from scenelang.measure.plan import count
+from scenelang.measure.plan import stages as sizes
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
 from scenelang.passes.context import Context
@@ -145,29 +144,28 @@ def _compare(found: list[tuple[str, Graph]], seed: int, proof: Proof) -> None:
     points = sample_points(graph.canvas, range(height), 2)
     distance, colour = evaluate(graph.root, points)
     clear = nearest_outline(graph, points) > EDGE
-    size = count(graph)
+    size, *smaller = sizes(dict(found))
     covered = int((distance < 0).sum())
-    if size.objects < 2 or covered < LEAST * len(distance):
+    if size["objects"] < 2 or covered < LEAST * len(distance):
         proof.bare += 1
         return
     proof.scenes += 1
     proof.samples += len(distance)
     proof.covered += covered
     proof.aside += int((~clear).sum())
-    proof.objects += size.objects
-    proof.matrices += size.matrices
+    proof.objects += size["objects"]
+    proof.matrices += size["matrices"]
     for link in found[-1][1].root.links:
         proof.words[link.op] += 1
-    for (_, before), (name, after) in itertools.pairwise(found):
-        if after == before:
+    for (name, after), less in zip(found[1:], smaller, strict=True):
+        if not less["changed"]:
             continue  # the same graph has the same picture
         tally = proof.passes[name]
         tally.changed += 1
-        smaller = count(after)
-        tally.objects += size.objects - smaller.objects
-        tally.matrices += size.matrices - smaller.matrices
-        tally.folds += size.folds - smaller.folds
-        size = smaller
+        tally.objects += size["objects"] - less["objects"]
+        tally.matrices += size["matrices"] - less["matrices"]
+        tally.folds += size["folds"] - less["folds"]
+        size = less
         now, painted = evaluate(after.root, points)
         look = clear & (np.abs(distance) > EDGE) & (np.abs(now) > EDGE)
         differing = int(((distance < 0) != (now < 0))[look].sum())
