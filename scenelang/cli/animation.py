@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -88,36 +89,6 @@ def wanted_target(name: str, out: str, wanted: Wanted) -> Target | None:
         raise click.UsageError(f"{error}.") from None
 
 
-def open_input(
-    name: str, request: Request, wanted: Wanted, found: Diagnostics
-) -> tuple[SourceFile | None, Clip | None]:
-    """The text of a scene, and the scene; None for what has errors.
-
-    Raises:
-        OSError: it cannot be opened.
-    """
-    source = read_text(name, found)
-    if source is None:
-        return None, None
-    path = None if name == STDIN else Path(name)
-    root = request.root if request.root is not None else "." if path is None else None
-    clip = Clip(
-        source,
-        path=path,
-        diagnostics=found,
-        defines=request.defines,
-        model=request.model,
-        root=None if root is None else Path(root),
-        size=request.size,
-        fps=wanted.fps,
-    )
-    try:
-        _ = clip.first
-    except SceneError:
-        return source, None
-    return source, clip
-
-
 def still_picture(clip: Clip, target: Target, wanted: Wanted, out: str) -> bool:
     """Whether a scene without an animation is drawn as one picture; reports where it cannot be.
 
@@ -163,13 +134,29 @@ def animate(name: str, out: str, target: Target, request: Request, wanted: Wante
 
     started = time.perf_counter()
     found = Diagnostics()
-    source, clip = open_input(name, request, wanted, found)
-    if source is not None and clip is not None and still_picture(clip, target, wanted, out):
+    source = read_text(name, found)
+    if source is None:
+        say_diagnostics(found)
+        return 1
+    path = None if name == STDIN else Path(name)
+    root = request.root if request.root is not None else "." if path is None else None
+    clip = Clip(
+        source,
+        path=path,
+        diagnostics=found,
+        defines=request.defines,
+        model=request.model,
+        root=None if root is None else Path(root),
+        size=request.size,
+        fps=wanted.fps,
+    )
+    with suppress(SceneError):  # its diagnostics are `found`
+        _ = clip.first
+    if not found.errors and still_picture(clip, target, wanted, out):
         return source
-    if source is not None:
-        found.items.extend(unused_defines(request))
-    numbers = frames_of(clip, wanted) if clip is not None and not found.errors else None
-    if clip is None or numbers is None or found.errors or (found.items and wanted.strict):
+    found.items.extend(unused_defines(request))
+    numbers = frames_of(clip, wanted) if not found.errors else None
+    if numbers is None or found.errors or (found.items and wanted.strict):
         say_diagnostics(found)
         return 1
     ready(target)

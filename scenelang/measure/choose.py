@@ -36,7 +36,8 @@ class Offer:
     flip: float
 
     def told(self) -> str:
-        return f"{self.point.name}: {_ms(self.ms)} and FLIP {self.flip:.2g} at most"
+        digits = 0 if self.ms >= 10 else 1
+        return f"{self.point.name}: {self.ms:.{digits}f} ms and FLIP {self.flip:.2g} at most"
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,66 +127,50 @@ def choose(found: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> C
     """
     if not found:
         raise NothingFits("nothing on the frontier draws this scene" + _because(refused))
-    good = [
-        o
-        for o in found
-        if (limits.flip is None or o.flip <= limits.flip) and (limits.ms is None or o.ms <= limits.ms)
-    ]
+    good = [offer for offer in found if not _lacks(offer, limits)]
     if not good:
         raise NothingFits(_nearest(found, limits))
     if limits.flip is not None:
-        ranked = sorted(good, key=lambda o: (o.ms, o.flip))
-        others = sorted((o for o in found if o is not ranked[0]), key=lambda o: (o not in good, o.ms))
-    else:
-        least = min(o.flip for o in good)
-        ranked = sorted(
-            good, key=lambda o: (o.flip > 1.02 * least, o.ms if o.flip <= 1.02 * least else o.flip)
-        )
-        others = sorted((o for o in found if o is not ranked[0]), key=lambda o: (o not in good, o.flip))
-    first = ranked[0]
-    runner_up = others[0] if others else None
-    return Choice(first, runner_up, refused, tuple(_notes(first, runner_up, limits, good)))
-
-
-def _notes(first: Offer, runner_up: Offer | None, limits: Limits, good: Sequence[Offer]) -> list[str]:
-    if limits.flip is not None:
+        first = min(good, key=lambda o: (o.ms, o.flip))
         limit = f"FLIP {limits.flip:g}" + (f" and {limits.ms:g} ms" if limits.ms is not None else "")
         why = f"the fastest of {len(good)} that keep {limit}"
     else:
+        least = min(o.flip for o in good)
+        first = min((o for o in good if o.flip <= 1.02 * least), key=lambda o: o.ms)
         why = f"the most exact of {len(good)} that keep {limits.ms:g} ms"
     notes = [f"chosen by the frontier: {first.told()}, {why}"]
+    others = [offer for offer in found if offer is not first]
+    by, worse = ("ms", "slower") if limits.flip is not None else ("flip", "no more exact")
+    runner_up = min(others, key=lambda o: (o not in good, getattr(o, by)), default=None)
     if runner_up is not None:
-        lacks = []
-        if limits.ms is not None and runner_up.ms > limits.ms:
-            lacks.append("too slow")
-        if limits.flip is not None and runner_up.flip > limits.flip:
-            lacks.append("not exact enough")
-        if not lacks:
-            lacks.append("slower" if limits.flip is not None else "no more exact")
-        notes.append(f"runner-up: {runner_up.told()}, {' and '.join(lacks)}")
-    return notes
+        notes.append(f"runner-up: {runner_up.told()}, {_lacks(runner_up, limits) or worse}")
+    return Choice(first, runner_up, refused, tuple(notes))
+
+
+def _lacks(offer: Offer, limits: Limits) -> str:
+    """Which limits an offer exceeds, in words."""
+    slow = limits.ms is not None and offer.ms > limits.ms
+    wrong = limits.flip is not None and offer.flip > limits.flip
+    return " and ".join(["too slow"] * slow + ["not exact enough"] * wrong)
 
 
 def _nearest(found: Sequence[Offer], limits: Limits) -> str:
     """What comes nearest to limits that nothing keeps."""
     asked = [f"{limits.ms:g} ms"] if limits.ms is not None else []
     asked += [f"FLIP {limits.flip:g}"] if limits.flip is not None else []
-    fastest, nearest = min(found, key=lambda o: o.ms), min(found, key=lambda o: (o.flip, o.ms))
-    if limits.flip is not None and nearest.flip <= limits.flip and limits.ms is not None:
-        keeps = min((o for o in found if o.flip <= limits.flip), key=lambda o: o.ms)
-        return f"nothing draws this scene within {' and '.join(asked)}; exact enough is {keeps.told()}"
-    if limits.flip is not None and nearest.flip > limits.flip:
-        return f"nothing draws this scene within {' and '.join(asked)}; the most exact is {nearest.told()}"
-    return f"nothing draws this scene within {' and '.join(asked)}; the fastest is {fastest.told()}"
+    exact = [o for o in found if limits.flip is not None and o.flip <= limits.flip]
+    if exact:
+        told = f"exact enough is {min(exact, key=lambda o: o.ms).told()}"
+    elif limits.flip is not None:
+        told = f"the most exact is {min(found, key=lambda o: (o.flip, o.ms)).told()}"
+    else:
+        told = f"the fastest is {min(found, key=lambda o: o.ms).told()}"
+    return f"nothing draws this scene within {' and '.join(asked)}; {told}"
 
 
 def _because(refused: dict[str, str]) -> str:
     told = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
     return f" ({told})" if told else ""
-
-
-def _ms(value: float) -> str:
-    return f"{value:.0f} ms" if value >= 10 else f"{value:.1f} ms"
 
 
 def machine_scale(frontier: Frontier, here_ms: float) -> float:

@@ -194,18 +194,12 @@ class Frontier:
     def from_json(data: bytes) -> Frontier:
         """Read a file as if a stranger had written it.
 
-        Points in 8 bits, which files of before have, are left out: nothing draws so any more.
-
         Raises:
             ValueError: it is none, or holds what it cannot.
         """
         found = read_json(data)
         if not isinstance(found, dict) or found.pop("format", None) != FORMAT:
             raise ValueError(f"not a frontier of format {FORMAT}")
-        if isinstance(points := found.get("points"), list):
-            found["points"] = [
-                p for p in points if not isinstance(p, dict) or p.pop("precision", "float32") == "float32"
-            ]
         try:
             return TypeAdapter(Frontier).validate_json(json.dumps(found))
         except ValidationError as error:
@@ -213,17 +207,13 @@ class Frontier:
             raise ValueError(f"`{place}` of the frontier does not hold what it should") from None
 
 
-def _short(value: float) -> float:
-    """Four digits that count."""
-    return float(f"{value:.4g}")
-
-
 def _rounded(value: Any) -> Any:
+    """Floats of four digits that count."""
     if isinstance(value, dict):
         return {k: _rounded(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [_rounded(v) for v in value]
-    return _short(value) if isinstance(value, float) else value
+    return float(f"{value:.4g}") if isinstance(value, float) else value
 
 
 def front(figures: Sequence[tuple[float, float]]) -> list[bool]:
@@ -242,13 +232,9 @@ def front(figures: Sequence[tuple[float, float]]) -> list[bool]:
 
 def between(points: Iterable[Point]) -> int:
     """How many points lie between the fastest and the nearest: measured in error, and neither of the two."""
-    drawn = [p for p in points if p.flip is not None]
-    if not drawn:
-        return 0
-    fastest = min(drawn, key=lambda p: p.ms.median)
-    nearest = min((p for p in drawn if p.flip is not None), key=lambda p: (p.flip.mean, p.ms.median))  # type: ignore[union-attr]
-    low, high = sorted((fastest.ms.median, nearest.ms.median))
-    return sum(low < p.ms.median < high for p in drawn if p is not fastest and p is not nearest)
+    drawn = [(p.ms.median, p.flip.mean) for p in points if p.flip is not None]
+    nearest = min(drawn, key=lambda p: p[::-1], default=(0.0, 0.0))
+    return sum(min(drawn)[0] < ms < nearest[0] for ms, _ in drawn)
 
 
 def frontier_path(model: str) -> Path:

@@ -45,16 +45,16 @@ def ssim(picture: Array, reference: Array) -> float:
     return float(torch_ssim(a, b, data_range=1.0, win_size=window))
 
 
-def flip_map(picture: Array, reference: Array) -> npt.NDArray[np.float32]:
-    """FLIP error of each pixel (H, W), LDR, in [0, 1].
+def flip_map(picture: Array, reference: Array, *, magma: bool = False) -> npt.NDArray[np.float32]:
+    """FLIP error of each pixel, LDR: (H, W) in [0, 1], or (H, W, 3) in the tool's colours, dark for 0.
 
     Source: Andersson et al., FLIP: A Difference Evaluator for Alternating Images, 2020 (their tool).
     """
     import flip_evaluator
 
     a, b = (np.ascontiguousarray(v, np.float32) for v in (reference, picture))
-    error, _, _ = flip_evaluator.evaluate(a, b, "LDR", applyMagma=False)
-    return np.asarray(error, np.float32)[:, :, 0]
+    error = np.asarray(flip_evaluator.evaluate(a, b, "LDR", applyMagma=magma)[0], np.float32)
+    return error if magma else error[:, :, 0]
 
 
 def flip(picture: Array, reference: Array) -> float:

@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image as pillow
 from PIL import ImageDraw
 
 from scenelang.image import Image
+from scenelang.measure.metrics import Array, flip_map
 
-Array = npt.NDArray[Any]
 GAP, TEXT = 4, 14
-
-
-def flip_picture(picture: Array, reference: Array) -> npt.NDArray[np.float32]:
-    """The FLIP map in the tool's own colours (H, W, 3), dark where the pictures agree."""
-    import flip_evaluator
-
-    a, b = (np.ascontiguousarray(v, np.float32) for v in (reference, picture))
-    return np.asarray(flip_evaluator.evaluate(a, b, "LDR")[0], np.float32)
 
 
 def side_by_side(picture: Array, reference: Array, label: str) -> Image:
     """Network, reference and FLIP map in a row, with a line of text above (H + 14, 3 W + 8, 3)."""
-    parts = [("network", picture), ("reference", reference), ("FLIP", flip_picture(picture, reference))]
+    parts = [
+        ("network", picture),
+        ("reference", reference),
+        ("FLIP", flip_map(picture, reference, magma=True)),
+    ]
     height, width = reference.shape[:2]
     sheet = pillow.new("RGB", (3 * width + 2 * GAP, height + TEXT), "white")
     pen = ImageDraw.Draw(sheet)

@@ -270,14 +270,6 @@ def test_the_file_comes_back() -> None:
     assert again.points[-1].flip is None
 
 
-def test_points_in_8_bits_of_older_files_are_left_out() -> None:
-    old = json.loads(frontier(*LADDER).to_json())
-    for index, told in enumerate(old["points"]):
-        told["precision"] = "int8" if index == 1 else "float32"
-    read = Frontier.from_json(json.dumps(old).encode())
-    assert [p.name for p in read.points] == ["fast", "slow", "bad"]
-
-
 def damaged() -> list[tuple[str, object]]:
     return [
         ("format", 2),

@@ -34,6 +34,8 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
 
     A word instead of a code lists the codes whose pages have it.
     """
+    from difflib import get_close_matches
+
     from scenelang.cli.say import wants_color
     from scenelang.diagnostics.codes import CODES
 
@@ -50,7 +52,11 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
         return
     about = _about(wanted) if len(wanted) >= 3 else []
     if not about:
-        raise click.UsageError(f"No code `{code}`.{_advice(wanted, list(CODES))}")
+        near = get_close_matches(wanted.upper(), list(CODES), 3, 0.7)
+        advice = "Codes look like E0401 and W0501; `scenelang explain --list` shows all."
+        if near:
+            advice = f"Did you mean {' or '.join(near)}?"
+        raise click.UsageError(f"No code `{code}`. {advice}")
     _print_list(about, kind, paint)
 
 
@@ -63,16 +69,6 @@ def _about(word: str) -> list[str]:
         return text.lower().replace("colour", "color").replace("grey", "gray")
 
     return [code for code in CODES if plain(word) in plain(read_page(code).text)]
-
-
-def _advice(wanted: str, known: list[str]) -> str:
-    """Codes near a mistyped one."""
-    from difflib import get_close_matches
-
-    near = get_close_matches(wanted.upper(), known, 3, 0.7)
-    if near:
-        return f" Did you mean {' or '.join(near)}?"
-    return " Codes look like E0401 and W0501; `scenelang explain --list` shows all."
 
 
 def _print_list(codes: list[str], kind: str, paint: bool) -> None:
