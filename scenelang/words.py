@@ -40,11 +40,6 @@ class Word(Record):
     snippet: str = ""
     variadic: bool = False
 
-    @property
-    def optional(self) -> list[bool]:
-        """Which arguments may be left out."""
-        return [index >= self.required for index in range(len(self.params))]
-
 
 def _table(*words: Word) -> dict[str, Word]:
     return {word.name: word for word in words}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from scenelang.diagnostics.diagnostic import Diagnostics
@@ -51,9 +50,7 @@ def load(
     scene, _ = load_scene(
         path, diagnostics=found, defines={**(params or {}), **values}, root=root, model=model, frame=frame
     )
-    if scene is None:
-        raise SceneError(found)
-    return scene if size is None else scene.sized(size)
+    return _sound(scene, found, size)
 
 
 def loads(
@@ -79,10 +76,14 @@ def loads(
         SourceFile(name, text),
         diagnostics=found,
         defines={**(params or {}), **values},
-        root=Path(root) if root is not None else None,
+        root=root,
         model=model,
         frame=frame,
     )
+    return _sound(scene, found, size)
+
+
+def _sound(scene: Scene | None, found: Diagnostics, size: tuple[int, int] | None) -> Scene:
     if scene is None:
         raise SceneError(found)
     return scene if size is None else scene.sized(size)

@@ -45,16 +45,24 @@ class Builder:
 
     __slots__ = ("children", "material", "material_span", "moved", "transforms")
 
-    def __init__(self) -> None:
+    def __init__(
+        self, material: Material | None = None, material_span: Span | None = None, moved: Span | None = None
+    ) -> None:
         self.children: list[Any] = []
         self.transforms: list[Any] = []
-        self.material: Material | None = None
-        self.material_span: Span | None = None
-        self.moved: Span | None = None
+        self.material, self.material_span, self.moved = material, material_span, moved
 
     def add(self, node: Any) -> None:
         """Append a child."""
         self.children.append(node)
+
+    def extend(self, other: Builder) -> None:
+        """Add all that another builder of the same block holds."""
+        self.children += other.children
+        self.transforms += other.transforms
+        if other.material is not None:
+            self.material, self.material_span = other.material, other.material_span
+        self.moved = self.moved or other.moved
 
 
 class ChainBuilder(Builder):

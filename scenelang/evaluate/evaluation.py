@@ -7,79 +7,46 @@ what they find and go on. A Scene comes out only where nothing is wrong.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.builder import Builder, make
-from scenelang.evaluate.file_context import Unit
-from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.file_context import FileContext
+from scenelang.evaluate.inputs import Defines, Inputs
 from scenelang.evaluate.limits import MAX_OBJECTS, MAX_STEPS, Halt
 from scenelang.evaluate.loader import Loader, Unreadable, read_source
 from scenelang.evaluate.names import UNBOUND
 from scenelang.evaluate.prepare import EXPRESSIONS, STATEMENTS
 from scenelang.evaluate.prepare.blocks import Body
 from scenelang.evaluate.prepare.imports import prepare_file
-from scenelang.evaluate.report.bad_calls import report_misfits
 from scenelang.evaluate.report.reporter import Reporter
-from scenelang.evaluate.session import Session, Watch
+from scenelang.evaluate.session import Session
 from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
-from scenelang.models.manifest import Manifest
 from scenelang.scene.schema import Scene
-from scenelang.scene.spans import Place, SpanMap
+from scenelang.scene.spans import SpanMap, Written
 from scenelang.syntax import nodes, parse
 
 
 def evaluate(
-    file: nodes.File,
-    *,
-    diagnostics: Diagnostics,
-    defines: Mapping[str, Any] | Defines | None = None,
-    models: Iterable[Manifest] | None = None,
-    model: str | None = None,
-    root: Path | None = None,
-    path: Path | None = None,
-    frame: int = 0,
-    texts: Mapping[Path, str] | None = None,
-    watch: Watch | None = None,
+    file: nodes.File, *, diagnostics: Diagnostics, **inputs: Unpack[Inputs]
 ) -> tuple[Scene | None, SpanMap]:
     """Evaluate a syntax tree.
 
     Args:
         file: the tree.
         diagnostics: where mistakes go.
-        defines: values for params: text as after ``-D NAME=``, or Python values. `Defines` may be shared by
-            several evaluations; the caller then reports what none of them used.
-        models: manifests that names are taken from; by default those of all shipped models.
-        model: name of the model to use, instead of the one that the file names.
-        root: folder that imports cannot leave; by default that of ``path``.
-        path: file that the tree was read from.
-        frame: frame of the animation, from 0.
-        texts: what imported files hold, by their resolved paths, instead of what is on the disk.
-        watch: is shown every name's value and every node; see `Session`.
+        **inputs: what else there is; see `Inputs`.
 
     Returns:
         The Scene, or None if anything is wrong, and where its nodes were written.
     """
-    evaluation = Evaluation(
-        file,
-        diagnostics=diagnostics,
-        defines=defines,
-        models=models,
-        model=model,
-        root=root,
-        path=path,
-        frame=frame,
-        texts=texts,
-        watch=watch,
-    )
-    return evaluation.run(frame)
+    return Evaluation(file, diagnostics=diagnostics, **inputs).run(inputs.get("frame", 0))
 
 
 class Evaluation:
@@ -88,65 +55,44 @@ class Evaluation:
     Args:
         file: the tree.
         diagnostics: where mistakes go; each is reported for the first frame that has it.
-        defines, models, model, root, path, texts, watch: as for `evaluate`.
-        frame: the first frame that is run.
-        fps: frames a second, instead of those that ``animate`` names.
-        replays: run what no frame changes once.
+        **inputs: what else there is; see `Inputs`.
+
+    Attributes:
+        wanted: all files that it imports, also those that are not there.
+        sources: the text of the file and of all that it imports.
     """
 
-    def __init__(
-        self,
-        file: nodes.File,
-        *,
-        diagnostics: Diagnostics,
-        defines: Mapping[str, Any] | Defines | None = None,
-        models: Iterable[Manifest] | None = None,
-        model: str | None = None,
-        root: Path | None = None,
-        path: Path | None = None,
-        frame: int = 0,
-        fps: float | None = None,
-        replays: bool = False,
-        texts: Mapping[Path, str] | None = None,
-        watch: Watch | None = None,
-    ) -> None:
+    def __init__(self, file: nodes.File, *, diagnostics: Diagnostics, **inputs: Unpack[Inputs]) -> None:
         self.file, self.diagnostics = file, diagnostics
-        self.animates = _animates(file)
+        self.animates = any(isinstance(s, nodes.Call) and s.name.text == "animate" for s in file.statements)
         self._errors = len(diagnostics.errors)
-        words = _choose(file, vocabulary(models), model, diagnostics)
         self._steps = self._objects = 0
         self._session = session = Session(
             Reporter(diagnostics),
-            words,
+            _choose(file, vocabulary(inputs.get("models")), inputs.get("model"), diagnostics),
             EXPRESSIONS,
             STATEMENTS,
-            frame,
-            fps,
-            replays=replays and self.animates,
+            inputs.get("frame", 0),
+            inputs.get("fps"),
+            replays=inputs.get("replays", False) and self.animates,
+            watch=inputs.get("watch"),
         )
-        session.watch = watch
-        resolved = path.resolve() if path is not None else None
-        folder = root.resolve() if root is not None else resolved.parent if resolved is not None else None
-        loader = Loader(folder, [resolved] if resolved is not None else [], texts=texts or {})
-        self.inputs = inputs = defines if isinstance(defines, Defines) else Defines(defines or {})
-        self._unit = Unit(file.span.source, session, loader, inputs, resolved)
+        path, root, defines = inputs.get("path"), inputs.get("root"), inputs.get("defines")
+        path = path.resolve() if path is not None else None
+        folder = Path(root).resolve() if root is not None else path.parent if path is not None else None
+        loader = Loader(folder, [path] if path is not None else [], texts=inputs.get("texts") or {})
+        self.inputs = given = defines if isinstance(defines, Defines) else Defines(defines or {})
+        self._context = FileContext(file.span.source, session, loader, given, path)
         self._body: Body | None = None
         if not self.animates:
             session.animated[:] = [0.0, 0.0, 0.0, 1.0]
-        with deep_stack():
-            try:
-                self._body = prepare_file(self._unit, file)
-                inputs.lost |= self._unit.lost
-                if inputs is not defines:
-                    inputs.report_unused(diagnostics)
-            except Halt:
-                pass
-            with suppress(Halt):
-                report_misfits(session.report)
+        with deep_stack(), suppress(Halt):
+            self._body = prepare_file(self._context, file)
+            given.lost |= self._context.damage.words
+            if given is not defines:
+                given.report_unused(diagnostics)
         self.wanted = tuple(loader.wanted)
-        """All files that it imports, also those that are not there."""
         self.sources = (file.span.source, *(imported.span.source for imported in loader.parsed.values()))
-        """The text of the file and of all that it imports."""
 
     @property
     def frames(self) -> int:
@@ -181,115 +127,72 @@ class Evaluation:
         if self.animates:
             session.animated[:] = [UNBOUND] * 4
         out = Builder()
-        with deep_stack():
-            try:
-                if self._body is not None:
-                    session.tick(self._body.weight, self.file.span)
-                    for act in self._body.actions:
-                        act(self._unit.root_env, out)
-            except Halt:
-                pass
+        if self._body is not None:
+            with deep_stack(), suppress(Halt):
+                session.tick(self._body.weight, self.file.span)
+                for act in self._body.actions:
+                    act(self._context.env, out)
         self._steps += session.steps
         self._objects += session.objects
         if self.animates and frame:
             name_frame(self.diagnostics, before, frame)
         if self._body is None or len(self.diagnostics.errors) > self._errors:
             return None, session.spans
-        settings = session.settings
-        scene = make(
-            Scene,
-            {
-                "version": 1,
-                "model": session.vocabulary.chosen.name if session.vocabulary.chosen else None,
-                "canvas": settings.canvas,
-                "background": settings.background,
-                "animation": settings.animation,
-                "nodes": tuple(out.children),
-            },
-        )
+        settings, chosen = session.settings, session.vocabulary.chosen
+        fields = {
+            "version": 1,
+            "model": chosen.name if chosen else None,
+            "canvas": settings.canvas,
+            "background": settings.background,
+            "animation": settings.animation,
+            "nodes": tuple(out.children),
+        }
+        scene = make(Scene, fields)
         written = settings.given.get("model")
         if written is not None:
-            session.spans.record(scene, Place(written, written))
+            session.spans.record(scene, Written(written, written))
         return scene, session.spans
 
 
 def _choose(file: nodes.File, words: Vocabulary, model: str | None, diagnostics: Diagnostics) -> Vocabulary:
     """The vocabulary of the model from outside, or of the one that the file names."""
-    if model is not None:
-        chosen = words.choose(model)
-        if chosen is None:
-            help = f"there is {listing(m.name for m in words.models)}"
-            diagnostics.add("E0210", f"unknown model `{model}`", None, help=help)
-        return chosen or Vocabulary(words.models, blind=True)
-    for stmt in file.statements:
-        if isinstance(stmt, nodes.Model) and isinstance(stmt.name, nodes.String):
-            # An unknown model is reported when its statement is met.
-            return words.choose(stmt.name.value) or Vocabulary(words.models, blind=True)
-    return words
-
-
-def _animates(file: nodes.File) -> bool:
-    return any(isinstance(s, nodes.Call) and s.name.text == "animate" for s in file.statements)
+    name = model
+    if name is None:
+        stated = (stmt.name for stmt in file.statements if isinstance(stmt, nodes.Model))
+        name = next((stmt.value for stmt in stated if isinstance(stmt, nodes.String)), None)
+    if name is None:
+        return words
+    chosen = words.choose(name)
+    if chosen is None and model is not None:  # what the file names is reported at its statement
+        help = f"there is {listing(m.name for m in words.models)}"
+        diagnostics.add("E0210", f"unknown model `{name}`", None, help=help)
+    return chosen or Vocabulary(words.models, blind=True)
 
 
 def load_scene(
-    path: str | os.PathLike[str],
-    *,
-    diagnostics: Diagnostics,
-    defines: Mapping[str, Any] | Defines | None = None,
-    root: str | os.PathLike[str] | None = None,
-    model: str | None = None,
-    models: Iterable[Manifest] | None = None,
-    frame: int = 0,
+    path: str | os.PathLike[str], /, *, diagnostics: Diagnostics, **inputs: Unpack[Inputs]
 ) -> tuple[Scene | None, SpanMap]:
     """Read, parse and evaluate a scene file; arguments as for `evaluate`.
 
     Raises:
         OSError: the file cannot be opened.
     """
-    where = Path(path)
+    inputs["path"] = where = Path(path)
     try:
         source = read_source(where, os.fspath(path))
     except Unreadable as error:
         empty = SourceFile(os.fspath(path), "")
         diagnostics.add(error.code, f"cannot read `{where.name}`: {error}", Span(empty, 0, 0))
         return None, SpanMap()
-    return load_source(
-        source,
-        diagnostics=diagnostics,
-        defines=defines,
-        root=Path(root) if root is not None else None,
-        path=where,
-        model=model,
-        models=models,
-        frame=frame,
-    )
+    return load_source(source, diagnostics=diagnostics, **inputs)
 
 
 def load_source(
-    source: SourceFile,
-    *,
-    diagnostics: Diagnostics,
-    defines: Mapping[str, Any] | Defines | None = None,
-    root: Path | None = None,
-    path: Path | None = None,
-    model: str | None = None,
-    models: Iterable[Manifest] | None = None,
-    frame: int = 0,
+    source: SourceFile, *, diagnostics: Diagnostics, **inputs: Unpack[Inputs]
 ) -> tuple[Scene | None, SpanMap]:
     """Parse and evaluate scene text; arguments as for `evaluate`."""
     before, start = len(diagnostics.errors), len(diagnostics)
-    file = parse(source, diagnostics)
-    scene, spans = evaluate(
-        file,
-        diagnostics=diagnostics,
-        defines=defines,
-        models=models,
-        model=model,
-        root=root,
-        path=path,
-        frame=frame,
-    )
+    scene, spans = evaluate(parse(source, diagnostics), diagnostics=diagnostics, **inputs)
     diagnostics.items[start:] = in_file_order(diagnostics.items[start:])
     return (scene if len(diagnostics.errors) == before else None), spans
 

@@ -1,21 +1,30 @@
-"""One file while it is prepared and run."""
+"""One file while it is prepared and run, and where a statement stands in it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal, NamedTuple
 
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.loader import Loader
-from scenelang.evaluate.names import Env, Frame, Scope, file_frame
+from scenelang.evaluate.names import UNBOUND, Env, Scope, Slots
+from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.report.suppression import NONE, Damage
 from scenelang.evaluate.session import Session
 from scenelang.syntax import nodes
 
+Kind = Literal["file", "group", "chain", "object", "material", "unknown"]
+"""What a block may hold. ``unknown`` is the block of something misspelt: nothing is out of place there."""
+
+Action = Callable[[Env, Builder], None]
+
 
 @dataclass(slots=True)
-class Unit:
+class FileContext:
     """The state of one file.
 
     Args:
@@ -25,6 +34,10 @@ class Unit:
         defines: values for params.
         path: where it was read from, resolved; None for text without a file.
         prefix: how the first file calls its params: empty, or ``lib.``.
+        env: its live slots.
+        weight: half evaluation steps of what has been prepared of the block at hand.
+        first: its first statement.
+        damage: what syntax mistakes leave unknown of it.
     """
 
     source: SourceFile
@@ -33,7 +46,7 @@ class Unit:
     defines: Defines
     path: Path | None = None
     prefix: str = ""
-    frame: Frame = field(default_factory=file_frame)
+    env: Env = field(default_factory=lambda: [UNBOUND])
     scope: Scope = field(init=False)
     nesting: int = 0
     weight: int = 0
@@ -41,16 +54,42 @@ class Unit:
     damage: Damage = NONE
 
     def __post_init__(self) -> None:
-        self.scope = Scope(self.frame)
-        self.session.roots.append(self.root_env)
+        self.scope = Scope(Slots(root=self.env))
+        self.session.roots.append(self.env)
+
+
+class Place(NamedTuple):
+    """Where a statement or an expression stands.
+
+    Args:
+        file: its file.
+        scope: the names it sees.
+        kind: the kind of block around it.
+        nested: whether a ``for`` or ``if`` stands between it and that block's braces.
+        repeated: whether a ``for`` stands around it, however far out.
+        block: the names of that block, which tell it from others.
+    """
+
+    file: FileContext
+    scope: Scope
+    kind: Kind
+    nested: bool = False
+    repeated: bool = False
+    block: Scope | None = None
 
     @property
-    def root_env(self) -> Env:
-        """The live slots of the file."""
-        assert self.frame.root is not None
-        return self.frame.root
+    def session(self) -> Session:
+        """The evaluation."""
+        return self.file.session
 
     @property
-    def lost(self) -> frozenset[str]:
-        """Words inside what syntax mistakes have damaged: a definition may have been among it."""
-        return self.damage.words
+    def report(self) -> Reporter:
+        """Where mistakes go."""
+        return self.file.session.report
+
+    def inner(self, kind: Kind | None = None) -> Place:
+        """The place inside a block: a new scope, and a new kind unless control flow passes it on."""
+        scope = Scope(self.scope.slots, self.scope)
+        if kind is None:
+            return self._replace(scope=scope, nested=True)
+        return Place(self.file, scope, kind, False, self.repeated, scope)

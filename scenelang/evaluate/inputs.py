@@ -1,14 +1,18 @@
-"""Values that come from outside for params."""
+"""What comes from outside: values for params, and all else that an evaluation takes besides its text."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, TypedDict
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Label
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import listing, nearest
+from scenelang.evaluate.session import Watch
+from scenelang.models.manifest import Manifest
 
 
 @dataclass(slots=True)
@@ -37,3 +41,32 @@ class Defines:
                 names = listing(self.known)
                 help, labels = f"its params are {names}" if names else "the scene has no params", []
             diagnostics.add("E0211", f"no param `{name}` to set", None, help=help, labels=labels)
+
+
+class Inputs(TypedDict, total=False):
+    """What an evaluation takes besides a text; all of it may be left out.
+
+    Args:
+        defines: values for params: text as after ``-D NAME=``, or Python values. `Defines` may be shared by
+            several evaluations; the caller then reports what none of them used.
+        models: manifests that names are taken from; by default those of all shipped models.
+        model: name of the model to use, instead of the one that the file names.
+        root: folder that imports cannot leave; by default that of ``path``.
+        path: file that the text was read from.
+        frame: frame of the animation, from 0; the first that is run where there are several.
+        texts: what imported files hold, by their resolved paths, instead of what is on the disk.
+        watch: is shown every name's value and every node; see `Session`.
+        fps: frames a second, instead of those that ``animate`` names.
+        replays: run what no frame changes once.
+    """
+
+    defines: Mapping[str, Any] | Defines | None
+    models: Iterable[Manifest] | None
+    model: str | None
+    root: str | os.PathLike[str] | None
+    path: Path | None
+    frame: int
+    texts: Mapping[Path, str] | None
+    watch: Watch | None
+    fps: float | None
+    replays: bool

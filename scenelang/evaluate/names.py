@@ -6,28 +6,23 @@ list of slots; slot 0 of a function's or module's list is the list it was define
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
+from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import nodes
 
 Env = list[Any]
 
-
-class Unbound:
-    """What a slot holds before its ``let``, ``param`` or ``animate`` has run."""
-
-    __slots__ = ()
-
-
-UNBOUND: Final = Unbound()
+UNBOUND: Final = object()
+"""What a slot holds before its ``let``, ``param`` or ``animate`` has run."""
 
 
 @dataclass(slots=True, eq=False)
 class Needs:
-    """What a statement, a function's or a module's body depends on.
+    """What a statement, or the body of a function or module, depends on.
 
     Args:
         frame: it reads ``t``, ``u`` or ``frame`` itself.
@@ -39,43 +34,35 @@ class Needs:
 
     def varies(self) -> bool:
         """Whether it may differ from frame to frame; ask when everything is prepared."""
-        seen = {id(self)}
-        stack = [self]
+        seen, stack = {self}, [self]
         while stack:
             needs = stack.pop()
             if needs.frame:
                 return True
-            for other in needs.on:
-                if id(other) not in seen:
-                    seen.add(id(other))
-                    stack.append(other)
+            stack += [other for other in needs.on if other not in seen]
+            seen.update(needs.on)
         return False
 
 
-@dataclass(slots=True)
-class Frame:
+@dataclass(slots=True, eq=False)
+class Slots:
     """The slots of a file, or of one call of a function or module.
 
     Args:
-        parent: the frame it was defined in; None for a file.
+        parent: those of where it was defined; None for a file.
         root: a file's live slots, which exist while it is prepared; None for a call.
     """
 
-    parent: Frame | None = None
+    parent: Slots | None = None
     root: Env | None = None
     size: int = 1
 
-    def slot(self) -> int:
+    def add(self) -> int:
         """A new slot."""
         self.size += 1
         if self.root is not None:
             self.root.append(UNBOUND)
         return self.size - 1
-
-
-def file_frame() -> Frame:
-    """The frame of a file."""
-    return Frame(root=[UNBOUND])
 
 
 @dataclass(slots=True)
@@ -84,24 +71,21 @@ class Definition:
 
     Args:
         node: its statement.
-        frame: where it was defined.
-        run: for a fn ``run(env) -> value``; for a module ``run(env, out)``.
+        outer: the slots of where it was defined.
+        run: of a fn ``run(env) -> value``; of a module its block's actions.
         defaults: how to get each parameter's default.
-        slots: number of slots of a call.
+        size: number of slots of a call.
         weight: evaluation steps of one call.
+        needs: what its body depends on besides its arguments.
     """
 
     node: nodes.Fn | nodes.Module
-    frame: Frame
+    outer: Slots
     run: Any = None
     defaults: tuple[Any, ...] = ()
-    slots: int = 1
+    size: int = 1
     weight: int = 1
     needs: Needs = field(default_factory=Needs)
-    """What its body depends on besides its arguments."""
-
-
-BindingKind = Literal["let", "param", "argument", "loop", "fn", "module", "import", "constant", "poison"]
 
 
 @dataclass(slots=True)
@@ -111,64 +95,69 @@ class Binding:
     Args:
         kind: how it came about.
         span: where; None for the language's own names.
-        frame: the frame that holds its slot.
+        slots: what holds its slot.
         slot: its slot.
-        value: a `Definition`, an imported file, or a constant's value.
-        known: whether ``value`` is the value of a ``let`` that never changes.
+        value: a `Definition`, an imported file, or the value of a ``let`` that never changes.
+        known: whether ``value`` is that of such a ``let``.
         needs: what the value of a ``let`` depends on.
     """
 
-    kind: BindingKind
+    kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "poison"]
     span: Span | None = None
-    frame: Frame | None = None
+    slots: Slots | None = None
     slot: int = 0
     value: Any = None
     known: bool = False
     needs: Needs | None = None
+
+    def labels(self, words: str = "defined here") -> tuple[Label, ...]:
+        """A label for its definition, if that has a place."""
+        return () if self.span is None else (Label(self.span, words),)
 
 
 @dataclass(slots=True, eq=False)
 class Scope:
     """The names of one block, and the block around it."""
 
-    frame: Frame
+    slots: Slots
     parent: Scope | None = None
     names: dict[str, Binding] = field(default_factory=dict)
     later: dict[str, Span] = field(default_factory=dict)
     """Names that a later line of this block defines."""
 
-    def find(self, name: str) -> Binding | None:
-        """What ``name`` stands for here."""
+    def outwards(self) -> Iterator[Scope]:
+        """This block, and those around it."""
         scope: Scope | None = self
         while scope is not None:
-            found = scope.names.get(name)
-            if found is not None:
-                return found
+            yield scope
             scope = scope.parent
-        return None
+
+    def find(self, name: str) -> Binding | None:
+        """What ``name`` stands for here."""
+        return next((scope.names[name] for scope in self.outwards() if name in scope.names), None)
 
     def defined_later(self, name: str) -> Span | None:
         """Where a later line of this block, or of one around it, defines ``name``."""
-        scope: Scope | None = self
-        while scope is not None:
-            if name in scope.later:
-                return scope.later[name]
-            scope = scope.parent
-        return None
+        return next((scope.later[name] for scope in self.outwards() if name in scope.later), None)
 
     def visible(self) -> Iterator[tuple[str, Binding]]:
         """All names that can be used here, inner ones first."""
-        scope: Scope | None = self
-        while scope is not None:
+        for scope in self.outwards():
             yield from scope.names.items()
-            scope = scope.parent
 
-    def hops(self, frame: Frame) -> int:
-        """How many frames outwards from here ``frame`` is."""
-        count, at = 0, self.frame
-        while at is not frame:
-            count += 1
-            if at.parent is None:
-                raise LookupError("a frame that does not enclose this scope")
-            at = at.parent
-        return count
+    def reach(self, slots: Slots) -> Callable[[Env], Env]:
+        """How to get the live ``slots``, which enclose this scope, from those of here."""
+        root = slots.root
+        if root is not None:
+            return lambda env: root
+        hops, at = 0, self.slots
+        while at is not slots:
+            assert at.parent is not None
+            hops, at = hops + 1, at.parent
+
+        def outer(env: Env) -> Env:
+            for _ in range(hops):
+                env = env[0]
+            return env
+
+        return outer

@@ -16,25 +16,11 @@ from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.names import Needs
 from scenelang.evaluate.session import Session
+from scenelang.scene.spans import SpanMap
 
 
 @dataclass(slots=True)
-class _Kept:
-    """What a statement put into its block, and what it counted."""
-
-    children: list[Any]
-    transforms: list[Any]
-    material: Any
-    material_span: Any
-    moved: Any
-    spans: Any
-    steps: int
-    objects: int
-    parts: int
-
-
-@dataclass(slots=True)
-class Still:
+class Replayed:
     """The action of a statement of a file or a group that runs at most once in a frame.
 
     Args:
@@ -42,6 +28,8 @@ class Still:
         needs: what it depends on.
         session: the evaluation.
         span: of the statement.
+        varies: whether frames change it, once that was asked.
+        kept: what it put into its block, the places of that, and the steps, objects and parts it counted.
     """
 
     action: Callable[[Any, Builder], None]
@@ -49,54 +37,36 @@ class Still:
     session: Session
     span: Span
     varies: bool | None = None
-    kept: _Kept | None = None
+    kept: tuple[Builder, SpanMap, int, int, int] | None = None
 
     def __call__(self, env: Any, out: Builder) -> None:
         """Run the statement, or replay what it did."""
         if self.varies is None:
             self.varies = self.needs.varies()
+        session = self.session
         if self.varies:
             self.action(env, out)
         elif self.kept is None:
-            self._first(env, out)
-        elif (self.kept.children and out.moved) or (self.kept.material and out.material):
-            self.action(env, out)  # an error that needs the place it stands in
+            own = Builder(out.material, out.material_span, out.moved)
+            steps, objects, parts = session.steps, session.objects, session.parts
+            around, session.spans = session.spans, SpanMap()
+            try:
+                self.action(env, own)
+            finally:
+                around.add(session.spans)
+                spans, session.spans = session.spans, around
+            own.material = own.material if out.material is None else None
+            own.moved = own.moved if own.transforms else None
+            counted = session.steps - steps, session.objects - objects, session.parts - parts
+            self.kept = (own, spans, *counted)
+            out.extend(own)
         else:
-            self._again(out)
-
-    def _first(self, env: Any, out: Builder) -> None:
-        session = self.session
-        children, transforms = len(out.children), len(out.transforms)
-        material = out.material
-        counted = session.steps, session.objects, session.parts
-        around = session.spans
-        session.spans = own = around.__class__()
-        try:
-            self.action(env, out)
-        finally:
-            session.spans = around
-            around.add(own)
-        self.kept = _Kept(
-            out.children[children:],
-            out.transforms[transforms:],
-            out.material if out.material is not material else None,
-            out.material_span,
-            out.moved if len(out.transforms) > transforms else None,
-            own,
-            session.steps - counted[0],
-            session.objects - counted[1],
-            session.parts - counted[2],
-        )
-
-    def _again(self, out: Builder) -> None:
-        kept, session = self.kept, self.session
-        assert kept is not None
-        session.tick(kept.steps, self.span)
-        session.count_parts(kept.parts, self.span)
-        session.count_objects(kept.objects, self.span)
-        session.spans.add(kept.spans)
-        out.children.extend(kept.children)
-        out.transforms.extend(kept.transforms)
-        if kept.material is not None:
-            out.material, out.material_span = kept.material, kept.material_span
-        out.moved = out.moved or kept.moved
+            own, spans, steps, objects, parts = self.kept
+            if (own.children and out.moved) or (own.material and out.material):
+                self.action(env, out)  # an error that needs the place it stands in
+                return
+            session.tick(steps, self.span)
+            session.count_parts(parts, self.span)
+            session.count_objects(objects, self.span)
+            session.spans.add(spans)
+            out.extend(own)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from scenelang.diagnostics.diagnostic import Label
-from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.limits import MAX_OBJECTS, MAX_PARTS, MAX_STEPS, Halt
 from scenelang.evaluate.names import UNBOUND, Needs
 from scenelang.evaluate.report.reporter import Reporter
@@ -44,11 +44,11 @@ class Session:
         report: where mistakes go.
         vocabulary: names that models offer.
         expressions, statements: how each class of the syntax tree is prepared.
-        frame: number of the frame to evaluate.
-        fps: frames a second instead of those that ``animate`` names.
+        frame, fps: as of `Inputs`.
         replays: run what no frame changes once; the evaluation is for several frames.
         roots: the live slots of every file.
         needs: collects what the statement being prepared depends on.
+        zeros: where an angle was a 0 without a unit that frames may change.
         watch: called with the place of each name and its value, and of each statement and its node.
     """
 
@@ -69,8 +69,7 @@ class Session:
     replays: bool = False
     roots: list[list[Any]] = field(default_factory=list)
     needs: Needs = field(default_factory=Needs)
-    zeros: dict[tuple[int, int, int], Span] = field(default_factory=dict)
-    """Where an angle was a 0 without a unit that frames may change."""
+    zeros: dict[tuple[SourceFile, Span], Span] = field(default_factory=dict)
     watch: Watch | None = None
 
     def restart(self, frame: int) -> None:
@@ -104,10 +103,6 @@ class Session:
         self.parts += parts
         if self.parts > MAX_PARTS:
             raise self.halt("E0320", f"more than {MAX_PARTS:,} nodes and transforms in one scene", span)
-
-    def count_object(self, span: Span) -> None:
-        """Count one object."""
-        self.count_objects(1, span)
 
     def count_objects(self, number: int, span: Span) -> None:
         """Count objects that a Scene will hold."""

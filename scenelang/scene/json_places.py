@@ -11,7 +11,7 @@ from typing import Final
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.scene.modifiers import Transform
 from scenelang.scene.nodes import Chain, Object, SceneData, SceneNode
-from scenelang.scene.spans import Place, SpanMap
+from scenelang.scene.spans import SpanMap, Written
 
 Key = str | int
 
@@ -103,16 +103,16 @@ def record_places(scene: SceneData, root: Value, source: SourceFile, spans: Span
     """Put the places of a scene and all its nodes, transforms and materials into ``spans``."""
     named = root.items.get("model")
     if named is not None:
-        spans.record(scene, _place(named, root, source))
+        spans.record(scene, _written(named, root, source))
     todo: list[tuple[SceneNode, Value]] = _pairs(scene.nodes, root.get("nodes"))
     while todo:
         node, value = todo.pop()
         heading = "geometry" if isinstance(node, Object) else "op" if node.kind == "boolean" else "kind"
-        spans.record(node, _place(value.get(heading), value, source))
+        spans.record(node, _written(value.get(heading), value, source))
         _record_steps(node.transforms, value.get("transforms"), source, spans)
         if node.material is not None:
             material = value.get("material")
-            spans.record(node.material, _place(material.get("name"), material, source))
+            spans.record(node.material, _written(material.get("name"), material, source))
             _record_steps(node.material.ops, material.get("ops"), source, spans)
         if isinstance(node, Chain):
             links = value.get("children")
@@ -130,8 +130,8 @@ def _record_steps(
 ) -> None:
     for at, step in enumerate(steps):
         value = values.get(at)
-        spans.record(step, _place(value.get("kind"), value, source))
+        spans.record(step, _written(value.get("kind"), value, source))
 
 
-def _place(name: Value, statement: Value, source: SourceFile) -> Place:
-    return Place(name.span(source), statement.span(source))
+def _written(name: Value, statement: Value, source: SourceFile) -> Written:
+    return Written(name.span(source), statement.span(source))

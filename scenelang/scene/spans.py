@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -9,7 +10,7 @@ from scenelang.diagnostics.span import Span
 from scenelang.scene import library
 
 
-class Place(NamedTuple):
+class Written(NamedTuple):
     """The two spans of a node: its heading name or keyword, and its whole statement."""
 
     name: Span
@@ -22,65 +23,61 @@ class Calls(NamedTuple):
     span: Span
     outer: Calls | None
 
+    def outwards(self) -> Iterator[Span]:
+        """The places of the calls."""
+        calls: Calls | None = self
+        while calls is not None:
+            yield calls.span
+            calls = calls.outer
+
     def outside(self) -> Span | None:
         """The innermost call that is not written in the library."""
-        calls: Calls | None = self
-        while calls is not None and library.holds(calls.span.source):
-            calls = calls.outer
-        return None if calls is None else calls.span
+        return next((call for call in self.outwards() if not library.holds(call.source)), None)
 
 
 @dataclass(slots=True)
 class SpanMap:
     """Spans of a Scene's nodes, transforms and materials, by identity.
 
-    It answers for the very objects that the evaluator made and only while that Scene is alive; for any
-    other object it answers None. Nodes that one statement made many times share one place.
+    It answers for the very objects that the evaluator made; for any other it answers None. Nodes that one
+    statement made many times share one place.
     """
 
-    _places: dict[int, Place] = field(default_factory=dict)
-    _calls: dict[int, Calls] = field(default_factory=dict)
+    _known: dict[int, tuple[object, Written, Calls | None]] = field(default_factory=dict)
+    """By `id`; each entry holds its node, so that no other can come by that `id`."""
 
-    def record(self, node: object, place: Place, calls: Calls | None = None) -> None:
+    def record(self, node: object, written: Written, calls: Calls | None = None) -> None:
         """Remember where ``node`` was written and through which calls it came about.
 
         What the library makes counts as written where it is called.
         """
-        if calls is not None and library.holds(place.name.source):
-            site = calls.outside() or place.name
-            place = Place(site, site)
-        self._places[id(node)] = place
-        if calls is not None:
-            self._calls[id(node)] = calls
+        if calls is not None and library.holds(written.name.source):
+            site = calls.outside() or written.name
+            written = Written(site, site)
+        self._known[id(node)] = node, written, calls
 
     def copy(self, old: object, new: object) -> None:
         """``new`` stands for ``old``, which an outer block has added to."""
-        self._places[id(new)] = self._places[id(old)]
-        if id(old) in self._calls:
-            self._calls[id(new)] = self._calls[id(old)]
+        self._known[id(new)] = new, *self._known[id(old)][1:]
 
     def add(self, other: SpanMap) -> None:
         """Take over all that ``other`` knows."""
-        self._places.update(other._places)
-        self._calls.update(other._calls)
+        self._known.update(other._known)
 
     def span(self, node: object) -> Span | None:
         """The name or keyword that heads the statement of ``node``: what a caret points at."""
-        place = self._places.get(id(node))
-        return place.name if place else None
+        known = self._known.get(id(node))
+        return known[1].name if known else None
 
     def statement(self, node: object) -> Span | None:
         """The whole statement of ``node``."""
-        place = self._places.get(id(node))
-        return place.statement if place else None
+        known = self._known.get(id(node))
+        return known[1].statement if known else None
 
     def calls(self, node: object) -> tuple[Span, ...]:
         """The calls that led to ``node``, innermost first; empty where it stands in no module."""
-        found, calls = [], self._calls.get(id(node))
-        while calls is not None:
-            found.append(calls.span)
-            calls = calls.outer
-        return tuple(found)
+        known = self._known.get(id(node))
+        return tuple(known[2].outwards()) if known and known[2] is not None else ()
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(self._known)

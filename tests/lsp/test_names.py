@@ -9,7 +9,7 @@ import pytest
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.evaluation import evaluate
-from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.file_context import Place
 from scenelang.evaluate.names import Binding
 from scenelang.evaluate.prepare import references
 from scenelang.lsp.context import cursor_at
@@ -40,10 +40,10 @@ def test_names_mean_what_they_mean_to_the_evaluator(text: str, monkeypatch: pyte
     resolved: list[tuple[nodes.Name, Span]] = []
     original = references.value_of
 
-    def watched(name: nodes.Name, binding: Binding, unit: Unit, scope: object) -> object:
+    def watched(name: nodes.Name, binding: Binding, place: Place) -> object:
         if name.span.source is source and binding.span is not None and "." not in name.text:
             resolved.append((name, binding.span))
-        return original(name, binding, unit, scope)  # type: ignore[arg-type]
+        return original(name, binding, place)
 
     monkeypatch.setattr(references, "value_of", watched)
     file = parse(source, Diagnostics())

@@ -8,7 +8,9 @@ import pytest
 from scene_cases import run_text, transform
 
 import scenelang as nsg
+from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.scene.schema import SceneNode
+from scenelang.scene.spans import Calls, SpanMap, Written
 
 
 def nodes(text: str, **options: object) -> tuple[SceneNode, ...]:
@@ -307,3 +309,15 @@ def test_spans_beside_the_scene() -> None:
 
 def test_the_same_text_gives_the_same_scene() -> None:
     assert run_text(ANIMATION, frame=5).good() == run_text(ANIMATION, frame=5).good()
+
+
+def test_a_place_of_its_own_is_kept_for_a_node_that_nobody_else_keeps() -> None:
+    """What was known of a node that is gone is not told of the next one, which may have its address."""
+    spans, span = SpanMap(), Span(SourceFile("a.nsg", "square;"), 0, 6)
+    for _ in range(100):
+        spans.record(object(), Written(span, span), Calls(span, None))
+    assert len(spans) == 100
+    node = object()
+    spans.record(node, Written(span, span), Calls(span, None))
+    spans.record(node, Written(span, span))
+    assert spans.calls(node) == ()

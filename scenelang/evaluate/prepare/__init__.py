@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from scenelang.evaluate.prepare import (
     blocks,
+    calls,
     heads,
     imports,
     literals,
@@ -34,7 +35,7 @@ EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
     nodes.Unary: operations.prepare_unary,
     nodes.Binary: operations.prepare_binary,
     nodes.Conditional: operations.prepare_conditional,
-    nodes.CallExpr: references.prepare_call,
+    nodes.CallExpr: calls.prepare_call,
     nodes.Member: references.prepare_member,
     nodes.Index: literals.prepare_index,
     nodes.MaterialExpr: materials.prepare_material,
@@ -45,8 +46,8 @@ STATEMENTS: Final[Mapping[type, Callable[..., Any]]] = {
     nodes.Model: settings.prepare_model,
     nodes.Param: params.prepare_param,
     nodes.Let: blocks.prepare_let,
-    nodes.Fn: blocks.skip_declared,
-    nodes.Module: blocks.skip_declared,
+    nodes.Fn: blocks.skip,
+    nodes.Module: blocks.skip,
     nodes.Import: imports.prepare_import,
     nodes.For: blocks.prepare_for,
     nodes.If: blocks.prepare_if,
@@ -54,5 +55,5 @@ STATEMENTS: Final[Mapping[type, Callable[..., Any]]] = {
     nodes.Node: scene_nodes.prepare_node,
     nodes.Combined: scene_nodes.prepare_combined,
     nodes.MaterialUse: materials.prepare_use,
-    nodes.BadStmt: blocks.skip_bad,
+    nodes.BadStmt: blocks.skip,
 }

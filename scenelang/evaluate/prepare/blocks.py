@@ -3,61 +3,43 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
 
-from scenelang.diagnostics.diagnostic import Fix, Label
+from scenelang.diagnostics.diagnostic import Fix
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.costs import CALL_STEPS, HALF_STEPS
-from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.file_context import Action, Place
 from scenelang.evaluate.limits import MAX_NESTING
-from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Frame, Needs, Scope
-from scenelang.evaluate.prepare.expressions import VARIES, guarded, prepare, watched
+from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Needs, Scope, Slots
+from scenelang.evaluate.prepare.expressions import VARIES, guarded, prepare
 from scenelang.evaluate.prepare.operations import condition
-from scenelang.evaluate.replay import Still
-from scenelang.evaluate.report.undefined import tell_bound
+from scenelang.evaluate.replay import Replayed
+from scenelang.evaluate.report.undefined import report_rebound
+from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.value import POISON, Problem, RangeValue, Vec, unexpected
 from scenelang.syntax import nodes
 from scenelang.words import LANGUAGE, SETTINGS
 
-Kind = Literal["file", "group", "chain", "object", "material", "unknown"]
-"""What a block may hold. ``unknown`` is the block of something misspelt: nothing is out of place there."""
-
-Action = Callable[[Env, Builder], None]
-
-
-class Place(NamedTuple):
-    """Where a statement stands.
-
-    Args:
-        unit: its file.
-        scope: the names it sees.
-        kind: the kind of block around it.
-        nested: whether a ``for`` or ``if`` stands between it and that block's braces.
-        repeated: whether a ``for`` stands around it, however far out.
-        block: the names of that block, which tell it from others.
-    """
-
-    unit: Unit
-    scope: Scope
-    kind: Kind
-    nested: bool = False
-    repeated: bool = False
-    block: Scope | None = None
-
 
 class Body(NamedTuple):
-    """A prepared block."""
+    """A prepared block, and what a run of it costs."""
 
-    actions: tuple[Action, ...]
-    weight: int
+    actions: Iterable[Action] = ()
+    weight: int = 1
+
+    def run(self, env: Env, out: Builder, session: Session, span: Span) -> None:
+        """Run the block, whose steps count at ``span``."""
+        session.tick(self.weight, span)
+        for act in self.actions:
+            act(env, out)
 
 
 def prepare_statement(stmt: nodes.Stmt, place: Place) -> Action | None:
     """One statement's action; None where it does nothing when it runs."""
-    place.unit.weight += HALF_STEPS.get(stmt.__class__, 0)
-    action: Action | None = place.unit.session.statements[stmt.__class__](stmt, place)
+    place.file.weight += HALF_STEPS.get(stmt.__class__, 0)
+    action: Action | None = place.session.statements[stmt.__class__](stmt, place)
     return action
 
 
@@ -67,27 +49,31 @@ def prepare_block(statements: Sequence[nodes.Stmt], place: Place, span: Span) ->
     Functions and modules are known in the whole block; their bodies are prepared after it, when all
     names of the block are known to them.
     """
-    unit, scope = place.unit, place.scope
-    unit.nesting += 1
-    if unit.nesting > MAX_NESTING:
-        message = f"a tree of more than {MAX_NESTING} levels"
-        raise unit.session.halt("E0324", message, span)
-    before = unit.weight
-    bodies = [declare(stmt, place) for stmt in statements if isinstance(stmt, nodes.Fn | nodes.Module)]
+    file, scope = place.file, place.scope
+    file.nesting += 1
+    if file.nesting > MAX_NESTING:
+        raise file.session.halt("E0324", f"a tree of more than {MAX_NESTING} levels", span)
+    before = file.weight
+    declared = [_declare(stmt, place) for stmt in statements if isinstance(stmt, nodes.Fn | nodes.Module)]
+    bodies = [prepare_body for prepare_body in declared if prepare_body is not None]
     for stmt in statements:
         if isinstance(stmt, nodes.Let | nodes.Param):
             scope.later.setdefault(stmt.name.text, stmt.name.span)
     prepared = [_collected(stmt, place) for stmt in statements]
     scope.later.clear()
     actions = [action for action in prepared if action is not None]
-    if any(bodies):
-        actions = _unbind(scope, place) + actions
-    for body in bodies:
-        if body is not None:
-            body()
-    unit.nesting -= 1
-    weight, unit.weight = unit.weight - before, before  # whoever runs the block counts it
+    if bodies and not (scope.slots.root is not None and scope is file.scope):
+        actions = _unbind(scope) + actions
+    for prepare_body in bodies:
+        prepare_body()
+    file.nesting -= 1
+    weight, file.weight = file.weight - before, before  # whoever runs the block counts it
     return Body(tuple(actions), 1 + len(actions) + weight // 2)
+
+
+def prepare_inner(block: nodes.Block | None, place: Place) -> Body:
+    """Prepare a block of a statement, with the place inside it; nothing to run where there is none."""
+    return Body() if block is None else prepare_block(block.statements, place, block.span)
 
 
 def _collected(stmt: nodes.Stmt, place: Place) -> Action | None:
@@ -95,8 +81,8 @@ def _collected(stmt: nodes.Stmt, place: Place) -> Action | None:
 
     That holds of statements of a file or its groups. Loops and modules run more than once in a frame.
     """
-    session = place.unit.session
-    if not session.replays or place.repeated or place.scope.frame.root is None:
+    session = place.session
+    if not session.replays or place.repeated or place.scope.slots.root is None:
         return prepare_statement(stmt, place)
     around, session.needs = session.needs, Needs()
     try:
@@ -106,18 +92,15 @@ def _collected(stmt: nodes.Stmt, place: Place) -> Action | None:
         around.on.append(session.needs)
         session.needs = around
     fills = isinstance(stmt, nodes.Call | nodes.Node | nodes.For | nodes.If)
-    if action is None or not fills or place.kind not in ("file", "group"):
+    setting = isinstance(stmt, nodes.Call) and stmt.name.text in SETTINGS
+    if action is None or not fills or setting or place.kind not in ("file", "group"):
         return action
-    if isinstance(stmt, nodes.Call) and stmt.name.text in SETTINGS:
-        return action
-    return Still(action, needs, session, stmt.span)
+    return Replayed(action, needs, session, stmt.span)
 
 
-def _unbind(scope: Scope, place: Place) -> list[Action]:
+def _unbind(scope: Scope) -> list[Action]:
     """In a loop, a function must not see what the pass before left in a slot."""
-    if scope.frame.root is not None and scope is place.unit.scope:
-        return []
-    slots = [b.slot for b in scope.names.values() if b.kind == "let" and b.frame is scope.frame]
+    slots = [b.slot for b in scope.names.values() if b.kind == "let" and b.slots is scope.slots]
 
     def action(env: Env, out: Builder) -> None:
         for slot in slots:
@@ -126,30 +109,18 @@ def _unbind(scope: Scope, place: Place) -> list[Action]:
     return [action] if slots else []
 
 
-def inner(place: Place, kind: Kind | None = None) -> Place:
-    """The place inside a block: a new scope, and a new kind unless control flow passes it on."""
-    scope = Scope(place.scope.frame, place.scope)
-    if kind is None:
-        return Place(place.unit, scope, place.kind, True, place.repeated, place.block)
-    return Place(place.unit, scope, kind, False, place.repeated, scope)
-
-
 def misplaced(
     place: Place, span: Span, message: str, help: str | None = None, fix: Fix | None = None
-) -> bool:
+) -> None:
     """Report a statement in the wrong place, unless nothing is known about the place.
 
-    Several of a sort in one block are told as one: it is the block that is of the wrong kind.
+    Several of a sort in one block are one report: it is the block that is of the wrong kind. Messages that
+    differ only in what they quote are of a sort.
     """
-    session = place.unit.session
-    if place.kind == "unknown":
-        return True
-    if place.block is None:
-        session.report.error("E0330", message, span, help=help, fix=fix)
-    else:
+    if place.kind != "unknown":
         sort = re.sub(r"`[^`]*`", "", message)
-        session.report.error_once(("E0330", place.block, sort), "E0330", message, span, help=help, fix=fix)
-    return True
+        key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, sort)
+        place.report.error_once(key, "E0330", message, span, help=help, fix=fix)
 
 
 # ---------------------------------------------------------------- definitions
@@ -157,137 +128,116 @@ def misplaced(
 
 def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
     """Bind a name in this scope; reports a second definition and keeps the first."""
-    unit, scope = place.unit, place.scope
+    file, scope = place.file, place.scope
     earlier = scope.names.get(name.text)
     scope.later.pop(name.text, None)
-    if unit.damage and unit.damage.holds(name.span):
+    if file.damage and file.damage.holds(name.span):
         # What it stands for is known when its statement reads again.
         binding.kind = "poison"
-        scope.names[name.text] = binding
-        tell_bound(
-            unit.session.report, name, earlier or (scope.parent.find(name.text) if scope.parent else None)
-        )
-        return True
-    if earlier is not None:
-        labels = (Label(earlier.span, "first defined here"),) if earlier.span else ()
-        unit.session.report.error(
-            "E0202",
-            f"`{name.text}` is already defined in this scope",
-            name.span,
-            labels=labels,
-            help="names are bound once; an inner block may bind them anew",
-        )
+        report_rebound(place.report, name, scope.find(name.text))
+    elif earlier is not None:
+        message = f"`{name.text}` is already defined in this scope"
+        help = "names are bound once; an inner block may bind them anew"
+        labels = earlier.labels("first defined here")
+        place.report.error("E0202", message, name.span, labels=labels, help=help)
         return False
     scope.names[name.text] = binding
     return True
 
 
 def prepare_let(stmt: nodes.Let, place: Place) -> Action | None:
-    code = prepare(stmt.value, place.unit, place.scope)
-    name = stmt.name.span
-    place.unit.session.report.origins[id(name.source), name.start] = stmt.value
-    frame = place.scope.frame
-    slot = frame.slot()
-    known = code.value is not VARIES
+    code = prepare(stmt.value, place)
+    name, session, slots = stmt.name.span, place.session, place.scope.slots
+    slot, known = slots.add(), code.value is not VARIES
     value = code.value if known else None
-    binding = Binding("let", stmt.name.span, frame, slot, value, known, place.unit.session.needs)
-    define(stmt.name, binding, place)
-    get = watched(code.run, stmt.name.span, place.unit)
+    define(stmt.name, Binding("let", name, slots, slot, value, known, session.needs), place)
+    get, watch = code.run, session.watch
 
     def action(env: Env, out: Builder) -> None:
         env[slot] = get(env)
 
-    return action
+    def watched(env: Env, out: Builder) -> None:
+        env[slot] = get(env)
+        if watch is not None:
+            watch(name, env[slot])
+
+    return action if watch is None else watched
 
 
-def declare(stmt: nodes.Fn | nodes.Module, place: Place) -> Callable[[], None] | None:
+def _declare(stmt: nodes.Fn | nodes.Module, place: Place) -> Callable[[], None] | None:
     """Make a function or module known; returns how to prepare its body."""
-    unit, scope = place.unit, place.scope
-    name = stmt.name
+    name, outer = stmt.name, place.scope.slots
     if isinstance(stmt, nodes.Module) and name.text in LANGUAGE:
         message = f"`{name.text}` is a word of the language and names no module"
-        unit.session.report.error("E0209", message, name.span, help="rename it")
+        place.report.error("E0209", message, name.span, help="rename it")
         return None
-    frame = Frame(scope.frame)
-    definition = Definition(stmt, scope.frame)
-    kind: Literal["fn", "module"] = "fn" if isinstance(stmt, nodes.Fn) else "module"
-    define(name, Binding(kind, name.span, value=definition), place)
-    return lambda: _prepare_body(stmt, definition, frame, place)
+    definition = Definition(stmt, outer)
+    binding = Binding("fn" if isinstance(stmt, nodes.Fn) else "module", name.span, value=definition)
+    define(name, binding, place)
+    return lambda: _prepare_body(stmt, definition, place)
 
 
-def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, frame: Frame, place: Place) -> None:
-    unit = place.unit
-    scope = Scope(frame, place.scope)
-    params = Place(unit, scope, "group")
-    defaults = []
-    slots = [frame.slot() for _ in stmt.params]
+def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, place: Place) -> None:
+    file, report, session = place.file, place.report, place.session
+    slots = Slots(definition.outer)
+    inside = Place(file, Scope(slots, place.scope), "group")
+    defaults: list[Callable[[Env], Any]] = []
+    places = [slots.add() for _ in stmt.params]
     optional = False
-    for index, (param, slot) in enumerate(zip(stmt.params, slots, strict=True)):
+    for param, slot in zip(stmt.params, places, strict=True):
         at = param.name.span
-        unit.session.report.parameters[id(at.source), at.start] = id(stmt), index
         if param.default is not None:
             optional = True
-            defaults.append(prepare(param.default, unit, scope).run)
+            defaults.append(prepare(param.default, inside).run)
         else:
             if optional:
                 message = f"`{param.name.text}` has no default but follows one that has"
-                unit.session.report.error(
-                    "E0308", message, param.span, help="put it first, or give it a default"
-                )
+                report.error("E0308", message, param.span, help="put it first, or give it a default")
             defaults.append(lambda env: POISON)
-        define(param.name, Binding("argument", param.name.span, frame, slot), params)
+        define(param.name, Binding("argument", at, slots, slot), inside)
     definition.defaults = tuple(defaults)
-    before = unit.weight
-    around, unit.session.needs = unit.session.needs, definition.needs
+    before = file.weight
+    around, session.needs = session.needs, definition.needs
     if isinstance(stmt, nodes.Fn):
-        name = stmt.name.span
-        unit.session.report.origins[id(name.source), name.start] = stmt.body
-        definition.run = prepare(stmt.body, unit, scope).run
-        definition.weight = CALL_STEPS + (unit.weight - before) // 2
-        unit.weight = before
+        definition.run = prepare(stmt.body, inside).run
+        definition.weight = CALL_STEPS + (file.weight - before) // 2
+        file.weight = before
     else:
-        body = prepare_block(stmt.body.statements, Place(unit, Scope(frame, scope), "group"), stmt.body.span)
-        definition.run = body.actions
-        definition.weight = body.weight
-    unit.session.needs = around
-    definition.slots = frame.size
+        body = prepare_inner(stmt.body, inside._replace(scope=Scope(slots, inside.scope)))
+        definition.run, definition.weight = body
+    session.needs = around
+    definition.size = slots.size
 
 
-def skip_declared(stmt: nodes.Fn | nodes.Module, place: Place) -> Action | None:
-    return None  # done by `declare`
-
-
-def skip_bad(stmt: nodes.BadStmt, place: Place) -> Action | None:
+def skip(stmt: nodes.Fn | nodes.Module | nodes.BadStmt, place: Place) -> Action | None:
+    """Nothing to run: `prepare_block` has declared it, or recovery has reported it."""
     return None
 
 
 # ---------------------------------------------------------------- control flow
 
 
+def _items(value: Any) -> Any:
+    if value.__class__ is Vec:
+        return value.items
+    if value.__class__ is RangeValue:
+        if value.unit != "number" and value.step is None:
+            help = "add a step, as in 0deg..90deg step 30deg"
+            raise Problem("E0311", f"a range of {value.unit}s without a step", help)
+        value.count()
+        return value
+    advice = "write 0..<n for n passes" if value.__class__ is float else None
+    raise unexpected("a range or a vector", value, advice)
+
+
 def prepare_for(stmt: nodes.For, place: Place) -> Action | None:
-    unit = place.unit
-    iterable = prepare(stmt.iterable, unit, place.scope)
-    loop = inner(place)._replace(repeated=True)
-    frame = loop.scope.frame
-    slot = frame.slot()
-    define(stmt.variable, Binding("loop", stmt.variable.span, frame, slot), loop)
-    body = prepare_block(stmt.body.statements, inner(loop), stmt.body.span)
-    session, span, actions, weight = unit.session, stmt.iterable.span, body.actions, body.weight + 1
-
-    def items(value: Any) -> Any:
-        if value.__class__ is Vec:
-            return value.items
-        if value.__class__ is RangeValue:
-            if value.unit != "number" and value.step is None:
-                help = "add a step, as in 0deg..90deg step 30deg"
-                raise Problem("E0311", f"a range of {value.unit}s without a step", help)
-            value.count()
-            return value
-        advice = "write 0..<n for n passes" if value.__class__ is float else None
-        raise unexpected("a range or a vector", value, advice)
-
-    check = guarded(unit, items, span, (), item_steps=0)
-    get = iterable.run
+    get = prepare(stmt.iterable, place).run
+    loop = place.inner()._replace(repeated=True)
+    slot = loop.scope.slots.add()
+    define(stmt.variable, Binding("loop", stmt.variable.span, loop.scope.slots, slot), loop)
+    actions, weight = prepare_inner(stmt.body, loop.inner())
+    session, span = place.session, stmt.iterable.span
+    check = guarded(place, _items, span, (), item_steps=0)
 
     def action(env: Env, out: Builder) -> None:
         values = check(get(env))
@@ -297,7 +247,7 @@ def prepare_for(stmt: nodes.For, place: Place) -> Action | None:
             env[slot] = value
             if session.watch is not None:
                 session.watch(stmt.variable.span, value)
-            session.tick(weight, span)
+            session.tick(weight + 1, span)
             for act in actions:
                 act(env, out)
 
@@ -305,15 +255,14 @@ def prepare_for(stmt: nodes.For, place: Place) -> Action | None:
 
 
 def prepare_if(stmt: nodes.If, place: Place) -> Action | None:
-    unit = place.unit
     arms: list[tuple[Callable[[Env], Any], Body]] = []
     at: nodes.If | nodes.Block | None = stmt
     while isinstance(at, nodes.If):
-        test = condition(at.condition, unit, place.scope).run
-        arms.append((test, prepare_block(at.then.statements, inner(place), at.then.span)))
+        test = condition(at.condition, place).run
+        arms.append((test, prepare_inner(at.then, place.inner())))
         at = at.otherwise
-    last = prepare_block(at.statements, inner(place), at.span) if at is not None else None
-    session, span = unit.session, stmt.condition.span
+    last = prepare_inner(at, place.inner()) if at is not None else None
+    session, span = place.session, stmt.condition.span
 
     def action(env: Env, out: Builder) -> None:
         chosen = last
@@ -325,8 +274,6 @@ def prepare_if(stmt: nodes.If, place: Place) -> Action | None:
             if value is POISON:
                 return
         if chosen is not None:
-            session.tick(chosen.weight, span)
-            for act in chosen.actions:
-                act(env, out)
+            chosen.run(env, out, session, span)
 
     return action

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final, NamedTuple
 
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.costs import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS
-from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.file_context import Place
 from scenelang.evaluate.limits import MAX_NESTING
-from scenelang.evaluate.names import Env, Needs, Scope
+from scenelang.evaluate.names import Env, Needs
 from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.values.value import POISON, Problem, Vec
 from scenelang.syntax import nodes
 
 Run = Callable[[Env], Any]
 
-
-class Varies:
-    """Marks an expression whose value is known only when it runs."""
-
-    __slots__ = ()
-
-
-VARIES: Final = Varies()
+VARIES: Final = object()
+"""Marks an expression whose value is known only when it runs."""
 _FOLDED_NUMBERS: Final = 64
 _ANGLES: Final = {"rotate": "angle", "hue": "angle", "sin": "x", "cos": "x", "tan": "x"}
 """What takes an angle first, and how it calls it."""
@@ -36,18 +30,11 @@ class Code(NamedTuple):
     value: Any = VARIES
 
 
-def watched(run: Run, span: Span, unit: Unit) -> Run:
-    """``run``, showing its values to whoever watches the session."""
-    watch = unit.session.watch
-    if watch is None:
-        return run
+class Given(NamedTuple):
+    """An argument of a call, and its prepared value."""
 
-    def shown(env: Env) -> Any:
-        value = run(env)
-        watch(span, value)
-        return value
-
-    return shown
+    arg: nodes.Argument
+    code: Code
 
 
 def constant(value: Any) -> Code:
@@ -58,36 +45,35 @@ def constant(value: Any) -> Code:
 POISONED: Final = constant(POISON)
 
 
-def prepare(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
+def prepare(expr: nodes.Expr, place: Place) -> Code:
     """Resolve the names of ``expr`` and make it runnable; reports what is wrong in any case."""
-    unit.weight += HALF_STEPS.get(expr.__class__, 1)
-    unit.nesting += 1
-    if unit.nesting > MAX_NESTING:
-        unit.nesting -= 1
-        message = f"a tree of more than {MAX_NESTING} levels"
-        raise unit.session.halt("E0324", message, expr.span)
+    file = place.file
+    file.weight += HALF_STEPS.get(expr.__class__, 1)
+    file.nesting += 1
     try:
-        code: Code = unit.session.expressions[expr.__class__](expr, unit, scope)
+        if file.nesting > MAX_NESTING:
+            raise file.session.halt("E0324", f"a tree of more than {MAX_NESTING} levels", expr.span)
+        code: Code = file.session.expressions[expr.__class__](expr, place)
         return code
     finally:
-        unit.nesting -= 1
+        file.nesting -= 1
 
 
-def prepare_arguments(name: str, args: Iterable[nodes.Argument], unit: Unit, scope: Scope) -> dict[int, Code]:
-    """Prepare the arguments of one of the language's own words, by their ids."""
-    wanted, codes = _ANGLES.get(name, ""), {}
-    for index, arg in enumerate(args):
-        is_angle = wanted and (arg.name.text == wanted if arg.name else index == 0)
-        codes[id(arg)] = (_prepare_angle if is_angle else prepare)(arg.value, unit, scope)
-    return codes
+def prepare_arguments(args: Iterable[nodes.Argument] | None, place: Place, name: str = "") -> list[Given]:
+    """Prepare the arguments of a call; ``name`` is that of one of the language's own words."""
+    angle, given = _ANGLES.get(name, ""), []
+    for index, arg in enumerate(args or ()):
+        is_angle = angle and (arg.name.text == angle if arg.name else index == 0)
+        given.append(Given(arg, (_prepare_angle if is_angle else prepare)(arg.value, place)))
+    return given
 
 
-def _prepare_angle(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
+def _prepare_angle(expr: nodes.Expr, place: Place) -> Code:
     """`prepare`, noting a 0 without a unit that may be another number in another frame."""
-    session = unit.session
+    session = place.session
     around, session.needs = session.needs, Needs()
     try:
-        code = prepare(expr, unit, scope)
+        code = prepare(expr, place)
     finally:
         own, session.needs = session.needs, around
         around.on.append(own)
@@ -98,13 +84,13 @@ def _prepare_angle(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
     def run(env: Env) -> Any:
         value = get(env)
         if value.__class__ is float and value == 0.0 and own.varies():
-            session.zeros[id(expr.span.source), expr.span.start, expr.span.end] = expr.span
+            session.zeros[expr.span.source, expr.span] = expr.span
         return value
 
     return Code(run)
 
 
-def folded(unit: Unit, codes: list[Code], function: Callable[..., Any], run: Run) -> Code:
+def folded(codes: Iterable[Code], function: Callable[..., Any], run: Run) -> Code:
     """``run``, or its value where all inputs are constant and nothing is wrong with it."""
     values = [code.value for code in codes]
     if VARIES in values or POISON in values:
@@ -118,14 +104,14 @@ def folded(unit: Unit, codes: list[Code], function: Callable[..., Any], run: Run
 
 
 def guarded(
-    unit: Unit,
+    place: Place,
     function: Callable[..., Any],
     span: Span,
     operands: tuple[nodes.Expr | None, ...],
     item_steps: int = ITEM_STEPS,
 ) -> Callable[..., Any]:
     """``function`` on values: silent on poison, problems reported, its work counted."""
-    session = unit.session
+    session = place.session
 
     def run(*values: Any) -> Any:
         session.steps += GENERAL_STEPS  # the next call or pass looks at the limit
@@ -142,3 +128,21 @@ def guarded(
             return POISON
 
     return run
+
+
+def computed(
+    place: Place,
+    function: Callable[..., Any],
+    span: Span,
+    exprs: Sequence[nodes.Expr],
+    codes: Sequence[Code] | None = None,
+    item_steps: int = ITEM_STEPS,
+) -> Code:
+    """``function`` of expressions, guarded and folded; they are prepared unless they come as ``codes``."""
+    codes = [prepare(expr, place) for expr in exprs] if codes is None else codes
+    getters = tuple([code.run for code in codes])
+    slow = guarded(place, function, span, tuple(exprs), item_steps)
+    if len(getters) == 1:
+        get = getters[0]
+        return folded(codes, function, lambda env: slow(get(env)))
+    return folded(codes, function, lambda env: slow(*[get(env) for get in getters]))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from scenelang.diagnostics.diagnostic import Edit, Fix, Label
+from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, instead, listing
-from scenelang.evaluate.names import Binding, Scope
-from scenelang.evaluate.prepare.blocks import Action, Place, inner, prepare_block
-from scenelang.evaluate.prepare.expressions import prepare
+from scenelang.evaluate.file_context import Action, Place
+from scenelang.evaluate.names import Binding
+from scenelang.evaluate.prepare.blocks import prepare_inner
+from scenelang.evaluate.prepare.expressions import prepare_arguments
 from scenelang.evaluate.prepare.materials import prepare_value_use
 from scenelang.evaluate.prepare.nodes import HOLDERS, prepare_module_call, prepare_object
 from scenelang.evaluate.prepare.references import lookup, wrong_kind
@@ -16,7 +17,14 @@ from scenelang.evaluate.prepare.transforms import prepare_move
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice
 from scenelang.evaluate.report.shapes import in_library
-from scenelang.evaluate.report.undefined import VALUES, report_unknown, unknown, unknown_member, within_effort
+from scenelang.evaluate.report.undefined import (
+    VALUES,
+    report_early,
+    report_unknown,
+    unknown,
+    unknown_member,
+    within_effort,
+)
 from scenelang.syntax import nodes
 from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, NODES, OPERATIONS, SETTINGS, TRANSFORMS
 
@@ -27,10 +35,9 @@ def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
         return prepare_setting(stmt, place)
     if name in TRANSFORMS or name in OPERATIONS:
         return prepare_move(stmt, place)
-    binding = lookup(stmt.name, place.unit, place.scope)
+    binding = lookup(stmt.name, place)
     if binding is None:
-        words = place.unit.session.vocabulary
-        if name in words.geometries:
+        if name in place.session.vocabulary.geometries:
             return prepare_object(stmt, place)
         if not _lacks_module(stmt, place):
             _skim(stmt, place)
@@ -39,19 +46,19 @@ def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
     if binding.kind == "module":
         return prepare_module_call(stmt, binding.value, place)
     if binding.kind in VALUES:
-        if _is_hidden_geometry(stmt, place):
-            wrong_kind(stmt.name, binding, place.unit, "a geometry here", "give one of them another name")
-            return None
-        return prepare_value_use(stmt, binding, place)
+        if not _is_hidden_geometry(stmt, place):
+            return prepare_value_use(stmt, binding, place)
+        wrong_kind(stmt.name, binding, place, "a geometry here", "give one of them another name")
+        return None
     _skim(stmt, place)
     if binding.kind != "poison":
-        wrong_kind(stmt.name, binding, place.unit, "an object or a module")
+        wrong_kind(stmt.name, binding, place, "an object or a module")
     return None
 
 
 def _is_hidden_geometry(stmt: nodes.Call, place: Place) -> bool:
     """Whether a statement can only be an object of a geometry, whose name stands for a value here."""
-    if stmt.name.text not in place.unit.session.vocabulary.geometries or place.kind not in HOLDERS:
+    if stmt.name.text not in place.session.vocabulary.geometries or place.kind not in HOLDERS:
         return False
     inside = stmt.body.statements if stmt.body is not None else ()
     return place.kind == "file" or any(
@@ -62,123 +69,104 @@ def _is_hidden_geometry(stmt: nodes.Call, place: Place) -> bool:
 
 def _skim(stmt: nodes.Call, place: Place) -> None:
     """Look for mistakes in the arguments and the block of something that will not run."""
-    for arg in stmt.args or ():
-        prepare(arg.value, place.unit, place.scope)
-    if stmt.body is not None:
-        prepare_block(stmt.body.statements, inner(place, "unknown"), stmt.body.span)
+    prepare_arguments(stmt.args, place)
+    prepare_inner(stmt.body, place.inner("unknown"))
 
 
 def _lacks_module(stmt: nodes.Call, place: Place) -> bool:
     """Report ``dot(x, y) { … }`` whose arguments are unknown names: the word `module` is missing."""
-    unit, scope, name = place.unit, place.scope, stmt.name
-    if stmt.body is None or not stmt.args or "." in name.text:
+    name, damage = stmt.name.text, place.file.damage
+    if stmt.body is None or not stmt.args or "." in name or (damage and damage.loses(name)):
         return False
-    params = [
-        arg.name or (arg.value.name if isinstance(arg.value, nodes.NameRef) else None) for arg in stmt.args
-    ]
-    bare = [p for p, arg in zip(params, stmt.args, strict=True) if p is not None and arg.name is None]
-    if None in params or not bare or not all(_stands_for_nothing(p.text, scope) for p in bare):
+    values = [arg.value.name for arg in stmt.args if isinstance(arg.value, nodes.NameRef) and not arg.name]
+    params = [arg.name for arg in stmt.args if arg.name] + values
+    if len(params) < len(stmt.args) or not values:
         return False
-    if unit.damage and unit.damage.loses(name.text):
+    if any(place.scope.find(p.text) or p.text in CONSTANTS or p.text in ANIMATED for p in values):
         return False
-    body = inner(place, "unknown")
-    for param in params:
-        if param is not None:
-            body.scope.names[param.text] = Binding("poison", param.span)
-    prepare_block(stmt.body.statements, body, stmt.body.span)
+    body = place.inner("unknown")
+    body.scope.names.update({param.text: Binding("poison", param.span) for param in params})
+    prepare_inner(stmt.body, body)
     written = ", ".join(arg.span.text for arg in stmt.args)
-    help = f"to define it write module {name.text}({written}) {{ … }}"
-    message = f"unknown geometry or module `{name.text}`"
-    report_unknown(name, unit, scope, "E0204", message, advise=lambda: (help, None), kinds=("module",))
+    help = f"to define it write module {name}({written}) {{ … }}"
+    message = f"unknown geometry or module `{name}`"
+    report_unknown(stmt.name, place, "E0204", message, advise=lambda: (help, None), kinds=("module",))
     return True
-
-
-def _stands_for_nothing(name: str, scope: Scope) -> bool:
-    return scope.find(name) is None and name not in CONSTANTS and name not in ANIMATED
 
 
 def _unknown(stmt: nodes.Call, place: Place) -> None:
     """Report a statement whose name stands for nothing."""
-    unit, scope, name = place.unit, place.scope, stmt.name
-    session, words = unit.session, unit.session.vocabulary
-    if unit.damage and unit.damage.loses(name.text):
+    name, text, words = stmt.name, stmt.name.text, place.session.vocabulary
+    if place.file.damage and place.file.damage.loses(text):
         return
-    if "." in name.text:
-        alias = scope.find(name.text.partition(".")[0])
-        if alias is not None and alias.kind == "import":
-            unknown_member(name, unit, alias.value)
-        elif alias is None:
-            unknown(name, unit, scope)
+    if "." in text:
+        alias = place.scope.find(text.partition(".")[0])
+        if alias is None:
+            unknown(name, place)
+        elif alias.kind == "import":
+            unknown_member(name, place, alias.value)
         else:
-            wrong_kind(name, alias, unit, "an imported file")
+            wrong_kind(name, alias, place, "an imported file")
         return
     if words.blind and place.kind in HOLDERS:
         return  # it may be a geometry of the model that is not at hand
-    later = scope.defined_later(name.text)
-    if later is not None:
-        help = f"move the definition of `{name.text}` above this line"
-        labels = (Label(later, "defined here"),)
-        session.report.error(
-            "E0203", f"`{name.text}` is used before its line", name.span, labels=labels, help=help
-        )
+    if report_early(name, place):
         return
-    owner = words.owner(name.text)
+    owner = words.owner(text)
     if owner is not None and words.chosen is not None:
-        message = f"geometry `{name.text}` belongs to model `{owner}`, not `{words.chosen.name}`"
+        message = f"geometry `{text}` belongs to model `{owner}`, not `{words.chosen.name}`"
         help = f"model `{words.chosen.name}` draws {listing(words.geometries)}"
-        session.report.error("E0205", message, name.span, help=help, labels=session.model_label())
+        place.report.error("E0205", message, name.span, help=help, labels=place.session.model_label())
         return
-    if name.text in FUNCTIONS:
-        message = f"`{name.text}` is a function, not an object or a module"
-        session.report.error("E0213", message, name.span)
+    if text in FUNCTIONS:
+        place.report.error("E0213", f"`{text}` is a function, not an object or a module", name.span)
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
-
-    def advise() -> Advice:
-        candidates = _candidates(stmt, place, scope)
-        hint, fix = did_you_mean(name.text, candidates, name.span, effort=session.report.effort)
-        if hint is None and place.kind in HOLDERS:
-            hint, fix = in_library(stmt, unit, scope)
-        if fix is None:
-            known, fix = instead(name.text, foreign_words.WORDS, candidates, name.span)
-            hint = known or hint
-        if fix is not None and stmt.body is not None and fix.edits[0].replacement in NODES:
-            span = Span(name.span.source, name.span.start, stmt.body.span.start)  # without parentheses
-            fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
-        meant = foreign_words.WORDS.get(name.text, "")
-        if hint is None and place.kind == "object" and meant in words.material_ops - words.transforms:
-            from scenelang.evaluate.report.habits import in_material  # only mistakes need it
-
-            hint = f"it is called `{meant}` here and stands in a material: material flat {{ {meant}(…); }}"
-            fix = in_material(stmt, place.unit.session, meant)
-        if hint is None and foreign_words.STATEMENTS.get(name.text):
-            hint = foreign_words.STATEMENTS[name.text]
-        if hint is None and place.kind in ("file", "group", "chain") and words.geometries:
-            hint = f"the model draws {listing(words.geometries)}"
-        return hint, fix
-
-    message = f"unknown {what} `{name.text}`"
-    report_unknown(name, unit, scope, "E0204", message, advise=advise, kinds=("module", *VALUES))
+    kinds = ("module", *VALUES)
+    message = f"unknown {what} `{text}`"
+    report_unknown(name, place, "E0204", message, advise=lambda: _advice(stmt, place), kinds=kinds)
 
 
-def _candidates(stmt: nodes.Call, place: Place, scope: Scope) -> set[str]:
+def _advice(stmt: nodes.Call, place: Place) -> Advice:
+    """What may have been meant by a statement whose name stands for nothing."""
+    name, text, words = stmt.name, stmt.name.text, place.session.vocabulary
+    candidates = _candidates(stmt, place)
+    help, fix = did_you_mean(text, candidates, name.span, effort=place.report.effort)
+    if help is None and place.kind in HOLDERS:
+        help, fix = in_library(stmt, place)
+    if fix is None:
+        known, fix = instead(text, foreign_words.WORDS, candidates, name.span)
+        help = known or help
+    if fix is not None and stmt.body is not None and fix.edits[0].replacement in NODES:
+        span = Span(name.span.source, name.span.start, stmt.body.span.start)  # without parentheses
+        fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
+    meant = foreign_words.WORDS.get(text, "")
+    if help is None and place.kind == "object" and meant in words.material_ops - words.transforms:
+        from scenelang.evaluate.report.habits import in_material  # only mistakes need it
+
+        help = f"it is called `{meant}` here and stands in a material: material flat {{ {meant}(…); }}"
+        fix = in_material(stmt, place.session, meant)
+    help = help or foreign_words.STATEMENTS.get(text)
+    if help is None and place.kind in ("file", "group", "chain") and words.geometries:
+        help = f"the model draws {listing(words.geometries)}"
+    return help, fix
+
+
+def _candidates(stmt: nodes.Call, place: Place) -> set[str]:
     """Names that could have been meant, given where the statement stands and how it looks."""
-    words = place.unit.session.vocabulary
-    before = stmt.span.source.text[max(0, stmt.span.start - 1000) : stmt.span.start].rstrip()
-    otherwise = {"else", "else if"} if before.endswith("}") and stmt.body is not None else set()
-    if place.kind == "material":
+    words, kind = place.session.vocabulary, place.kind
+    if kind == "material":
         return words.material_ops
-    if place.kind == "object" and stmt.args is not None:
+    if kind == "object" and stmt.args is not None:
         return words.transforms
-    near = within_effort(place.unit.session.report, scope, VALUES if place.kind == "object" else ("module",))
-    names = {n for n, _ in near}
-    if place.kind == "object":
+    names = {n for n, _ in within_effort(place, VALUES if kind == "object" else ("module",))}
+    if kind == "object":
         return {*names, "material"}
     found = words.geometries | names
-    if not stmt.args and stmt.body is not None:
-        found.update((*NODES, *(otherwise - {"else if"})))
-    if stmt.args is not None and stmt.body is None:
-        found.update(words.transforms if place.kind != "file" else SETTINGS)
-    if stmt.args is not None and stmt.body is not None:
-        found.update(otherwise - {"else"})
-    return found
+    if stmt.body is None:
+        return found if stmt.args is None else found | (words.transforms if kind != "file" else {*SETTINGS})
+    before = stmt.span.source.text[max(0, stmt.span.start - 1000) : stmt.span.start].rstrip()
+    otherwise = before.endswith("}")
+    if not stmt.args:
+        found = {*found, *NODES, *(["else"] if otherwise else [])}
+    return {*found, "else if"} if stmt.args is not None and otherwise else found

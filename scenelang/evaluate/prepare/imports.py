@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from scenelang.evaluate.builder import Builder
-from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.file_context import Action, FileContext, Place
 from scenelang.evaluate.names import Binding, Env
-from scenelang.evaluate.prepare.blocks import Action, Body, Place, define, prepare_block
+from scenelang.evaluate.prepare.blocks import Body, define, prepare_block
 from scenelang.evaluate.prepare.settings import at_top_level
 from scenelang.evaluate.report.suppression import find_damage
 from scenelang.syntax import nodes
@@ -14,19 +14,19 @@ _BROUGHT = (nodes.Param, nodes.Let, nodes.Fn, nodes.Module, nodes.Import, nodes.
 
 
 def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
-    unit = place.unit
+    context, alias = place.file, stmt.alias
     if not at_top_level(place, stmt.span, "an import"):
-        define(stmt.alias, Binding("poison", stmt.alias.span), place)
+        define(alias, Binding("poison", alias.span), place)
         return None
-    loader = unit.loader
-    binding = Binding("import", stmt.alias.span)
-    good = define(stmt.alias, binding, place)
-    path = loader.find(stmt, unit.path, unit.session)
-    file = loader.read(path, stmt, unit.session) if path is not None else None
+    loader = context.loader
+    binding = Binding("import", alias.span)
+    good = define(alias, binding, place)
+    path = loader.find(stmt, context.path, context.session)
+    file = loader.read(path, stmt, context.session) if path is not None else None
     if path is None or file is None or not good:
         return None
-    prefix = f"{unit.prefix}{stmt.alias.text}."
-    brought = Unit(file.span.source, unit.session, loader, unit.defines, path, prefix)
+    prefix = f"{context.prefix}{alias.text}."
+    brought = FileContext(file.span.source, context.session, loader, context.defines, path, prefix)
     loader.chain.append(path)
     loader.sites.append(stmt.path.span)
     try:
@@ -35,20 +35,20 @@ def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
         loader.chain.pop()
         loader.sites.pop()
     binding.value = brought
-    env = brought.root_env
 
     def action(_: Env, out: Builder) -> None:
         for act in body.actions:
-            act(env, Builder())
+            act(brought.env, Builder())
 
     return action
 
 
-def prepare_file(unit: Unit, file: nodes.File, *, imported: bool = False) -> Body:
+def prepare_file(context: FileContext, file: nodes.File, *, imported: bool = False) -> Body:
     """Prepare a file's statements; of an imported one only what it brings."""
-    unit.damage = find_damage(file, unit.session.report.diagnostics)
-    if unit.damage:
-        unit.session.report.damaged[id(unit.source)] = unit.damage
-    unit.first = file.statements[0] if file.statements else None
+    report = context.session.report
+    context.damage = find_damage(file, report.diagnostics)
+    if context.damage:
+        report.damaged[context.source] = context.damage
+    context.first = file.statements[0] if file.statements else None
     statements = [s for s in file.statements if not imported or isinstance(s, _BROUGHT)]
-    return prepare_block(statements, Place(unit, unit.scope, "file"), file.span)
+    return prepare_block(statements, Place(context, context.scope, "file"), file.span)

@@ -7,9 +7,9 @@ import operator
 from collections.abc import Callable
 from typing import Any, Final
 
-from scenelang.evaluate.file_context import Unit
-from scenelang.evaluate.names import Env, Scope
-from scenelang.evaluate.prepare.expressions import POISONED, Code, Run, folded, guarded, prepare
+from scenelang.evaluate.file_context import Place
+from scenelang.evaluate.names import Env
+from scenelang.evaluate.prepare.expressions import POISONED, Code, computed, folded, guarded, prepare
 from scenelang.evaluate.values import operators
 from scenelang.evaluate.values.value import POISON, unexpected
 from scenelang.syntax import nodes
@@ -28,54 +28,47 @@ _FAST: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "==": operator.eq,
     "!=": operator.ne,
 }
+"""What operators mean on two numbers, unless that is an error or not finite."""
 
 
-def _meaning(op: str) -> Callable[[Any, Any], Any]:
+def _meaning(op: str, a: Any, b: Any) -> Any:
     if op in operators.ARITHMETIC:
-        return lambda a, b: operators.binary(op, a, b)
+        return operators.binary(op, a, b)
     if op in operators.COMPARE:
-        return lambda a, b: operators.compare(op, a, b)
-    if op == "==":
-        return operators.equal
-    return lambda a, b: not operators.equal(a, b)
+        return operators.compare(op, a, b)
+    return operators.equal(a, b) is (op == "==")
 
 
-def _join(left: Run, right: Run, op: str, slow: Callable[[Any, Any], Any]) -> Run:
-    """A closure for one operator, with the common case of two numbers inline."""
-    fast = _FAST[op]
-    if op in operators.ARITHMETIC:
+def prepare_binary(expr: nodes.Binary, place: Place) -> Code:
+    op = expr.op
+    if op in ("&&", "||"):
+        return _logic(expr, place)
+    codes = [prepare(expr.left, place), prepare(expr.right, place)]
+    if op not in _FAST:
+        return POISONED  # recovery kept what was written, and reported it
 
-        def arithmetic(env: Env) -> Any:
-            a, b = left(env), right(env)
-            if a.__class__ is float and b.__class__ is float:
-                try:
-                    result = fast(a, b)
-                    if result - result == 0.0:
-                        return result
-                except (ArithmeticError, ValueError):
-                    pass
-            return slow(a, b)
+    def meaning(a: Any, b: Any) -> Any:
+        return _meaning(op, a, b)
 
-        return arithmetic
+    slow = guarded(place, meaning, expr.op_span, (expr.left, expr.right))
+    left, right, fast = codes[0].run, codes[1].run, _FAST[op]
+
+    def arithmetic(env: Env) -> Any:
+        a, b = left(env), right(env)
+        if a.__class__ is float and b.__class__ is float:
+            try:
+                result = fast(a, b)
+                if result - result == 0.0:
+                    return result
+            except (ArithmeticError, ValueError):
+                pass
+        return slow(a, b)
 
     def compare(env: Env) -> Any:
         a, b = left(env), right(env)
-        if a.__class__ is float and b.__class__ is float:
-            return fast(a, b)
-        return slow(a, b)
+        return fast(a, b) if a.__class__ is float and b.__class__ is float else slow(a, b)
 
-    return compare
-
-
-def prepare_binary(expr: nodes.Binary, unit: Unit, scope: Scope) -> Code:
-    if expr.op in ("&&", "||"):
-        return _logic(expr, unit, scope)
-    left, right = prepare(expr.left, unit, scope), prepare(expr.right, unit, scope)
-    if expr.op not in _FAST:
-        return POISONED  # recovery kept what was written, and reported it
-    meaning = _meaning(expr.op)
-    slow = guarded(unit, meaning, expr.op_span, (expr.left, expr.right))
-    return folded(unit, [left, right], meaning, _join(left.run, right.run, expr.op, slow))
+    return folded(codes, meaning, arithmetic if op in operators.ARITHMETIC else compare)
 
 
 def _truth(value: Any, operand: int = 0) -> bool:
@@ -85,13 +78,13 @@ def _truth(value: Any, operand: int = 0) -> bool:
     raise unexpected("a boolean", value, help, operand)
 
 
-def condition(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
+def condition(expr: nodes.Expr, place: Place) -> Code:
     """A prepared expression that is true, false or poison."""
-    code = prepare(expr, unit, scope)
+    code = prepare(expr, place)
     if code.value is True or code.value is False:
         return code
     get = code.run
-    slow = guarded(unit, _truth, expr.span, (expr,))
+    slow = guarded(place, _truth, expr.span, (expr,))
 
     def run(env: Env) -> Any:
         value = get(env)
@@ -100,9 +93,8 @@ def condition(expr: nodes.Expr, unit: Unit, scope: Scope) -> Code:
     return Code(run)
 
 
-def _logic(expr: nodes.Binary, unit: Unit, scope: Scope) -> Code:
-    left = condition(expr.left, unit, scope).run
-    right = condition(expr.right, unit, scope).run
+def _logic(expr: nodes.Binary, place: Place) -> Code:
+    left, right = condition(expr.left, place).run, condition(expr.right, place).run
     decides = expr.op == "||"
 
     def run(env: Env) -> Any:
@@ -112,26 +104,22 @@ def _logic(expr: nodes.Binary, unit: Unit, scope: Scope) -> Code:
     return Code(run)
 
 
-def prepare_unary(expr: nodes.Unary, unit: Unit, scope: Scope) -> Code:
-    if expr.op == "!":
-        truth = condition(expr.operand, unit, scope).run
+def prepare_unary(expr: nodes.Unary, place: Place) -> Code:
+    if expr.op != "!":
+        meaning = operators.negate if expr.op == "-" else operators.plus
+        return computed(place, meaning, expr.span, (expr.operand,))
+    truth = condition(expr.operand, place).run
 
-        def invert(env: Env) -> Any:
-            value = truth(env)
-            return POISON if value is POISON else not value
+    def invert(env: Env) -> Any:
+        value = truth(env)
+        return POISON if value is POISON else not value
 
-        return Code(invert)
-    code = prepare(expr.operand, unit, scope)
-    meaning = operators.negate if expr.op == "-" else operators.plus
-    slow = guarded(unit, meaning, expr.span, (expr.operand,))
-    get = code.run
-    return folded(unit, [code], meaning, lambda env: slow(get(env)))
+    return Code(invert)
 
 
-def prepare_conditional(expr: nodes.Conditional, unit: Unit, scope: Scope) -> Code:
-    test = condition(expr.condition, unit, scope).run
-    then = prepare(expr.then, unit, scope).run
-    otherwise = prepare(expr.otherwise, unit, scope).run
+def prepare_conditional(expr: nodes.Conditional, place: Place) -> Code:
+    test = condition(expr.condition, place).run
+    then, otherwise = prepare(expr.then, place).run, prepare(expr.otherwise, place).run
 
     def run(env: Env) -> Any:
         value = test(env)

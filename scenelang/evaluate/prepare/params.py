@@ -9,11 +9,11 @@ from typing import Any
 from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix, Label
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.builder import Builder
-from scenelang.evaluate.file_context import Unit
+from scenelang.evaluate.file_context import Action, FileContext, Place
 from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.names import Binding, Env
-from scenelang.evaluate.prepare.blocks import Action, Place, define
-from scenelang.evaluate.prepare.expressions import VARIES, Code, prepare
+from scenelang.evaluate.prepare.blocks import define
+from scenelang.evaluate.prepare.expressions import VARIES, prepare
 from scenelang.evaluate.prepare.settings import at_top_level
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Reporter
@@ -35,19 +35,18 @@ from scenelang.syntax import nodes, parse
 
 
 def prepare_param(stmt: nodes.Param, place: Place) -> Action | None:
-    unit, name = place.unit, stmt.name
-    session = unit.session
-    default = prepare(stmt.default, unit, place.scope)
-    bounds = prepare(stmt.range, unit, place.scope) if stmt.range is not None else None
-    slot = place.scope.frame.slot()
+    file, name, session, slots = place.file, stmt.name, place.session, place.scope.slots
+    default = prepare(stmt.default, place)
+    bounds = prepare(stmt.range, place) if stmt.range is not None else None
+    slot = slots.add()
     if not at_top_level(place, name.span, "a param"):
         define(name, Binding("poison", name.span), place)
         return None
-    if not define(name, Binding("param", name.span, place.scope.frame, slot, needs=session.needs), place):
+    if not define(name, Binding("param", name.span, slots, slot, needs=session.needs), place):
         return None
-    full = unit.prefix + name.text
-    unit.defines.known[full] = name.span
-    given = unit.defines.values.get(full, VARIES)
+    full = file.prefix + name.text
+    file.defines.known[full] = name.span
+    given = file.defines.values.get(full, VARIES)
 
     def action(env: Env, out: Builder) -> None:
         value = default.run(env)
@@ -55,7 +54,7 @@ def prepare_param(stmt: nodes.Param, place: Place) -> Action | None:
         if value is not POISON:
             value = _checked_default(value, allowed, stmt, session)
         if given is not VARIES:
-            value = _from_outside(full, given, value, allowed, stmt, unit)
+            value = _from_outside(full, given, value, allowed, stmt, file)
         env[slot] = value
         if session.watch is not None:
             session.watch(name.span, value)
@@ -114,58 +113,51 @@ def within(value: Any, allowed: Any) -> bool:
         return all(within(item, allowed) for item in value.items)
     if value.__class__ not in UNITS:
         raise Problem("E0301", f"{describe(value)} with a range of {allowed.unit}s")
-    x, unit = unpack(value)
-    same_unit(x, unit, allowed.start or allowed.stop, allowed.unit)
+    x, kind = unpack(value)
+    same_unit(x, kind, allowed.start or allowed.stop, allowed.unit)
     return bool(allowed.contains(x))
 
 
-def _from_outside(full: str, given: Any, default: Any, allowed: Any, stmt: nodes.Param, unit: Unit) -> Any:
+def _from_outside(
+    full: str, given: Any, default: Any, allowed: Any, stmt: nodes.Param, file: FileContext
+) -> Any:
     """The value from outside, of the default's type and in range; poison after a report."""
-    span, session = stmt.name.span, unit.session
+    span, report = stmt.name.span, file.session.report
     text = given if isinstance(given, str) else repr(given)
     shown = f"{full}={text}" if len(text) <= 60 else f"{full}={text[:57]}…"
-    if default.__class__ is str and isinstance(given, str):
-        value: Any = given
-    else:
-        value = literal(given, unit) if isinstance(given, str) else from_python(given)
-        if value is None:
-            colour = foreign_words.COLOURS.get(given.lower()) if isinstance(given, str) else None
-            advice = "write a number with its unit, a colour, a vector, true or false"
-            if colour:
-                advice = f"colours have no names; {given} is {colour}"
-            labels = (Label(stmt.default.span, "its default"),)
-            session.report.error("E0310", f"{shown} is not a literal", span, help=advice, labels=labels)
-            return POISON
+    value = given
+    if default.__class__ is not str or not isinstance(given, str):
+        value = literal(given, file) if isinstance(given, str) else from_python(given)
+    help: str | None
+    if value is None:
+        colour = foreign_words.COLOURS.get(given.lower()) if isinstance(given, str) else None
+        help = "write a number with its unit, a colour, a vector, true or false"
+        help = f"colours have no names; {given} is {colour}" if colour else help
+        labels = (Label(stmt.default.span, "its default"),)
+        report.error("E0310", f"{shown} is not a literal", span, help=help, labels=labels)
+        return POISON
     if default is POISON:
         return value
-    fitting = _fit(value, default)
-    if fitting is None:
+    if value.__class__ is float and default.__class__ is Time:
+        value = Time(value)  # a bare number is seconds
+    elif value.__class__ is float and default.__class__ is Angle and value == 0.0:
+        value = Angle(0.0)
+    if value.__class__ is not default.__class__:
         help = "give it a unit, as in 30deg" if default.__class__ is Angle else None
         message = f"{shown} is {describe(value)}, expected {describe(default)}"
         labels = (Label(stmt.default.span, f"its default is {describe(default)}"),)
-        session.report.error("E0310", message, span, help=help, labels=labels)
+        report.error("E0310", message, span, help=help, labels=labels)
         return POISON
-    if allowed.__class__ is RangeValue or allowed.__class__ is Vec:
+    if stmt.range is not None and (allowed.__class__ is RangeValue or allowed.__class__ is Vec):
         try:
-            inside = within(fitting, allowed)
+            inside = within(value, allowed)
         except Problem:
-            return fitting  # the default has met and reported it
-        if not inside and stmt.range is not None:
+            return value  # the default has met and reported it
+        if not inside:
             labels = (Label(stmt.range.span, "the range"),)
-            session.report.error("E0309", f"{shown} is outside {stmt.range.span.text}", span, labels=labels)
+            report.error("E0309", f"{shown} is outside {stmt.range.span.text}", span, labels=labels)
             return POISON
-    return fitting
-
-
-def _fit(value: Any, default: Any) -> Any:
-    """``value`` as the type of ``default``, or None: 0 is any angle, a bare number seconds."""
-    if value.__class__ is default.__class__:
-        return value
-    if default.__class__ is Angle and value.__class__ is float and value == 0.0:
-        return Angle(0.0)
-    if default.__class__ is Time and value.__class__ is float:
-        return Time(value)
-    return None
+    return value
 
 
 def from_python(value: Any) -> Any:
@@ -187,19 +179,16 @@ def from_python(value: Any) -> Any:
     return None
 
 
-def literal(text: str, unit: Unit) -> Any:
+def literal(text: str, file: FileContext) -> Any:
     """The value of a literal; None where ``text`` is not a literal."""
-    diagnostics = Diagnostics()
-    head = "let value = "
-    file = parse(SourceFile("", f"{head}{text};"), diagnostics)
-    stmt = file.statements[0] if len(file.statements) == 1 else None
+    diagnostics, around = Diagnostics(), file.session
+    tree = parse(SourceFile("", f"let value = {text};"), diagnostics)
+    stmt = tree.statements[0] if len(tree.statements) == 1 else None
     if diagnostics.errors or not isinstance(stmt, nodes.Let) or not _is_literal(stmt.value):
         return None
-    around = unit.session
     session = Session(Reporter(diagnostics), around.vocabulary, around.expressions, around.statements)
-    alone = Unit(SourceFile("", text), session, unit.loader, Defines({}))
-    code: Code = prepare(stmt.value, alone, alone.scope)
-    value = code.value if code.value is not VARIES else code.run([])
+    alone = FileContext(SourceFile("", text), session, file.loader, Defines({}))
+    value = prepare(stmt.value, Place(alone, alone.scope, "file")).run([])
     return None if value is POISON or diagnostics.errors else value
 
 

@@ -10,10 +10,11 @@ from scenelang.diagnostics.fixes import removal
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.evaluate.builder import Builder, make
+from scenelang.evaluate.file_context import Action, Place
 from scenelang.evaluate.names import Env
 from scenelang.evaluate.prepare.arguments import bind
-from scenelang.evaluate.prepare.blocks import Action, Place, misplaced
-from scenelang.evaluate.prepare.expressions import prepare
+from scenelang.evaluate.prepare.blocks import misplaced
+from scenelang.evaluate.prepare.expressions import prepare, prepare_arguments
 from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import number
@@ -35,96 +36,74 @@ def at_top_level(place: Place, span: Span, what: str) -> bool:
     return False
 
 
-def once(session: Session, what: str, span: Span) -> bool:
+def _once(session: Session, what: str, span: Span) -> bool:
     """Whether a setting is given for the first time; reports a second time."""
     first = session.settings.given.setdefault(what, span)
-    if first is span:
-        return True
-    session.report.error(
-        "E0333", f"`{what}` is given twice", span, labels=(Label(first, "first given here"),)
-    )
-    return False
+    if first is not span:
+        labels = (Label(first, "first given here"),)
+        session.report.error("E0333", f"`{what}` is given twice", span, labels=labels)
+    return first is span
 
 
 def prepare_version(stmt: nodes.Version, place: Place) -> Action | None:
-    session, version = place.unit.session, stmt.number
+    version, first = stmt.number, place.file.first
     if not at_top_level(place, stmt.span, "the language version"):
         return None
     if version.unit or version.value != 1:
         message = f"language version {version.span.text} is not supported"
-        session.report.error("E0334", message, version.span, help="this is version 1: nsg 1;")
-    elif place.unit.first is not stmt:
+        place.report.error("E0334", message, version.span, help="this is version 1: nsg 1;")
+    elif first is not stmt:
+        fix = None
+        if first is not None and first.span.source is stmt.span.source:
+            source, start = stmt.span.source, first.span.start
+            there = Edit(Span(source, start, start), f"{stmt.span.text}\n")
+            away = removal(source, stmt.span.start, stmt.span.end)
+            fix = Fix("move it to the top", (there, *away.edits))
         message = "the language version is not the first statement"
-        session.report.error("E0334", message, stmt.span, fix=_to_the_top(stmt, place.unit.first))
+        place.report.error("E0334", message, stmt.span, fix=fix)
     return None
 
 
-def _to_the_top(stmt: nodes.Version, first: nodes.Stmt | None) -> Fix | None:
-    """Move a statement before the first one."""
-    if first is None or stmt.span.source is not first.span.source:
-        return None
-    source, start = stmt.span.source, first.span.start
-    away = removal(source, stmt.span.start, stmt.span.end)
-    return Fix("move it to the top", (Edit(Span(source, start, start), f"{stmt.span.text}\n"), *away.edits))
-
-
 def prepare_model(stmt: nodes.Model, place: Place) -> Action | None:
-    unit, session = place.unit, place.unit.session
-    if not at_top_level(place, stmt.span, "'model'") or not once(session, "model", stmt.span):
-        return None
-    if not isinstance(stmt.name, nodes.String):
-        if not isinstance(stmt.name, nodes.BadExpr):
-            prepare(stmt.name, unit, place.scope)
-            session.report.error("E0301", "expected the model's name as a string", stmt.name.span)
+    session, name, span = place.session, stmt.name, stmt.name.span
+    if not at_top_level(place, stmt.span, "'model'") or not _once(session, "model", stmt.span):
         return None
     known = [m.name for m in session.vocabulary.models]
-    if stmt.name.value not in known:
-        span = stmt.name.span
-        help, fix = did_you_mean(stmt.name.value, known, Span(span.source, span.start + 1, span.end - 1))
+    if not isinstance(name, nodes.String):
+        if not isinstance(name, nodes.BadExpr):
+            prepare(name, place)
+            session.report.error("E0301", "expected the model's name as a string", span)
+    elif name.value not in known:
+        help, fix = did_you_mean(name.value, known, Span(span.source, span.start + 1, span.end - 1))
         help = help or f"there is {listing(known)}"
-        session.report.error("E0210", f"unknown model `{stmt.name.value}`", span, help=help, fix=fix)
+        session.report.error("E0210", f"unknown model `{name.value}`", span, help=help, fix=fix)
     return None
 
 
 def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
     """``canvas``, ``background`` or ``animate``."""
-    unit, name, span = place.unit, stmt.name.text, stmt.name.span
-    session = unit.session
-    codes = {id(arg): prepare(arg.value, unit, place.scope) for arg in stmt.args or ()}
-    if not at_top_level(place, span, f"`{name}`") or not once(session, name, span):
+    session, name, span = place.session, stmt.name.text, stmt.name.span
+    given = prepare_arguments(stmt.args, place)
+    if not at_top_level(place, span, f"`{name}`") or not _once(session, name, span):
         return None
     if stmt.body is not None:
         session.report.error("E0330", f"`{name}` takes no block", span, help=f"write {name}(…);")
         return None
-    word = SETTINGS[name]
-    bound = bind(session, name, word.params, word.optional, stmt.args or (), span, spread=name == "canvas")
-    if bound is None:
-        return _unknown_time(session) if name == "animate" else None
-    getters = [codes[id(arg)].run if arg is not None else None for arg in bound]
-    operands = tuple([arg.value if arg is not None else None for arg in bound])
-    apply = _APPLY[name]
+    word, apply = SETTINGS[name], _APPLY[name]
+    bound = bind(session.report, stmt.name, word.params, word.required, given, spread=name == "canvas")
+    getters = [None if one is None else one.code.run for one in bound or ()]
+    operands = tuple([None if one is None else one.arg.value for one in bound or ()])
 
     def action(env: Env, out: Builder) -> None:
         values = [LEFT_OUT if get is None else get(env) for get in getters]
-        if any(value is POISON for value in values):
-            if name == "animate":
-                session.animated[:] = [POISON] * 4
-            return
         try:
-            apply(session, span, *values)
+            if bound is not None and POISON not in values:
+                apply(session, span, *values)
+                return
         except Problem as problem:
             report_problem(session.report, problem, span, operands)
-            if name == "animate":
-                session.animated[:] = [POISON] * 4
-
-    return action
-
-
-def _unknown_time(session: Session) -> Action:
-    """What `animate` with a mistake does: its variables are unknown, which is not a further mistake."""
-
-    def action(env: Env, out: Builder) -> None:
-        session.animated[:] = [POISON] * 4
+        if name == "animate":  # with a mistake, which is not a further one of what needs its variables
+            session.animated[:] = [POISON] * 4
 
     return action
 
@@ -152,11 +131,8 @@ def _background(session: Session, span: Span, value: Any) -> None:
         help = "in 3D the background belongs to the model"
         session.report.error("E0336", message, span, help=help, labels=session.model_label())
         return
-    if value is None:
-        session.settings.background = None
-        return
-    rgb = color(value)
-    for component in rgb:
+    rgb = None if value is None else color(value)
+    for component in rgb or ():
         if not 0.0 <= component <= 1.0:
             raise Problem("E0311", f"background component {show(component)} is outside 0..1", operand=0)
     session.settings.background = rgb
@@ -178,7 +154,6 @@ def _animate(session: Session, span: Span, seconds: Any, fps: Any, loop: Any) ->
     session.settings.animation = animation
     frame, frames = session.frame, animation.frames
     if not 0 <= frame < frames:
-        session.animated[:] = [POISON] * 4
         raise Problem("E0337", f"frame {frame} is outside 0..{frames - 1}")
     u = frame / frames if looping else frame / max(1, frames - 1)
     session.animated[:] = [frame / rate, u, float(frame), float(frames)]

@@ -7,7 +7,7 @@ from collections.abc import Container
 from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
-from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.syntax import nodes
 
 _GLUED: Final = "give it a unit: deg, rad or turn"
@@ -18,7 +18,7 @@ _OPENS: Final = ("(", "[", ",", "=", "")
 
 
 def angle_advice(
-    expr: nodes.Expr | None, variables: Container[tuple[int, int]], *, hue: bool = False
+    expr: nodes.Expr | None, variables: Container[tuple[SourceFile, int]], *, hue: bool = False
 ) -> tuple[str, Fix | None]:
     """Help and fix for a bare number where an angle is wanted.
 
@@ -60,11 +60,11 @@ def _at(expr: nodes.Expr, place: int) -> Span:
     return Span(expr.span.source, place, place)
 
 
-def _power_of_pi(expr: nodes.Expr, variables: Container[tuple[int, int]]) -> int:
+def _power_of_pi(expr: nodes.Expr, variables: Container[tuple[SourceFile, int]]) -> int:
     """To which power PI or TAU is a factor of a number: 1 where it is in radians, -1 in ``180 / PI``."""
     match expr:
         case nodes.NameRef(name=name):
-            own = (id(name.span.source), name.span.start) not in variables
+            own = (name.span.source, name.span.start) not in variables
             return int(own and name.text in ("PI", "TAU"))
         case nodes.Unary():
             return _power_of_pi(expr.operand, variables)

@@ -63,7 +63,9 @@ def member_advice(of: nodes.Expr | None, name: nodes.Name) -> Advice:
     return f"write {text}", write(of.span.to(name.span), text)
 
 
-def advice(problem: Problem, operand: nodes.Expr | None, variables: Container[tuple[int, int]]) -> Advice:
+def advice(
+    problem: Problem, operand: nodes.Expr | None, variables: Container[tuple[SourceFile, int]]
+) -> Advice:
     """Help and fix for a value of the wrong kind, by what the problem says can be mended."""
     if problem.fix == "colour":
         colour = _colour(operand.value) if isinstance(operand, nodes.String) else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Collection, Hashable
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Final
@@ -11,11 +11,9 @@ from scenelang.diagnostics.diagnostic import Diagnostics, Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import Effort
 from scenelang.evaluate.limits import MAX_COMPARED, Halt
-from scenelang.evaluate.report.mismatch import Misfit
 from scenelang.evaluate.report.suppression import NONE, Damage
 from scenelang.scene import library
 from scenelang.scene.spans import Calls
-from scenelang.syntax import nodes
 from scenelang.syntax.lexer import scan
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report
@@ -32,28 +30,29 @@ class Shared:
 
     Args:
         index: its index among the diagnostics.
+        code: its code.
         own: labels of its own.
         again: further places.
     """
 
     index: int
+    code: str
     own: tuple[Label, ...]
     again: dict[Span, None] = field(default_factory=dict)
 
 
-def shown_places(places: Collection[Span], words: str | Sequence[str], rest: str = "") -> tuple[Label, ...]:
+def shown_places(places: Collection[Span], words: str, rest: str = "") -> tuple[Label, ...]:
     """Labels for the places that share one report: the first few, and how many there are beyond.
 
     Args:
         places: in the order in which they were met.
-        words: what is said at each place, or at all.
+        words: what is said at each place.
         rest: how the number of the others is put: "in" for "and in 2 more".
     """
-    each = [words] * _SHOWN if isinstance(words, str) else words
-    labels = [Label(place, text) for place, text in zip(islice(places, _SHOWN), each, strict=False)]
+    labels = [Label(place, words) for place in islice(places, _SHOWN)]
     if len(places) > _SHOWN:
         more = f"{rest} {len(places) - _SHOWN} more".strip()
-        labels[-1] = replace(labels[-1], message=f"{labels[-1].message}, and {more}")
+        labels[-1] = replace(labels[-1], message=f"{words}, and {more}")
     return tuple(labels)
 
 
@@ -64,53 +63,33 @@ class Reporter:
     Args:
         diagnostics: receives them.
         calls: the calls that are running.
+        damaged: what syntax mistakes have damaged, by file.
+        reported: the code that was reported at each place.
+        shared: reports that several places share, by what they have in common.
+        at_definition: unknown names that were reported where a definition has the slip.
+        effort: what looking for similar names may still cost.
+        names_in: where each name of a file stands.
+        defined: where variables and functions are defined, by the file and start of each use.
     """
 
     diagnostics: Diagnostics
     calls: Calls | None = None
-    damaged: dict[int, Damage] = field(default_factory=dict)
-    reported: dict[tuple[int, int, int], str] = field(default_factory=dict)
-    blamed: dict[tuple[int, int, str], Shared] = field(default_factory=dict)
-    """Reports of values of the wrong kind, by the definitions they may come from and what is said."""
-    unknown: dict[tuple[str, str, int], Shared] = field(default_factory=dict)
-    """Reports of unknown names, by code, name and file."""
-    told: set[tuple[str, str, int]] = field(default_factory=set)
-    """Unknown names that were reported where a definition has the slip."""
-    effort: Effort = field(default_factory=lambda: Effort(MAX_COMPARED))
+    damaged: dict[SourceFile, Damage] = field(default_factory=dict)
+    reported: dict[tuple[SourceFile, Span], str] = field(default_factory=dict)
     shared: dict[Hashable, Shared] = field(default_factory=dict)
-    """Other reports that several places share, by what they have in common."""
-    misfits: dict[int, tuple[nodes.Fn | nodes.Module, dict[Span, Misfit]]] = field(default_factory=dict)
-    """Calls that do not fit by what they call and where, until they are reported."""
-    names_in: dict[int, dict[str, list[Span]]] = field(default_factory=dict)
-    defined: dict[tuple[int, int], Span] = field(default_factory=dict)
-    """Where variables and functions are defined, by the file and place of each use."""
-    origins: dict[tuple[int, int], nodes.Expr] = field(default_factory=dict)
-    """The values of lets and the bodies of functions, by the file and place of their names."""
-    parameters: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)
-    """What a parameter belongs to, as a key of ``given``, and its index; by its file and place."""
-    given: dict[int, list[list[nodes.Argument | None]]] = field(default_factory=dict)
-    """The arguments of all calls of a function or module."""
-
-    def call_labels(self) -> list[Label]:
-        """Labels for the innermost calls that are running."""
-        labels: list[Label] = []
-        calls = self.calls
-        while calls is not None and len(labels) < 2:
-            labels.append(Label(calls.span, "in this call"))
-            calls = calls.outer
-        return labels
+    at_definition: set[Hashable] = field(default_factory=set)
+    effort: Effort = field(default_factory=lambda: Effort(MAX_COMPARED))
+    names_in: dict[SourceFile, dict[str, list[Span]]] = field(default_factory=dict)
+    defined: dict[tuple[SourceFile, int], Span] = field(default_factory=dict)
 
     def follows(self, code: str, span: Span) -> bool:
         """Whether a diagnostic may follow from a syntax mistake, there or in a call that is running."""
         if not self.damaged:
             return False
-        damage = self.damaged.get(id(span.source), NONE)
-        calls = self.calls
-        while calls is not None:
-            if self.damaged.get(id(calls.span.source), NONE).holds(calls.span):
-                return True
-            calls = calls.outer
-        return damage.explains(code, span)
+        within = self.calls.outwards() if self.calls is not None else ()
+        if any(self.damaged.get(call.source, NONE).holds(call) for call in within):
+            return True
+        return self.damaged.get(span.source, NONE).explains(code, span)
 
     def error(
         self,
@@ -132,17 +111,25 @@ class Reporter:
         Raises:
             Halt: there are so many mistakes that no more are kept.
         """
-        site = self.calls.outside() if self.calls is not None and library.holds(span.source) else None
+        calls = self.calls
+        site = calls.outside() if calls is not None and library.holds(span.source) else None
         if site is not None:
             labels, fix, span = (Label(span, "which is used here"),), None, site
-        place = (id(span.source), span.start, span.end)
-        if self.reported.setdefault(place, code) != code or self.follows(code, span):
+        elif calls is not None:
+            labels = (*labels, *(Label(call, "in this call") for call in islice(calls.outwards(), 2)))
+        if self.reported.setdefault((span.source, span), code) != code or self.follows(code, span):
             return None  # one place, one mistake: what else is wrong there most likely comes of it
         index = len(self.diagnostics)
-        around = self.call_labels() if site is None else []
-        if not self.diagnostics.add(code, message, span, labels=(*labels, *around), help=help, fix=fix):
+        if not self.diagnostics.add(code, message, span, labels=labels, help=help, fix=fix):
             raise Halt
-        return Shared(index, self.diagnostics.items[index].labels) if index < len(self.diagnostics) else None
+        if index == len(self.diagnostics):
+            return None
+        return Shared(index, code, self.diagnostics.items[index].labels)
+
+    def warn(self, code: str, message: str, span: Span, help: str | None) -> None:
+        """Warn, unless it may follow from a mistake of syntax."""
+        if not self.follows(code, span):
+            self.diagnostics.add(code, message, span, help=help)
 
     def share(self, shared: Shared, place: Span, rest: str = "") -> None:
         """Show a further place at a report."""
@@ -180,9 +167,9 @@ class Reporter:
 
     def uses(self, source: SourceFile) -> dict[str, list[Span]]:
         """Where each name stands in a text, its definition included; made at the first unknown name."""
-        known = self.names_in.get(id(source))
+        known = self.names_in.get(source)
         if known is None:
-            known = self.names_in[id(source)] = {}
+            known = self.names_in[source] = {}
             tokens = scan(source, Report(source))
             kinds = {tables().kind(name) for name in ("NAME", "step", "as")}
             for index, kind in enumerate(tokens.kinds):

@@ -7,8 +7,7 @@ from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
-from scenelang.evaluate.file_context import Unit
-from scenelang.evaluate.names import Scope
+from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.scene import library
 from scenelang.syntax import nodes
 
@@ -65,16 +64,18 @@ SHAPES: Final = {
 """Names of shapes, in small letters."""
 
 
-def in_library(stmt: nodes.Call, unit: Unit, scope: Scope) -> tuple[str | None, Fix | None]:
+def in_library(stmt: nodes.Call, place: Place) -> tuple[str | None, Fix | None]:
     """Help and fix for a statement whose name is that of a shape of the library; both None for any other."""
     shape = SHAPES.get(stmt.name.text.lower())
-    if shape is None or not unit.session.vocabulary.geometries >= _LEAVES:
+    if shape is None or not place.session.vocabulary.geometries >= _LEAVES:
         return None, None
-    imported = next((n for n, b in scope.visible() if b.kind == "import" and _is_library(b.value)), None)
-    alias = imported or ("s" if scope.find("s") is None else "shapes")
+    imported = next(
+        (n for n, b in place.scope.visible() if b.kind == "import" and _is_library(b.value)), None
+    )
+    alias = imported or ("s" if place.scope.find("s") is None else "shapes")
     text = f'import "{library.SHAPES}" as {alias};'
     help = f"{'' if imported else text + ' then '}{alias}.{shape.call}"
-    if imported is None and scope.find(alias) is not None:
+    if imported is None and place.scope.find(alias) is not None:
         return help, None
     edit = _edit(stmt, shape, alias)
     if edit is None:
@@ -82,11 +83,11 @@ def in_library(stmt: nodes.Call, unit: Unit, scope: Scope) -> tuple[str | None, 
     message = f"write `{edit.replacement}`"
     if imported:
         return help, Fix(message, (edit,))
-    return help, Fix(f"import it and {message}", _with_import(edit, unit, text))
+    return help, Fix(f"import it and {message}", _with_import(edit, place.file, text))
 
 
 def _is_library(value: object) -> bool:
-    return isinstance(value, Unit) and value.source.name == library.called(library.SHAPES)
+    return isinstance(value, FileContext) and value.source.name == library.called(library.SHAPES)
 
 
 def _edit(stmt: nodes.Call, shape: Shape, alias: str) -> Edit | None:
@@ -99,11 +100,11 @@ def _edit(stmt: nodes.Call, shape: Shape, alias: str) -> Edit | None:
     return Edit(name, f"{alias}.{shape.module}") if fits else None
 
 
-def _with_import(edit: Edit, unit: Unit, text: str) -> tuple[Edit, ...]:
+def _with_import(edit: Edit, file: FileContext, text: str) -> tuple[Edit, ...]:
     """An edit, and the import on a line of its own at the head of the file."""
-    first = unit.first.span if unit.first is not None else edit.span
+    first = file.first.span if file.first is not None else edit.span
     source = first.source
-    if isinstance(unit.first, nodes.Version):
+    if isinstance(file.first, nodes.Version):
         return Edit(Span(source, first.end, first.end), f"\n{text}"), edit
     if first.start == edit.span.start:
         return (Edit(edit.span, f"{text}\n{edit.replacement}"),)

@@ -1,0 +1,142 @@
+"""Calls of functions: the language's own, and those that a scene defines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from scenelang.diagnostics.span import Span
+from scenelang.evaluate import costs
+from scenelang.evaluate.file_context import Place
+from scenelang.evaluate.limits import MAX_DEPTH
+from scenelang.evaluate.names import UNBOUND, Definition, Env
+from scenelang.evaluate.prepare.arguments import bind
+from scenelang.evaluate.prepare.expressions import POISONED, Code, Given, Run, computed, prepare_arguments
+from scenelang.evaluate.prepare.references import lookup, wrong_kind
+from scenelang.evaluate.report.undefined import unknown, unknown_member
+from scenelang.evaluate.values.functions import FUNCTIONS, Builtin
+from scenelang.scene.spans import Calls
+from scenelang.syntax import nodes
+
+
+def prepare_call(expr: nodes.CallExpr, place: Place) -> Code:
+    name = expr.name
+    binding = lookup(name, place)
+    given = prepare_arguments(expr.args, place, name.text if binding is None else "")
+    if binding is None:
+        return _call_builtin(expr, given, place)
+    if binding.kind == "poison":
+        return POISONED
+    if binding.kind != "fn":
+        help = "a module makes objects and is called as a statement" if binding.kind == "module" else None
+        wrong_kind(name, binding, place, "a function", help)
+        return POISONED
+    definition: Definition = binding.value
+    enter = entering(name, given, definition, place)
+    if enter is None:
+        return POISONED
+    session = place.session
+    session.report.defined[name.span.source, name.span.start] = definition.node.name.span
+
+    def run(env: Env) -> Any:
+        before = session.report.calls
+        frame = enter(env)
+        value = definition.run(frame)
+        session.report.calls = before
+        session.depth -= 1
+        return value
+
+    return Code(run)
+
+
+def _call_builtin(expr: nodes.CallExpr, given: list[Given], place: Place) -> Code:
+    """A call of a function of the language; reports a name that stands for nothing."""
+    name = expr.name
+    builtin = FUNCTIONS.get(name.text)
+    if builtin is None:
+        alias, dot, _ = name.text.partition(".")
+        outer = place.scope.find(alias) if dot else None
+        if outer is None:
+            unknown(name, place, expr)
+        elif outer.kind == "import":
+            unknown_member(name, place, outer.value)
+        else:
+            _method(expr, place)
+        return POISONED
+    if builtin.variadic:
+        if not given or any(arg.name for arg, _ in given):
+            message = f"`{name.text}` takes one or more arguments without names"
+            place.report.error("E0308", message, name.span)
+            return POISONED
+    else:
+        bound = bind(place.report, name, builtin.params, len(builtin.params), given)
+        if bound is None:
+            return POISONED
+        given = [one for one in bound if one is not None]
+    exprs = [arg.value for arg, _ in given]
+    meaning = builtin.run if builtin.doubt is None else _doubted(builtin, exprs, place)
+    place.file.weight += costs.FUNCTIONS.get(name.text, 4 * len(given) if builtin.variadic else 0)
+    per_item = 0 if name.text == "len" else costs.FUNCTION_ITEM_STEPS
+    return computed(place, meaning, expr.span, exprs, [code for _, code in given], per_item)
+
+
+def _method(expr: nodes.CallExpr, place: Place) -> None:
+    """Report `v.length()`: a value has no functions."""
+    alias, _, rest = expr.name.text.partition(".")
+    source, start = expr.name.span.source, expr.name.span.start
+    value = nodes.Name(alias, Span(source, start, start + len(alias)))
+    last = nodes.Name(rest, Span(source, expr.name.span.end - len(rest), expr.span.end))
+    from scenelang.evaluate.report.habits import member_advice  # only mistakes need it
+
+    help, fix = member_advice(nodes.NameRef(value, value.span), last)
+    help = help or f"write {rest}(…) with the value as an argument"
+    place.report.error("E0128", "only a name can be called", expr.name.span, help=help, fix=fix)
+
+
+def _doubted(builtin: Builtin, exprs: Sequence[nodes.Expr], place: Place) -> Callable[..., Any]:
+    """A function that warns of doubtful values."""
+
+    def run(*values: Any) -> Any:
+        result = builtin.run(*values)
+        doubt = builtin.doubt(*values) if builtin.doubt else None
+        if doubt is not None and doubt.operand is not None:
+            place.report.warn(doubt.code, doubt.message, exprs[doubt.operand].span, doubt.help)
+        return result
+
+    return run
+
+
+def entering(name: nodes.Name, args: Sequence[Given], definition: Definition, place: Place) -> Run | None:
+    """How to make the slots of one call, which also counts it; None if the arguments do not fit.
+
+    When the call is over, the caller takes 1 from the session's depth and puts its calls back.
+    """
+    params = definition.node.params
+    session, span = place.session, name.span
+    session.needs.on.append(definition.needs)
+    required = sum(param.default is None for param in params)
+    bound = bind(session.report, name, [p.name.text for p in params], required, args, definition.node)
+    if bound is None:
+        return None
+    given = [None if one is None else one.code.run for one in bound]
+    link = place.scope.reach(definition.outer)
+
+    def enter(env: Env) -> Env:
+        session.depth += 1
+        if session.depth > MAX_DEPTH:
+            raise session.halt("E0321", f"calls nested deeper than {MAX_DEPTH}", span)
+        session.tick(definition.weight, span)
+        frame: Env = [UNBOUND] * definition.size
+        frame[0] = link(env)
+        before, slot = session.report.calls, 1
+        inside = Calls(span, before)
+        for get in given:
+            session.report.calls = before if get is not None else inside  # defaults are the callee's
+            frame[slot] = get(env) if get is not None else definition.defaults[slot - 1](frame)
+            if session.watch is not None:
+                session.watch(params[slot - 1].name.span, frame[slot])
+            slot += 1
+        session.report.calls = inside
+        return frame
+
+    return enter
