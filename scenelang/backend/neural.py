@@ -13,9 +13,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 
-import torch
-
 from scenelang.backend.errors import RenderError
+
+try:
+    import torch
+except ModuleNotFoundError as error:
+    raise RenderError("this is drawn by torch, which is not installed; pip install torch") from error
 from scenelang.backend.memory import keep_memory
 from scenelang.backend.options import Samples
 from scenelang.backend.small import check_fits

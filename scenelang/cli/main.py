@@ -135,6 +135,8 @@ def _told() -> Iterator[None]:
 
         if isinstance(error, ModelError):
             raise Trouble(str(error)) from None
+        if isinstance(error, ModuleNotFoundError) and error.name == "torch":
+            raise Trouble("this needs torch, which is not installed; pip install torch") from None
         raise
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -212,3 +214,16 @@ def test_compile_refuses_errors(folder: Folder) -> None:
     assert result.exit_code == 1
     assert "E0201" in result.stderr
     assert os.listdir() == ["a.nsg"]
+
+
+@pytest.mark.parametrize("options", [("--size", "4096x4096"), ("--max-ms", "5"), ("--device", "cpu")])
+def test_without_torch_what_it_draws_is_refused(folder: Folder, options: tuple[str, ...]) -> None:
+    """Small pictures are drawn by numpy alone; the others say what is missing."""
+    folder.write("a.nsg", "for (i in 0..<20) { star { scale(0.5); translate(rand(i), 0); } }")
+    code = "import sys; sys.modules['torch'] = None\nfrom scenelang.cli.main import main; main(sys.argv[1:])"
+    command = (sys.executable, "-c", code, "render", "a.nsg", "-o", "a.png")
+    assert subprocess.run(command, check=True).returncode == 0
+    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "torch, which is not installed" in done.stderr
+    assert "Traceback" not in done.stderr
