@@ -90,7 +90,7 @@ def draw_small(
         model = load_arrays(program.model)
     except ModelError as error:
         raise RenderError(str(error)) from None
-    check_fits(program, model.name, model.digest)
+    check_fits(program, program.model, model.digest)
     try:
         return draw(
             model.network,

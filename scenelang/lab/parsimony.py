@@ -71,7 +71,7 @@ def ways_of(scene: Scene, model: Model) -> dict[str, dict[str, float]]:
     for name, options in WAYS.items():
         arguments = dict(options)
         without = arguments.pop("without", ())
-        p = compile_scene(scene, model=model.manifest.name, codes=model.codes(), without=without)
+        p = compile_scene(scene, model=model.manifest.name, codes=model.codes, without=without)
         best = math.inf
         for _ in range(REPEATS):
             started = time.perf_counter()

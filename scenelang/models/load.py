@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from scenelang.lifting.layout import LAYOUTS, WIDTH
 from scenelang.models.framed import MOST_WIDTH, framed_config
 from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.models.weights import LIFTING, Codes, codes_of, open_weights, shipped_weights
+from scenelang.models.weights import LIFTING, Codes, check_shapes, codes_of, open_weights, shipped_weights
 from scenelang.models.weights import ModelError as ModelError
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.reading import Reading, ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
-from scenelang.tensors import TensorError
 
 RENDERER = "renderer."
 """In front of the names of a renderer's tensors, where a file holds it beside a lifting's."""
@@ -34,27 +33,19 @@ class Model:
     Args:
         manifest: what the model states about itself.
         network: the trained network, in evaluation mode, without gradients.
-        digest: SHA-256 of the weights file, hex.
+        codes: of its weights, as `compile_scene` takes them.
         header: how the weights were trained (config, seed, revision, budget).
-        lifted: the codes, of a network that does not hold them itself.
     """
 
     manifest: Manifest
     network: Network
-    digest: str
+    codes: Codes
     header: dict[str, Any]
-    lifted: Codes | None = None
 
-    def codes(self) -> Codes:
-        """The codes of these weights, as `compile_scene` takes them."""
-        if not isinstance(self.network, Framed):
-            assert self.lifted is not None
-            return self.lifted
-        return Codes(
-            dict(zip(self.manifest.geometries, map(tuple, self.network.codes.tolist()), strict=True)),
-            dict(zip(self.manifest.materials, map(tuple, self.network.material_codes.tolist()), strict=True)),
-            self.digest,
-        )
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the weights file, hex."""
+        return self.codes.digest
 
     @property
     def framed(self) -> Framed:
@@ -74,32 +65,24 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
     Raises:
         ModelError: the file does not fit the manifest or itself, or holds numbers that are not finite.
     """
-    file = open_weights(data)
+    header, arrays = open_weights(data)
     make = _MAKERS.get(manifest.renderer)
     if make is None:
         raise ModelError(f"an unknown renderer `{manifest.renderer}`")
     try:
         with torch.random.fork_rng(devices=[]):
             # Not on the meta device, which takes no memory but 1.8 s to import what it stands on.
-            network = make(file.header["config"], manifest, len(data))
+            network = make(header["config"], manifest, len(data))
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise ModelError(f"bad network sizes: {error}") from None
-    try:
-        tensors = {name: torch.from_numpy(array) for name, array in file.arrays().items()}
-        if not isinstance(network, Framed):
-            tensors = {
-                name.removeprefix(RENDERER): tensor.float() if tensor.dtype == torch.float16 else tensor
-                for name, tensor in tensors.items()
-                if not name.startswith(LIFTING)
-            }
-        network.load_state_dict(tensors, assign=True)
-    except (TensorError, RuntimeError) as error:  # both say what does not fit
-        raise ModelError(f"damaged weights: {' '.join(str(error).split())[:300]}") from None
-    for name, parameter in network.named_parameters():
-        if parameter.dtype != torch.float32:
-            raise ModelError(
-                f"damaged weights: tensor `{name}` is {parameter.dtype}, where float32 is needed"
-            )
+    if not isinstance(network, Framed):
+        arrays = {
+            name.removeprefix(RENDERER): array.astype(np.float32) if array.dtype == np.float16 else array
+            for name, array in arrays.items()
+            if not name.startswith(LIFTING)
+        }
+    check_shapes(arrays, {name: tuple(held.shape) for name, held in network.state_dict().items()})
+    network.load_state_dict({k: torch.from_numpy(array) for k, array in arrays.items()}, assign=True)
     return network.requires_grad_(False).eval().to(device)
 
 
@@ -141,11 +124,9 @@ def load_model(name: str, device: str = "cpu", path: Path | None = None) -> Mode
         KeyError: there is no such model.
         ModelError: its weights are missing or damaged.
     """
-    manifest = load_manifest(name)
-    data = shipped_weights(name, path)
+    manifest, data = load_manifest(name), shipped_weights(name, path)
     network = load_network(data, manifest, device)
-    lifted = None if isinstance(network, Framed) else codes_of(manifest, data)
-    return Model(manifest, network, hashlib.sha256(data).hexdigest(), open_weights(data).header, lifted)
+    return Model(manifest, network, codes_of(manifest, data), open_weights(data).header)
 
 
 def place_of(network: Network) -> torch.device:

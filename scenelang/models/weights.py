@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scenelang.files import read_regular
 from scenelang.models.manifest import ROOT, Manifest, load_manifest
-from scenelang.tensors import TensorError, TensorFile, read_tensors
+from scenelang.tensors import TensorError, read_tensors
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from scenelang.lifting.learned import Lifting
 
 MOST_BYTES = 64 << 20
@@ -65,38 +66,47 @@ def weights_path(name: str) -> Path:
     return ROOT / name / "weights.safetensors"
 
 
-def read_weights(path: Path) -> bytes:
-    """The bytes of a weights file; of a larger one than any, the first.
-
-    Raises:
-        OSError: it cannot be read.
-    """
-    return read_regular(path, MOST_BYTES)
-
-
 def shipped_weights(name: str, path: Path | None = None) -> bytes:
-    """The bytes of a shipped model's weights file, or of the one at ``path``.
+    """The bytes of a shipped model's weights file, or of the one at ``path``; of one too large, the first.
 
     Raises:
         ModelError: it cannot be read.
     """
     try:
-        return read_weights(path or weights_path(name))
+        return read_regular(path or weights_path(name), MOST_BYTES)
     except OSError as error:
         why = (error.strerror or str(error)).lower()
-        raise ModelError(f"cannot read the weights of `{name}`: {why}") from None
+        raise ModelError(f"cannot read the weights of `{name}`: {why}") from error
 
 
-def open_weights(data: bytes) -> TensorFile:
-    """What a weights file holds.
+class Weights(NamedTuple):
+    """What a weights file holds: its header and its tensors by name, all finite."""
+
+    header: dict[str, Any]
+    arrays: dict[str, npt.NDArray[Any]]
+
+
+def open_weights(data: bytes) -> Weights:
+    """Read a weights file.
 
     Raises:
-        ModelError: it is damaged, foreign or hostile.
+        ModelError: it is damaged, foreign or hostile, or holds numbers that are not finite.
     """
     try:
-        return read_tensors(data, MOST_BYTES)
+        found = read_tensors(data, MOST_BYTES)
+        return Weights(found.header, found.arrays())
     except TensorError as error:
         raise ModelError(f"damaged weights: {error}") from None
+
+
+def check_shapes(arrays: Mapping[str, npt.NDArray[Any]], shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """Raise ModelError where tensors are not those of a network, float32 and of its shapes."""
+    for name in sorted(shapes.keys() | arrays.keys()):
+        found = arrays.get(name)
+        if name not in shapes or found is None or found.shape != shapes[name] or found.dtype != "float32":
+            held = "is missing" if found is None else f"is {found.dtype} {list(found.shape)}"
+            wanted = f"float32 {list(shapes[name])} is needed" if name in shapes else "none is known"
+            raise ModelError(f"damaged weights: tensor `{name}` {held}, where {wanted}")
 
 
 def read_facts(name: str) -> Facts:
@@ -106,10 +116,10 @@ def read_facts(name: str) -> Facts:
         OSError: it cannot be read.
         ModelError: it is damaged.
     """
-    data = read_weights(weights_path(name))
-    found = open_weights(data)
-    parameters = sum(math.prod(tensor.shape) for tensor in found.tensors.values())
-    return Facts(hashlib.sha256(data).hexdigest(), len(data), parameters, found.header)
+    data = read_regular(weights_path(name), MOST_BYTES)
+    header, arrays = open_weights(data)
+    parameters = sum(array.size for array in arrays.values())
+    return Facts(hashlib.sha256(data).hexdigest(), len(data), parameters, header)
 
 
 @lru_cache(maxsize=8)
@@ -121,7 +131,7 @@ def load_codes(name: str) -> Codes:
         FileNotFoundError: it has no weights.
         ModelError: its weights are damaged.
     """
-    return codes_of(load_manifest(name), read_weights(weights_path(name)))
+    return codes_of(load_manifest(name), read_regular(weights_path(name), MOST_BYTES))
 
 
 def codes_of(manifest: Manifest, data: bytes) -> Codes:
@@ -132,10 +142,7 @@ def codes_of(manifest: Manifest, data: bytes) -> Codes:
     """
     from scenelang.lifting.layout import LAYOUTS, WIDTH
 
-    try:
-        tensors = open_weights(data).arrays()
-    except TensorError as error:
-        raise ModelError(f"damaged weights: {error}") from None
+    tensors = open_weights(data).arrays
     prefix = "" if manifest.renderer == "framed" else LIFTING
     learned = manifest.lifting == "learned"
     layout = LAYOUTS.get(manifest.layout)

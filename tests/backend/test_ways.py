@@ -14,6 +14,7 @@ from scenelang.backend.neural import draw_program, open_model
 from scenelang.measure.metrics import psnr
 from scenelang.models.load import Model
 from scenelang.models.manifest import load_manifest
+from scenelang.models.weights import Codes
 from scenelang.program.compile import compile_scene
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 from scenelang.scene.schema import Object, Rotate, Scale, Scene
@@ -76,7 +77,7 @@ def test_streaming_samples_in_one_way() -> None:
     manifest = replace(
         load_manifest("shapes2d"), name="small", renderer="streaming", sizes=((SIDE, SIDE),), white=True
     )
-    small = Model(manifest, Streaming(StreamingConfig(64, SIDE, 1 / 16)), DIGEST, {})
+    small = Model(manifest, Streaming(StreamingConfig(64, SIDE, 1 / 16)), Codes({}, {}, DIGEST), {})
     program = replace(compile_scene(scene((SIDE, SIDE), (1, 1, 1))), model="small", weights=DIGEST)
     with pytest.raises(RenderError, match="model `small` samples pixels in one way only, not `four`"):
         draw_program(program, small, samples="four")

@@ -112,7 +112,7 @@ def test_shapes_in_weights_are_shapes(shape: object, monkeypatch: pytest.MonkeyP
     }
     text = json.dumps(outer).encode()
     data = struct.pack("<Q", len(text)) + text
-    monkeypatch.setattr("scenelang.models.weights.read_weights", lambda path: data)
+    monkeypatch.setattr("scenelang.models.weights.read_regular", lambda path, most: data)
     with pytest.raises(ModelError, match="has no shape"):
         read_facts("shapes2d")
 

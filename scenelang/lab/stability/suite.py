@@ -116,7 +116,7 @@ def unfolded(scene: Scene, program: Program, model: Model) -> Program:
     (chain,) = scene.nodes
     assert isinstance(chain, Chain)
     vectors = program.vectors.copy()
-    lifting = model.codes().lifting
+    lifting = model.codes.lifting
     if lifting is not None:
         nodes = [link.node for link in chain.children if isinstance(link.node, Object)]
         steps = [[step_of(t, PLANE) for t in node.transforms] for node in nodes]
@@ -149,7 +149,7 @@ def picture_of(model: Model, program: Program, **options: Any) -> Image:
 
 def _drawn(model: Model, scene: Scene, folded: bool) -> Image:
     without = () if folded else OPTIONAL
-    program = compile_scene(scene, model=model.manifest.name, codes=model.codes(), without=without)
+    program = compile_scene(scene, model=model.manifest.name, codes=model.codes, without=without)
     return picture_of(model, program if folded else unfolded(scene, program, model))
 
 
@@ -249,7 +249,7 @@ def arithmetic(model: Model, scenes: int, seed: int) -> dict[str, float]:
         return most  # draws whole pictures
     for index in range(scenes):
         scene = scene_of(probe, 4, index, seed, model)
-        program = compile_scene(scene, model=model.manifest.name, codes=model.codes())
+        program = compile_scene(scene, model=model.manifest.name, codes=model.codes)
         base = np.asarray(picture_of(model, program))
         for name, options in (
             ("tiles", {"tile": 1999}),
