@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from scenelang.diagnostics.codes import CODES
-from scenelang.diagnostics.pages import AREAS, read_page
+from scenelang.diagnostics.pages import AREAS, CODES, read_page
 
 TARGET = Path(__file__).with_name("errors.md")
 _PAGES = "../scenelang/diagnostics/pages"
@@ -95,7 +94,7 @@ def index() -> str:
     parts = [_HEAD]
     for area, name in AREAS.items():
         parts.append(f"\n### {name[0].upper()}{name[1:]}\n\n| code | | |\n|---|---|---|\n")
-        for code in sorted((c for c in CODES if c[1:3] == area), key=lambda c: (c[0], c)):
+        for code in (code for code in CODES if code[1:3] == area):
             page = read_page(code)
             first = re.split(r"(?<=\.)\s", " ".join(page.meaning.split()))[0]
             first = first.replace("|", "\\|")

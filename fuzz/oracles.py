@@ -10,9 +10,9 @@ from typing import Any
 
 from fuzz.target import Failure, hold
 from scenelang.diagnostics import render
-from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import program_bytes

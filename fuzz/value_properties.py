@@ -14,8 +14,8 @@ from fuzz.oracles import check_diagnostics
 from fuzz.target import hold, load_target
 from scenelang.backend.errors import RenderError
 from scenelang.backend.render import render
-from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
+from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.formatting import format_text
 from scenelang.models.manifest import Manifest, load_manifest

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 from lsprotocol import types
 
 from scenelang.diagnostics import pages
-from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.diagnostic import Diagnostic
+from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.span import Span
 from scenelang.lsp.text import Lines
 from scenelang.lsp.workspace import uri_of

@@ -8,8 +8,7 @@ import re
 import pytest
 
 from scenelang.diagnostics.cells import paint
-from scenelang.diagnostics.codes import CODES
-from scenelang.diagnostics.pages import read_page
+from scenelang.diagnostics.pages import CODES, read_page
 from tests.cli.conftest import Folder
 
 
@@ -48,9 +47,7 @@ def test_files_beside_an_example_are_named(folder: Folder) -> None:
 @pytest.mark.parametrize("arguments", [(), ("--list",), ("E0302", "--list")])
 def test_all_codes(folder: Folder, arguments: tuple[str, ...]) -> None:
     shown = folder.run("explain", *arguments).stdout
-    assert re.findall(r"^  ([EW]\d{4})  ", shown, re.MULTILINE) == sorted(
-        CODES, key=lambda c: (c[1:3], c[0], c)
-    )
+    assert re.findall(r"^  ([EW]\d{4})  ", shown, re.MULTILINE) == list(CODES)
     assert shown.startswith("syntax\n  E0101")
 
 
@@ -75,7 +72,7 @@ def test_an_unknown_code(folder: Folder, wrong: str, advice: str) -> None:
 def test_json(folder: Folder) -> None:
     data = json.loads(folder.run("explain", "E0309", "--format", "json").stdout)
     assert (data["version"], data["code"], data["severity"]) == (1, "E0309", "error")
-    assert data["title"] == CODES["E0309"]
+    assert data["title"] == "param outside its range"
     assert data["text"].startswith("# E0309: ")
     assert [example["kind"] for example in data["examples"]] == ["bad", "good"]
     assert data["examples"][0]["options"] == ["-D", "size=7"]

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import apply_fixes, settle
-from scenelang.diagnostics.pages import read_page
+from scenelang.diagnostics.pages import CODES, read_page
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import load_source
 from scenelang.resolve.unused import find_unused

@@ -6,8 +6,8 @@ import re
 import runpy
 from pathlib import Path
 
-from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.render import render_text
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import load_source

@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 
 import scenelang
-from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.pages import AREAS, Example, Page, read_page
+from scenelang.diagnostics.pages import AREAS, CODES, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate import limits, loader
 from scenelang.evaluate.evaluation import Evaluation, load_source
@@ -100,8 +99,9 @@ def test_example(example: Example, page: Page, tmp_path: Path, monkeypatch: pyte
     assert [d.code for d in found] == wanted, [(d.message, d.span) for d in found]
 
 
-def test_pages_and_codes_belong_together() -> None:
-    assert {path.stem for path in PAGES.glob("*.md")} == set(CODES)
+def test_codes_are_those_of_the_pages() -> None:
+    assert sorted(CODES) == sorted(path.stem for path in PAGES.glob("*.md"))
+    assert all(re.fullmatch(r"[EW]0[1-5]\d\d", code) for code in CODES)
 
 
 @pytest.mark.parametrize("page", [*map(read_page, CODES)], ids=lambda page: page.code)

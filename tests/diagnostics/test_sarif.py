@@ -10,9 +10,8 @@ from urllib.parse import unquote
 import jsonschema
 import pytest
 
-from scenelang.diagnostics.codes import CODES
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
-from scenelang.diagnostics.pages import read_page
+from scenelang.diagnostics.pages import CODES, read_page
 from scenelang.diagnostics.render import render_github, render_sarif
 from scenelang.diagnostics.span import SourceFile, Span
 

@@ -37,7 +37,7 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
     from difflib import get_close_matches
 
     from scenelang.cli.say import wants_color
-    from scenelang.diagnostics.codes import CODES
+    from scenelang.diagnostics.pages import CODES, read_page
 
     paint = wants_color(sys.stdout, color)
     if code is None or listed:
@@ -46,8 +46,6 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
     found = re.search(r"[EWew]\d{4}", code)
     wanted = found.group().upper() if found else code.strip()
     if wanted in CODES:
-        from scenelang.diagnostics.pages import read_page
-
         _print_page(read_page(wanted), kind, paint)
         return
     about = _about(wanted) if len(wanted) >= 3 else []
@@ -62,8 +60,7 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
 
 def _about(word: str) -> list[str]:
     """The codes whose pages have a word, in British or American spelling, in their text or examples."""
-    from scenelang.diagnostics.codes import CODES
-    from scenelang.diagnostics.pages import read_page
+    from scenelang.diagnostics.pages import CODES, read_page
 
     def plain(text: str) -> str:
         return text.lower().replace("colour", "color").replace("grey", "gray")
@@ -72,18 +69,18 @@ def _about(word: str) -> list[str]:
 
 
 def _print_list(codes: list[str], kind: str, paint: bool) -> None:
-    from scenelang.diagnostics.codes import CODES
-    from scenelang.diagnostics.pages import AREAS, severity_of
+    from scenelang.diagnostics.pages import AREAS, read_page
 
     if kind == "json":
         import json
 
-        data = [{"code": c, "severity": severity_of(c), "title": CODES[c]} for c in codes]
+        data = [{"code": p.code, "severity": p.severity, "title": p.title} for p in map(read_page, codes)]
         click.echo(json.dumps({"version": 1, "codes": data}, indent=2))
         return
     sections = []
     for area, name in AREAS.items():
-        own = [f"  {_styled(c, severity_of(c), paint)}  {CODES[c]}" for c in codes if c[1:3] == area]
+        pages = [read_page(code) for code in codes if code[1:3] == area]
+        own = [f"  {_styled(page.code, page.severity, paint)}  {page.title}" for page in pages]
         if own:
             sections.append("\n".join([_styled(name, "bold", paint), *own]))
     click.echo("\n\n".join(sections), color=True)

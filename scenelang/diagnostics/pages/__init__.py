@@ -4,7 +4,7 @@ A page is plain Markdown with a fixed shape, so that it serves three readers: `s
 documentation site (which renders each file of this folder as ``errors/CODE.html``; ``docs/errors.md`` is the
 index), and the tests, which run every example.
 
-- The first line is ``# CODE: title`` with the title of `diagnostics.codes`.
+- The first line is ``# CODE: title``. Codes are stable and never reused.
 - The sections ``## Why``, ``## Example`` and ``## Instead`` follow the paragraph that says what it is.
 - A fence ``nsg {.bad}`` gives exactly this code, ``nsg {.good}`` nothing at all; ``json`` is a Scene for
   `scenelang.scene.json`, ``python`` is run and raises `SceneError`.
@@ -12,7 +12,7 @@ index), and the tests, which run every example.
 - A ``sh`` fence behind an example is the command that checks it; its options count.
 - ``<!-- with scenelang.module.LIMIT = 3 -->`` before an example lowers limits that it is too short to reach.
 
-Nothing is read before it is asked for.
+No page is read before it is asked for.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from functools import cache
 from importlib.resources import files
 from typing import Final, Literal
 
-from scenelang.diagnostics.codes import CODES
 from scenelang.records import Record
 
 AREAS: Final = {
@@ -35,6 +34,9 @@ AREAS: Final = {
     "04": "graph and booleans",
     "05": "what a model can do",
 }
+_NAMES = (page.name.removesuffix(".md") for page in files(__name__).iterdir() if page.name[-3:] == ".md")
+CODES: Final = tuple(sorted(_NAMES, key=lambda code: (code[1:3], code)))
+"""All codes, area by area, errors first."""
 _FENCE: Final = re.compile(
     r"(?:^<!-- with (?P<limits>[^\n]*) -->\n)?^```(?P<info>[^\n]*)\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
@@ -76,7 +78,7 @@ class Page(Record):
 
     @property
     def title(self) -> str:
-        return CODES[self.code]
+        return self.text.partition("\n")[0].partition(": ")[2]
 
     @property
     def severity(self) -> str:
