@@ -13,12 +13,12 @@ from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 
 DEFINITIONS = ("let", "param", "fn")
-_ENDS = ("`}`", "the end of the file")
 _OPERATORS = ("+", "-", "*", "/", "%", "^", "<", "<=", ">", ">=", "==", "!=", "&&", "||", "?", "..", "..<")
 _DIVISION = re.compile(r"[ \t]*//[ \t]*[\w.()]{1,40}[ \t]*;[ \t]*(?=\n)")
 """What is taken for a comment and was meant for a division."""
-
-_KEYWORD_HELP = "choose another name"
+_WORDS = {"BAD_EXPRESSION": "an expression", "NAME": "a name", "STRING": "a string", "NUMBER": "a number"}
+_CODES = {")": "E0103", "]": "E0103", "BAD_EXPRESSION": "E0108", "NAME": "E0109", "(": "E0107", ";": "E0102"}
+"""Codes of what is missing; anything else is E0126."""
 
 
 def report_repair(
@@ -54,8 +54,8 @@ def report_braces(tokens: Tokens, report: Report, statements: Sequence[tuple[int
     """Report braces that are missing around statements, each the tokens ``[first, stop)``."""
     edits = []
     for first, stop in statements:
-        edits.append(Edit(_empty(tokens, tokens.starts[first]), "{ "))
-        edits.append(Edit(_empty(tokens, tokens.ends[stop - 1]), " }"))
+        for at, brace in ((tokens.starts[first], "{ "), (tokens.ends[stop - 1], " }")):
+            edits.append(Edit(Span(tokens.source, at, at), brace))
     first = statements[0][0]
     at = tokens.end_before(first) if tokens.on_new_line(first) else tokens.starts[first]
     fix = None if _goes_on(tokens, *statements[-1]) else Fix("put braces around it", tuple(edits))
@@ -64,168 +64,133 @@ def report_braces(tokens: Tokens, report: Report, statements: Sequence[tuple[int
 
 def report_broken_off(tokens: Tokens, report: Report, at: int, names: Sequence[str]) -> None:
     """Report a statement that breaks off before a token, and what it lacks."""
-    end = tokens.end_before(at)
-    codes = {
-        ")": "E0103",
-        "]": "E0103",
-        "BAD_EXPRESSION": "E0108",
-        "NAME": "E0109",
-        "(": "E0107",
-        ";": "E0102",
-    }
-    report.add(
-        codes.get(names[0], "E0126"),
-        f"unfinished statement: missing {_listed(names)}",
-        end,
-        end,
-        help="the line breaks off here",
-    )
+    end, code = tokens.end_before(at), _CODES.get(names[0], "E0126")
+    message = f"unfinished statement: missing {_listed(names)}"
+    report.add(code, message, end, end, help="the line breaks off here")
 
 
 def report_instead(tokens: Tokens, report: Report, at: int, names: Sequence[str]) -> None:
     """Report a token that stands where another belongs."""
-    start, end = tokens.starts[at], tokens.ends[at]
     found, first = _shown(tokens, at), names[0]
-    if first == "BAD_EXPRESSION":
-        report.add("E0108", f"expected an expression, found {found}", start, end)
-    elif first == "NAME":
-        report.add("E0109", f"expected a name, found {found}", start, end)
-    elif first == "STRING":
-        report.add("E0126", f"expected a string, found {found}", start, end)
+    if first in _WORDS:
+        report.add(_CODES.get(first, "E0126"), f"expected {_WORDS[first]}, found {found}", *tokens.place(at))
     else:
-        report.add("E0130", f"{found} where {_listed(names)} belongs", start, end)
+        report.add("E0130", f"{found} where {_listed(names)} belongs", *tokens.place(at))
 
 
 def report_misspelt(tokens: Tokens, report: Report, at: int, word: str) -> None:
     """Report a word where a keyword was meant."""
-    start, end = tokens.starts[at], tokens.ends[at]
-    report.add(
-        "E0132", f"unknown word `{tokens.text(at)}`", start, end, help=f"did you mean `{word}`?", fix=word
-    )
+    message, help = f"unknown word `{tokens.text(at)}`", f"did you mean `{word}`?"
+    report.add("E0132", message, *tokens.place(at), help=help, fix=word)
 
 
 def report_unexpected(tokens: Tokens, report: Report, at: int) -> None:
     """Report a token that nothing could make sense of."""
-    if tokens.starts[at] in tokens.reported:
-        return
-    start, end = tokens.starts[at], tokens.ends[at]
-    if tokens.kinds[at] == END:
-        start = end = tokens.end_before(at)
-    report.add("E0122", f"this is not a statement: unexpected {_shown(tokens, at)}", start, end)
+    if tokens.starts[at] not in tokens.reported:
+        place = (tokens.end_before(at),) * 2 if tokens.kinds[at] == END else tokens.place(at)
+        report.add("E0122", f"this is not a statement: unexpected {_shown(tokens, at)}", *place)
 
 
 def _report_insertion(
     tokens: Tokens, report: Report, at: int, names: list[str], open_brackets: Sequence[int], sure: bool
 ) -> None:
-    end = tokens.end_before(at)
-    found = _shown(tokens, at)
-    first = names[0]
+    end, next = tokens.end_before(at), tokens.starts[at]
+    found, first, text = _shown(tokens, at), names[0], "".join(names)
+    new_line, last = tokens.on_new_line(at), tokens.kinds[at] == END
+    code, message, help = _CODES.get(first, "E0126"), f"missing `{text}`", None
+    labels: list[Label] = []
+    fix: str | Fix | None = None
+    place = end, end
     ends = names[-1] == ";" or (names[-2:] == ["{", "}"] and names[2:])
     if ends and set(names) - {")", "]", ";"}:
         report_broken_off(tokens, report, at, names)
         return
-    # An operand is missed where the next token stands, anything else where the last one ended.
-    place = (
-        (end, end)
-        if tokens.on_new_line(at) or tokens.kinds[at] == END
-        else (tokens.starts[at], tokens.ends[at])
-    )
     if first in (")", "]"):
-        text = "".join(names)
-        labels = [Label(_span(tokens, open_brackets[-1]), "opened here")]
-        report.add("E0103", f"missing `{text}`", end, end, labels=labels, fix=text if sure else None)
+        labels = [Label(Span(tokens.source, *tokens.place(open_brackets[-1])), "opened here")]
+        fix = text if sure else None
     elif first == ";":
         help = "a `;` ends every statement without a block"
         # Inside a line an operator may be missing as well, or a brace.
         called = tokens.text(at - 1) == ")" and head(tokens, at) not in DEFINITIONS
-        sure = tokens.on_new_line(at) or called or found in _ENDS
-        if tokens.kinds[at] != END and _DIVISION.match(tokens.source.text, end):
-            help, sure = "`//` begins a comment; the whole part of a / b is floor(a / b)", False
-        report.add("E0102", "missing `;`", end, end, help=help, fix=";" if sure else None)
-    elif names == ["BAD_EXPRESSION"]:
-        report.add("E0108", f"expected an expression, found {found}", *place)
-    elif names == ["NAME"]:
-        report.add("E0109", f"expected a name, found {found}", *place)
-    elif names == ["STRING"]:
-        report.add("E0126", f"expected a string, found {found}", *place)
-    elif names == ["{", "}"]:
-        report.add("E0106", "missing block", end, end, help="braces are mandatory here, even around nothing")
+        if not last and _DIVISION.match(tokens.source.text, end):
+            help = "`//` begins a comment; the whole part of a / b is floor(a / b)"
+        elif new_line or called or last or found == "`}`":
+            fix = ";"
+    elif first in _WORDS:
+        message = f"expected {_WORDS[first]}, found {found}"
+        if not (new_line or last):  # an operand is missed where the next token stands
+            place = tokens.place(at)
+    elif text == "{}":
+        code, message, help = "E0106", "missing block", "braces are mandatory here, even around nothing"
     elif first == "(":
-        text, next = "".join(names), tokens.starts[at]
-        gap = tokens.source.text[end:next] == " " and names == ["("]
-        opening = report.change(end, next if gap else end, text, f"insert `{text}`")
-        report.add("E0107", f"missing `{text}`", end, end, fix=opening)
+        gap = tokens.source.text[end:next] == " " and text == "("
+        fix = report.change(end, next if gap else end, text, f"insert `{text}`")
     elif first == ",":
         literal = all(_is_literal(tokens, index) for index in (at - 1, at))
-        message = "missing `,`" if literal else f"missing `,` or operator before {found}"
+        code, message = "E0112", "missing `,`" if literal else f"missing `,` or operator before {found}"
         # Of equal ones, one may be too many; beside others an operator may be missing.
-        sure = literal and tokens.text(at - 1) != tokens.text(at) and _are_items(tokens, at - 1, at + 1)
-        report.add("E0112", message, end, end, fix="," if sure else None)
+        if literal and tokens.text(at - 1) != tokens.text(at) and _are_items(tokens, at - 1, at + 1):
+            fix = ","
     elif first == "*":
-        report.add("E0112", f"missing operator before {found}", end, end)
+        code, message = "E0112", f"missing operator before {found}"
     elif names[1:]:
-        what = "a name" if names[1] == "NAME" else "a value"
-        report.add("E0126", f"missing `{first}` and {what}", end, end)
+        message = f"missing `{first}` and {'a name' if names[1] == 'NAME' else 'a value'}"
     else:
-        safe = first in ("=", "in", "as")
-        fix = f" {first}" if safe else None
-        start = end if not tokens.on_new_line(at) else tokens.starts[at]
-        report.add("E0126", f"missing `{first}` before {found}", start, start, fix=fix)
+        message = f"missing `{first}` before {found}"
+        fix = f" {first}" if first in ("=", "in", "as") else None
+        place = (next, next) if new_line else place
+    report.add(code, message, *place, labels=labels, help=help, fix=fix)
 
 
 def _report_deletion(tokens: Tokens, report: Report, repair: Repair) -> None:
-    start, end = tokens.starts[repair.at], tokens.ends[repair.end - 1]
-    text = tokens.source.text[start:end]
+    place = tokens.place(repair.at, repair.end)
+    text = tokens.source.text[slice(*place)]
     if text in (")", "]"):
         # Beside operators it may be the opening one that is missing.
         fix = None if _has_operator(tokens, repair.at + 1) else ""
-        report.add("E0105", f"unmatched `{text}`", start, end, fix=fix)
-    else:
-        report.add("E0101", f"unexpected {_quoted(text)}", start, end, fix=_once(tokens, repair, text))
-
-
-def _once(tokens: Tokens, repair: Repair, text: str) -> str | None:
-    """What to write for something that stands twice in a row: nothing, unless it may be meant to."""
+        report.add("E0105", f"unmatched `{text}`", *place, fix=fix)
+        return
+    # What stands twice in a row goes, unless it may be meant to.
     twice = text == tokens.text(repair.end) or (repair.at and text == tokens.text(repair.at - 1))
-    return "" if twice and text != "," and not _is_literal(tokens, repair.at) else None
+    fix = "" if twice and text != "," and not _is_literal(tokens, repair.at) else None
+    report.add("E0101", f"unexpected {_quoted(text)}", *place, fix=fix)
 
 
 def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
-    start, end = tokens.starts[repair.at], tokens.ends[repair.end - 1]
-    text = tokens.source.text[start:end]
-    new = "".join(names)
-    fix: str | None = new
-    if new == "=" and (tokens.end_before(repair.at), tokens.starts[repair.end]) == (start, end + 1):
+    at, (start, end) = repair.at, tokens.place(repair.at, repair.end)
+    text, new = tokens.source.text[start:end], "".join(names)
+    code, message, help = "E0130", f"`{text}` where `{new}` belongs", None
+    fix: str | Fix | None = new
+    if new == "=" and (tokens.end_before(at), tokens.starts[repair.end]) == (start, end + 1):
         fix = " ="  # as in `angle: 30deg`
     if repair.delete == 2:
-        first, second = tokens.text(repair.at), tokens.text(repair.at + 1)
-        gap = tokens.source.text[tokens.ends[repair.at] : tokens.starts[repair.at + 1]]
-        bracket = any(one in "()[]" for one in (first, second))
-        sure = not (bracket and _has_operator(tokens, repair.at + 2))
-        swap = report.change(start, end, f"{second}{gap}{first}", "swap them") if sure else None
-        report.add("E0131", f"`{first}` and `{second}` are in the wrong order", start, end, fix=swap)
+        first, second = tokens.text(at), tokens.text(at + 1)
+        gap = tokens.source.text[tokens.ends[at] : tokens.starts[at + 1]]
+        code, message, fix = "E0131", f"`{first}` and `{second}` are in the wrong order", None
+        if not ({first, second}.intersection("()[]") and _has_operator(tokens, at + 2)):
+            fix = report.change(start, end, f"{second}{gap}{first}", "swap them")
     elif new == "NAME" and text.isalpha():
-        report.add("E0110", f"`{text}` is a keyword, not a name", start, end, help=_KEYWORD_HELP)
+        code, message, fix = "E0110", f"`{text}` is a keyword, not a name", None
+        help = "choose another name"
     elif new == "==":
-        if head(tokens, repair.at) in DEFINITIONS:
+        code, message, help = "E0111", "`=` does not compare", "equality is `==`"
+        if head(tokens, at) in DEFINITIONS:
             fix = None  # two names for one value, more likely
-        report.add("E0111", "`=` does not compare", start, end, help="equality is `==`", fix=fix)
     elif new == "{}":
-        report.add("E0106", f"missing block, found `{text}`", start, end)
+        code, message, fix = "E0106", f"missing block, found `{text}`", None
     elif text in (")", "]") and new in (")", "]"):
-        report.add("E0105", f"`{text}` where `{new}` belongs", start, end, fix=fix)
+        code = "E0105"
     elif word_for(text) == new:
+        code, message, help = "E0127", f"`{text}` is not used here", f"`{new}` is the sign for it"
         if new == "!" and tokens.text(repair.end) != "(":
             fix = None  # elsewhere it takes all of a comparison, here only what is next
-        report.add(
-            "E0127", f"`{text}` is not used here", start, end, help=f"`{new}` is the sign for it", fix=fix
-        )
     elif new.isalpha() and new.islower() and new in keywords_near(text):
-        report_misspelt(tokens, report, repair.at, new)
-    elif repair.delete == 1 and text in REPLACEMENTS and new in REPLACEMENTS[text]:
-        report.add("E0130", f"`{text}` where `{new}` belongs", start, end, fix=fix)
-    else:
-        report_instead(tokens, report, repair.at, names)
+        report_misspelt(tokens, report, at, new)
+        return
+    elif repair.delete > 1 or new not in REPLACEMENTS.get(text, ()):
+        report_instead(tokens, report, at, names)
+        return
+    report.add(code, message, start, end, help=help, fix=fix)
 
 
 def head(tokens: Tokens, at: int) -> str:
@@ -269,11 +234,10 @@ def _goes_on(tokens: Tokens, first: int, stop: int) -> bool:
 
 def _listed(names: Sequence[str]) -> str:
     """What is missing, in words: "an expression, `)` and `{`"."""
-    words = {"BAD_EXPRESSION": "an expression", "NAME": "a name", "STRING": "a string", "NUMBER": "a number"}
     parts: list[str] = []
     for name in names:
-        if name in words:
-            parts.append(words[name])
+        if name in _WORDS:
+            parts.append(_WORDS[name])
         elif parts and parts[-1].endswith("`") and not name.isalpha() and not parts[-1][-2].isalpha():
             parts[-1] = f"{parts[-1][:-1]}{' ' * (name == '{')}{name}`"
         else:
@@ -292,11 +256,3 @@ def _shown(tokens: Tokens, at: int) -> str:
 def _quoted(text: str) -> str:
     text = " ".join(text.split())
     return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}…`"
-
-
-def _span(tokens: Tokens, index: int) -> Span:
-    return Span(tokens.source, tokens.starts[index], tokens.ends[index])
-
-
-def _empty(tokens: Tokens, at: int) -> Span:
-    return Span(tokens.source, at, at)

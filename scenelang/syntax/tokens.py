@@ -103,6 +103,10 @@ class Tokens:
         """The text of one token."""
         return self.source.text[self.starts[index] : self.ends[index]]
 
+    def place(self, first: int, stop: int = 0) -> tuple[int, int]:
+        """Start and end of a token, or of those before ``stop``."""
+        return self.starts[first], self.ends[(stop or first + 1) - 1]
+
     def end_before(self, index: int) -> int:
         """Where the token before ``index`` ends: where something missing belongs."""
         return self.ends[index - 1] if index else 0
