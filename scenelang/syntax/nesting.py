@@ -67,13 +67,6 @@ def limit_nesting(tokens: Tokens, report: Report) -> None:
 
 
 def _give_up(tokens: Tokens, report: Report, first: int, at: int) -> None:
-    report.add(
-        "E0120",
-        f"nested deeper than {MAX_DEPTH} levels",
-        tokens.starts[at],
-        tokens.ends[at],
-        help="give a part of it a name with `let`, `fn` or `module`; the rest is skipped",
-    )
-    start, last = tokens.starts[first], len(tokens.kinds) - 1
-    tokens.replace(first, last - first, [tables().kind("BAD_STATEMENT")])
-    tokens.starts[first], tokens.ends[first] = start, tokens.ends[-1]
+    help = "give a part of it a name with `let`, `fn` or `module`; the rest is skipped"
+    report.add("E0120", f"nested deeper than {MAX_DEPTH} levels", *tokens.place(at), help=help)
+    tokens.give_up(first, len(tokens.kinds) - 1, "BAD_STATEMENT", tokens.starts[first], tokens.ends[-1])

@@ -213,8 +213,6 @@ class Recovery(Habits):
             stop += 1
         if stop == first:
             return None
-        start, end = tokens.starts[first], tokens.ends[stop - 1]
-        headed = self._is(stop, "{") and not self._is(stop - 1, ";")
-        tokens.replace(first, stop - first, [tables().kind("BAD_HEAD" if headed else "BAD_STATEMENT")])
-        tokens.starts[first], tokens.ends[first] = start, end
+        bad = "BAD_HEAD" if self._is(stop, "{") and not self._is(stop - 1, ";") else "BAD_STATEMENT"
+        tokens.give_up(first, stop, bad, *tokens.place(first, stop))
         return first

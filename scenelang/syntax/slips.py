@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from itertools import chain
+from bisect import bisect_left
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
@@ -19,8 +19,9 @@ _FAR = 1000  # tokens that the statement of a loop without braces may have
 _IMPORT = re.compile(
     r"""(?P<word>use|include|require)[ \t]*
         (?:<(?P<angled>[^<>"'\n]+)>|"(?P<quoted>[^"\\\n]+)")[ \t]*(?:;|(?=//)|$)""",
-    re.VERBOSE,
+    re.VERBOSE | re.MULTILINE,
 )
+_GROUPED = re.compile(r"[0-9]{1,3}(?:,[0-9]{3}(?![\w°]|\.(?!\.)))+")
 
 
 class Slips:
@@ -73,44 +74,35 @@ class Slips:
     def _bare_path(self, at: int) -> bool:
         """`import lib/parts.nsg as parts`: the path without its quotes."""
         tokens = self.tokens
-        for stop in range(at + 1, min(at + 20, len(tokens.kinds) - 1)):
-            if tokens.on_new_line(stop) or self._is(stop, ";"):
-                return False
-            if self._is(stop, "as"):
-                break
-        else:
+        near = range(at + 1, min(at + 20, len(tokens.kinds) - 1))
+        stop = next((i for i in near if tokens.on_new_line(i) or self._is(i, ";", "as")), at)
+        if not self._is(stop, "as") or stop == at or tokens.on_new_line(stop):
             return False
-        start, end = tokens.starts[at], tokens.ends[stop - 1]
-        span = Span(tokens.source, start, end)
-        fix = self.report.change(start, end, f'"{span.text}"', "put quotes around it")
-        self.report.add("E0126", f"expected a string, found `{span.text}`", start, end, fix=fix)
+        start, end = tokens.place(at, stop)
+        path = tokens.source.text[start:end]
+        fix = self.report.change(start, end, f'"{path}"', "put quotes around it")
+        self.report.add("E0126", f"expected a string, found `{path}`", start, end, fix=fix)
         tokens.replace(at, stop - at, [])
         self._insert(at, "STRING")
         return True
 
     def _import_of_others(self, first: int) -> bool:
         """`use <lib.scad>`, `include "parts.nsg";`: a file without a name for it."""
-        tokens, text = self.tokens, self.tokens.source.text
-        start = tokens.starts[first]
-        line = text[start : text.find("\n", start) if "\n" in text[start:] else len(text)]
-        found = _IMPORT.match(line)
+        tokens, start = self.tokens, self.tokens.starts[first]
+        found = _IMPORT.match(tokens.source.text, start)
         if found is None:
             return False
         path = found["angled"] or found["quoted"]
         alias = re.sub(r"\W", "_", path.rpartition("/")[2].partition(".")[0]) or "parts"
-        alias = f"_{alias}" if alias[0].isdigit() or alias in tables().literals else alias
-        end = start + found.end()
+        alias = f"_{alias}" if alias[0].isdigit() or alias in self.literals else alias
         written = f'import "{path}" as {alias};'
-        message = f"`{found['word']}` without a name for the file"
         fix = written if path.endswith(".nsg") else None  # any other file has to be written anew
+        message = f"`{found['word']}` without a name for the file"
         help = f"write {written} and use what it defines as {alias}.…"
-        self.report.add("E0126", message, start, end, help=help, fix=fix)
-        stop = first
-        while not self._at_end(stop) and tokens.starts[stop] < end:
-            tokens.reported.add(tokens.starts[stop])
-            stop += 1
-        tokens.replace(first, stop - first, [tables().kind("BAD_STATEMENT")])
-        tokens.starts[first], tokens.ends[first] = start, end
+        self.report.add("E0126", message, start, found.end(), help=help, fix=fix)
+        stop = bisect_left(tokens.starts, found.end(), first, len(tokens.kinds) - 1)
+        tokens.reported.update(tokens.starts[first:stop])
+        tokens.give_up(first, stop, "BAD_STATEMENT", start, found.end())
         return True
 
     def _end_of_statement(self, at: int) -> int:
@@ -159,42 +151,24 @@ class Slips:
             stop += 1
         if stop < at + 2 or tokens.kinds[at - 1] not in literal or not fits(states, self.literals[","]):
             return False
-        gaps = [tokens.ends[index - 1] for index in range(at, stop)]
+        gaps = tokens.ends[at - 1 : stop - 1]
         edits = tuple(Edit(Span(tokens.source, gap, gap), ",") for gap in gaps)
         self.report.add("E0112", "missing `,`", gaps[0], gaps[-1], fix=Fix("insert `,` between them", edits))
-        for column, new in (
-            (tokens.kinds, [self.literals[","]] * len(gaps)),
-            (tokens.starts, gaps),
-            (tokens.ends, gaps),
-        ):
-            column[at:stop] = chain.from_iterable(zip(new, column[at:stop], strict=True))
+        for index in reversed(range(at, stop)):
+            self._insert(index, ",")
         return True
 
     def _grouped_digits(self, at: int) -> bool:
         """`let n = 1,000;`: commas in a number."""
-        tokens, number = self.tokens, tables().kind("NUMBER")
-        stop = at
-        while (
-            self._is(stop, ",")
-            and tokens.kinds[stop + 1] == number
-            and tokens.starts[at - 1] < tokens.starts[stop] == tokens.ends[stop - 1]
-            and tokens.ends[stop] == tokens.starts[stop + 1]
-            and re.fullmatch(r"[0-9]{3}", tokens.text(stop + 1))
-        ):
-            stop += 2
-        if (
-            stop == at
-            or tokens.kinds[at - 1] != number
-            or not re.fullmatch("[0-9]{1,3}", tokens.text(at - 1))
-        ):
+        tokens, start = self.tokens, self.tokens.starts[at - 1]
+        found = _GROUPED.match(tokens.source.text, start)
+        if not found or not self._is(at, ",") or tokens.kinds[at - 1] != tables().kind("NUMBER"):
             return False
-        start, end = tokens.starts[at - 1], tokens.ends[stop - 1]
-        text = tokens.source.text[start:end]
-        plain = text.replace(",", "")
+        commas = found[0].count(",")
         help = "digits are not grouped, and decimals stand behind a point"
-        fix = plain if text.count(",") > 1 else None  # one comma may be the decimal one
-        self.report.add("E0116", f"`{text}` is not a number", start, end, help=help, fix=fix)
+        fix = found[0].replace(",", "") if commas > 1 else None  # one comma may be the decimal one
+        self.report.add("E0116", f"`{found[0]}` is not a number", start, found.end(), help=help, fix=fix)
         tokens.reported.add(start)
-        tokens.ends[at - 1] = end
-        tokens.replace(at, stop - at, [])
+        tokens.ends[at - 1] = found.end()
+        tokens.replace(at, 2 * commas, [])
         return True

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Edit, Fix, Label
 from scenelang.diagnostics.fixes import removal
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.syntax.tables import tables
 
 MAX_MISTAKES = 200
 """After so many the rest of a file is not reported: it is not a scene."""
@@ -128,6 +129,11 @@ class Tokens:
         self.kinds[index : index + count] = kinds
         self.starts[index : index + count] = [at] * len(kinds)
         self.ends[index : index + count] = [at] * len(kinds)
+
+    def give_up(self, first: int, stop: int, name: str, start: int, end: int) -> None:
+        """Put one token that stands for what cannot be read in the place of some."""
+        self.replace(first, stop - first, [tables().kind(name)])
+        self.starts[first], self.ends[first] = start, end
 
     def drop(self, indices: Sequence[int]) -> None:
         """Take out any number of tokens at once."""
