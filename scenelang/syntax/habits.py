@@ -14,7 +14,6 @@ from scenelang.syntax.foreign import HABITS, Habit
 from scenelang.syntax.patterns import (
     MOST,
     Change,
-    Columns,
     Match,
     block,
     change,
@@ -26,6 +25,7 @@ from scenelang.syntax.repairs import FOLLOWED
 from scenelang.syntax.slips import Slips
 from scenelang.syntax.spelling import word_for
 from scenelang.syntax.tables import tables
+from scenelang.syntax.tokens import Token
 from scenelang.words import NODES, TRANSFORMS
 
 _FLAT: Final = frozenset(("square", "triangle", "pentagon", "star"))
@@ -101,8 +101,8 @@ class Habits(Slips):
         """Whether a change lets the rest of the statement read, or the head of one with a block."""
         if new.first > at:
             return False
-        old = self._reach(stack, first, new.first, ([], [], []), new.first, at)
-        reached = self._reach(stack, first, new.first, new.columns, new.stop, at)
+        old = self._reach(stack, first, new.first, [], new.first, at)
+        reached = self._reach(stack, first, new.first, new.new, new.stop, at)
         end = match.stop
         whole = meant[-1:] in (";", "}", "{", "")
         while not whole and end < match.stop + FOLLOWED and not self._at_end(end):
@@ -111,15 +111,14 @@ class Habits(Slips):
         head = "BODY" in meant or (match.parts[0][0] == "for" and reached == match.stop)
         return reached > max(old, at) and (reached >= end or head)
 
-    def _reach(self, stack: list[int], first: int, begin: int, columns: Columns, stop: int, at: int) -> int:
+    def _reach(self, stack: list[int], first: int, begin: int, new: list[Token], stop: int, at: int) -> int:
         """The first token after a mistake that does not fit where others stand for ``[begin, stop)``."""
-        tokens, rest = self.tokens, slice(stop, max(at, stop) + FOLLOWED)
-        parts = zip((tokens.kinds, tokens.starts, tokens.ends), columns, strict=True)
-        trial = zip(*(all_[first:begin] + its + all_[rest] for all_, its in parts), strict=True)
+        tokens = self.tokens
+        trial = tokens.part(first, begin) + new + tokens.part(stop, max(at, stop) + FOLLOWED)
         # Words that stand for operators elsewhere are mended, and reported, when their turn comes.
         words = [(kind, word_for(tokens.source.text[start:end])) for kind, start, end in trial]
         read = [self.literals[sign] if sign else kind for kind, sign in words]
-        return first + reach(stack.copy(), read, 0, len(read)) + (stop - begin) - len(columns[0])
+        return first + reach(stack.copy(), read, 0, len(read)) + (stop - begin) - len(new)
 
     def _tell(self, habit: Habit, match: Match, new: Change) -> None:
         tokens = self.tokens
@@ -133,8 +132,7 @@ class Habits(Slips):
         help = habit.help and match.told(habit.help)
         if tokens.starts[match.start] not in tokens.reported:
             self.report.add(habit.code, match.told(habit.message), *new.place, help=help, fix=fix)
-        for column, values in zip((tokens.kinds, tokens.starts, tokens.ends), new.columns, strict=True):
-            column[new.first : new.stop] = values
+        tokens.splice(new.first, new.stop, new.new)
 
     @cached_property
     def _materials(self) -> tuple[str | None, str | None]:

@@ -25,7 +25,7 @@ from typing import Final
 
 from scenelang.records import Record
 from scenelang.syntax.tables import END, tables
-from scenelang.syntax.tokens import Tokens
+from scenelang.syntax.tokens import Token, Tokens
 from scenelang.words import NODES, OPERATIONS, TRANSFORMS
 
 MOST: Final = 200
@@ -48,10 +48,6 @@ _PIECE = re.compile(
     r"|(?P<text>[A-Za-z_]\w*|\.\.<(?!\w+>)|\.\.|[<>=!]=|&&|\|\||\S))"
 )
 _TYPED = re.compile(rf"\b(?:{'|'.join(TYPES)})\s+(?=[A-Za-z_])|\s*:\s*[A-Za-z_]\w*")
-
-
-Columns = tuple[list[int], list[int], list[int]]
-"""Kinds, starts and ends of tokens."""
 
 
 class Piece(Record):
@@ -226,7 +222,7 @@ class Change(Record):
     Args:
         first, stop: the tokens that go.
         place: where it is shown: the text that goes, with the name before it.
-        columns: kinds, starts and ends of those that come. Holes that change their order are left out.
+        new: the tokens that come; holes that change their order are left out.
         start, end: the text that goes.
         text: the text that comes.
     """
@@ -234,7 +230,7 @@ class Change(Record):
     first: int
     stop: int
     place: tuple[int, int]
-    columns: Columns
+    new: list[Token]
     start: int
     end: int
     text: str
@@ -273,49 +269,40 @@ def change(match: Match, replacement: str, extra: Mapping[str, str]) -> Change |
     start = tokens.ends[first - 1] if touching else tokens.starts[first]
     if gone and not middle and behind and not wanted[-behind].spaced:
         end = tokens.starts[stop]
-    texts = []
-    for number, piece in enumerate(middle):
-        text = piece.text
-        if piece.is_hole:
-            text = match.text(*holes[f"<{piece.text}>"])
-            text = without_types(text) if piece.text == "PARAMS" else text
-        texts.append(" " * (piece.spaced and number > 0) + text)
+    text, new = _written(match, middle, first, stop)
     if not gone and behind and wanted[-behind].spaced:
-        texts.append(" ")
+        text += " "
     shown_end = tokens.ends[stop - 1] if gone else end
     name = match.parts[before - 1] if before and gone and not touching else ("", first, first)
     shown = tokens.starts[name[1] if name[0].islower() and name[0][0] == "<" else first]
-    columns = _columns(match, middle, first, stop)
-    return Change(first, stop, (shown, max(shown, shown_end)), columns, start, end, "".join(texts))
+    return Change(first, stop, (shown, max(shown, shown_end)), new, start, end, text)
 
 
-def _columns(match: Match, middle: list[Piece], first: int, stop: int) -> Columns:
-    """The tokens of a replacement: those of holes at their places, others empty, in the order of the text."""
+def _written(match: Match, pieces: list[Piece], first: int, stop: int) -> tuple[str, list[Token]]:
+    """The text of a replacement, and its tokens: those of holes at their places, others empty, in order."""
     tokens, holes, language = match.tokens, match.holes(), tables()
-    kinds: list[int] = []
-    starts: list[int] = []
-    ends: list[int] = []
+    written = ""
+    new: list[Token] = []
     at = tokens.starts[first]
-
-    def put(kind: int, start: int, end: int) -> None:
-        kinds.append(kind)
-        starts.append(start)
-        ends.append(end)
-
-    for piece in middle:
-        place = holes.get(f"<{piece.text}>") if piece.is_hole else None
+    for number, piece in enumerate(pieces):
+        text, typed = piece.text, piece.text == "PARAMS"
+        place = holes.get(f"<{text}>") if piece.is_hole else None
         if place is not None and tokens.starts[place[0]] >= at:
-            for index in _untyped(tokens, place) if piece.text == "PARAMS" else range(*place):
-                put(tokens.kinds[index], tokens.starts[index], tokens.ends[index])
+            part = tokens.part(*place)
+            new += [part[index - place[0]] for index in _untyped(tokens, place)] if typed else part
             at = tokens.ends[place[1] - 1]
-        elif piece.text.startswith("BAD_"):
-            put(language.kind(piece.text), at, tokens.ends[stop - 1] if stop > first else at)
-            at = ends[-1]
+        elif text.startswith("BAD_"):
+            end = tokens.ends[stop - 1] if stop > first else at
+            new.append((language.kind(text), at, end))
+            at = end
         elif piece.is_hole:
-            put(language.kind("BAD_EXPRESSION" if piece.text.isupper() else "NAME"), at, at)
+            new.append((language.kind("BAD_EXPRESSION" if text.isupper() else "NAME"), at, at))
         else:
-            put(language.literals.get(piece.text, language.kind("NAME")), at, at)
-    return kinds, starts, ends
+            new.append((language.literals.get(text, language.kind("NAME")), at, at))
+        if place is not None:
+            text = without_types(match.text(*place)) if typed else match.text(*place)
+        written += " " * (piece.spaced and number > 0) + text
+    return written, new
 
 
 def _untyped(tokens: Tokens, place: tuple[int, int]) -> list[int]:

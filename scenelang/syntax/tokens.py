@@ -13,6 +13,10 @@ MAX_MISTAKES = 200
 """After so many the rest of a file is not reported: it is not a scene."""
 
 
+Token = tuple[int, int, int]
+"""Kind, start and end."""
+
+
 class Report:
     """The mistakes of one file, in the order of finding; at most `MAX_MISTAKES`.
 
@@ -123,17 +127,24 @@ class Tokens:
         first old one began, or at the end of the token before where none goes.
         """
         if len(kinds) == count == 1:
-            self.kinds[index : index + count] = kinds
+            self.kinds[index] = kinds[0]
             return
         at = self.starts[index] if count else self.end_before(index)
-        self.kinds[index : index + count] = kinds
-        self.starts[index : index + count] = [at] * len(kinds)
-        self.ends[index : index + count] = [at] * len(kinds)
+        self.splice(index, index + count, [(kind, at, at) for kind in kinds])
+
+    def part(self, first: int, stop: int) -> list[Token]:
+        """Kinds, starts and ends of the tokens ``[first, stop)``."""
+        columns = (self.kinds[first:stop], self.starts[first:stop], self.ends[first:stop])
+        return list(zip(*columns, strict=True))
+
+    def splice(self, first: int, stop: int, new: Sequence[Token]) -> None:
+        """Put others in the place of the tokens ``[first, stop)``."""
+        for number, column in enumerate((self.kinds, self.starts, self.ends)):
+            column[first:stop] = [token[number] for token in new]
 
     def give_up(self, first: int, stop: int, name: str, start: int, end: int) -> None:
         """Put one token that stands for what cannot be read in the place of some."""
-        self.replace(first, stop - first, [tables().kind(name)])
-        self.starts[first], self.ends[first] = start, end
+        self.splice(first, stop, [(tables().kind(name), start, end)])
 
     def drop(self, indices: Sequence[int]) -> None:
         """Take out any number of tokens at once."""
