@@ -7,14 +7,24 @@ its name becomes a `BadStmt`: recovery has reported it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final, get_args
 
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import nodes
-from scenelang.syntax.expressions import Arguments, ExpressionBuilder
+from scenelang.syntax.expressions import ExpressionBuilder
 from scenelang.syntax.tables import tables
 
-Parameters = tuple[tuple[nodes.Parameter, ...], int]
+_PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
+    "model": (nodes.Model, (1,)),
+    "let": (nodes.Let, (1, 3)),
+    "fn": (nodes.Fn, (1, 2, 4)),
+    "module": (nodes.Module, (1, 2, 3)),
+    "for_": (nodes.For, (2, 4, 6)),
+    "conditional": (nodes.Conditional, (0, 2, 4)),
+    "index": (nodes.Index, (0, 2)),
+    "member": (nodes.Member, (0, 2)),
+}
+"""Rules whose node has some of their parts as they are: its class, and which parts."""
 Keyword = tuple[Any, Span]
 
 
@@ -23,7 +33,20 @@ class Builder(ExpressionBuilder):
 
     def callbacks(self) -> list[Callable[..., Any] | None]:
         """The callback of every rule, in the order of `Tables.rules`; None passes the value on."""
-        return [getattr(self, name) if name else None for _, _, name in tables().rules]
+        plain = {name: self._plain(*made) for name, made in _PLAIN.items()}
+        return [plain.get(name) or getattr(self, name) if name else None for _, _, name in tables().rules]
+
+    def _plain(self, cls: type, which: tuple[int, ...]) -> Callable[..., Any]:
+        bad = nodes.BadStmt if issubclass(cls, get_args(nodes.Stmt)) else nodes.BadExpr
+
+        def make(*parts: Any) -> Any:
+            span = self._span(parts[0], parts[-1])
+            values = [parts[at] for at in which]
+            if any(isinstance(value, nodes.Name) and not value.text for value in values):
+                return bad(span)
+            return cls(*[value[0] if isinstance(value, tuple) else value for value in values], span)
+
+        return make
 
     def keyword(self, token: int) -> Keyword:
         return self.sign(token), self._span(token, token)
@@ -36,27 +59,10 @@ class Builder(ExpressionBuilder):
         value = self.number(number)
         return nodes.Version(value, span) if isinstance(value, nodes.Number) else nodes.BadStmt(span)
 
-    def model(self, word: int, name: nodes.Expr, semicolon: int) -> nodes.Stmt:
-        return nodes.Model(name, self._span(word, semicolon))
-
     def param(self, word: int, name: nodes.Name, equal: int, default: nodes.Expr, *rest: Any) -> nodes.Stmt:
         span = self._span(word, rest[-1])
         range = rest[1] if rest[1:] else None
         return nodes.Param(name, default, range, span) if name.text else nodes.BadStmt(span)
-
-    def let(self, word: int, name: nodes.Name, equal: int, value: nodes.Expr, last: int) -> nodes.Stmt:
-        span = self._span(word, last)
-        return nodes.Let(name, value, span) if name.text else nodes.BadStmt(span)
-
-    def fn(
-        self, word: int, name: nodes.Name, params: Parameters, equal: int, body: nodes.Expr, last: int
-    ) -> nodes.Stmt:
-        span = self._span(word, last)
-        return nodes.Fn(name, params[0], body, span) if name.text else nodes.BadStmt(span)
-
-    def module(self, word: int, name: nodes.Name, params: Parameters, body: nodes.Block) -> nodes.Stmt:
-        span = self._to(word, body)
-        return nodes.Module(name, params[0], body, span) if name.text else nodes.BadStmt(span)
 
     def parameter(self, name: nodes.Name, *default: Any) -> nodes.Parameter:
         value = default[1] if default else None
@@ -68,24 +74,11 @@ class Builder(ExpressionBuilder):
             return nodes.BadStmt(span)
         return nodes.Import(self.string(path), alias, span)
 
-    def for_(
-        self,
-        word: int,
-        opening: int,
-        variable: nodes.Name,
-        within: int,
-        iterable: nodes.Expr,
-        closing: int,
-        body: nodes.Block,
-    ) -> nodes.Stmt:
-        span = self._to(word, body)
-        return nodes.For(variable, iterable, body, span) if variable.text else nodes.BadStmt(span)
-
     def if_(
         self, word: int, opening: int, condition: nodes.Expr, closing: int, then: nodes.Block, *rest: Any
     ) -> nodes.Stmt:
         otherwise = rest[1] if rest else None
-        return nodes.If(condition, then, otherwise, self._to(word, otherwise or then))
+        return nodes.If(condition, then, otherwise, self._span(word, otherwise or then))
 
     def node(self, kind: Keyword, body: nodes.Block) -> nodes.Stmt:
         return nodes.Node(kind[0], body, kind[1].to(body.span), kind[1])
@@ -94,22 +87,20 @@ class Builder(ExpressionBuilder):
         return nodes.Combined(op[0], child, op[1].to(child.span), op[1])
 
     def material_use(self, word: int, name: nodes.Name, last: Any) -> nodes.Stmt:
-        span = self._to(word, last)
+        span = self._span(word, last)
         return nodes.MaterialUse(name, _block(last), span) if name.text else nodes.BadStmt(span)
 
     def call(self, name: nodes.Name, *rest: Any) -> nodes.Stmt:
-        args: Arguments | None = rest[0] if rest[1:] else None
-        end = self._to(0, rest[-1]).end
-        span = Span(self.source, name.span.start, end)
+        span = self._span(name, rest[-1])
         if not name.text:
             return nodes.BadStmt(span)
-        return nodes.Call(name, args[0] if args else None, _block(rest[-1]), span)
+        return nodes.Call(name, rest[0][0] if rest[1:] else None, _block(rest[-1]), span)
 
     def bad_statement(self, token: int) -> nodes.Stmt:
         return nodes.BadStmt(self._span(token, token))
 
     def bad_block(self, head: int, body: nodes.Block) -> nodes.Stmt:
-        return nodes.BadStmt(self._to(head, body))
+        return nodes.BadStmt(self._span(head, body))
 
     def block(self, opening: int, *rest: Any) -> nodes.Block:
         return nodes.Block(tuple(rest[0]) if rest[1:] else (), self._span(opening, rest[-1]))

@@ -40,13 +40,10 @@ class ExpressionBuilder:
         self.ends = tokens.ends
         self.signs = tables().kinds
 
-    def _span(self, first: int, last: int) -> Span:
-        return Span(self.source, self.starts[first], self.ends[last])
-
-    def _to(self, first: int, last: Any) -> Span:
-        """From a token to the last of a node, or to another token."""
-        end = self.ends[last] if isinstance(last, int) else last.span.end
-        return Span(self.source, self.starts[first], end)
+    def _span(self, first: Any, last: Any) -> Span:
+        """From the first of some parts to the last: tokens, nodes, or lists with their end."""
+        start = self.starts[first] if isinstance(first, int) else first.span.start
+        return Span(self.source, start, self.ends[last] if isinstance(last, int) else last.span.end)
 
     def sign(self, token: int) -> Any:
         """What a literal token stands for; recovery may have read it from other text."""
@@ -86,13 +83,7 @@ class ExpressionBuilder:
 
     def range(self, start: nodes.Expr, dots: int, stop: nodes.Expr, *rest: Any) -> nodes.Expr:
         step = rest[1] if rest else None
-        span = start.span.to((step or stop).span)
-        return nodes.Range(start, stop, self.sign(dots) == "..<", step, span)
-
-    def conditional(
-        self, condition: nodes.Expr, mark: int, then: nodes.Expr, colon: int, otherwise: nodes.Expr
-    ) -> nodes.Expr:
-        return nodes.Conditional(condition, then, otherwise, condition.span.to(otherwise.span))
+        return nodes.Range(start, stop, self.sign(dots) == "..<", step, self._span(start, step or stop))
 
     def binary(self, left: nodes.Expr, op: int, right: nodes.Expr) -> nodes.Expr:
         start, end = self.starts[op], self.ends[op]
@@ -105,16 +96,8 @@ class ExpressionBuilder:
         return nodes.Unary(self.sign(op), operand, Span(self.source, self.starts[op], operand.span.end))
 
     def material(self, word: int, name: nodes.Name, *body: nodes.Block) -> nodes.Expr:
-        block = body[0] if body else None
-        span = self._to(word, block or name)
-        return nodes.MaterialExpr(name, block, span) if name.text else nodes.BadExpr(span)
-
-    def index(self, value: nodes.Expr, opening: int, index: nodes.Expr, closing: int) -> nodes.Expr:
-        return nodes.Index(value, index, Span(self.source, value.span.start, self.ends[closing]))
-
-    def member(self, value: nodes.Expr, dot: int, name: nodes.Name) -> nodes.Expr:
-        span = value.span.to(name.span)
-        return nodes.Member(value, name, span) if name.text else nodes.BadExpr(span)
+        span = self._span(word, body[0] if body else name)
+        return nodes.MaterialExpr(name, body[0] if body else None, span) if name.text else nodes.BadExpr(span)
 
     def method(self, value: nodes.Expr, dot: int, name: nodes.Name, args: Arguments) -> nodes.Expr:
         span = Span(self.source, value.span.start, args[1])
