@@ -17,39 +17,11 @@ from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 from scenelang.words import UNITS
 
-UNIT_ALIASES = {
-    "degree": "deg",
-    "degrees": "deg",
-    "°": "deg",
-    "radian": "rad",
-    "radians": "rad",
-    "turns": "turn",
-    "sec": "s",
-    "second": "s",
-    "seconds": "s",
-    "msec": "ms",
-}
-FOREIGN = {
-    "**": "^",
-    "===": "==",
-    "!==": "!=",
-    "<>": "!=",
-    "&": "&&",
-    "|": "||",
-    "−": "-",
-    "–": "-",
-    "×": "*",
-    "·": "*",
-    "÷": "/",
-    "≤": "<=",
-    "≥": ">=",
-    "≠": "!=",
-    "；": ";",
-    "，": ",",
-    "（": "(",
-    "）": ")",
-    "：": ":",
-}
+UNIT_ALIASES = {"degree": "deg", "degrees": "deg", "°": "deg", "radian": "rad", "radians": "rad"}
+UNIT_ALIASES |= {"turns": "turn", "sec": "s", "second": "s", "seconds": "s", "msec": "ms"}
+FOREIGN = {"**": "^", "===": "==", "!==": "!=", "<>": "!=", "&": "&&", "|": "||", "−": "-", "–": "-"}
+FOREIGN |= {"×": "*", "·": "*", "÷": "/", "≤": "<=", "≥": ">=", "≠": "!="}
+FOREIGN |= {"；": ";", "，": ",", "（": "(", "）": ")", "：": ":"}
 """Operators and punctuation of other languages and keyboards: what is written here instead."""
 
 # Possessive throughout: a text that matches nothing must not be tried in every way of splitting it.
@@ -66,6 +38,18 @@ _SLIPS = {
     "name": r"[^\W\d]\w*+",
     "foreign": r"&(?!&)|\|(?!\|)|" + "|".join(re.escape(text) for text in FOREIGN if text not in "&|"),
 }
+_SAID = {
+    "open_comment": ("", "E0115", "comment is never closed", "a comment ends with `*/`; the rest is skipped"),
+    "colour": ("COLOR", "E0118", "`{}` is not a colour", "a colour is `#` and 3 or 6 hexadecimal digits"),
+    "name": (
+        "NAME",
+        "E0124",
+        "`{}` is not a name",
+        "names are made of ASCII letters, digits and `_`",
+    ),
+    "variable": ("NAME", "E0113", "illegal name `{}`", "names have no `$`"),
+}
+"""Slips without a fix: what stands in their place, code, message, help."""
 _AFTER_STRING = re.compile(r"[ \t]*+(?:[;)]|as\b|$)", re.MULTILINE)
 """What may follow a string whose end is known though its quote is missing."""
 _ILLEGAL = r"[^\s\w\x21-\x7e]+|[@$\\~`]+|[\s\S]"
@@ -126,25 +110,22 @@ class _Slips:
     def __init__(self, tokens: Tokens, report: Report) -> None:
         self.tokens = tokens
         self.report = report
-        self.kind = tables().kind
 
     def read(self, name: str, start: int, end: int) -> None:
-        handler: Callable[[int, int, str], None] = getattr(self, f"_{name}")
-        handler(start, end, self.tokens.source.text[start:end])
+        text = self.tokens.source.text[start:end]
+        if name not in _SAID:
+            handler: Callable[[int, int, str], None] = getattr(self, f"_{name}")
+            handler(start, end, text)
+            return
+        kind, code, message, help = _SAID[name]
+        if kind:
+            self._keep(kind, start, end)
+        self.tokens.cut |= name == "open_comment"
+        self.report.add(code, message.format(text), start, end, help=help)
 
     def _keep(self, kind: str, start: int, end: int) -> None:
-        self.tokens.append(self.kind(kind), start, end)
+        self.tokens.append(tables().kind(kind), start, end)
         self.tokens.reported.add(start)
-
-    def _open_comment(self, start: int, end: int, text: str) -> None:
-        self.tokens.cut = True
-        self.report.add(
-            "E0115",
-            "comment is never closed",
-            start,
-            end,
-            help="a comment ends with `*/`; the rest is skipped",
-        )
 
     def _close_comment(self, start: int, end: int, text: str) -> None:
         self.report.add("E0115", "end of a comment that was never opened", start, end, fix="")
@@ -153,39 +134,32 @@ class _Slips:
         self._keep("STRING", start, end)
         sure = end - start > 1 and _AFTER_STRING.match(self.tokens.source.text, end)
         fix = self.report.change(end, end, '"') if sure else None
-        self.report.add(
-            "E0114", "string is never closed", start, end, help='a string ends with `"` on its line', fix=fix
-        )
+        help = 'a string ends with `"` on its line'
+        self.report.add("E0114", "string is never closed", start, end, help=help, fix=fix)
 
     def _quotes(self, start: int, end: int, text: str) -> None:
         self._keep("STRING", start, end)
-        safe = '"' not in text and "\\" not in text
-        fix = f'"{text[1:-1]}"' if safe else None
-        self.report.add(
-            "E0123", "string in the wrong quotes", start, end, help='strings stand in `"`', fix=fix
-        )
+        fix = None if '"' in text or "\\" in text else f'"{text[1:-1]}"'
+        help = 'strings stand in `"`'
+        self.report.add("E0123", "string in the wrong quotes", start, end, help=help, fix=fix)
 
     def _number(self, start: int, end: int, text: str) -> None:
         self._keep("NUMBER", start, end)
-        digits = re.match(r"[0-9]*\.?[0-9]*", text)
-        value = digits[0] if digits else ""
-        rest = text[len(value) :]
-        fix: str | None = None
+        found = re.match(r"([0-9]*\.?[0-9]*)(.*)", text, re.DOTALL)
+        value, rest = found.groups() if found else ("", text)
+        message, fix = f"`{text}` is not a number", None
         help = "numbers look like `1`, `0.5` or `1e-3`"
         if rest in ("f", "F"):
-            message, help = f"`{text}` is not a number", "numbers have no type"
-            fix = value
+            help, fix = "numbers have no type", value
         elif re.fullmatch("(?:_[0-9]+)+", rest):
-            message, help = f"`{text}` is not a number", "digits are not grouped"
-            fix = text.replace("_", "")
-        elif rest in UNIT_ALIASES:
-            message = f"`{rest}` is not a unit"
-            fix = value + UNIT_ALIASES[rest]
+            help, fix = "digits are not grouped", text.replace("_", "")
         elif rest and not rest.startswith((".", "e", "E")):
             message = f"`{rest}` is not a unit"
-            help = f"units are {', '.join(f'`{unit}`' for unit in UNITS)}; a product is written with `*`"
-        else:
-            message = f"`{text}` is not a number"
+            if rest in UNIT_ALIASES:
+                fix = value + UNIT_ALIASES[rest]
+            else:
+                units = ", ".join(f"`{unit}`" for unit in UNITS)
+                help = f"units are {units}; a product is written with `*`"
         self.report.add("E0116", message, start, end, help=help, fix=fix)
 
     def _hash(self, start: int, end: int, text: str) -> None:
@@ -195,45 +169,18 @@ class _Slips:
             self.report.add("E0133", "names are bound by `let`", start, end, fix=bound)
             return
         fix = None if text.rstrip().endswith((";", "{", "}")) else "//"  # OpenSCAD marks objects by it
-        self.report.add(
-            "E0127",
-            "`#` does not begin a comment",
-            start,
-            start + 1,
-            help="comments begin with `//`",
-            fix=fix,
-        )
-
-    def _colour(self, start: int, end: int, text: str) -> None:
-        self._keep("COLOR", start, end)
-        message = f"`{text}` is not a colour"
-        self.report.add("E0118", message, start, end, help="a colour is `#` and 3 or 6 hexadecimal digits")
-
-    def _name(self, start: int, end: int, text: str) -> None:
-        self._keep("NAME", start, end)
-        help = "names are made of the letters a to z and A to Z, digits and `_`"
-        self.report.add("E0124", f"`{text}` is not a name", start, end, help=help)
-
-    def _variable(self, start: int, end: int, text: str) -> None:
-        self._keep("NAME", start, end)
-        self.report.add("E0113", f"illegal name `{text}`", start, end, help="names have no `$`")
+        message, help = "`#` does not begin a comment", "comments begin with `//`"
+        self.report.add("E0127", message, start, start + 1, help=help, fix=fix)
 
     def _foreign(self, start: int, end: int, text: str) -> None:
-        instead = FOREIGN[text]
-        self._keep(instead, start, end)
-        self.report.add(
-            "E0127",
-            f"`{text}` is not used here",
-            start,
-            end,
-            help=f"`{instead}` is the sign for it",
-            fix=instead,
-        )
+        new = FOREIGN[text]
+        self._keep(new, start, end)
+        message, help = f"`{text}` is not used here", f"`{new}` is the sign for it"
+        self.report.add("E0127", message, start, end, help=help, fix=new)
 
     def _illegal(self, start: int, end: int, text: str) -> None:
         self.tokens.reported.add(start)
         shown = text if text.isprintable() else " ".join(f"U+{ord(c):04X}" for c in text[:8])
         unseen = all(category(c) in ("Cf", "Cc") for c in text)  # comes along when text is copied
-        fix = "" if unseen else None
-        help = "it cannot be seen" if unseen else None
+        help, fix = ("it cannot be seen", "") if unseen else (None, None)
         self.report.add("E0113", f"illegal character `{shown}`", start, end, help=help, fix=fix)

@@ -43,46 +43,13 @@ class Repair(Record):
 
 
 # What is forgotten, and what that costs. Several tokens that only make sense together count as one.
-_INSERTIONS = {
-    ";": 1.3,
-    ",": 1.2,
-    "=": 1.3,
-    "in": 1.4,
-    "as": 1.4,
-    ":": 1.5,
-    "..": 2.0,
-    "(": 1.6,
-    "( )": 1.6,
-    "{ }": 1.9,
-    "let": 1.4,
-    "param": 1.5,
-    "fn": 1.5,
-    "for": 1.5,
-    "if": 1.5,
-    "nsg": 1.6,
-    "model": 1.7,
-    "import": 1.6,
-    "material": 1.6,
-    "BAD_EXPRESSION": 1.6,
-    "NAME": 1.7,
-    "STRING": 1.8,
-    "*": 2.2,
-    "= BAD_EXPRESSION": 1.9,
-    "in BAD_EXPRESSION": 1.9,
-    "as NAME": 1.9,
-    ": BAD_EXPRESSION": 1.9,
-}
-_ONLY_BEFORE = {
-    "let": "NAME",
-    "param": "NAME",
-    "fn": "NAME",
-    "for": "(",
-    "if": "(",
-    "nsg": "NUMBER",
-    "model": "STRING",
-    "import": "STRING",
-    "material": "NAME",
-}
+_INSERTIONS = {";": 1.3, ",": 1.2, "=": 1.3, "in": 1.4, "as": 1.4, ":": 1.5, "..": 2.0, "*": 2.2}
+_INSERTIONS |= {"(": 1.6, "( )": 1.6, "{ }": 1.9, "BAD_EXPRESSION": 1.6, "NAME": 1.7, "STRING": 1.8}
+_INSERTIONS |= {"= BAD_EXPRESSION": 1.9, "in BAD_EXPRESSION": 1.9, "as NAME": 1.9, ": BAD_EXPRESSION": 1.9}
+_INSERTIONS |= {"let": 1.4, "param": 1.5, "fn": 1.5, "for": 1.5, "if": 1.5, "nsg": 1.6, "model": 1.7}
+_INSERTIONS |= {"import": 1.6, "material": 1.6}
+_ONLY_BEFORE = dict.fromkeys(("let", "param", "fn", "material"), "NAME") | {"for": "(", "if": "("}
+_ONLY_BEFORE |= {"nsg": "NUMBER", "model": "STRING", "import": "STRING"}
 _ONLY_AFTER = {"as": "STRING", "as NAME": "STRING"}
 REPLACEMENTS = {
     "=": {"==": 1.0},
