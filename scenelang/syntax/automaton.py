@@ -6,7 +6,7 @@ tables, keeps token indices on its stack and hands over at a mistake.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from scenelang.syntax.tables import END, tables
@@ -14,6 +14,10 @@ from scenelang.syntax.tables import END, tables
 LOOKAHEAD = 8
 """How far past a mistake a repair is followed; further on it tells nothing more."""
 
+# What brings a half-written statement to its end. What is tried first ends something; an operand or a name
+# is taken only where nothing else will do.
+_NEXT = (")", "]", "in", "=", ":", "BAD_EXPRESSION", "STRING", "NAME", "as", "(")
+_LONGEST = 24
 
 Mend = Callable[[list[int], list[Any], int], int | None]
 """Changes states, values and tokens at the index of one that does not fit, and says where reading goes on."""
@@ -122,3 +126,25 @@ def statement_depth(stack: list[int]) -> int:
     while language.actions[stack[at]].get(bad_statement, -1) < 0:
         at -= 1
     return at
+
+
+def completion(stack: Sequence[int], goal: int) -> tuple[int, ...] | None:
+    """The tokens after which ``goal`` fits; None where no few do.
+
+    Args:
+        stack: states of the parser; they are not changed.
+        goal: kind of the token that should follow: a `;` or a brace.
+
+    Returns:
+        Kinds of the missing tokens, without the goal; empty where it fits already.
+    """
+    kind = tables().kind
+    trial = list(stack)
+    missing: list[int] = []
+    while not fits(trial, goal):
+        following = next((k for k in map(kind, _NEXT) if fits(trial, k)), None)
+        if following is None or len(missing) == _LONGEST:
+            return None
+        advance(trial, following)
+        missing.append(following)
+    return tuple(missing)

@@ -13,8 +13,7 @@ from functools import cache
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.records import Record
-from scenelang.syntax.automaton import advance, fits, reach
-from scenelang.syntax.completion import completion
+from scenelang.syntax.automaton import advance, completion, fits, reach
 from scenelang.syntax.layout import Slip, find_slips
 from scenelang.syntax.mistakes import report_broken_off, report_instead
 from scenelang.syntax.tables import tables

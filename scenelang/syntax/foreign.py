@@ -2,9 +2,30 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Final
 
+from scenelang.diagnostics.suggest import ranked
 from scenelang.records import Record
+from scenelang.syntax.tables import tables
+
+OPERATORS: Final = {"and": "&&", "or": "||", "not": "!", "mod": "%"}
+"""Operators that other languages write as words."""
+
+HEADS: Final = (
+    dict.fromkeys(("function", "func", "fun", "def", "define"), "fn")
+    | dict.fromkeys(("var", "const", "float", "int", "bool", "vec2", "vec3"), "let")
+    | dict.fromkeys(("include", "use", "require"), "import")
+    | {"uniform": "param", "foreach": "for", "macro": "module", "class": "module"}
+)
+"""Words that begin statements in other languages, and the keyword that begins them here."""
+
+
+@lru_cache(maxsize=256)
+def keywords_near(text: str) -> tuple[str, ...]:
+    """Keywords that a word may have been meant for, nearest first."""
+    words = [word for word in tables().literals if word.isalpha()]
+    return tuple(word for _, word in ranked(text, words, max(1, len(text) // 3)))
 
 
 class Habit(Record):

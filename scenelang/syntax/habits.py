@@ -10,7 +10,7 @@ from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import mistakes
 from scenelang.syntax.automaton import reach
-from scenelang.syntax.foreign import HABITS, Habit
+from scenelang.syntax.foreign import HABITS, OPERATORS, Habit
 from scenelang.syntax.patterns import (
     MOST,
     Change,
@@ -23,7 +23,6 @@ from scenelang.syntax.patterns import (
 )
 from scenelang.syntax.repairs import FOLLOWED
 from scenelang.syntax.slips import Slips
-from scenelang.syntax.spelling import word_for
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Token
 from scenelang.words import NODES, TRANSFORMS
@@ -116,7 +115,7 @@ class Habits(Slips):
         tokens = self.tokens
         trial = tokens.part(first, begin) + new + tokens.part(stop, max(at, stop) + FOLLOWED)
         # Words that stand for operators elsewhere are mended, and reported, when their turn comes.
-        words = [(kind, word_for(tokens.source.text[start:end])) for kind, start, end in trial]
+        words = [(kind, OPERATORS.get(tokens.source.text[start:end])) for kind, start, end in trial]
         read = [self.literals[sign] if sign else kind for kind, sign in words]
         return first + reach(stack.copy(), read, 0, len(read)) + (stop - begin) - len(new)
 

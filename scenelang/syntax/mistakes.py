@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
+from scenelang.syntax.foreign import OPERATORS, keywords_near
 from scenelang.syntax.repairs import MAX_REPLAY, REPLACEMENTS, Repair
-from scenelang.syntax.spelling import keywords_near, word_for
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 
@@ -180,7 +180,7 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
         code, message, fix = "E0106", f"missing block, found `{text}`", None
     elif text in (")", "]") and new in (")", "]"):
         code = "E0105"
-    elif word_for(text) == new:
+    elif OPERATORS.get(text) == new:
         code, message, help = "E0127", f"`{text}` is not used here", f"`{new}` is the sign for it"
         if new == "!" and tokens.text(repair.end) != "(":
             fix = None  # elsewhere it takes all of a comparison, here only what is next

@@ -11,17 +11,17 @@ from typing import Any
 
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import mistakes, nodes
-from scenelang.syntax.automaton import reach, statement_depth
-from scenelang.syntax.completion import closes_earlier
+from scenelang.syntax.automaton import advance, reach, statement_depth
+from scenelang.syntax.foreign import HEADS, keywords_near
 from scenelang.syntax.habits import Habits
 from scenelang.syntax.repairs import FOLLOWED, MAX_REPLAY, Repair, Search
-from scenelang.syntax.spelling import FOREIGN_HEADS, keywords_near
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
 from scenelang.words import DECLARING, NODES
 
 _WORDS = (*(word for word in DECLARING if word != "as"), "for", "if", "material", *NODES)
-_HEADS = ("let", "fn", "module", "param", "import", "for", "if", "group", "chain", "material", "union")
+_INSIDE = 65  # tokens over which another place for a closing bracket is looked for
+_STARTS = ("let", "fn", "module", "param", "import", "for", "if", "group", "chain", "material", "union")
 
 
 class Recovery(Habits):
@@ -35,7 +35,7 @@ class Recovery(Habits):
     def __init__(self, tokens: Tokens, report: Report) -> None:
         super().__init__(tokens, report)
         self.repairs = 0
-        self.heads = {self.literals[word] for word in _HEADS}
+        self.heads = {self.literals[word] for word in _STARTS}
 
     def resume(self, states: list[int], values: list[Any], at: int) -> int | None:
         """Mend what does not fit at a token.
@@ -82,15 +82,23 @@ class Recovery(Habits):
         return first
 
     def _stands_there(self, stack: list[int], search: Search, repair: Repair) -> bool:
-        """Whether a bracket that a repair closes can be closed nowhere else in the statement."""
+        """Whether a bracket that a repair closes can be closed nowhere else in the statement.
+
+        ``sin(x * 2;`` may have been meant as ``sin(x) * 2`` and as ``sin(x * 2)``.
+        """
         if repair.delete or repair.insert[0] not in search.closings:
             return True
         kinds, opening = self.tokens.kinds, search.open_brackets(repair.at)[0]
-        if repair.at - search.first > MAX_REPLAY:
+        if repair.at - search.first > MAX_REPLAY or repair.at - opening > _INSIDE:
             return False
         reach(stack, kinds, search.first, opening + 1)
         after = [*repair.insert[1:], *kinds[repair.at : search.bound]]
-        return not closes_earlier(stack, repair.insert[0], kinds[opening + 1 : repair.at], after)
+        for at in range(opening + 1, repair.at):
+            moved = [repair.insert[0], *kinds[at : repair.at], *after]
+            if kinds[at] != repair.insert[0] and reach(stack.copy(), moved, 0, len(moved)) == len(moved):
+                return False
+            advance(stack, kinds[at])
+        return True
 
     def _index(self, value: Any) -> int:
         """Index of the first token of something on the value stack."""
@@ -151,9 +159,7 @@ class Recovery(Habits):
         start, end = tokens.starts[first], tokens.ends[first]
         text = tokens.source.text[start:end]
         rest = tokens.kinds[first + 1 : at + FOLLOWED]
-        words = (
-            {FOREIGN_HEADS[text]} if text in FOREIGN_HEADS else set(keywords_near(text)).intersection(_WORDS)
-        )
+        words = {HEADS[text]} if text in HEADS else set(keywords_near(text)).intersection(_WORDS)
         read = {
             word: reach(stack.copy(), [self.literals[word], *rest], 0, len(rest) + 1)
             for word in sorted(words)
@@ -162,7 +168,7 @@ class Recovery(Habits):
         if word is None or read[word] <= at + 1 - first:
             return False
         fix = None if text == "int" else word  # whose quotients are whole
-        help = f"it is `{word}` here" if text in FOREIGN_HEADS else f"did you mean `{word}`?"
+        help = f"it is `{word}` here" if text in HEADS else f"did you mean `{word}`?"
         self.report.add("E0132", f"unknown statement `{text}`", start, end, help=help, fix=fix)
         tokens.kinds[first] = self.literals[word]
         return True

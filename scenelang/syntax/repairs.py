@@ -10,10 +10,9 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 
 from scenelang.records import Record
-from scenelang.syntax.automaton import LOOKAHEAD, advance, fits, reach
-from scenelang.syntax.completion import completion
+from scenelang.syntax.automaton import LOOKAHEAD, advance, completion, fits, reach
+from scenelang.syntax.foreign import OPERATORS, keywords_near
 from scenelang.syntax.layout import leaves_open
-from scenelang.syntax.spelling import keywords_near, word_for
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Tokens
 
@@ -99,10 +98,6 @@ def _replacements() -> dict[int, list[tuple[Kinds, float]]]:
 
 
 Found = tuple[float, float, Repair, list[int]]
-
-
-def _by_score(found: Found) -> float:
-    return -found[0]
 
 
 class Search:
@@ -198,14 +193,11 @@ class Search:
 
     def _settle(self, found: list[Found]) -> tuple[float, Repair] | None:
         """The best of several repairs: the few that look best are followed further."""
-        settled: tuple[float, Repair] | None = None
-        for _, cost, repair, trial in sorted(found, key=_by_score)[:8]:
-            start = max(self.at, repair.end)
-            stop = reach(trial.copy(), self.kinds, repair.end, start + FOLLOWED)
-            score = self._worth(stop) - cost
-            if settled is None or score > settled[0]:
-                settled = score, repair
-        return settled
+        settled = []
+        for _, cost, repair, trial in sorted(found, key=lambda one: -one[0])[:8]:
+            stop = reach(trial.copy(), self.kinds, repair.end, max(self.at, repair.end) + FOLLOWED)
+            settled.append((self._worth(stop) - cost, repair))
+        return max(settled, key=lambda one: one[0], default=None)
 
     def _candidates(self, stack: list[int], at: int) -> Iterator[Repair]:
         tokens, kinds = self.tokens, self.kinds
@@ -259,7 +251,7 @@ class Search:
     def _misspelt(self, at: int) -> Iterator[Repair]:
         """A keyword with a slip, or an operator written as a word."""
         if self.kinds[at] == self.name:
-            if operator := word_for(self.tokens.text(at)):
+            if operator := OPERATORS.get(self.tokens.text(at)):
                 yield Repair(at, 1, (tables().literals[operator],), _MISSPELT)
             for word in keywords_near(self.tokens.text(at)):
                 yield Repair(at, 1, (tables().literals[word],), _MISSPELT)
