@@ -9,8 +9,7 @@ decides where they go (behind a comma, for example).
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, TypeVar
 
 from scenelang.formatting.trivia import Comment
@@ -71,37 +70,21 @@ class Concat(Doc):
         self.parts = parts
 
 
-class Group(Doc, ABC):
-    """What is on one line if it fits, and otherwise as `make` says, which is asked at most once."""
+class Group(Doc):
+    """What is on one line if it fits, and otherwise as ``maker`` says, which is asked at most once."""
 
-    __slots__ = ("_made",)
+    __slots__ = ("_made", "maker")
 
-    def __init__(self, flat: str | None) -> None:
+    def __init__(self, flat: str | None, maker: Callable[[], Part]) -> None:
         super().__init__(flat)
+        self.maker = maker
         self._made: Part | None = None
 
     def broken(self) -> Part:
         """What it is where it does not fit on a line."""
         if self._made is None:
-            self._made = self.make()
+            self._made = self.maker()
         return self._made
-
-    @abstractmethod
-    def make(self) -> Part:
-        """What it is where it does not fit on a line, made anew."""
-
-
-class Choose(Group):
-    """A group that is made by a function of no arguments."""
-
-    __slots__ = ("maker",)
-
-    def __init__(self, flat: str | None, maker: Callable[[], Part]) -> None:
-        super().__init__(flat)
-        self.maker = maker
-
-    def make(self) -> Part:
-        return self.maker()
 
 
 class Indent(Doc):
@@ -145,36 +128,16 @@ SOFT: Final = Break("")
 BLANK: Final = Blank(None)
 
 
-def sequence(parts: Iterable[Part]) -> Part:
+def sequence(parts: Sequence[Part]) -> Part:
     """Parts one after another; comments between them stay there, those at the ends become its own."""
     inside: list[Part] = []
-    flat: str | None = ""
-    before: Sequence[Comment] = ()
     after: Sequence[Comment] = ()
-    blank = False
-    for part in parts:
-        if after:
-            inside.append(Comments(after, inside=True))
-            flat, after = None, ()
-        if isinstance(part, str):
-            inside.append(part)
-            if flat is not None:
-                flat += part
-            continue
-        if not inside:
-            before, blank = part.before, part.blank
-        elif part.before:
-            inside.append(Comments(part.before, inside=True))
-            flat = None
+    for index, part in enumerate(parts):
+        between = (after, before_of(part) if index else ())
+        inside += [Comments(comments, inside=True) for comments in between if comments]
         inside.append(part)
-        after = part.after
-        if flat is not None:
-            flat = None if part.flat is None else flat + part.flat
-    if flat is not None and len(flat) > WIDTH:
-        flat = None
-    doc = Concat(flat, inside)
-    doc.before, doc.after, doc.blank = before, after, blank
-    return doc
+        after = after_of(part)
+    return ends_of(Concat(joined(parts), inside), parts[0], parts[-1])
 
 
 def before_of(part: Part) -> Sequence[Comment]:
@@ -218,12 +181,10 @@ def joined(parts: Sequence[Part]) -> str | None:
     """The parts on one line; None if they cannot be."""
     flat = ""
     for index, part in enumerate(parts):
-        if isinstance(part, str):
-            flat += part
-        elif part.flat is None or (index and part.before) or (part.after and index < len(parts) - 1):
+        text = flat_of(part)
+        if text is None or (index and before_of(part)) or (after_of(part) and index < len(parts) - 1):
             return None
-        else:
-            flat += part.flat
+        flat += text
         if len(flat) > WIDTH:
             return None
     return flat

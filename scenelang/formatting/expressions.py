@@ -12,7 +12,6 @@ from typing import Any
 
 from scenelang.formatting.documents import (
     LINE,
-    Choose,
     Comments,
     Concat,
     Group,
@@ -55,12 +54,12 @@ class Operation(Group):
     __slots__ = ("level", "operands", "operators")
 
     def __init__(self, flat: str | None, operands: list[Part], operators: list[Part], level: int) -> None:
-        super().__init__(flat)
+        super().__init__(flat, self._lines)
         self.operands = operands
         self.operators = operators
         self.level = level
 
-    def make(self) -> Part:
+    def _lines(self) -> Part:
         first = self.operands[0]
         parts: list[Part] = [first]
         after = [*after_of(first)]
@@ -87,10 +86,10 @@ class Choice(Group):
     __slots__ = ("clauses",)
 
     def __init__(self, flat: str | None, clauses: list[tuple[Part, ...]]) -> None:
-        super().__init__(flat)
+        super().__init__(flat, self._lines)
         self.clauses = clauses  # (condition, ?, value, :) each, and (value,) as the last one
 
-    def make(self) -> Part:
+    def _lines(self) -> Part:
         *chosen, (otherwise,) = self.clauses
         if len(chosen) == 1:
             condition, mark, value, colon = chosen[0]
@@ -160,9 +159,9 @@ class ExpressionLayout:
                 items[-1] = Item(item, "".join(f" {text}" for text in texts_of(note.trailing)))
 
     def enclosed(self, opening: int, *rest: Any) -> Part:
-        return self._bracketed(Choose, opening, rest)
+        return self._bracketed(Group, opening, rest)
 
-    def _bracketed(self, form: type[Choose], opening: int, rest: Sequence[Any]) -> Part:
+    def _bracketed(self, form: type[Group], opening: int, rest: Sequence[Any]) -> Part:
         items: list[Item] = rest[0] if rest[1:] else []
         left, right = self.word(opening), self.word(rest[-1])
         if rest[2:]:
@@ -262,7 +261,7 @@ class ExpressionLayout:
 
     def _enclosed(self, left: Part, value: Part, right: Part) -> Part:
         inside = [Item(value)]
-        doc = Choose(joined([left, value, right]), lambda: broken(left, inside, right, comma=""))
+        doc = Group(joined([left, value, right]), lambda: broken(left, inside, right, comma=""))
         return ends_of(doc, left, right)
 
     def vector(self, opening: int, *rest: Any) -> Part:

@@ -17,9 +17,9 @@ from typing import Any
 from scenelang.formatting.documents import (
     BLANK,
     LINE,
-    Choose,
     Comments,
     Concat,
+    Group,
     Indent,
     Part,
     after_of,
@@ -37,11 +37,11 @@ from scenelang.formatting.trivia import Comment
 from scenelang.syntax.tables import tables
 
 
-class Statement(Choose):
+class Statement(Group):
     """A statement.
 
     Args:
-        flat, maker: see `Choose`.
+        flat, maker: see `Group`.
         depth: how many blocks it has within each other.
         simple: it may stand in a block that is on one line.
     """
@@ -168,7 +168,7 @@ class Layout(ExpressionLayout):
             return [" ", sign, " ", value]
         flat = flat_of(value)
         lines = Indent(Concat(None, [LINE, *comments_before(value), value]))
-        doc = Choose(None if commented or flat is None else " " + flat, lambda: lines)
+        doc = Group(None if commented or flat is None else " " + flat, lambda: lines)
         doc.after = after_of(value)
         return [" ", sign, doc]
 
@@ -183,7 +183,7 @@ class Layout(ExpressionLayout):
         if rest[1:]:
             limits = sequence([self.word(rest[0]), " ", rest[1]])
             flat = flat_of(limits)
-            tail = Choose(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, limits])))
+            tail = Group(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, limits])))
             head.append(ends_of(tail, limits, limits))
         return self._ended(head, rest[-1])
 

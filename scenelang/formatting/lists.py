@@ -10,11 +10,11 @@ from scenelang.formatting.documents import (
     BLANK,
     LINE,
     SOFT,
-    Choose,
     Comments,
     Concat,
     Doc,
     Fill,
+    Group,
     Indent,
     Part,
     Word,
@@ -41,7 +41,7 @@ class Item(NamedTuple):
     after: Sequence[Comment] = ()
 
 
-class Bracketed(Choose):
+class Bracketed(Group):
     """A vector or a block: as a call's only argument it opens on the call's line."""
 
     __slots__ = ()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.formatting.format import format_text
 from scenelang.formatting.trivia import comments_of
+from scenelang.syntax import parse
 from scenelang.syntax.lexer import scan
-from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report
-
-_ENDED_BY_SEMICOLON = {"nsg", "model", "param", "let", "fn", "import"}
 
 
 def format_range(text: str, start: int, end: int, *, name: str = "<text>") -> tuple[int, int, str]:
@@ -27,8 +26,12 @@ def format_range(text: str, start: int, end: int, *, name: str = "<text>") -> tu
         SceneError: the text has syntax errors, in the range or elsewhere.
     """
     result = format_text(text, name=name)
-    before, after = _statements(text), _statements(result)
-    if len(before) != len(after):  # statements that stand for nothing have gone
+    strays = Diagnostics()
+    before, after = _statements(text, strays), _statements(result, Diagnostics())
+    inside = (
+        any(first < d.span.start < last for first, last in before) for d in strays if d.span is not None
+    )
+    if not all(inside):  # semicolons that stand for nothing have gone
         return 0, len(text), result
     touched = [k for k, (first, last) in enumerate(before) if first < max(end, start + 1) and last > start]
     if not touched:
@@ -49,20 +52,6 @@ def _comments(text: str) -> list[str]:
     return comments_of(scan(source, Report(source)))
 
 
-def _statements(text: str) -> list[tuple[int, int]]:
-    """Start and end of each statement of the top level of a text without mistakes."""
-    source = SourceFile("", text)
-    tokens = scan(source, Report(source))
-    kinds = [tables().kinds[kind] for kind in tokens.kinds]
-    found: list[tuple[int, int]] = []
-    depth = 0
-    first: int | None = None
-    for index, kind in enumerate(kinds[:-1]):
-        if first is None:
-            first = index
-        depth += (kind in ("(", "[", "{")) - (kind in (")", "]", "}"))
-        closed = kind == "}" and kinds[first] not in _ENDED_BY_SEMICOLON and kinds[index + 1] != "else"
-        if depth == 0 and (kind == ";" or closed):
-            found.append((tokens.starts[first], tokens.ends[index]))
-            first = None
-    return found
+def _statements(text: str, found: Diagnostics) -> list[tuple[int, int]]:
+    """Start and end of each statement of the top level of a text without errors."""
+    return [(s.span.start, s.span.end) for s in parse(SourceFile("", text), found).statements]
