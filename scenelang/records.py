@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import MISSING, Field, dataclass, field
 from operator import attrgetter
-from typing import Any, ClassVar, dataclass_transform
+from typing import Any, dataclass_transform
 
 _register: Callable[[type], type] = dataclass(init=False, repr=False, eq=False, match_args=False)
 
@@ -51,7 +51,7 @@ class _RecordType(type):
 class Record(metaclass=_RecordType):
     """Base of records; two are equal where their classes and all fields are."""
 
-    _defaults: ClassVar[dict[str, Any]] = {}  # of all fields; MISSING where there is none
+    _defaults = dict[str, Any]()  # of all fields; MISSING where there is none
     _key = attrgetter("__class__")  # what equality and the hash are about
 
     def __eq__(self, other: object) -> bool:

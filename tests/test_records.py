@@ -5,11 +5,13 @@ from __future__ import annotations
 import copy
 import pickle
 from dataclasses import dataclass, field, fields, replace
-from typing import ClassVar
+from typing import ClassVar, get_type_hints
 
 import pytest
 
+from scenelang.diagnostics.span import Span
 from scenelang.records import Record
+from scenelang.syntax import nodes
 
 
 class Point(Record):
@@ -74,3 +76,7 @@ def test_one_that_may_change_is_equal_to_itself_alone() -> None:
     assert Bag().items == []
     assert bag == bag != Bag([1])
     assert len({bag, Bag([1])}) == 2
+
+
+def test_hints_can_be_resolved_in_a_module_of_its_own() -> None:
+    assert get_type_hints(nodes.Name, vars(nodes)) == {"text": str, "span": Span}

@@ -28,10 +28,8 @@ def format_range(text: str, start: int, end: int, *, name: str = "<text>") -> tu
     result = format_text(text, name=name)
     strays = Diagnostics()
     before, after = _statements(text, strays), _statements(result, Diagnostics())
-    inside = (
-        any(first < d.span.start < last for first, last in before) for d in strays if d.span is not None
-    )
-    if not all(inside):  # semicolons that stand for nothing have gone
+    gone = [d.span.start for d in strays if d.span is not None]  # semicolons that stand for nothing
+    if not all(any(first < at < last for first, last in before) for at in gone):
         return 0, len(text), result
     touched = [k for k, (first, last) in enumerate(before) if first < max(end, start + 1) and last > start]
     if not touched:

@@ -14,7 +14,7 @@ from scenelang.syntax import nodes
 from scenelang.syntax.expressions import ExpressionBuilder
 from scenelang.syntax.tables import tables
 
-_PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
+PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
     "model": (nodes.Model, (1,)),
     "let": (nodes.Let, (1, 3)),
     "fn": (nodes.Fn, (1, 2, 4)),
@@ -33,7 +33,7 @@ class Builder(ExpressionBuilder):
 
     def callbacks(self) -> list[Callable[..., Any] | None]:
         """The callback of every rule, in the order of `Tables.rules`; None passes the value on."""
-        plain = {name: self._plain(*made) for name, made in _PLAIN.items()}
+        plain = {name: self._plain(*made) for name, made in PLAIN.items()}
         return [plain.get(name) or getattr(self, name) if name else None for _, _, name in tables().rules]
 
     def _plain(self, cls: type, which: tuple[int, ...]) -> Callable[..., Any]:
