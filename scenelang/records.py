@@ -51,7 +51,6 @@ class _RecordType(type):
 class Record(metaclass=_RecordType):
     """Base of records; two are equal where their classes and all fields are."""
 
-    _defaults = dict[str, Any]()  # of all fields; MISSING where there is none
     _key = attrgetter("__class__")  # what equality and the hash are about
 
     def __eq__(self, other: object) -> bool:
@@ -63,5 +62,6 @@ class Record(metaclass=_RecordType):
         return hash(self._key(self))
 
     def __repr__(self) -> str:
-        fields = ", ".join(f"{name}={getattr(self, name)!r}" for name in self._defaults)
+        names = vars(self.__class__)["__match_args__"]
+        fields = ", ".join(f"{name}={getattr(self, name)!r}" for name in names)
         return f"{self.__class__.__qualname__}({fields})"
