@@ -1,17 +1,24 @@
-"""What a call calls: its parameters, whoever defined them."""
+"""What a call calls: its parameters, whoever defined them, and its signature at the cursor."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
+from typing import Final
+
+from lsprotocol import types
 
 from scenelang import words
-from scenelang.lsp.context import Cursor
-from scenelang.lsp.describe import describe_symbol
-from scenelang.lsp.sight import sight_at
+from scenelang.lsp.context import Cursor, cursor_at
+from scenelang.lsp.text import width
+from scenelang.lsp.tree import sight_at
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.resolve.names import Names
 from scenelang.resolve.symbols import Symbol
 from scenelang.syntax import nodes
+
+_LINE: Final = re.compile(r"^[ \t]*//(.*)$")
+_MAX_SHOWN: Final = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,3 +86,85 @@ def callee_of_word(name: str, in_material: bool) -> Callee | None:
         return None
     about = dict(zip(word.params, word.about, strict=False))
     return Callee(name, word.head, word.params, about, word.text, name != "shear", word.variadic)
+
+
+def signature_help(docs: Workspace, document: Document, offset: int) -> types.SignatureHelp | None:
+    """How what is being called is called, and which argument the cursor is in."""
+    cursor = cursor_at(document.parsed, offset)
+    callee = find_callee(docs, document, cursor)
+    if callee is None or cursor.call is None or cursor.inside == "comment":
+        return None
+    active: int | None = cursor.call.index
+    if cursor.call.named is not None:
+        named = cursor.call.named
+        active = callee.params.index(named) if named in callee.params else None
+    elif callee.variadic:
+        active = min(cursor.call.index, len(callee.params) - 1)
+    parameters = []
+    at = callee.head.find("(") + 1
+    for param in callee.params:
+        match = re.compile(rf"\b{re.escape(param)}\b").search(callee.head, at)
+        about = types.MarkupContent(types.MarkupKind.Markdown, callee.about.get(param, ""))
+        label: str | tuple[int, int] = param
+        if match is not None:
+            # Offsets into a label count UTF-16, whatever positions count.
+            label = (
+                width(callee.head[: match.start()], "utf-16"),
+                width(callee.head[: match.end()], "utf-16"),
+            )
+            at = match.end()
+        parameters.append(types.ParameterInformation(label, about if about.value else None))
+    text = types.MarkupContent(types.MarkupKind.Markdown, callee.text) if callee.text else None
+    if active is not None and active >= len(parameters):
+        active = None
+    signature = types.SignatureInformation(callee.head, text, parameters, active)
+    return types.SignatureHelp([signature], 0, active)
+
+
+def describe_symbol(symbol: Symbol) -> tuple[str, str]:
+    """A definition's first line, and the comment above it."""
+    node = symbol.node
+    if isinstance(node, nodes.Module):
+        head = f"module {_call(symbol)}"
+    elif isinstance(node, nodes.Fn):
+        head = f"fn {_call(symbol)} = {_short(node.body.span.text)}"
+    elif isinstance(node, nodes.For):
+        head = f"for ({symbol.name} in {_short(node.iterable.span.text)})"
+    elif isinstance(node, nodes.Parameter):
+        head = f"(parameter) {_short(node.span.text)}"
+    else:
+        head = _short(node.span.text)
+    return head, comment_above(symbol)
+
+
+def _call(symbol: Symbol) -> str:
+    params = ", ".join(_short(p.node.span.text) for p in symbol.params)
+    return f"{symbol.name}({params})"
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 1] + "…"
+
+
+def comment_above(symbol: Symbol) -> str:
+    """The lines of comment right above a definition, or behind it on its line."""
+    if isinstance(symbol.node, nodes.Parameter | nodes.For):
+        return ""
+    # The node's own text: it may be of an older version than the document's.
+    span = symbol.node.span
+    text = span.source.text
+    found: list[str] = []
+    start = text.rfind("\n", 0, span.start) + 1
+    while start:
+        above = text.rfind("\n", 0, start - 1) + 1
+        match = _LINE.match(text[above : start - 1].rstrip("\r"))
+        if match is None:
+            break
+        found.insert(0, match[1].strip())
+        start = above
+    end = text.find("\n", span.end)
+    behind = _LINE.match(text[span.end : end if end >= 0 else len(text)].rstrip("\r"))
+    if behind and not isinstance(symbol.node, nodes.Module):
+        found.append(behind[1].strip())
+    return "\n".join(found)

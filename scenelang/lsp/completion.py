@@ -10,12 +10,11 @@ from lsprotocol import types
 
 from scenelang import words
 from scenelang.evaluate.vocabulary import Vocabulary
-from scenelang.lsp.callees import Callee, find_callee
+from scenelang.lsp.callees import Callee, describe_symbol, find_callee
 from scenelang.lsp.completion_items import Item, strings, units
 from scenelang.lsp.context import Cursor, cursor_at
-from scenelang.lsp.describe import describe_symbol
-from scenelang.lsp.sight import sight_at
-from scenelang.lsp.vocabulary import vocabulary_of
+from scenelang.lsp.tree import sight_at
+from scenelang.lsp.values import vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.resolve.names import Names
 from scenelang.resolve.symbols import Symbol
@@ -89,7 +88,7 @@ class _Maker:
 
     def __init__(self, docs: Workspace, document: Document, cursor: Cursor, names: Names) -> None:
         self.docs, self.document, self.cursor, self.names = docs, document, cursor, names
-        self.words: Vocabulary = vocabulary_of(document, docs)
+        self.words: Vocabulary = vocabulary_of(document)
 
     def items(self) -> Iterator[Item]:
         cursor, before = self.cursor, self.cursor.before

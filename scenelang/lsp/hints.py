@@ -9,7 +9,7 @@ from lsprotocol import types
 from scenelang.lsp import values
 from scenelang.lsp.callees import callee_of, callee_of_word, find_symbol
 from scenelang.lsp.hover import seen_at
-from scenelang.lsp.settings import Settings
+from scenelang.lsp.server import Settings
 from scenelang.lsp.tree import walk
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax import nodes

@@ -9,10 +9,10 @@ from lsprotocol import types
 
 from scenelang import words
 from scenelang.lsp import values
+from scenelang.lsp.callees import describe_symbol
 from scenelang.lsp.check import Seen
-from scenelang.lsp.describe import describe_symbol
 from scenelang.lsp.tree import path_to
-from scenelang.lsp.vocabulary import space_of, vocabulary_of
+from scenelang.lsp.values import space_of, vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.models.manifest import Manifest
 from scenelang.resolve.symbols import Symbol, Use

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import re
 import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import wraps
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, BinaryIO, Final, TypeVar
+from typing import Any, BinaryIO, Final
 
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException, JsonRpcInvalidRequest
@@ -25,12 +26,89 @@ from pygls.protocol.language_server import lsp_method
 
 from scenelang.lsp.check import Checked, Superseded, Task, check
 from scenelang.lsp.convert import to_diagnostic
-from scenelang.lsp.incoming import Incoming
-from scenelang.lsp.settings import Settings
 from scenelang.lsp.workspace import Document, Workspace, path_of
 
 log = logging.getLogger("scenelang.lsp")
 _DEEP: Final = 10_000  # trees are up to 200 levels deep, walks take a few calls a level
+
+
+MAX_PAUSE_MS: Final = 60_000
+_LENGTH: Final = re.compile(rb"Content-Length: *(\d+)\r\n\Z")
+_MOST_DIGITS: Final = 8  # below 100 MB: the largest text there may be, each character escaped
+_CHUNK: Final = 1 << 16
+_LONGEST: Final = 64  # bytes of a header that counts
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What the client may set, as ``initializationOptions`` or ``workspace/didChangeConfiguration``.
+
+    Args:
+        debounce_ms: how long typing has to pause before a scene is evaluated.
+        model: draw with this model instead of the scene's.
+        root: the folder that imports cannot leave, instead of the scene's.
+        value_hints: show values behind lets.
+        argument_hints: show parameter names in calls.
+    """
+
+    debounce_ms: float = 200.0
+    model: str | None = None
+    root: Path | None = None
+    value_hints: bool = True
+    argument_hints: bool = True
+
+    @classmethod
+    def read(cls, options: Any) -> Settings:
+        """What a client sent; what is missing, of another type or out of range has its default."""
+        if not isinstance(options, dict):
+            return cls()
+        given = options.get("scenelang", options)
+        if not isinstance(given, dict):
+            return cls()
+        hints = given.get("inlayHints")
+        hints = hints if isinstance(hints, dict) else {}
+        pause, model, root = given.get("debounceMs"), given.get("model"), given.get("root")
+        if isinstance(pause, bool) or not isinstance(pause, int | float) or not 0 <= pause <= MAX_PAUSE_MS:
+            pause = cls().debounce_ms
+        return cls(
+            debounce_ms=float(pause),
+            model=model if isinstance(model, str) and model else None,
+            root=Path(root).expanduser() if isinstance(root, str) and root else None,
+            value_hints=hints.get("values") is not False,
+            argument_hints=hints.get("arguments") is not False,
+        )
+
+
+class Incoming:
+    """A stream whose messages of 100 MB and more are passed over, up to the next one's header.
+
+    No JSON holds a line that ends like a header, as newlines in strings are escaped.
+
+    Args:
+        stream: the client's.
+        refuse: called for each message that is passed over, from the thread that reads.
+    """
+
+    def __init__(self, stream: BinaryIO, refuse: Callable[[], None]) -> None:
+        self._stream, self._refuse = stream, refuse
+
+    def readline(self) -> bytes:
+        """A line of a header; empty at the end."""
+        line = b""
+        while True:
+            piece = self._stream.readline(_CHUNK)
+            line = line[-_LONGEST:] + piece
+            if not piece or piece.endswith(b"\n"):
+                break
+        length = _LENGTH.search(line)
+        if length is None or len(length[1]) <= _MOST_DIGITS:
+            return line if length is None else length[0]
+        self._refuse()
+        return b"\n"
+
+    def read(self, size: int) -> bytes:
+        """A message."""
+        return self._stream.read(size)
 
 
 class Protocol(LanguageServerProtocol):
@@ -178,30 +256,3 @@ class Server(LanguageServer):
     def report_server_error(self, error: Exception, source: Any) -> None:
         """Keep trouble in the log: a window that pops up helps nobody."""
         log.error("%s", error)
-
-
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-def quiet(empty: Any = None) -> Callable[[F], F]:
-    """Answer with ``empty`` where a handler fails: an editor goes on, and the log says what happened."""
-
-    def decorate(handler: F) -> F:
-        @wraps(handler)
-        def safe(server: Server, params: Any) -> Any:
-            try:
-                return handler(server, params)
-            except JsonRpcException:
-                raise
-            except Exception as error:
-                log.exception("internal error in %s", handler.__name__)
-                server.window_log_message(
-                    types.LogMessageParams(
-                        types.MessageType.Error, f"internal error in {handler.__name__}: {error!r}"
-                    )
-                )
-                return empty
-
-        return safe  # type: ignore[return-value]
-
-    return decorate

@@ -1,21 +1,46 @@
-"""Values, matrices and chains in words."""
+"""The words and the space of a document's model; values, matrices and chains in words."""
 
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 from scenelang.evaluate.values.value import POISON, Angle, MaterialValue, RangeValue, Time, Vec, pack, show
+from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.graph import affine
 from scenelang.graph.chain import merged
 from scenelang.graph.nodes import Move
 from scenelang.graph.space import Space
+from scenelang.graph.spaces import SPACES
 from scenelang.graph.steps import Affine, Rows, Warp
 from scenelang.graph.transforms import step_of
+from scenelang.lsp.workspace import Document
 from scenelang.scene import text as to_nsg
+from scenelang.syntax import nodes
 from scenelang.words import TRANSFORMS
 
 _MOST_ITEMS = 8
+
+
+@cache
+def _all() -> Vocabulary:
+    return vocabulary()
+
+
+def vocabulary_of(document: Document) -> Vocabulary:
+    """The words of the model that a document names, or those of all models."""
+    for stmt in document.parsed.heads():
+        if isinstance(stmt, nodes.Model) and isinstance(stmt.name, nodes.String):
+            return _all().choose(stmt.name.value) or _all()
+    return _all()
+
+
+def space_of(document: Document) -> Space:
+    """The space of the model which draws a document."""
+    if document.checked is not None and document.checked.manifest is not None:
+        return SPACES[document.checked.manifest.dimension]
+    return SPACES[vocabulary_of(document).dimension or 2]
 
 
 def show_value(value: Any) -> str | None:

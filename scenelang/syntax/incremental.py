@@ -25,7 +25,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.syntax import nodes
 from scenelang.syntax.lexer import scan
-from scenelang.syntax.move import move_diagnostic, move_node
+from scenelang.syntax.move import move
 from scenelang.syntax.parser import parse, parse_tokens
 from scenelang.syntax.repairs import FOLLOWED
 from scenelang.syntax.tables import tables
@@ -88,7 +88,7 @@ class Parsed:
         delta = self.starts[index] - piece.node.span.start
         if piece.version != self.version:
             # A new piece: the old one may belong to an older text that somebody still reads.
-            piece = _Piece(move_node(piece.node, delta, self.source), self.version)
+            piece = _Piece(move(piece.node, delta, self.source), self.version)
             self.pieces[index] = piece
         return piece.node
 
@@ -191,7 +191,7 @@ class _Splice:
             before = old.pieces[last].node
             if not fresh or fresh[-1].span.end != end:
                 return None
-            if fresh[-1] != move_node(before, fresh[-1].span.start - before.span.start, self.source):
+            if fresh[-1] != move(before, fresh[-1].span.start - before.span.start, self.source):
                 return None
         return self._joined(first, last, pristine, found, fresh, kept, begin, end, to_end)
 
@@ -262,9 +262,9 @@ class _Splice:
         after = [d for d in old.diagnostics if d.span is not None and d.span.start > end - delta]
         everything = Diagnostics()
         for part in (
-            (move_diagnostic(d, 0, source) for d in before),
+            (move(d, 0, source) for d in before),
             found,
-            (move_diagnostic(d, delta, source) for d in after if not to_end),
+            (move(d, delta, source) for d in after if not to_end),
         ):
             for d in part:
                 everything.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)

@@ -131,7 +131,7 @@ def test_extension_names_what_exists() -> None:
 
 def test_extension_passes_the_settings_of_the_server() -> None:
     pytest.importorskip("pygls")
-    from scenelang.lsp.settings import Settings
+    from scenelang.lsp.server import Settings
 
     changed = {
         "scenelang": {

@@ -16,8 +16,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from scenelang.lsp.incoming import Incoming
-from scenelang.lsp.settings import Settings
+from scenelang.lsp.server import Incoming, Settings
 from scenelang.lsp.workspace import MAX_TEXT
 from tests.lsp.client import PATIENCE_S, Client, Json
 
