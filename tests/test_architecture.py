@@ -43,6 +43,7 @@ ORDER = (
     "scenelang.reference",
     "scenelang.renderers",
     "scenelang.models.framed",
+    "scenelang.models.solid",
     "scenelang.models.load",
     "scenelang.training",
     "scenelang.backend",

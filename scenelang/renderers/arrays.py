@@ -29,9 +29,13 @@ class Arrays:
     packed: ClassVar[Any] = staticmethod(np.ascontiguousarray)  # the same entries, contiguous in memory
     where: ClassVar[Any] = staticmethod(lambda mask: mask.nonzero()[0])  # indices (k,) of a mask (M,)
     exp: ClassVar[Any] = np.exp
+    log: ClassVar[Any] = np.log
     cos: ClassVar[Any] = np.cos
     sin: ClassVar[Any] = np.sin
+    sqrt: ClassVar[Any] = np.sqrt
     minimum: ClassVar[Any] = np.minimum
+    maximum: ClassVar[Any] = np.maximum
+    select: ClassVar[Any] = staticmethod(np.where)  # (mask, where it holds, elsewhere)
 
     def array(self, values: np.ndarray, like: Array) -> Array:
         """An array of a numpy array, where another one lies."""
@@ -81,6 +85,16 @@ class Arrays:
             x = self.dense(x, *layer)  # (blocks, out, each)
             np.maximum(x, 0.0, out=x)
         return self.dense(x, *layers[-1]).swapaxes(0, 1).reshape(-1, blocks * each)[:, :count]
+
+    def sigmoid(self, x: Array) -> Array:
+        """``1 / (1 + exp(-x))``."""
+        return 1.0 / (1.0 + np.exp(-x))
+
+    def silu(self, x: Array) -> Array:
+        """``x sigmoid(x)``, in place."""
+        found = np.exp(-x)
+        found += 1.0
+        return np.divide(x, found, out=x)
 
     def take(self, x: Array, index: Array) -> Array:
         """Entries (…, k) of (…, M)."""

@@ -9,7 +9,7 @@ from functools import reduce
 import numpy as np
 import torch
 from torch import Tensor
-from torch.nn.functional import linear
+from torch.nn.functional import linear, silu
 
 from scenelang.renderers.arrays import Array, Arrays, Layers
 
@@ -28,7 +28,8 @@ class Torch(Arrays):
     stack = staticmethod(torch.stack)
     packed = staticmethod(Tensor.contiguous)
     where = staticmethod(_where)
-    exp, cos, sin, minimum = torch.exp, torch.cos, torch.sin, torch.minimum
+    exp, log, cos, sin, sqrt = torch.exp, torch.log, torch.cos, torch.sin, torch.sqrt
+    minimum, maximum, select = torch.minimum, torch.maximum, torch.where
 
     def array(self, values: np.ndarray, like: Tensor) -> Tensor:
         return torch.from_numpy(values).to(like.device)
@@ -69,6 +70,12 @@ class Torch(Arrays):
         for layer in layers[:-1]:
             x = self.dense(x, *layer).relu()
         return self.dense(x, *layers[-1])
+
+    def sigmoid(self, x: Tensor) -> Tensor:
+        return x.sigmoid()
+
+    def silu(self, x: Tensor) -> Tensor:
+        return silu(x, inplace=True)
 
     def take(self, x: Tensor, index: Tensor) -> Tensor:
         return x.index_select(-1, index)  # many times as fast as a subscript

@@ -11,6 +11,7 @@ from pydantic.dataclasses import dataclass as checked
 
 from scenelang.files import read_regular
 from scenelang.renderers.network import FramedConfig
+from scenelang.renderers.solid.network import SolidConfig
 from scenelang.training.scenes import SceneConfig
 
 CONFIGS = Path(__file__).parent / "configs"
@@ -71,6 +72,26 @@ class TrainConfig:
         return asdict(self)
 
 
+@checked(frozen=True, config={"extra": "forbid"})
+class SolidsConfig:
+    """Everything that decides what a training of solids yields, besides the code.
+
+    Args:
+        model: name of the model that the weights are for.
+        seed: seeds parameters and points.
+        cell, leaves: steps of Adam for the cell and for all leaves together.
+        polish: Gauss-Newton steps for each leaf, a multiple of 20.
+        network: sizes.
+    """
+
+    model: str
+    seed: int
+    cell: int
+    leaves: int
+    polish: int
+    network: SolidConfig
+
+
 def config_data(name: str) -> bytes:
     """The text of a configuration, by path or by the name of a shipped one.
 
@@ -86,6 +107,16 @@ def config_data(name: str) -> bytes:
 def is_study(data: bytes) -> bool:
     """Whether a configuration is one of a study, which the laboratory trains."""
     return b'"study"' in data
+
+
+def is_solids(data: bytes) -> bool:
+    """Whether a configuration is a `SolidsConfig`."""
+    return b'"polish"' in data
+
+
+def read_solids_config(name: str) -> SolidsConfig:
+    """As `read_config`, of solids."""
+    return TypeAdapter[SolidsConfig](SolidsConfig).validate_json(config_data(name))
 
 
 def read_config(name: str) -> TrainConfig:

@@ -68,14 +68,22 @@ def command(
     the shipped weights. Exits with 0 also when the budget ends first.
     """
     from scenelang.cli.progress import Bar
-    from scenelang.training.config import config_data, is_study, read_config
+    from scenelang.training.config import (
+        SolidsConfig,
+        config_data,
+        is_solids,
+        is_study,
+        read_config,
+        read_solids_config,
+    )
     from scenelang.training.loop import train
+    from scenelang.training.solids import train_solids
 
     if is_study(config_data(config)):
         raise click.UsageError(f"`{config}` configures a study; scenelang lab train trains it.")
     last: dict[str, float] = {}
     with mistakes_told(config, out), Bar() as bar:
-        wanted = read_config(config)
+        wanted = read_solids_config(config) if is_solids(config_data(config)) else read_config(config)
         place = prepare_torch(device, threads)
 
         def note(done: int, total: int, seconds: float, parts: dict[str, float]) -> None:
@@ -89,25 +97,30 @@ def command(
             else:
                 click.echo(f"{done:,} of {total:,} steps, {seconds:.0f} s, {_losses(parts)}", err=True)
 
-        finished = train(
-            wanted,
-            out,
-            budget_s=budget_s,
-            device=place,
-            report=note,
-            save_every_s=save_every,
-            report_every=every,
-        )
+        if isinstance(wanted, SolidsConfig):
+            finished = train_solids(wanted, out, budget_s=budget_s, report=note)
+        else:
+            finished = train(
+                wanted,
+                out,
+                budget_s=budget_s,
+                device=place,
+                report=note,
+                save_every_s=save_every,
+                report_every=every,
+            )
     reached = f", mean loss {_losses(last)}" if last else ""
-    if finished:
+    weights = out / "weights.safetensors"
+    if not finished:
+        click.echo(f"out of time{reached}: the same command goes on from the checkpoint in {out}")
+    elif isinstance(wanted, SolidsConfig):
+        click.echo(f"done{reached}: {weights}")
+    else:
         from scenelang.measure.record import record_measured
 
-        weights = out / "weights.safetensors"
         figures = record_measured(weights, wanted.cell or wanted.model)
         means = ", ".join(f"{k[5:]} {v['mean']:.1f}" for k, v in figures.items() if k.startswith("psnr_"))
         click.echo(f"done{reached}; PSNR of unseen scenes (dB): {means}: {weights}")
-    else:
-        click.echo(f"out of time{reached}: the same command goes on from the checkpoint in {out}")
 
 
 @contextmanager

@@ -1,0 +1,295 @@
+"""Solids to pictures: camera rays, light, ground, sky and media around the field.
+
+The light is computed, as the language defines it; what is learned is where things are and what they look
+like. Colours are linear up to the last step. Letters as in `network.py`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
+from scenelang.image import Image, from_samples
+from scenelang.program.program import ProgramError
+from scenelang.renderers.arrays import Array, Arrays
+from scenelang.renderers.solid.field import Meeting, SolidField
+from scenelang.renderers.solid.march import GAP, INF, Trail, march
+
+INTO = 3e-5  # world units behind a surface where its material is asked for
+CLEAR = 2e-4  # world units before a surface where rays from the light end
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
+NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2  # of a way through a medium, by what it takes of the light
+TILE = 1 << 16  # samples at a time
+CONTRAST = 0.02  # sRGB: pixels that differ more from a neighbour are sampled four times
+
+
+class Shade(NamedTuple):
+    """What M rays see: premultiplied linear radiance (3, M), alpha (M,), and what it cost."""
+
+    radiance: Array
+    alpha: Array
+    met: int
+
+
+class Lighting:
+    """A field under the light of its stage.
+
+    Args:
+        field: the solids.
+        stage: where they are.
+    """
+
+    def __init__(self, field: SolidField, stage: Stage) -> None:
+        self.field, self.stage, self.xp = field, stage, field.xp
+        like = field.network.codes
+        self.eye, self.lamp, self.power, self.horizon, self.zenith = (
+            field.xp.array(np.asarray(value, np.float32), like)
+            for value in (
+                stage.camera.eye,
+                stage.light.position,
+                [stage.light.power * c for c in stage.light.rgb],
+                stage.horizon,
+                stage.zenith,
+            )
+        )
+
+    def shade(self, way: Array) -> Shade:
+        """What rays from the eye see.
+
+        Args:
+            way: unit directions (3, M).
+        """
+        xp, stage, field = self.xp, self.stage, self.field
+        seen, limit = self._sky(way), 0 * way[0] + INF
+        alpha = 0 * way[0] + (0.0 if stage.transparent else 1.0)
+        if stage.transparent:
+            seen = seen * 0
+        if stage.ground is not None and stage.camera.eye[1] > stage.ground.y:
+            down = way[1] < 0
+            drop = (stage.ground.y - stage.camera.eye[1]) / xp.select(down, way[1], way[1] * 0 - 1)
+            limit = xp.select(down, drop, limit)
+        trail = march(field, self.eye, way, limit)
+        met = trail.met
+        for index, shaded in (
+            (xp.where(trail.hit < INF), self._surface),
+            (xp.where((trail.hit == INF) & (limit < INF)), self._ground),
+        ):
+            if len(index):
+                found, more = shaded(xp.take(way, index), index, trail, limit)
+                xp.put(seen, index, found)
+                xp.put(alpha, index, xp.take(alpha, index) * 0 + 1)
+                met += more
+        if trail.pieces:
+            clear = xp.exp(-EXTINCTION * trail.length)
+            glow, more = self._scattered(way, trail)
+            seen, alpha, met = seen * clear + glow, 1 - (1 - alpha) * clear, met + more
+        return Shade(seen, alpha, met)
+
+    def _sky(self, way: Array) -> Array:
+        high = (way[1] * 2).clip(0.0, 1.0)
+        return self.horizon[:, None] + (self.zenith - self.horizon)[:, None] * high
+
+    def _received(self, p: Array, n: Array) -> tuple[Array, int]:
+        """Light (3, K) that surface points (3, K) with unit normals receive."""
+        xp = self.xp
+        to = self.lamp[:, None] - p
+        r = _length(xp, to).clip(NEAREST)
+        facing = _dot(n, to) / r
+        lit = xp.where(facing > 0)
+        got = facing * 0
+        lifted = xp.take(p, lit) + LIFT * xp.take(n, lit)
+        clear, met = self._clear(lifted, CLEAR)
+        xp.put(got, lit, xp.take(facing / (r * r), lit) * clear)
+        return got * self.power[:, None] + (AMBIENT[0] + AMBIENT[1] * n[1]), met
+
+    def _clear(self, p: Array, before: float) -> tuple[Array, int]:
+        """The share (K,) of the light that reaches points (3, K)."""
+        xp = self.xp
+        way = p - self.lamp[:, None]
+        r = _length(xp, way)
+        trail = march(self.field, self.lamp, way / r.clip(1e-9), r - before)
+        return (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length), trail.met
+
+    def _surface(self, way: Array, index: Array, trail: Trail, limit: Array) -> tuple[Array, int]:
+        xp = self.xp
+        t = xp.take(trail.hit, index)
+        begin, end = xp.take(trail.begin, index), xp.take(trail.end, index)
+        found = self._look(way, t + INTO, begin, end)
+        sharp = xp.take(trail.soft, index) == 0
+        off = xp.where(sharp & (abs(found.distance) > 3 * INTO))
+        met = len(index)
+        if len(off):  # where the distances on both sides of the surface said little about it
+            t_off = xp.take(t, off) + INTO + self._ahead(found, way, off)
+            again = self._look(xp.take(way, off), t_off, xp.take(begin, off), xp.take(end, off))
+            xp.put(t, off, t_off - INTO)
+            for old, new in zip(found[:3], again[:3], strict=True):
+                xp.put(old, off, new)
+            met += len(off)
+        g = found.gradient
+        towards = _dot(g, way)
+        p = self.eye[:, None] + way * (t + sharp * (INTO + self._ahead(found, way, None)))
+        n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
+        light, more = self._received(p, n)
+        return found.register[:3] * light, met + more
+
+    def _look(self, way: Array, t: Array, begin: Array, end: Array) -> Meeting:
+        inside = [(begin[i] <= t) & (t <= end[i]) for i in range(len(begin))]
+        return self.field.meet(self.eye[:, None] + way * t, inside, register=True, gradient=True)
+
+    def _ahead(self, found: Meeting, way: Array, index: Array | None) -> Array:
+        """How much farther rays meet the surface than where the field was asked."""
+        xp, d, g = self.xp, found.distance, found.gradient
+        if index is not None:
+            d, g, way = xp.take(d, index), xp.take(g, index), xp.take(way, index)
+        towards = _dot(g, way)
+        return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-GAP, GAP)
+
+    def _ground(self, way: Array, index: Array, trail: Trail, limit: Array) -> tuple[Array, int]:
+        xp, ground = self.xp, self.stage.ground
+        assert ground is not None
+        p = self.eye[:, None] + way * xp.take(limit, index)
+        n = p * 0
+        n[1] = 1.0
+        light, met = self._received(p, n)
+        kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
+        colour = xp.array(np.asarray(ground.rgb, np.float32), p)[:, None] * light
+        return kept * colour + (1 - kept) * self.horizon[:, None], met
+
+    def _scattered(self, way: Array, trail: Trail) -> tuple[Array, int]:
+        """Light (3, M) that media send towards the eye.
+
+        Of a piece that takes u of the light, the integral over T sigma dt is one over du, from 0 to u.
+        """
+        xp = self.xp
+        ray, begin, end, before = (xp.concat(parts, 0) for parts in zip(*trail.pieces, strict=True))
+        taken = 1 - xp.exp(-EXTINCTION * (end - begin))
+        nodes = xp.array(NODES.astype(np.float32), way)[:, None]
+        weights = xp.array(WEIGHTS.astype(np.float32), way)[:, None]
+        t = begin - xp.log(1 - nodes * taken) / EXTINCTION  # (nodes, P)
+        weight = weights * (taken * xp.exp(-EXTINCTION * before))
+        count = len(NODES)
+        t, weight, rays = t.reshape(-1), weight.reshape(-1), xp.concat([ray] * count, 0)
+        p = self.eye[:, None] + xp.take(way, rays) * t
+        first, last = xp.take(trail.begin, rays), xp.take(trail.end, rays)
+        inside = [(first[i] <= t) & (t <= last[i]) for i in range(len(first))]
+        colour = self.field.meet(p, inside, register=True).register[:3]
+        r = _length(xp, self.lamp[:, None] - p).clip(NEAREST)
+        clear, met = self._clear(p, 0.0)
+        light = (clear / (4 * r * r)) * self.power[:, None] + AMBIENT[0]
+        sent = (colour * light * weight).reshape(3, count, -1).sum(1)
+        glow = 0 * way
+        done = 0
+        for part in trail.pieces:  # a ray occurs once in each
+            k = len(part[0])
+            xp.put(glow, part[0], xp.take(glow, part[0]) + sent[:, done : done + k])
+            done += k
+        return glow, met + len(rays)
+
+
+def draw_solids(
+    field: SolidField, stage: Stage, canvas: tuple[int, int], *, adaptive: bool = True
+) -> tuple[Image, int]:
+    """Draw a field of solids.
+
+    Args:
+        field: the solids.
+        stage: camera, light, ground and sky.
+        canvas: width and height in pixels.
+        adaptive: sample once where nothing changes from pixel to pixel, instead of four times everywhere.
+
+    Returns:
+        The picture and how many (object, point) pairs went through the network.
+
+    Raises:
+        ProgramError: numbers out of all proportion, which no compiled scene has.
+    """
+    width, height = canvas
+    lighting = Lighting(field, stage)
+    out = np.empty((4, height, width))
+    met = 0
+    rows = max(1, TILE // width)
+    for top in range(0, height, rows):
+        part, cost = _band(lighting, canvas, range(top, min(top + rows, height)), adaptive)
+        out[:, top : top + rows], met = part, met + cost
+    if not np.isfinite(out).all():
+        raise ProgramError("numbers that the network cannot draw with")
+    colour, alpha = np.moveaxis(out[:3], 0, 2), out[3]
+    if stage.transparent:
+        straight = encoded(colour / np.maximum(alpha, 1e-6)[..., None])
+        return from_samples(straight * alpha[..., None], alpha), met
+    return from_samples(encoded(colour), None), met
+
+
+def encoded(linear: np.ndarray) -> Any:
+    """sRGB of linear values, clamped to [0, 1] (IEC 61966-2-1)."""
+    x = np.clip(linear, 0.0, 1.0)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+
+
+def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, adaptive: bool) -> tuple[np.ndarray, int]:
+    """Premultiplied radiance and alpha (4, rows, W) of some rows of pixels."""
+    width, height = canvas
+    if adaptive:
+        near = range(max(rows.start - 1, 0), min(rows.stop + 1, height))
+        y, x = (a.reshape(-1) for a in np.mgrid[near.start : near.stop, 0:width])
+        shade = _shade(lighting, canvas, x + 0.5, y + 0.5)
+        once = shade[0].reshape(4, len(near), width)
+        rough = _rough(once)[rows.start - near.start :][: len(rows)]
+        picture = np.ascontiguousarray(once[:, rows.start - near.start :][:, : len(rows)])
+        y, x = np.nonzero(rough)
+        met = shade[1]
+    else:
+        picture, met = np.empty((4, len(rows), width), np.float32), 0
+        y, x = (a.reshape(-1) for a in np.mgrid[0 : len(rows), 0:width])
+    if len(x):
+        quarter = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])
+        four, more = _shade(
+            lighting,
+            canvas,
+            (x[:, None] + quarter[0]).reshape(-1),
+            (y[:, None] + rows.start + quarter[1]).reshape(-1),
+        )
+        picture[:, y, x] = four.reshape(4, -1, 4).mean(2)
+        met += more
+    return picture, met
+
+
+def _shade(
+    lighting: Lighting, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, int]:
+    """Radiance and alpha (4, M) at places (M,) of the picture in pixels, from its upper left corner."""
+    xp, camera = lighting.xp, lighting.stage.camera
+    (width, height), (forward, right, up) = canvas, np.array(camera.axes())
+    px = 2 / min(canvas)
+    ahead = forward / np.tan(camera.fov_rad / 2)
+    way = ahead[:, None] + right[:, None] * ((x - width / 2) * px) + up[:, None] * ((height / 2 - y) * px)
+    way = (way / np.sqrt((way * way).sum(0))).astype(np.float32)
+    with xp.inference():
+        shade = lighting.shade(xp.array(way, lighting.field.network.codes))
+        return xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None]], 0)), shade.met
+
+
+def _rough(picture: np.ndarray) -> np.ndarray:
+    """Pixels (H, W) of (4, H, W) that differ from one of their eight neighbours."""
+    shown = np.sqrt(np.clip(picture, 0.0, 1.0))  # nearly as bright as it looks
+    rough = np.zeros(shown.shape[1:], bool)
+    for a, b in (
+        ((slice(None), slice(1, None)), (slice(None), slice(None, -1))),
+        ((slice(1, None), slice(None)), (slice(None, -1), slice(None))),
+        ((slice(1, None), slice(1, None)), (slice(None, -1), slice(None, -1))),
+        ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))),
+    ):
+        far = (abs(shown[(slice(None), *a)] - shown[(slice(None), *b)]) > CONTRAST).any(0)
+        rough[a] |= far
+        rough[b] |= far
+    return rough
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _length(xp: Arrays, a: Array) -> Array:
+    return xp.sqrt(_dot(a, a))

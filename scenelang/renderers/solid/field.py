@@ -1,0 +1,248 @@
+"""The solids' field: what it answers at points of space, and where along a ray it has to be asked.
+
+Each object's frame (`solid_frames.py`) carries points into its own space, where the network meets them. An
+object lies in a ball; farther than its blends reach beyond that, it changes nothing and is not asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from scenelang.renderers.arrays import Array, Arrays, Layers
+from scenelang.renderers.field import INTERSECT, SMOOTH, UNION
+from scenelang.renderers.solid.frames import SolidFrame, read_solid_frame
+from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, SolidNetwork
+
+SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """One object, ready to be met.
+
+    Args:
+        frame: where it lies.
+        token: how it joins what came before.
+        look: colour and medium (4, 1).
+        layers: its decoder.
+        direct: the same from world points, where its way back is a single map.
+        radius: leaf units from its origin beyond which it changes nothing.
+        blend: the cell's blend width over its own.
+    """
+
+    frame: SolidFrame
+    token: int
+    look: Array
+    layers: Layers
+    direct: Layers | None
+    radius: float
+    blend: float
+
+    @property
+    def draws(self) -> bool:
+        """Whether something may be seen, where it is met, of what was empty before."""
+        return self.token in (UNION, SMOOTH)
+
+
+class Meeting(NamedTuple):
+    """What the field answers at points (M,).
+
+    Args:
+        distance: D.
+        register: colour and medium (4, M), if asked for.
+        gradient: of D (3, M), if asked for.
+        change: a bound on D and on how far another object's material may begin, if asked for.
+    """
+
+    distance: Array
+    register: Array = None
+    gradient: Array = None
+    change: Array = None
+
+
+class SolidField:
+    """A program's objects with their weights, ready to be met by points.
+
+    Args:
+        network: trained parameters, on any device.
+        vectors: (N, 64) float32, geometry and material vectors.
+        tokens: (N,) boolean tokens 0 to 3.
+
+    Raises:
+        ProgramError: an object's vector holds no way from the world to a leaf.
+    """
+
+    def __init__(self, network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) -> None:
+        self.network, self.xp = network, network.xp
+        with self.xp.inference():
+            self.cells = network.cells()
+            self.solids = self._solids(vectors, tokens)
+        self.plain = all(solid.token == UNION for solid in self.solids)
+        """Whether every object draws."""
+        self.media = any(float(solid.look[3, 0]) > 0.5 for solid in self.solids)
+        """Whether some object is a medium."""
+
+    def _solids(self, vectors: np.ndarray, tokens: np.ndarray) -> list[Solid]:
+        xp, layout, like = self.xp, self.network.layout, self.network.codes
+        solids: list[Solid] = []
+        smooths, widest = 0, 0.0  # of the blends from an object on
+        for vector, token in zip(vectors[::-1], tokens[::-1].tolist(), strict=True):
+            g, m = vector[: layout.geometry], vector[layout.geometry :]
+            frame = read_solid_frame(g, layout)
+            smooth = token == SMOOTH
+            smooths, widest = smooths + smooth, max(widest, frame.blend * smooth)
+            layers = [
+                (xp.packed(w), b) for w, b in self.network.decoder(xp.array(g[: layout.code].copy(), like))
+            ]
+            look = self.network.look(xp.array(m[layout.material_code].copy(), like))
+            matrix = xp.array(m[layout.colour].reshape(3, 4).copy(), like)
+            colour = (matrix[:, :3] @ look[:3] + matrix[:, 3]).clip(0.0, 1.0)
+            outer = frame.outer.placed(xp, like)
+            steps = [step.placed(xp, like) for step in frame.steps]
+            direct = None
+            radius = 1 + SLACK + abs(frame.amount) + widest * (1 + smooths / 4) / frame.scale
+            if not steps and not frame.amount and radius <= RADIUS:
+                (w, b), *rest = layers
+                direct = [(w @ outer.linear, w @ outer.shift + b), *rest]
+            solids.append(
+                Solid(
+                    frame=replace(frame, outer=outer, steps=tuple(steps)),
+                    token=token,
+                    look=xp.concat([colour, look[3:]], 0)[:, None],
+                    layers=layers,
+                    direct=direct,
+                    radius=radius,
+                    blend=BLEND / frame.blend if smooth and frame.blend > 0 else 1.0,
+                )
+            )
+        return solids[::-1]
+
+    def spans(self, origin: Array, way: Array) -> tuple[Array, Array, Array]:
+        """Where rays may meet each object: begin and end (N, M), inf and -inf for never, and a bound (N, M)
+        on how fast its distance changes along them.
+
+        Args:
+            origin: of all rays (3,).
+            way: unit directions (3, M).
+        """
+        xp, count = self.xp, way.shape[1]
+        shape = len(self.solids), count
+        begin, end, rate = (xp.full(shape, v, way) for v in (float("inf"), -float("inf"), 1.0))
+        for i, solid in enumerate(self.solids):
+            frame = solid.frame
+            a = frame.outer.linear @ way
+            b = frame.outer.linear @ origin + frame.outer.shift
+            square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+            middle = -(b @ a) / square
+            near = b[:, None] + middle * a  # the point closest to the ball's centre
+            left = frame.ball(solid.radius) ** 2 - near[0] * near[0] - near[1] * near[1] - near[2] * near[2]
+            half = xp.sqrt((left / square).clip(0.0))
+            hit = left > 0
+            begin[i] = xp.select(hit, middle - half, begin[i])
+            end[i] = xp.select(hit, middle + half, end[i])
+            rate[i] = (frame.scale * frame.growth(solid.radius)) * xp.sqrt(square)
+            if solid.token == INTERSECT:  # outside its ball nothing is left of what came before
+                begin[:i] = xp.maximum(begin[:i], begin[i])
+                end[:i] = xp.minimum(end[:i], end[i])
+        return begin, end, rate
+
+    def meet(
+        self,
+        p: Array,
+        inside: Sequence[Array],
+        register: bool = False,
+        gradient: bool = False,
+        change: bool = False,
+    ) -> Meeting:
+        """Let points meet the objects.
+
+        Args:
+            p: world points (3, M).
+            inside: of each object, which points (M,) may be in its reach.
+            register, gradient, change: what to answer beside the distance.
+        """
+        xp, count = self.xp, p.shape[1]
+        state = xp.full((count,), EMPTY, p)
+        memory = xp.full((4, count), 0.0, p) if register else None
+        slope = xp.full((3, count), 0.0, p) if gradient else None
+        bound = xp.full((count,), EMPTY, p) if change else None
+        touched = None if self.plain else inside[0] & ~inside[0]
+        for solid, mask in zip(self.solids, inside, strict=True):
+            if touched is not None:
+                if solid.draws:
+                    touched = touched | mask
+                else:
+                    mask = mask & touched
+            index = xp.where(mask)
+            met = len(index)
+            if not met:
+                continue
+            every = met == count
+            q = p if every else xp.take(p, index)
+            before = state if every else xp.take(state, index)
+            d, own = self._distance(solid, q, gradient)
+            cell = self.cells[solid.token]
+            joined = self.network.join(d, before, solid.blend, cell, None if register else 1)
+            if bound is not None:
+                gap = abs(d)
+                if solid.token == SMOOTH:
+                    gap = xp.minimum(gap, abs(before - d) / 2)
+                bound = _update(
+                    xp, bound, index, every, xp.minimum(bound if every else xp.take(bound, index), gap)
+                )
+            if slope is not None:
+                by_own, by_past = self.network.partials(d, before, joined, solid.blend, cell)
+                past = slope if every else xp.take(slope, index)
+                slope = _update(xp, slope, index, every, by_own * own + by_past * past)
+            if memory is not None:
+                held = memory if every else xp.take(memory, index)
+                memory = _update(xp, memory, index, every, self.network.register(joined, held, solid.look))
+            state = _update(xp, state, index, every, joined.state)
+        return Meeting(state, memory, slope, None if bound is None else xp.minimum(bound, abs(state)))
+
+    def _distance(self, solid: Solid, p: Array, gradient: bool) -> tuple[Array, Array | None]:
+        """An object's world distance (M,) at world points (3, M), and its gradient (3, M) if asked for."""
+        xp, network, frame = self.xp, self.network, solid.frame
+        scale = frame.scale
+        if solid.direct is not None:
+            if not gradient:
+                return network.distance(p, solid.direct) * scale, None
+            d, g = network.gradient(p, solid.direct)
+            return d * scale, g * scale
+        q = frame.local(xp, p)
+        rim = length = None
+        at = q
+        if solid.radius > RADIUS:
+            length = xp.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
+            rim = RADIUS / length.clip(RADIUS)
+            at = q * rim
+        if gradient:
+            d, g = network.gradient(at, solid.layers)
+        else:
+            d, g = network.distance(at, solid.layers), None
+        if rim is not None and length is not None:
+            d = d + (length - RADIUS).clip(0.0)
+            if g is not None:
+                n = q / length.clip(1e-9)
+                radial = g[0] * n[0] + g[1] * n[1] + g[2] * n[2]
+                g = xp.select(length > RADIUS, rim * (g - radial * n) + n, g)
+        if frame.amount:
+            f = frame.frequency
+            s, c = xp.sin(f * q), xp.cos(f * q)
+            d = d + frame.amount * (s[0] * s[1] * s[2])
+            if g is not None:
+                more = xp.stack([c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]], 0)
+                g = g + (frame.amount * f) * more
+        return d * scale, None if g is None else frame.pulled(xp, p, g) * scale
+
+
+def _update(xp: Arrays, whole: Array, index: Array, every: bool, values: Array) -> Array:
+    """An array (…, M) with new values (…, k) at some places, or at every one."""
+    if every:
+        return values
+    xp.put(whole, index, values)
+    return whole

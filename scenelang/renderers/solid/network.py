@@ -1,0 +1,209 @@
+"""The solids' network: what it computes, from top to bottom, for parameters of either library.
+
+Letters: N objects, M points, C = `code`, G = `width`, L = `paint_lines`, K = `kind_lines`. Distances are in
+world units, leaf coordinates in leaf units, points lie last, as in `network.py`, whose two learned parts are
+these too:
+
+1. The decoder turns leaf coordinates into a distance. Its weights are a linear function of the object's code.
+   Light shows normals, so its units are smooth: SiLU (Elfwing et al. 2018).
+2. The cell is an LSTM whose gates are clamped lines in the object's distance and the distance so far, chosen
+   by the boolean token. Its register carries colour and medium, the latter under a gate of its own.
+
+Both say how their answers change with what they are asked, written by hand: a surface's normal is the
+gradient of the distance behind the last object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from scenelang.lifting.layout import SOLID_LAYOUT, Layout
+from scenelang.renderers.arrays import NUMPY, Array, Arrays, Layers
+from scenelang.renderers.network import TOKENS
+
+EMPTY = 100.0  # world units: the distance where nothing has been met
+RADIUS = 3.0  # leaf units: the decoder sees points in this ball, farther ones at its rim
+BLEND = 0.15  # world units: the width of the blends that the cell is trained on
+BLOCK = 2048  # points that go through the decoder at once
+
+
+@dataclass(frozen=True, slots=True)
+class SolidConfig:
+    """Sizes of the network.
+
+    Args:
+        code, material_code: entries of the codes.
+        width: hidden units of the decoder's two layers.
+        paint_lines, kind_lines: lines of which the highest opens the gate of colour and that of medium.
+    """
+
+    code: int = 4
+    material_code: int = 2
+    width: int = 16
+    paint_lines: int = 2
+    kind_lines: int = 2
+
+
+class Cell(NamedTuple):
+    """Weights of the cell of one token."""
+
+    lines: Array  # (1 + L + K, 2): levels of the gates from (distance, distance so far)
+    bias: Array  # (1 + L + K)
+    candidate: Array  # (): what an open gate makes of the object's distance
+    bump: Array  # (): by how much a half-open gate lowers the distance, times four
+
+
+class SolidNetwork:
+    """The formulas of the network, over parameters of either library."""
+
+    config: SolidConfig
+    layout: Layout = SOLID_LAYOUT
+    xp: ClassVar[Arrays]
+    codes: Any  # (geometries, C)
+    material_codes: Any  # (materials, material_code)
+    albedo: Any  # (material_code + 1, 4): colour and medium
+    decoder_w: Any  # (C + 1, 3, G), (C + 1, G, G), (C + 1, G, 1)
+    decoder_b: Any  # (C + 1, G), (C + 1, G), (C + 1, 1)
+    cell_lines: Any  # (TOKENS, 2, 1 + L + K)
+    cell_gain: Any  # (TOKENS, 1 + L + K): a logarithm
+    cell_bias: Any  # (TOKENS, 1 + L + K)
+    candidate: Any  # (TOKENS,)
+    bump: Any  # (TOKENS,)
+
+    def decoder(self, code: Array) -> Layers:
+        """The decoder of a code (C,): each weight is linear in (code, 1)."""
+        one = self.xp.concat([code, self.xp.full((1,), 1.0, code)], 0)
+        return [
+            ((one @ w.reshape(len(w), -1)).reshape(w.shape[1:]).swapaxes(0, 1), one @ b)
+            for w, b in zip(self.decoder_w, self.decoder_b, strict=True)
+        ]
+
+    def cells(self) -> list[Cell]:
+        """The cell of each token."""
+        gain = self.xp.exp(self.cell_gain)
+        lines = (self.cell_lines * gain[:, None]).swapaxes(1, 2)
+        bump = self.bump / gain[:, 0]
+        return [
+            Cell(self.xp.packed(lines[i]), self.cell_bias[i], self.candidate[i], bump[i])
+            for i in range(TOKENS)
+        ]
+
+    def look(self, material_code: Array) -> Array:
+        """Colour and medium (…, 4) of material codes (…, material_code)."""
+        return material_code @ self.albedo[:-1] + self.albedo[-1]
+
+    def distance(self, q: Array, layers: Layers) -> Array:
+        """Distances (M,) of leaf coordinates (3, M), leaf units."""
+        return self._in_blocks(q, layers, False)[0]
+
+    def gradient(self, q: Array, layers: Layers) -> tuple[Array, Array]:
+        """Distances (M,) and their gradients (3, M)."""
+        found = self._in_blocks(q, layers, True)
+        return found[0], found[1:]
+
+    def _in_blocks(self, q: Array, layers: Layers, slopes: bool) -> Array:
+        xp, ask = self.xp, self._slopes if slopes else self._values
+        count = q.shape[1]
+        if count <= BLOCK:
+            return ask(q, layers)
+        return xp.concat([ask(q[:, i : i + BLOCK], layers) for i in range(0, count, BLOCK)], 1)
+
+    def _values(self, q: Array, layers: Layers) -> Array:
+        """Distances (1, M)."""
+        for w, b in layers[:-1]:
+            q = self.xp.silu(self.xp.dense(q, w, b))
+        return self.xp.dense(q, *layers[-1])
+
+    def _slopes(self, q: Array, layers: Layers) -> Array:
+        """Distances and gradients (4, M), which go back through the layers."""
+        xp, kept = self.xp, []
+        for w, b in layers[:-1]:
+            a = xp.dense(q, w, b)
+            s = xp.sigmoid(a)
+            q = a * s
+            kept.append(s * (1 + a - q))  # the derivative of a s
+        w, b = layers[-1]
+        value, g = xp.dense(q, w, b), w.T
+        for slope, (w, _) in zip(reversed(kept), reversed(layers[:-1]), strict=True):
+            g = w.T @ (slope * g)
+        return xp.concat([value, g], 0)
+
+    def join(self, d: Array, state: Array, scale: float, cell: Cell, rows: int | None) -> Joined:
+        """One object: the cell.
+
+        Args:
+            d: the object's distance (M,).
+            state: the distance so far (M,).
+            scale: both are multiplied by it, and the answer divided: of a blend narrower or wider than the
+                cell's, the cell's width over its own.
+            cell: of the object's token.
+            rows: gates that are asked for: 1 for the distance alone, None for the register too.
+        """
+        xp = self.xp
+        levels = xp.dense(xp.stack([d, state], 0), cell.lines[:rows] * scale, cell.bias[:rows])
+        gates = levels.clip(0.0, 1.0)
+        take = gates[0]
+        keep = 1 - take
+        new = take * (d * cell.candidate - keep * (cell.bump / scale)) + keep * state
+        return Joined(new, gates, take, keep)
+
+    def partials(
+        self, d: Array, state: Array, joined: Joined, scale: float, cell: Cell
+    ) -> tuple[Array, Array]:
+        """How the distance behind an object changes with its own (M,) and with that before it (M,)."""
+        take, keep = joined.take, joined.keep
+        open_ = (take > 0) & (take < 1)
+        rate = self.xp.select(
+            open_, d * cell.candidate - state - (keep - take) * (cell.bump / scale), 0.0 * d
+        )
+        own, past = (cell.lines[0] * scale).tolist()
+        return take * cell.candidate + rate * own, keep + rate * past
+
+    def register(self, joined: Joined, before: Array, look: Array) -> Array:
+        """Colour and medium (4, M) behind an object of some look (4, 1)."""
+        xp, n = self.xp, 1 + self.config.paint_lines
+        paint, kind = xp.largest(joined.gates[1:n]), xp.largest(joined.gates[n:])
+        gate = xp.concat([paint, paint, paint, kind], 0)
+        return before + gate * (look - before)
+
+
+class Joined(NamedTuple):
+    """What the cell answers."""
+
+    state: Array  # (M,)
+    gates: Array  # (rows, M)
+    take: Array  # (M,)
+    keep: Array  # (M,)
+
+
+class SolidArrays(SolidNetwork):
+    """A trained network as numpy arrays, by the names of `solid_shapes`."""
+
+    xp = NUMPY
+
+    def __init__(self, config: SolidConfig, arrays: Mapping[str, np.ndarray]) -> None:
+        self.config = config
+        for name, value in arrays.items():
+            setattr(self, name, value)
+        self.decoder_w, self.decoder_b = ([arrays[f"decoder_{k}.{i}"] for i in range(3)] for k in "wb")
+
+
+def solid_shapes(c: SolidConfig, geometries: int, materials: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of a network's parameters in a file, by name."""
+    sizes, rows = [3, c.width, c.width, 1], 1 + c.paint_lines + c.kind_lines
+    return {
+        "codes": (geometries, c.code),
+        "material_codes": (materials, c.material_code),
+        "albedo": (c.material_code + 1, 4),
+        **{f"decoder_w.{i}": (c.code + 1, *sizes[i : i + 2]) for i in range(3)},
+        **{f"decoder_b.{i}": (c.code + 1, sizes[i + 1]) for i in range(3)},
+        "cell_lines": (TOKENS, 2, rows),
+        "cell_gain": (TOKENS, rows),
+        "cell_bias": (TOKENS, rows),
+        "candidate": (TOKENS,),
+        "bump": (TOKENS,),
+    }

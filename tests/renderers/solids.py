@@ -1,0 +1,109 @@
+"""Scenes of solids that are lifted by hand, after the solid layout's description."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
+from scenelang.lifting.exact import inverse_frame
+from scenelang.lifting.layout import SOLID_LAYOUT as LAYOUT
+from scenelang.models.solid import solid_arrays
+from scenelang.models.weights import shipped_weights
+from scenelang.renderers.solid.field import SolidField
+from scenelang.renderers.solid.network import SolidArrays, SolidNetwork
+from scenelang.words import TOKENS
+
+LEAVES, MATERIALS = ("sphere", "torus"), ("diffuse", "volumetric")
+
+
+class Object(NamedTuple):
+    """An object; steps are nearest the leaf first: displacement, turns, maps, turns, maps."""
+
+    leaf: str
+    steps: Sequence[Step] = ()
+    material: str = "diffuse"
+    rgb: tuple[float, float, float] = (0.8, 0.5, 0.3)
+    token: str = "union"
+    k: float = 0.15
+
+
+@lru_cache
+def network() -> SolidArrays:
+    """The shipped network."""
+    return solid_arrays(shipped_weights("solids3d"), len(LEAVES), len(MATERIALS))
+
+
+def moved(x: float, y: float, z: float) -> Affine:
+    return Affine((1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z))
+
+
+def scaled(x: float, y: float, z: float) -> Affine:
+    return Affine((x, 0, 0, 0, 0, y, 0, 0, 0, 0, z, 0))
+
+
+def turned(angle: float) -> Affine:
+    """About the direction (1, 2, 3)."""
+    a = np.array([1.0, 2.0, 3.0]) / 14**0.5
+    cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+    matrix = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return Affine(tuple(np.column_stack([matrix, np.zeros(3)]).ravel().tolist()))
+
+
+def vector(o: Object, net: SolidNetwork) -> np.ndarray:
+    """The 64 numbers of an object."""
+    maps, turns = [np.eye(4)], [[]]  # maps and turns take turns, nearest the leaf first
+    g = np.zeros(LAYOUT.geometry)
+    g[-1] = o.k
+    for step in o.steps:
+        if isinstance(step, Displace):
+            g[-3:-1] = step.amount, step.frequency
+        elif isinstance(step, Affine):
+            maps[-1] = np.vstack([np.reshape(step.rows, (3, 4)), (0, 0, 0, 1)]) @ maps[-1]
+        else:
+            if (maps[-1] != np.eye(4)).any():
+                maps.append(np.eye(4))
+                turns.append([])
+            slot = (step.twirl, step.bend[0], 0.0) if isinstance(step, Warp) else (0.0, 0.0, step.twist)
+            turns[-1].insert(0, slot)
+    if len(maps) == 1:
+        maps, turns = [np.eye(4), maps[0]], [turns[0], []]
+    middle, last = maps
+    for slots, group in zip(turns, (LAYOUT.inner_warps, LAYOUT.outer_warps), strict=True):
+        flat = np.ravel(slots)
+        g[group.start : group.start + len(flat)] = flat
+    g[: LAYOUT.code] = net.xp.to_numpy(net.codes)[LEAVES.index(o.leaf)]
+    g[LAYOUT.one] = 1.0
+    for frame, matrix in ((LAYOUT.frame, last), (LAYOUT.middle, middle)):
+        g[frame] = inverse_frame(tuple(matrix[:3].ravel().tolist()), 3)
+    m = np.zeros(64 - len(g))
+    m[LAYOUT.colour] = np.column_stack([np.diag(o.rgb), np.zeros(3)]).ravel()
+    m[LAYOUT.material_code] = net.xp.to_numpy(net.material_codes)[MATERIALS.index(o.material)]
+    return np.concatenate([g, m]).astype(np.float32)
+
+
+def field(objects: Sequence[Object], net: SolidNetwork | None = None) -> SolidField:
+    """The field of a stream of objects."""
+    net = net or network()
+    vectors = np.reshape([vector(o, net) for o in objects], (-1, 64)).astype(np.float32)
+    return SolidField(net, vectors, np.array([TOKENS[o.token] for o in objects], np.int8))
+
+
+MIXED = (
+    Object(
+        "torus",
+        (Displace(0.05, 6.0), Twist(0.8), Warp(0.5, (0.0, 0.0)), scaled(0.9, 0.7, 0.8), turned(1.0)),
+    ),
+    Object(
+        "sphere",
+        (scaled(0.5, 0.3, 0.4), Warp(0.0, (0.7, 0.0)), moved(0.3, 0.2, 0.1)),
+        token="smooth",
+        k=0.3,
+    ),
+    Object("torus", (scaled(0.5, 0.5, 0.5), turned(2.0), moved(0.0, 0.4, 0.3)), token="subtract"),
+    Object("sphere", (scaled(1.1, 1.0, 1.2),), token="intersect"),
+)
+"""Objects of every kind about the origin."""

@@ -1,0 +1,242 @@
+"""Solids: frames, field and pictures against closed forms, differences and the other library."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from scenelang.graph.stage import Light, Stage
+from scenelang.graph.steps import Displace, Twist, Warp
+from scenelang.reference.fold import combine
+from scenelang.reference.leaves import leaf_distance
+from scenelang.renderers.solid import draw
+from scenelang.renderers.solid.draw import draw_solids
+from scenelang.renderers.solid.field import Meeting, SolidField
+from scenelang.renderers.solid.frames import read_solid_frame
+from scenelang.renderers.solid.network import SolidArrays
+from scenelang.renderers.solid.parameters import Solids
+from scenelang.words import TOKENS
+from tests.renderers.solids import LEAVES, MIXED, Object, field, moved, network, scaled, turned, vector
+
+rng = np.random.default_rng(7)
+
+
+def everywhere(solids: SolidField, p: np.ndarray, **asked: bool) -> Meeting:
+    """What a field answers where every object is met."""
+    return solids.meet(p, [np.ones(p.shape[1], bool)] * len(solids.solids), **asked)
+
+
+def psnr(a: np.ndarray, b: np.ndarray) -> float:
+    return float(-10 * np.log10(np.square(np.asarray(a, float) - b).mean() + 1e-12))
+
+
+def test_frames_lead_back_step_by_step() -> None:
+    inner = (Twist(0.8), Warp(0.5, (0.3, 0.0)), scaled(0.9, 0.7, 0.8), turned(1.0))
+    steps = (*inner, Warp(-0.4, (0, 0)), moved(1, 2, 3))
+    p = rng.normal(size=(3, 50))
+    q = p - np.array([[1.0], [2], [3]])
+    for step in reversed(steps[:-1]):
+        if isinstance(step, Warp | Twist):
+            if isinstance(step, Twist):
+                j, a = 2, step.twist * q[1]
+            else:
+                j, a = 1, step.twirl * np.linalg.norm(q, axis=0) + step.bend[0] * q[0]
+            new = q.copy()
+            new[0], new[j] = np.cos(a) * q[0] + np.sin(a) * q[j], np.cos(a) * q[j] - np.sin(a) * q[0]
+            q = new
+        else:
+            rows = np.reshape(step.rows, (3, 4))
+            q = np.linalg.solve(rows[:, :3], q - rows[:, 3:])
+    net = network()
+    frame = read_solid_frame(vector(Object("torus", steps), net)[: net.layout.geometry])
+    assert frame.local(net.xp, p.astype(np.float32)) == pytest.approx(q, abs=1e-4)
+    assert frame.scale == pytest.approx(0.7, rel=1e-6)
+
+
+@pytest.mark.parametrize("leaf", LEAVES)
+def test_leaves_are_exact_near_their_surfaces(leaf: str) -> None:
+    q = rng.uniform(-1.2, 1.2, (3, 20000))
+    exact = leaf_distance(leaf, q)
+    q, exact = q[:, abs(exact) < 0.05], exact[abs(exact) < 0.05]
+    found = everywhere(field([Object(leaf)]), q.astype(np.float32), gradient=True)
+    assert abs(found.distance - exact).mean() < 3e-4
+    h = 1e-5
+    normal = np.stack([leaf_distance(leaf, q + h * e[:, None]) - exact for e in np.eye(3)]) / h
+    across = np.cross(normal, found.gradient, axis=0)
+    angle = np.degrees(np.arctan2(np.linalg.norm(across, axis=0), (normal * found.gradient).sum(0)))
+    assert np.median(angle) < 0.2
+
+
+@pytest.mark.parametrize("token", TOKENS)
+def test_the_cell_is_the_fold(token: str) -> None:
+    net, n = network(), 4000
+    past, own = rng.normal(size=(2, n)).astype(np.float32) * 10 ** rng.uniform(-2, 0, n).astype(np.float32)
+    own[::2] = past[::2] + own[::2] / 10
+    cell = net.cells()[TOKENS[token]]
+    for width in (0.15, 0.05, 0.6):
+        joined = net.join(own * width / 0.15, past * width / 0.15, 0.15 / width, cell, None)
+        depth, paint = combine(past, np.zeros((n, 1)), own, np.ones((n, 1)), TOKENS[token])
+        assert joined.state == pytest.approx(depth * width / 0.15, abs=2e-4, rel=3e-4)
+        register = net.register(joined, np.zeros((4, n), np.float32), np.ones((4, 1), np.float32))
+        clear = (abs(own - past) > 1e-3) & (abs(own) > 1e-3)
+        assert register[0, clear] == pytest.approx(paint[clear, 0], abs=2e-3)
+        assert register[3, clear] == pytest.approx(paint[clear, 0].round(), abs=2e-3)
+
+
+def test_gradients_are_those_of_the_distance() -> None:
+    solids, p, h = field(MIXED), rng.uniform(-1, 1, (3, 400)).astype(np.float32), 2e-3
+    found = everywhere(solids, p, gradient=True)
+    steps = h * np.eye(3, dtype=np.float32)[..., None]
+    slopes = [
+        (everywhere(solids, p + step).distance - everywhere(solids, p - step).distance) / (2 * h)
+        for step in steps
+    ]
+    wrong = np.linalg.norm(np.stack(slopes) - found.gradient, axis=0)
+    assert np.median(wrong) < 2e-3
+    assert (wrong > 0.05).mean() < 0.05  # at creases the differences see both sides
+
+
+def test_objects_change_nothing_out_of_their_reach() -> None:
+    """Signs, colours and kinds are those of the whole fold; so no surface is missed."""
+    small = (scaled(0.3, 0.3, 0.3), moved(0.9, 0, 0))
+    solids = field([*MIXED, Object("sphere", small, "volumetric", token="smooth")])
+    origin = np.array([0.3, 1.0, 4.0], np.float32)
+    p = rng.uniform(-1.5, 1.5, (3, 20000)).astype(np.float32)
+    t = np.linalg.norm(p - origin[:, None], axis=0)
+    begin, end, _ = solids.spans(origin, (p - origin[:, None]) / t)
+    near = solids.meet(p, list((begin <= t) & (t <= end)), register=True)
+    whole = everywhere(solids, p, register=True)
+    inside = whole.distance < -1e-4
+    assert ((near.distance < 0) == inside)[abs(whole.distance) > 1e-4].all()
+    assert near.register[:, inside] == pytest.approx(whole.register[:, inside], abs=1e-3)
+    assert inside.sum() > 500
+
+
+def test_steps_pass_no_surface() -> None:
+    """Along rays the distance changes at most as fast as the bound says."""
+    solids = field(MIXED[:3])
+    origin = np.array([0.3, 1.0, 4.0], np.float32)
+    way = rng.normal(size=(3, 3000)).astype(np.float32) * 0.1 - origin[:, None]
+    way /= np.linalg.norm(way, axis=0)
+    _, _, rate = solids.spans(origin, way)
+    t = rng.uniform(3, 5, 3000).astype(np.float32)
+    a, b = (everywhere(solids, origin[:, None] + way * at).distance for at in (t, t + 0.02))
+    assert (abs(a - b) / 0.02 <= rate.max(0) + 1e-3).all()
+
+
+def sphere_picture(canvas: tuple[int, int], radius: float, stage: Stage) -> np.ndarray:
+    """A grey sphere at the origin over the ground, in closed form."""
+    width, height = canvas
+    y, x = np.mgrid[0 : 2 * height, 0 : 2 * width] / 2 + 0.25
+    forward, right, up = np.array(stage.camera.axes())
+    way = 3 * forward[:, None, None] + np.multiply.outer(right, (x - width / 2) * 2 / min(canvas))
+    way = way - np.multiply.outer(up, (y - height / 2) * 2 / min(canvas))
+    way /= np.linalg.norm(way, axis=0)
+    eye, lamp = np.array(stage.camera.eye)[:, None, None], np.array(stage.light.position)[:, None, None]
+
+    def first(o: np.ndarray, d: np.ndarray) -> np.ndarray:
+        b, c = (o * d).sum(0), (o * o).sum(0) - radius**2
+        root = b * b - c
+        t = -b - np.sqrt(np.maximum(root, 0))
+        return np.where((root > 0) & (t > 1e-6), t, np.inf)
+
+    high = np.clip(2 * way[1], 0, 1)
+    sky = np.array(stage.horizon)[:, None, None] * (1 - high) + np.array(stage.zenith)[:, None, None] * high
+    t = first(eye + 0 * way, way)
+    down = np.where(way[1] < 0, (-1 - eye[1]) / np.minimum(way[1], -1e-9), np.inf)
+    ball = t < down
+    p = eye + way * np.where(ball, t, np.where(down < np.inf, down, 0))
+    n = np.where(ball, p / radius, np.array([0.0, 1, 0])[:, None, None])
+    to = lamp - p
+    r = np.linalg.norm(to, axis=0)
+    shadow = first(p + 1e-4 * n, to / r) < r
+    light = stage.light.power * np.maximum((n * to).sum(0) / r, 0) / r**2 * ~shadow + 0.12 + 0.06 * n[1]
+    fade = np.exp(-(p[0] ** 2 + p[2] ** 2) / 64)
+    floor = np.array([0.5, 0.48, 0.45])[:, None, None] * light
+    floor = fade * floor + (1 - fade) * np.array(stage.horizon)[:, None, None]
+    seen = np.where(ball, 0.5 * light, np.where(down < np.inf, floor, sky))
+    linear = np.clip(seen.reshape(3, height, 2, width, 2).mean((2, 4)), 0, 1)
+    return np.moveaxis(
+        np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055), 0, 2
+    )
+
+
+@pytest.mark.parametrize("canvas", [(96, 96), (120, 60)])
+def test_a_sphere_is_drawn_as_in_closed_form(canvas: tuple[int, int]) -> None:
+    stage = Stage(light=Light((2.0, 3.0, 2.5), 20.0))
+    solids = field([Object("sphere", (scaled(0.8, 0.8, 0.8),), rgb=(0.5, 0.5, 0.5))])
+    exact = sphere_picture(canvas, 0.8, stage)
+    assert psnr(draw_solids(solids, stage, canvas, adaptive=False)[0], exact) > 50
+    assert psnr(draw_solids(solids, stage, canvas)[0], exact) > 48
+
+
+def test_a_medium_lets_through_what_its_length_says() -> None:
+    """Straight through the middle, lit by nothing: what is behind times the transmittance, plus ambient."""
+    stage = Stage(light=Light(power=0.0), ground=None, horizon=(0.5, 0.5, 0.5), zenith=(0.5, 0.5, 0.5))
+    solids = field([Object("sphere", (scaled(0.5, 0.5, 0.5),), "volumetric", (1.0, 1.0, 1.0))])
+    image, _ = draw_solids(solids, stage, (65, 65), adaptive=False)
+    clear = np.exp(-3 * 1.0)
+    linear = 0.5 * clear + 0.12 * (1 - clear)
+    assert image[32, 32] == pytest.approx(1.055 * linear ** (1 / 2.4) - 0.055, abs=2e-3)
+    alpha, _ = draw_solids(solids, Stage(light=Light(power=0.0), ground=None, transparent=True), (65, 65))
+    assert alpha[32, 32, 3] == pytest.approx(1 - clear, abs=1e-3)
+    assert alpha[0, 0, 3] == 0
+
+
+def test_both_libraries_draw_the_same() -> None:
+    net = network()
+    other = Solids(net.config, 2, 2)
+    names = dict(other.named_parameters())
+    with torch.no_grad():
+        for name, parameter in names.items():
+            group, _, index = name.partition(".")
+            value = getattr(net, group)
+            parameter.copy_(torch.from_numpy(value[int(index)] if index else value))
+    objects = [*MIXED[:2], Object("sphere", (scaled(0.4, 0.4, 0.4), moved(-0.8, 0, 0.4)), "volumetric")]
+    mine, _ = draw_solids(field(objects), Stage(), (48, 48))
+    theirs, _ = draw_solids(field(objects, other), Stage(), (48, 48))
+    assert psnr(mine, theirs) > 60
+
+
+def test_tiles_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, _ = draw_solids(field(MIXED), Stage(), (48, 40))
+    monkeypatch.setattr(draw, "TILE", 48 * 7)
+    assert psnr(draw_solids(field(MIXED), Stage(), (48, 40))[0], whole) > 100
+
+
+def test_what_is_drawn_is_in_codes_and_cell() -> None:
+    """Swapped codes swap shapes; random weights of the cell draw noise."""
+    step = (scaled(0.8, 0.8, 0.8),)
+    ball, ring = (draw_solids(field([Object(leaf, step)]), Stage(), (32, 32))[0] for leaf in LEAVES)
+    g = vector(Object("sphere", step), network())
+    g[:4] = network().codes[1]
+    swapped, _ = draw_solids(SolidField(network(), g[None], np.zeros(1, np.int8)), Stage(), (32, 32))
+    assert psnr(swapped, ring) > 90
+    assert psnr(swapped, ball) < 40
+    noise = SolidArrays(network().config, weights())
+    noise.cell_lines = rng.normal(size=noise.cell_lines.shape).astype(np.float32)
+    noise.cell_gain = noise.cell_gain * 0
+    drawn, good = (draw_solids(field(MIXED, net), Stage(), (32, 32))[0] for net in (noise, network()))
+    assert psnr(drawn, good) < 30
+
+
+def weights() -> dict[str, np.ndarray]:
+    net = network()
+    named = {k: v for k, v in vars(net).items() if isinstance(v, np.ndarray)}
+    return named | {f"decoder_{k}.{i}": getattr(net, f"decoder_{k}")[i] for k in "wb" for i in range(3)}
+
+
+def test_nothing_is_an_empty_stage() -> None:
+    image, met = draw_solids(field([]), Stage(), (16, 16))
+    assert met == 0
+    assert image[0, 8, 2] > image[0, 8, 0]
+
+
+def test_displacement_moves_the_surface() -> None:
+    p = np.array([[0.5], [0.5], [0.7071]], np.float32)
+    plain, bumpy = (
+        everywhere(field([Object("sphere", steps)]), p).distance[0] for steps in ((), (Displace(0.1, 3.0),))
+    )
+    wanted = 0.1 * np.sin(1.5) ** 2 * np.sin(3 * 0.7071)
+    assert bumpy - plain == pytest.approx(wanted, abs=1e-5)
