@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -11,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.image import Image
-from scenelang.lab.about import Report, silent
+from scenelang.lab.about import Report, about, silent
 from scenelang.measure.metrics import MOST_DB, compare
-from scenelang.measure.scenes import draw_scene, reference_of, scenes_of, spread
+from scenelang.measure.scenes import draw_scene, reference_of, scenes_of, summarise
 from scenelang.measure.sheet import contact_sheet, side_by_side
 from scenelang.models.load import Model
 from scenelang.words import TOKENS
@@ -21,19 +20,12 @@ from scenelang.words import TOKENS
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One scene's figures.
+    """One scene's figures."""
 
-    Args:
-        index: in its set.
-        last: the word that joins the last object of the stream.
-        objects: rows of the Program.
-        figures: psnr (dB), ssim, flip.
-    """
-
-    index: int
-    last: str
-    objects: int
-    figures: dict[str, float]
+    index: int  # in its set
+    last: str  # the word that joins the last object of the stream
+    objects: int  # rows of the Program
+    figures: dict[str, float]  # psnr (dB), ssim, flip
 
 
 def _worst(cases: list[Case], count: int = 12) -> list[Case]:
@@ -88,12 +80,12 @@ def evaluate_set(
         "seed": seed,
         "psnr_cap_db": MOST_DB,
         "weights": model.digest,
-        "machine": f"{platform.machine()}, {threads} thread(s)",
+        **about(),
         "seconds": round(time.perf_counter() - started, 1),
-        **summarise(cases),
+        **_summary(cases),
         "worst_cases": [{"index": c.index, "last": c.last, **c.figures} for c in _worst(cases)],
         "by_last_token": {
-            word: summarise([c for c in cases if c.last == word])
+            word: _summary([c for c in cases if c.last == word])
             for word in (*TOKENS, "all_union")
             if any(c.last == word for c in cases)
         },
@@ -107,9 +99,5 @@ def _last_word(tokens: npt.NDArray[np.int8]) -> str:
     return next(word for word, value in TOKENS.items() if value == tokens[-1])
 
 
-def summarise(cases: list[Case]) -> dict[str, Any]:
-    """Mean, 5th percentile from the bad end, and worst of each figure."""
-    out: dict[str, Any] = {"count": len(cases)}
-    for figure, bad_end in (("psnr", 5), ("ssim", 5), ("flip", 95)):
-        out[figure] = spread([c.figures[figure] for c in cases], bad_end)
-    return out
+def _summary(cases: list[Case]) -> dict[str, Any]:
+    return {"count": len(cases), **summarise([case.figures for case in cases])}

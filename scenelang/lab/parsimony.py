@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 
@@ -17,7 +16,7 @@ from scenelang.graph.nodes import Graph
 from scenelang.lab.about import about
 from scenelang.lab.charts import FAINT, INK, LINE, WARN, figure_png, pyplot
 from scenelang.measure.metrics import over_white, psnr
-from scenelang.measure.plan import choice, drawing_cost, stages, token_counts
+from scenelang.measure.plan import plan_of
 from scenelang.measure.scenes import reference_of
 from scenelang.models.load import Model
 from scenelang.passes import OPTIONAL
@@ -55,11 +54,7 @@ def example_plan(path: Path) -> dict[str, Any]:
         "file": path.name,
         "frame": frame,
         "canvas": list(program.canvas),
-        **choice(scene, program.model, asked=False),
-        "stages": stages(graphs),
-        "rows": len(program),
-        "tokens": token_counts(program.tokens.tolist()),
-        "drawing": drawing_cost(scene, program, model),
+        **plan_of(scene, program, graphs, model),
         "ways": ways_of(scene, model) if model.manifest.renderer == "framed" else {},
     }
 
@@ -110,19 +105,12 @@ def measure_examples(
     }
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """What taking a part away, or another size, does to the error.
+class Verdict(NamedTuple):
+    """What taking a part away, or another size, does to the error."""
 
-    Args:
-        change: mean PSNR in dB less the whole renderer's; below 0 where the part buys something.
-        blends: the same of scenes of smooth unions alone.
-        word: ``pays``, ``no difference`` or ``costs``: the changes against the spread over seeds.
-    """
-
-    change: float
-    blends: float
-    word: str
+    change: float  # mean PSNR in dB less the whole renderer's; below 0 where the part buys something
+    blends: float  # the same of scenes of smooth unions alone
+    word: str  # `pays`, `no difference` or `costs`: the changes against the spread over seeds
 
 
 def whole_runs(parts: Mapping[str, Any]) -> list[Mapping[str, Any]]:

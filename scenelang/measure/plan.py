@@ -63,6 +63,26 @@ def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
     return out
 
 
+def plan_of(
+    scene: Scene,
+    program: Program,
+    graphs: Mapping[str, Graph],
+    model: Model,
+    *,
+    asked: bool = False,
+    spans: Spans | None = None,
+    threads: int = 1,
+) -> dict[str, Any]:
+    """What `choice` and `drawing_cost` say, the `stages`, and the rows and tokens of the stream."""
+    return {
+        **choice(scene, program.model, asked),
+        "stages": stages(graphs),
+        "rows": len(program),
+        "tokens": token_counts(program.tokens.tolist()),
+        "drawing": drawing_cost(scene, program, model, spans, threads),
+    }
+
+
 def choice(scene: Scene, chosen: str, asked: bool) -> dict[str, Any]:
     """Which model draws a scene, why, and what would have been next.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -64,3 +64,9 @@ def spread(values: list[float], bad_end: int) -> dict[str, float]:
         "p5": round(float(np.percentile(values, bad_end)), 5),
         "worst": round(worst, 5),
     }
+
+
+def summarise(cases: Sequence[Mapping[str, float]]) -> dict[str, dict[str, float]]:
+    """Mean, worst and the tail towards it of what `compare` said of each case."""
+    bad_ends = {"psnr": 5, "ssim": 5, "flip": 95}
+    return {name: spread([case[name] for case in cases], bad_end) for name, bad_end in bad_ends.items()}

@@ -12,11 +12,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from scenelang.lab.designs.ablation_runs import SEEDS, SIZES, ablation_runs
 from scenelang.lab.designs.ablations import VARIANTS, make_student
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, random_scenes
 from scenelang.lab.designs.students import FramedStudent, StudentConfig
 from scenelang.lab.designs.studies import Study, StudyConfig
+from scenelang.lab.experiments.runs import SEEDS, TRIED, ablation_runs
 from scenelang.renderers.network import FramedConfig
 from scenelang.training.losses import leaf_loss, trace_loss
 from scenelang.training.scenes import SceneConfig, leaf_batch, random_batch
@@ -52,7 +52,7 @@ def test_runs_differ_in_one_thing() -> None:
         assert study.seed == 1
         sizes, other = asdict(FramedConfig()), asdict(study.student.framed)
         changed = {key for key in sizes if sizes[key] != other[key]}
-        assert changed == ({group} if group in SIZES else set())
+        assert changed == ({group} if group in TRIED else set())
         if group == "parts":
             assert study.student.variant == name
     assert [study.seed for name, _, study in RUNS if name == "framed"] == list(range(1, 1 + SEEDS))
@@ -61,7 +61,7 @@ def test_runs_differ_in_one_thing() -> None:
 
 
 def test_sizes_hold_the_shipped_one() -> None:
-    for size, values in SIZES.items():
+    for size, values in TRIED.items():
         assert getattr(FramedConfig(), size) in values
 
 

@@ -10,11 +10,10 @@ import torch
 from safetensors.numpy import load_file
 
 from scenelang.graph.steps import Affine, Warp
-from scenelang.lab.designs.config import StudentFile
 from scenelang.lab.designs.export import export
 from scenelang.lab.designs.pictures import PictureConfig, random_scenes
 from scenelang.lab.designs.students import StudentConfig
-from scenelang.lab.designs.studies import Study, StudyConfig
+from scenelang.lab.designs.studies import StudentFile, Study, StudyConfig
 from scenelang.lifting.learned import lift_geometry, lift_material, read_lifting
 from scenelang.renderers.streaming import StreamingConfig
 

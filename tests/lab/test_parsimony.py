@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from scenelang.lab.designs.ablation_runs import ablation_runs
+from scenelang.lab.experiments.runs import ablation_runs
 from scenelang.lab.parsimony import (
     WAYS,
     example_plan,

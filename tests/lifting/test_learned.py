@@ -32,7 +32,7 @@ def test_without_torch_it_gives_the_same() -> None:
     for kind, inputs in GEOMETRY_INPUTS.items():
         numbers = rng.normal(size=(5, inputs))
         with torch.no_grad():
-            expected = network.geometry_matrix(kind, torch.from_numpy(numbers)).numpy()
+            expected = network.geometry[kind](torch.from_numpy(numbers)).numpy()
         np.testing.assert_allclose(lifting.matrices(kind, numbers), expected, atol=1e-12)
 
 
@@ -77,7 +77,7 @@ def test_a_fresh_encoder_is_near_the_identity() -> None:
     torch.manual_seed(0)
     network = Encoders(LiftingConfig(), 4, 1)
     with torch.no_grad():
-        made = network.geometry_matrix("affine", torch.randn(10, 16))
+        made = network.geometry["affine"](torch.randn(10, 16))
     assert float((made - torch.eye(32)).norm(dim=(1, 2)).max()) < 2.0
 
 

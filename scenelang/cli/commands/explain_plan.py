@@ -42,18 +42,12 @@ def command(
     if program is None or scene is None or job.failed():
         ctx.exit(1)
     from scenelang.backend.neural import choose_device, open_model, usable_cores
-    from scenelang.measure.plan import choice, drawing_cost, stages, token_counts
+    from scenelang.measure.plan import plan_of
 
     opened = open_model(program.model, choose_device(device))
-    plan: dict[str, Any] = {
-        "version": 1,
-        "file": file,
-        **choice(scene, program.model, asked=request.model is not None),
-        "stages": stages(job.graphs),
-        "rows": len(program),
-        "tokens": token_counts(program.tokens.tolist()),
-        "drawing": drawing_cost(scene, program, opened, source.spans, threads or usable_cores()),
-    }
+    asked, cores = request.model is not None, threads or usable_cores()
+    found = plan_of(scene, program, job.graphs, opened, asked=asked, spans=source.spans, threads=cores)
+    plan: dict[str, Any] = {"version": 1, "file": file, **found}
     click.echo(json.dumps(plan, indent=2) if kind == "json" else _text(plan))
 
 

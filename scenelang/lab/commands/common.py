@@ -55,13 +55,9 @@ def write_chart(path: Path, draw: Callable[[], bytes]) -> None:
 
 
 def model_to_measure(name: str, weights: Path | None) -> Model:
-    """A shipped model, or one with other weights; what cannot be loaded ends the command."""
-    from scenelang.backend.errors import RenderError
-    from scenelang.models.load import ModelError, load_model
+    """A shipped model, or one with other weights."""
+    from scenelang.models.load import load_model
+    from scenelang.models.manifest import available
 
-    try:
-        return load_model(name, path=weights)
-    except KeyError:
-        raise click.UsageError(f"no model `{name}`") from None
-    except ModelError as error:
-        raise RenderError(str(error)) from None
+    check_names("model", [name], available())
+    return load_model(name, path=weights)

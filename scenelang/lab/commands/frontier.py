@@ -79,11 +79,9 @@ def _measure(base: str, out: Path, scenes: int, seed: int, threads: int) -> None
     from scenelang.measure.frontier import NAME
 
     with Bar() as bar:
-        measured = measure_frontier(base, scenes, seed, threads, bar)
-    frontier = measured.frontier
+        frontier, pictures, exact = measure_frontier(base, scenes, seed, threads, bar)
     write_whole(out / NAME, frontier.to_json().encode())
-    page = frontier_page(frontier, measured.pictures, measured.exact)
-    write_whole(out / "frontier.html", page.encode())
+    write_whole(out / "frontier.html", frontier_page(frontier, pictures, exact).encode())
     common.write_chart(out / "frontier.png", lambda: frontier_chart(frontier))
     click.echo(_table(frontier))
 
@@ -92,21 +90,14 @@ def _table(frontier: Frontier) -> str:
     """All points, the fastest first."""
     from scenelang.measure.frontier import between
 
-    lines = [f"{'':2}{'way to draw':44}{'ms':>9}{'p95':>9}{'FLIP':>9}{'promise':>9}{'PSNR':>7}{'scenes':>8}"]
+    lines = [f"{'':2}{'way to draw':44}{'ms':>9}{'FLIP':>9}{'promise':>9}{'PSNR':>7}{'scenes':>8}"]
     for p in frontier.points:
         errors = " " * 25
         if p.flip is not None and p.psnr is not None:
             errors = f"{p.flip.mean:9.5f}{p.flip.bound:9.5f}{p.psnr.mean:7.2f}"
-        mark = "* " if p.on_front else "  "
-        lines.append(f"{mark}{p.title:44}{p.ms.median:9.2f}{p.ms.p95:9.2f}{errors}{p.scenes:8}")
-    lines.append(
-        f"* on the front. {between(frontier.points)} points lie between the fastest and the nearest."
-    )
-    default = next((p for p in frontier.points if p.name == frontier.set), None)
-    if default is not None and default.ratio_to_streaming:
-        ratio = f"{default.ratio_to_streaming:.1f} times as fast as the paper's streaming one"
-        lines.append(f"A frame of {default.name} is {ratio}.")
-    return "\n".join(lines)
+        lines.append(f"{'* ' if p.on_front else '  '}{p.title:44}{p.ms.median:9.2f}{errors}{p.scenes:8}")
+    count = between(frontier.points)
+    return "\n".join([*lines, f"* on the front. {count} points lie between the fastest and the nearest."])
 
 
 def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path | None) -> bool:

@@ -25,9 +25,8 @@ def command(
     CONFIG is a JSON file or the name of a shipped configuration, such as shapes2d-streaming. By default one
     thread computes, as for the shipped weights. Exits with 0 also when the budget ends first.
     """
-    from scenelang.lab.designs.config import read_student
     from scenelang.lab.designs.export import export
-    from scenelang.lab.designs.studies import Study
+    from scenelang.lab.designs.studies import Study, read_student
 
     with mistakes_told(config, out):
         file = read_student(config)

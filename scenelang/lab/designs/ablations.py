@@ -1,7 +1,7 @@
 """The `framed` renderer without one of its parts at a time, to see what each part buys.
 
 Each network here derives from the shipped one and has one thing taken away. None of them ships, and the
-shipped renderer knows nothing of them. `ablation_runs.py` lists the study.
+shipped renderer knows nothing of them. `experiments/runs.py` lists the study.
 
 Letters: B streams, N objects, P points, F features, S state, L lines of the paint gate, as in
 `renderers/network.py`.

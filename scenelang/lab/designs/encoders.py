@@ -12,8 +12,7 @@ Letters: M transformations, d the size of the vector that a matrix acts on, W = 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
@@ -34,9 +33,6 @@ class LiftingConfig:
     geometry: int = 32
     material: int = 32
     width: int = 64
-
-    def to_json(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 class Encoder(nn.Module):
@@ -84,19 +80,9 @@ class Encoders(nn.Module):
         self.config = config
         self.codes = nn.Parameter(torch.randn(geometries, config.geometry))
         self.material_codes = nn.Parameter(torch.randn(materials, config.material))
-        self.geometry = nn.ModuleDict(
+        self.geometry = nn.ModuleDict(  # of geometry transformations (M, inputs)
             {kind: Encoder(n, config.width, config.geometry) for kind, n in GEOMETRY_INPUTS.items()}
         )
-        self.material = nn.ModuleDict(
+        self.material = nn.ModuleDict(  # of colour operations (M, inputs)
             {kind: Encoder(n, config.width, config.material) for kind, n in MATERIAL_INPUTS.items()}
         )
-
-    def geometry_matrix(self, kind: str, numbers: Tensor) -> Tensor:
-        """Matrices (M, d_g, d_g) of geometry transformations (M, inputs)."""
-        matrix: Tensor = self.geometry[kind](numbers)
-        return matrix
-
-    def material_matrix(self, kind: str, numbers: Tensor) -> Tensor:
-        """Matrices (M, d_m, d_m) of colour operations (M, inputs)."""
-        matrix: Tensor = self.material[kind](numbers)
-        return matrix

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
-import torch
 
 from scenelang.lab.about import about
-from scenelang.lab.designs.config import StudentFile
 from scenelang.lab.designs.students import StreamingStudent
-from scenelang.lab.designs.studies import Study
+from scenelang.lab.designs.studies import StudentFile, Study
 from scenelang.models.load import RENDERER
 from scenelang.training.checkpoint import save_tensors
 
@@ -30,15 +26,16 @@ def export(study: Study, file: StudentFile, path: Path, device: str = "cpu") -> 
         ValueError: the student is a framed one, whose weights `scenelang.training.loop` writes.
     """
     student = study.averaged
-    kept: dict[str, torch.Tensor] = {}
-    last = f"{RENDERER}stages.{study.config.student.streaming.resolution}."
     if study.config.student.renderer == "framed":
         raise ValueError("framed models are trained by a configuration with phases")
-    for name, tensor in student.state_dict().items():
-        grown = isinstance(student, StreamingStudent) and name.startswith(f"{RENDERER}stages.")
-        if not grown or name.startswith(last):
-            kept[name] = tensor.detach().half().cpu().contiguous()
-    header: dict[str, Any] = {
+    levels = f"{RENDERER}stages." if isinstance(student, StreamingStudent) else "none"
+    last = f"{RENDERER}stages.{study.config.student.streaming.resolution}."
+    kept = {
+        name: tensor.detach().half().cpu().contiguous()
+        for name, tensor in student.state_dict().items()
+        if not name.startswith(levels) or name.startswith(last)
+    }
+    header = {
         "format": 1,
         "model": file.model,
         "config": study.config.to_json(),

@@ -71,8 +71,8 @@ class LearnedLifting(Encoders):
             ("bend", scenes.bend.view(-1, 1)),
             ("affine", scenes.affine.view(-1, 16)),
         ):
-            g = self.geometry_matrix(kind, numbers) @ g
-        m = self.material_matrix("color", scenes.rgb.view(-1, 3)) @ self.material_codes[0]
+            g = self.geometry[kind](numbers) @ g
+        m = self.material["color"](scenes.rgb.view(-1, 3)) @ self.material_codes[0]
         return torch.cat([g[..., 0], m], 1).view(b, n, -1)
 
 

@@ -19,9 +19,11 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
+from pydantic import TypeAdapter
+from pydantic.dataclasses import dataclass as checked
 from torch import Tensor, nn
 
 from scenelang.lab.designs.ablations import make_student
@@ -44,6 +46,7 @@ from scenelang.lab.designs.students import (
 )
 from scenelang.renderers.streaming import SMALLEST
 from scenelang.training.checkpoint import load_tensors, pack_training, save_tensors, unpack_training
+from scenelang.training.config import config_data
 from scenelang.training.losses import leaf_loss, trace_loss
 from scenelang.training.scenes import Batch, SceneConfig, leaf_batch, points_of
 
@@ -92,19 +95,30 @@ class StudyConfig:
         return asdict(self)
 
 
-@dataclass(slots=True)
-class Progress:
-    """Where a study is.
+@checked(frozen=True, config={"extra": "forbid"})
+class StudentFile:
+    """A model of another renderer or lifting, trained by a study: its name, and what is trained."""
 
-    Args:
-        step: optimiser steps done.
-        seconds: processor time spent.
-        loss: of the last batch.
+    model: str
+    study: StudyConfig
+
+
+def read_student(name: str) -> StudentFile:
+    """Read a configuration by path or by the name of a shipped one.
+
+    Raises:
+        OSError: there is no such file, or it cannot be read.
+        pydantic.ValidationError: a key is unknown or a value has the wrong type.
     """
+    return TypeAdapter[StudentFile](StudentFile).validate_json(config_data(name))
 
-    step: int
-    seconds: float
-    loss: float
+
+class Progress(NamedTuple):
+    """Where a study is."""
+
+    step: int  # optimiser steps done
+    seconds: float  # processor time spent
+    loss: float  # of the last batch
 
 
 def rate_at(share: float, config: StudyConfig) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -24,13 +24,11 @@ from scenelang.lab.about import about
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, pictures, random_scenes
 from scenelang.lab.designs.students import Student
 from scenelang.lab.designs.studies import Study
+from scenelang.lab.experiments.lpips import Lpips, LpipsError, load_lpips
 from scenelang.lab.experiments.runs import EXPERIMENTS, Run
 from scenelang.measure.metrics import MOST_DB, compare
-from scenelang.measure.scenes import spread
+from scenelang.measure.scenes import summarise
 from scenelang.renderers.field import SMOOTH
-
-if TYPE_CHECKING:
-    from scenelang.lab.experiments.lpips import Lpips
 
 UNSEEN = 2021  # seed of the scenes that are measured; trainings use small ones
 STRIP = 8  # scenes of a strip
@@ -61,7 +59,7 @@ def run_experiment(
     budget_s: float,
     seed: int,
     settings: Settings,
-    report: Report | None = None,
+    report: Report = lambda *_: None,
 ) -> dict[str, Any]:
     """Train and measure all runs of an experiment.
 
@@ -77,6 +75,7 @@ def run_experiment(
     """
     runs = EXPERIMENTS[name](budget_s, seed)
     results = [run_one(run, settings, report) for run in runs]
+    _, blank = unseen(settings.scenes, max(run.side for run in runs), settings.device)
     return {
         "experiment": name,
         "set": "shapes2d",
@@ -84,18 +83,13 @@ def run_experiment(
         **about(),
         "device": settings.device,
         "budget_s": budget_s,
-        "white": white(max(run.side for run in runs), settings),
+        # pictures with nothing on them, which a renderer has to beat to have learned anything
+        "white": _figures(torch.ones_like(blank), blank),
         "runs": results,
     }
 
 
-def white(side: int, settings: Settings) -> dict[str, Any]:
-    """Figures of pictures with nothing on them, which a renderer has to beat to have learned anything."""
-    _, exact = unseen(settings.scenes, side, settings.device)
-    return _figures(torch.ones_like(exact), exact)
-
-
-def run_one(run: Run, settings: Settings, report: Report | None = None) -> dict[str, Any]:
+def run_one(run: Run, settings: Settings, report: Report = lambda *_: None) -> dict[str, Any]:
     """Train one run, or what is left of it, and measure it."""
     config = run.study
     study = Study(config, settings.folder / "runs" / run.folder, settings.device)
@@ -104,18 +98,20 @@ def run_one(run: Run, settings: Settings, report: Report | None = None) -> dict[
         finite = finite and math.isfinite(progress.loss)
         if not finite:
             break
-        if progress.seconds >= due and report is not None:
+        if progress.seconds >= due:
             report(run, study, None)
             due = progress.seconds + config.seconds / REPORTS
     finite = finite and all(bool(p.isfinite().all()) for p in study.averaged.parameters())
-    scenes, exact = _measured(run, study, settings.scenes, run.side, settings)
+    scenes, exact = unseen(settings.scenes, run.side, settings.device)
+    if run.seen:
+        assert study.fixed is not None
+        scenes, exact = study.fixed, _exact(study.fixed, run.side)
     shown = draw(study.averaged, scenes, run.side)
     figures = _figures(shown, exact)
     if run.blends:
         blended, truth = unseen(settings.scenes, run.side, settings.device, blends=True)
         figures["blends"] = round(_psnr(draw(study.averaged, blended, run.side), truth), 4)
-    if report is not None:
-        report(run, study, figures["psnr"]["mean"])
+    report(run, study, figures["psnr"]["mean"])
     return {
         "name": run.name,
         "group": run.group,
@@ -129,14 +125,6 @@ def run_one(run: Run, settings: Settings, report: Report | None = None) -> dict[
         **figures,
         "strip": _strips(run, shown, exact, settings.folder),
     }
-
-
-def _measured(run: Run, study: Study, count: int, r: int, settings: Settings) -> tuple[Scenes, Tensor]:
-    """The scenes that a run is measured on, and their exact pictures (B, 3, R, R)."""
-    if not run.seen:
-        return unseen(count, r, settings.device)
-    assert study.fixed is not None
-    return study.fixed, _exact(study.fixed, r)
 
 
 @lru_cache(maxsize=4)
@@ -181,18 +169,11 @@ def _figures(shown: Tensor, exact: Tensor) -> dict[str, Any]:
         # a network that came to nothing draws what is not a number; its picture is grey
         a, b = (v.nan_to_num(0.5).permute(1, 2, 0).numpy() for v in (one, other))
         cases.append(compare(a, b))
-    out: dict[str, Any] = {
-        metric: spread([case[metric] for case in cases], bad_end)
-        for metric, bad_end in (("psnr", 5), ("ssim", 5), ("flip", 95))
-    }
-    out["lpips"] = _lpips(shown, exact)
-    return out
+    return summarise(cases) | {"lpips": _lpips(shown, exact)}
 
 
 def _lpips(shown: Tensor, exact: Tensor) -> dict[str, float] | None:
     """LPIPS of VGG16 features, mean; None where its weights are not installed."""
-    from scenelang.lab.experiments.lpips import LpipsError
-
     try:
         distance = _vgg()
     except LpipsError:
@@ -207,8 +188,6 @@ def _lpips(shown: Tensor, exact: Tensor) -> dict[str, float] | None:
 
 @lru_cache(maxsize=1)
 def _vgg() -> Lpips:
-    from scenelang.lab.experiments.lpips import load_lpips
-
     return load_lpips()
 
 

@@ -72,22 +72,9 @@ class Record:
     converged: list[float] = field(default_factory=list)
 
 
-@dataclass(slots=True)
-class Measured:
-    """A frontier and the pictures that belong to it.
-
-    Args:
-        frontier: figures.
-        pictures: of each point, by name, of the first scenes.
-        exact: the exact ones.
-    """
-
-    frontier: Frontier
-    pictures: dict[str, list[Image]]
-    exact: list[Image]
-
-
-def measure_frontier(base: str, scenes: int, seed: int, threads: int, report: Report = silent) -> Measured:
+def measure_frontier(
+    base: str, scenes: int, seed: int, threads: int, report: Report = silent
+) -> tuple[Frontier, dict[str, list[Image]], list[Image]]:
     """Measure all ways to draw the scenes of a set.
 
     Args:
@@ -96,6 +83,9 @@ def measure_frontier(base: str, scenes: int, seed: int, threads: int, report: Re
         seed: of the scenes.
         threads: cores to draw on.
         report: called with the stage, what is done and all.
+
+    Returns:
+        The figures, pictures of the first scenes by the name of what drew them, and the exact ones.
     """
     keep_memory()
     torch.set_num_threads(threads)
@@ -135,9 +125,7 @@ def measure_frontier(base: str, scenes: int, seed: int, threads: int, report: Re
         points=tuple(sorted(points, key=lambda p: p.ms.median)),
     )
     pictures = {name: record.pictures for name, record in records.items() if record.pictures}
-    return Measured(
-        frontier, pictures, [reference_of(scene_at(i), manifest) for i in range(min(SHOWN, scenes))]
-    )
+    return frontier, pictures, [reference_of(scene_at(i), manifest) for i in range(min(SHOWN, scenes))]
 
 
 def _timed(run: Draw, threads: int) -> tuple[float, Image]:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import platform
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import torch
 
 from scenelang.backend.neural import open_model
-from scenelang.lab.about import Report, silent
+from scenelang.lab.about import Report, about, silent
 from scenelang.lab.frontier.ways import ways_of
 from scenelang.measure.choose import error_scale
 from scenelang.measure.frontier import Frontier
@@ -18,7 +16,6 @@ from scenelang.measure.scenes import reference_of, scenes_of
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.work import load_of
-from scenelang.training.loop import revision
 
 KEPT: Final = 0.95
 """Share of scenes in which a promise has to hold."""
@@ -26,21 +23,13 @@ SLOW: Final = 6
 """Scenes of the first case for ways that take over half a second a frame; the other cases have none."""
 
 
-@dataclass(frozen=True, slots=True)
-class Case:
-    """Scenes that promises are tried on.
-
-    Args:
-        name: what they are called.
-        set: of `scenelang.measure.sets`.
-        canvas: instead of the set's; None for the set's own.
-        share: of the scenes that are asked for.
-    """
+class Case(NamedTuple):
+    """Scenes that promises are tried on: of a set, on a canvas or the set's own."""
 
     name: str
     set: str
     canvas: tuple[int, int] | None
-    share: float
+    share: float  # of the scenes that are asked for
 
 
 CASES: Final = (
@@ -102,24 +91,22 @@ def verify(
                 error = flip(way.prepare(scene)(), exact)
                 ratios[way.name].append(error / promise if promise > 0 else (1.0 if error <= 0 else 2.0))
             report(case.name, index + 1, count)
-        cases[case.name] = {name: _summary(values) for name, values in ratios.items() if values}
+        cases[case.name] = {
+            name: {
+                "scenes": len(values),
+                "kept": round(sum(value <= 1.0 for value in values) / len(values), 4),
+                "worst": round(max(values), 3),
+            }
+            for name, values in ratios.items()
+            if values
+        }
     return {
         "format": 1,
         "set": manifest.set,
         "seed": seed,
         "frontier_seed": frontier.seed,
         "frontier_revision": frontier.revision,
-        "revision": revision(),
-        "machine": platform.machine(),
+        **about(),
         "held": all(row["kept"] >= KEPT for rows in cases.values() for row in rows.values()),
         "cases": cases,
-    }
-
-
-def _summary(ratios: list[float]) -> dict[str, float]:
-    kept = sum(ratio <= 1.0 for ratio in ratios)
-    return {
-        "scenes": len(ratios),
-        "kept": round(kept / len(ratios), 4),
-        "worst": round(max(ratios), 3),
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -24,12 +24,8 @@ from scenelang.scene.schema import Scene
 
 FULL = 256  # pixels along a side at which the paper's renderer is timed
 Draw = Callable[[], Image]
-
-
-class Prepare(Protocol):
-    """Compiles a scene, which is not timed, and returns what draws it, which is."""
-
-    def __call__(self, scene: Scene) -> Draw: ...
+Prepare = Callable[[Scene], Draw]
+"""Compiles a scene, which is not timed, and returns what draws it, which is."""
 
 
 @dataclass(frozen=True, slots=True)

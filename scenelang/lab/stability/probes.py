@@ -56,30 +56,30 @@ class Probe:
     folded: bool = True
 
 
-def _with(**changes: object) -> Callable[[Rng], Scene]:
-    config = replace(BASE, **changes)  # type: ignore[arg-type]
-    return lambda rng: random_scene(rng, config)
+def _scene(rng: Rng, **changes: object) -> Scene:
+    return random_scene(rng, replace(BASE, **changes))  # type: ignore[arg-type]
 
 
-def _objects(rng: Rng, count: float) -> Scene:
-    return _with(objects=(int(count),) * 2)(rng)
+def _of(rng: Rng, count: float, **changes: object) -> Scene:
+    """So many objects."""
+    return _scene(rng, objects=(int(count),) * 2, **changes)
 
 
 def _operators(rng: Rng, count: float) -> Scene:
     """One object and so many operators after it, none of them a plain union."""
-    scene = _with(objects=(int(count) + 1,) * 2, unions=0.0)(rng)
+    scene = _of(rng, count + 1, unions=0.0)
     words: tuple[Combine, ...] = ("smooth", "subtract", "intersect")
     # intersections leave little of a picture: objects are larger, so that something is there to be wrong
     return _joined(scene, lambda i: "union" if i == 0 else words[int(rng.integers(3))], 1.6)
 
 
-def _blends(rng: Rng, count: float) -> Scene:
-    return _joined(_with(objects=(int(count) + 1,) * 2)(rng), lambda i: "smooth" if i else "union", 1.0)
+def _blends(rng: Rng, count: float, larger: float = 1.0) -> Scene:
+    return _joined(_of(rng, count + 1), lambda i: "smooth" if i else "union", larger)
 
 
 def _contrast(rng: Rng, contrast: float, size: float = LARGE) -> Scene:
     """One `smooth` of three objects, a white one and two that are darker."""
-    scene = _joined(_with(objects=(3, 3))(rng), lambda i: "smooth" if i else "union", size)
+    scene = _blends(rng, 2, size)
     white = int(rng.integers(3))
 
     def grey(i: int) -> Material:
@@ -121,27 +121,11 @@ def _joined(scene: Scene, word: Callable[[int], Combine], larger: float) -> Scen
     return _rebuilt(scene, moves, lambda i, _: word(i))
 
 
-def _affine_steps(rng: Rng, steps: float) -> Scene:
-    return _with(affine_steps=max(3, int(steps)))(rng)
-
-
-def _warp(rng: Rng, factor: float) -> Scene:
-    return _with(warp=BASE.warp * factor)(rng)
-
-
-def _size(rng: Rng, factor: float) -> Scene:
-    return _with(size=factor)(rng)
-
-
-def _canvas(rng: Rng, side: float) -> Scene:
-    return _with(canvas=(int(side),) * 2)(rng)
-
-
 def _thin(rng: Rng, ratio: float) -> Scene:
     def moves(_: int, node: Object) -> list[Transform]:
         return [Scale(x=t.x, y=t.x / ratio, z=1.0) if isinstance(t, Scale) else t for t in node.transforms]
 
-    return _rebuilt(random_scene(rng, BASE), moves)
+    return _rebuilt(_scene(rng), moves)
 
 
 def _sheared(rng: Rng, k: float) -> Scene:
@@ -149,7 +133,7 @@ def _sheared(rng: Rng, k: float) -> Scene:
         *first, rotate, translate = node.transforms
         return [*first, Shear(axes="xy", k=k), rotate, translate]
 
-    return _rebuilt(random_scene(rng, BASE), moves)
+    return _rebuilt(_scene(rng), moves)
 
 
 def _order(rng: Rng, kind: float) -> Scene:
@@ -167,17 +151,13 @@ def _order(rng: Rng, kind: float) -> Scene:
             return [twirl, scale, bend, rotate, translate]
         return list(node.transforms)
 
-    return _rebuilt(random_scene(rng, BASE), moves)
+    return _rebuilt(_scene(rng), moves)
 
 
 PROBES: dict[str, Probe] = {
-    "objects": Probe("objects of a scene", "objects", (1, 2, 4, 8, 16, 32, 64, 128), 4, _objects),
+    "objects": Probe("objects of a scene", "objects", (1, 2, 4, 8, 16, 32, 64, 128), 4, _of),
     "operators": Probe(
-        "operators in a row: smooth, subtract, intersect",
-        "operators",
-        (1, 2, 3, 4, 5, 6, 7, 8),
-        3,
-        _operators,
+        "operators in a row: smooth, subtract, intersect", "operators", tuple(range(1, 9)), 3, _operators
     ),
     "blends": Probe("smooth unions in a row", "smooth unions", (1, 2, 4, 8, 16, 32, 64), 4, _blends),
     "contrast": Probe(
@@ -189,27 +169,27 @@ PROBES: dict[str, Probe] = {
         lambda rng, size: _contrast(rng, 1.0, size),
     ),
     "affine": Probe(
-        "affine maps of each object, each lifted by itself",
-        "affine maps",
-        (3, 4, 8, 16, 32, 64),
-        3,
-        _affine_steps,
-        folded=False,
+        "affine maps of each object, each lifted by itself", "affine maps", (3, 4, 8, 16, 32, 64), 3,
+        lambda rng, steps: _scene(rng, affine_steps=max(3, int(steps))), folded=False,
     ),
     "warp": Probe(
-        "deformations beyond the base set's ±0.8", "times the range", (0.5, 1, 1.5, 2, 2.5, 3), 1, _warp
+        "deformations beyond the base set's ±0.8", "times the range", (0.5, 1, 1.5, 2, 2.5, 3), 1,
+        lambda rng, factor: _scene(rng, warp=BASE.warp * factor),
     ),
-    "size": Probe("sizes beyond the base set's", "times the size", (0.03, 0.1, 0.3, 1, 2, 4, 8), 1, _size),
+    "size": Probe(
+        "sizes beyond the base set's", "times the size", (0.03, 0.1, 0.3, 1, 2, 4, 8), 1,
+        lambda rng, factor: _scene(rng, size=factor),
+    ),
     "thin": Probe("thin objects", "ratio of the scales", (1, 3, 10, 30, 100, 300), 3, _thin),
     "shear": Probe("sheared objects", "shear", (0, 0.5, 1, 2, 4, 8), 0, _sheared),
     "order": Probe(
-        "orders of transformations",
-        "order (0 as trained, 1 affine shuffled, 2 deformed last, 3 mixed)",
-        (0, 1, 2, 3),
-        0,
-        _order
+        "orders of transformations", "order (0 as trained, 1 affine shuffled, 2 deformed last, 3 mixed)",
+        (0, 1, 2, 3), 0, _order,
     ),
-    "canvas": Probe("canvas sizes", "pixels along a side", (32, 64, 128, 256, 512, 1024), 256, _canvas),
+    "canvas": Probe(
+        "canvas sizes", "pixels along a side", (32, 64, 128, 256, 512, 1024), 256,
+        lambda rng, side: _scene(rng, canvas=(int(side),) * 2),
+    ),
 }  # fmt: skip
 
 
@@ -235,7 +215,7 @@ def union_of(nodes: list[Object]) -> Scene:
 
 def animated(rng: Rng, frames: int) -> list[Scene]:
     """Frames of a base scene whose objects turn by 3 degrees, drift by a pixel and sway a little each."""
-    scene = random_scene(rng, BASE)
+    scene = _scene(rng)
     (chain,) = scene.nodes
     drifts = [(float(rng.normal()), float(rng.normal())) for _ in chain.children]  # type: ignore[union-attr]
     return [

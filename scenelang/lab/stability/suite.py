@@ -8,13 +8,10 @@ errors, averaged over channels, over the number of such pixels.
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
-import platform
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +21,7 @@ from scenelang.graph.spaces import PLANE
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.graph.transforms import step_of
 from scenelang.image import Image
-from scenelang.lab.about import Report, silent
+from scenelang.lab.about import Report, about, silent
 from scenelang.lab.stability.probes import PROBES, Probe, animated, apart, rng_of, union_of
 from scenelang.lifting import exact
 from scenelang.lifting.layout import PLANE_LAYOUT
@@ -48,23 +45,14 @@ IDEAL = 8  # samples along a pixel's side of a picture whose own sampling hardly
 Array = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Errors:
-    """A picture against the exact one.
+class Errors(NamedTuple):
+    """A picture against the exact one."""
 
-    Args:
-        psnr: dB, at most 50.
-        flip: mean FLIP in [0, 1].
-        per_edge: absolute error per edge pixel.
-        per_covered: absolute error per covered pixel.
-        square: mean squared error, which no cap hides.
-    """
-
-    psnr: float
-    flip: float
-    per_edge: float
-    per_covered: float
-    square: float
+    psnr: float  # dB, at most 50
+    flip: float  # mean FLIP in [0, 1]
+    per_edge: float  # absolute error per edge pixel
+    per_covered: float  # absolute error per covered pixel
+    square: float  # mean squared error, which no cap hides
 
 
 def exact_picture(
@@ -93,13 +81,14 @@ def exact_picture(
 def compare(picture: Image, reference: tuple[Array, Any, Any]) -> Errors:
     """Errors of a picture against what `exact_picture` gave."""
     exact_one, covered, edge = reference
-    gap = float(np.abs(np.asarray(picture, np.float64)[..., :3] - exact_one).mean(2).sum())
+    gap = np.asarray(picture, np.float64)[..., :3] - exact_one
+    total = float(np.abs(gap).mean(2).sum())
     return Errors(
         psnr(picture, exact_one),
         flip(picture, exact_one),
-        gap / max(1, edge.sum()),
-        gap / max(1, covered.sum()),
-        float(np.square(np.asarray(picture, np.float64)[..., :3] - exact_one).mean()),
+        total / max(1, edge.sum()),
+        total / max(1, covered.sum()),
+        float(np.square(gap).mean()),
     )
 
 
@@ -208,8 +197,7 @@ def order_of_disjoint(model: Model, scenes: int, seed: int) -> dict[str, float]:
     """Objects that do not overlap, in two orders: how far apart the pictures are, and a healthy PSNR."""
     most, values = 0.0, []
     for index in range(scenes):
-        rng = rng_of(seed, index)
-        nodes = apart(rng)
+        nodes = apart(rng := rng_of(seed, index))
         first = sized(union_of(nodes), model.manifest)
         second = sized(union_of([nodes[i] for i in rng.permutation(len(nodes))]), model.manifest)
         a, b = _drawn(model, first, True), _drawn(model, second, True)
@@ -225,9 +213,8 @@ def flicker(model: Model, scenes: int, seed: int) -> dict[str, float]:
     which nothing moves do not count, and where none does more are drawn.
     """
     ratios: list[float] = []
-    for index in itertools.count():
-        if index >= scenes and ratios:
-            break
+    index = -1
+    while (index := index + 1) < scenes or not ratios:
         frames = [sized(f, model.manifest) for f in animated(rng_of(seed, index), FRAMES)]
         ours = [np.asarray(_drawn(model, f, True), np.float64) for f in frames]
         exact_ones = [exact_picture(f, model)[0] for f in frames]
@@ -289,7 +276,6 @@ def run_stability(
     """
     started = time.perf_counter()
     probes = {n: run_probe(model, n, scenes, seed, report) for n in PROBES if not only or n in only}
-    probes = {name: probe for name, probe in probes.items() if probe["rows"]}
     invariants = {}
     for name, measure in INVARIANTS.items():
         if not only or name in only:
@@ -300,8 +286,8 @@ def run_stability(
         "weights": model.digest,
         "scenes": scenes,
         "seed": seed,
-        "machine": platform.machine(),
+        **about(),
         "seconds": round(time.perf_counter() - started, 1),
-        "probes": probes,
+        "probes": {name: probe for name, probe in probes.items() if probe["rows"]},
         "invariants": invariants,
     }
