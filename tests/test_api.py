@@ -81,7 +81,7 @@ def test_pictures_repeat(device: Device) -> None:
 
 def test_tiles_do_not_show() -> None:
     compiled, network = program(FOUR), neural.open_model("shapes2d").network
-    arguments = (network, compiled.vectors, compiled.tokens, compiled.canvas, compiled.background)
+    arguments = (network, compiled)
     whole = draw(*arguments, tile=1 << 20).image
     for tile in (1, 700, 1 << 12):
         assert np.abs(draw(*arguments, tile=tile).image - whole).max() <= STEP

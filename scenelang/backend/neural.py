@@ -12,6 +12,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from typing import Any
 
 from scenelang.backend.errors import RenderError
 
@@ -21,7 +22,6 @@ except ModuleNotFoundError as error:
     raise RenderError("this is drawn by torch, which is not installed; pip install torch") from error
 from scenelang.backend.memory import keep_memory
 from scenelang.backend.options import Samples
-from scenelang.backend.small import check_fits
 from scenelang.models.load import Model, ModelError, load_model, place_of
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing, draw
@@ -124,38 +124,21 @@ def draw_program(
         RenderError: the Program was compiled for another model or other weights, its vectors are none that
             a compiler makes, or the model does not draw in this way.
     """
-    name = model.manifest.name
-    if samples != "adaptive" and not isinstance(model.network, Framed):
-        raise RenderError(f"model `{name}` samples pixels in one way only, not `{samples}`")
-    check_fits(program, name, model.digest)
+    name, network = model.manifest.name, model.network
+    if program.model != name:
+        raise RenderError(f"a program for model `{program.model}`, not `{name}`")
     threads = usable_cores() if threads is None else threads
-    if place_of(model.network).type != "cpu":
+    if place_of(network).type != "cpu":
         threads, split = 1, 1  # the device is busy with one tile
     with _drawing, _one_torch_thread():
         try:
-            if not isinstance(model.network, Framed):
-                torch.set_num_threads(threads)
-                return draw_whole(
-                    model.network,
-                    program.vectors,
-                    program.tokens,
-                    program.canvas,
-                    program.background,
-                    progress=progress,
-                )
-            return draw(
-                model.network,
-                program.vectors,
-                program.tokens,
-                program.canvas,
-                program.background,
-                threads=threads,
-                split=split,
-                kept=kept,
-                skip=skip,
-                adaptive=samples != "four",
-                refine=samples != "one",
-                progress=progress,
-            )
+            program.check_weights(model.digest)
+            if isinstance(network, Framed):
+                options: dict[str, Any] = {"skip": skip, "samples": samples, "progress": progress}
+                return draw(network, program, threads=threads, split=split, kept=kept, **options)
+            if samples != "adaptive":
+                raise RenderError(f"model `{name}` samples pixels in one way only, not `{samples}`")
+            torch.set_num_threads(threads)
+            return draw_whole(network, program, progress=progress)
         except ProgramError as error:
-            raise RenderError(f"a damaged program: {error}") from None
+            raise RenderError(str(error)) from None

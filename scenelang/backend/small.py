@@ -87,32 +87,8 @@ def draw_small(
     """
     keep_memory()
     try:
-        model = load_arrays(program.model)
-    except ModelError as error:
+        network, digest = load_arrays(program.model)
+        program.check_weights(digest)
+        return draw(network, program, kept=kept, samples=samples, progress=progress)
+    except (ModelError, ProgramError) as error:
         raise RenderError(str(error)) from None
-    check_fits(program, program.model, model.digest)
-    try:
-        return draw(
-            model.network,
-            program.vectors,
-            program.tokens,
-            program.canvas,
-            program.background,
-            kept=kept,
-            adaptive=samples != "four",
-            refine=samples != "one",
-            progress=progress,
-        )
-    except ProgramError as error:
-        raise RenderError(f"a damaged program: {error}") from None
-
-
-def check_fits(program: Program, model: str, digest: str) -> None:
-    """Raise RenderError for a Program that was compiled for another model or for other weights."""
-    if program.model != model:
-        raise RenderError(f"a program for model `{program.model}`, not `{model}`")
-    if program.weights != digest:
-        raise RenderError(
-            f"the program was compiled for weights {program.weights[:12]}… of model `{model}`, "
-            f"these are {digest[:12]}…: compile the scene again"
-        )

@@ -30,8 +30,8 @@ LEAST_DB = 0.5  # a part that buys less is not told from noise, however small th
 WAYS: Mapping[str, Mapping[str, Any]] = {
     "as shipped": {},
     "every sample meets every object": {"skip": False},
-    "four samples in every pixel": {"adaptive": False},
-    "both": {"skip": False, "adaptive": False},
+    "four samples in every pixel": {"samples": "four"},
+    "both": {"skip": False, "samples": "four"},
     "hidden and unseen objects stay": {"without": OPTIONAL},
 }
 """Ways of drawing that leave out less, by the arguments of `draw` and `compile_scene`."""
@@ -70,7 +70,7 @@ def ways_of(scene: Scene, model: Model) -> dict[str, dict[str, float]]:
         best = math.inf
         for _ in range(REPEATS):
             started = time.perf_counter()
-            drawing = draw(model.framed, p.vectors, p.tokens, p.canvas, p.background, **arguments)
+            drawing = draw(model.framed, p, **arguments)
             best = min(best, 1000 * (time.perf_counter() - started))
         error = psnr(over_white(drawing.image), exact)
         found[name] = {"meetings": drawing.pairs, "ms": round(best, 2), "psnr": round(error, 2)}

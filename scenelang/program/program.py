@@ -99,6 +99,14 @@ class Program:
             total.update(array.astype(kind).tobytes())
         return total.hexdigest()
 
+    def check_weights(self, digest: str) -> None:
+        """Raise ProgramError where it was compiled for other weights than those of a digest."""
+        if self.weights != digest:
+            raise ProgramError(
+                f"the program was compiled for weights {self.weights[:12]}… of model `{self.model}`, "
+                f"these are {digest[:12]}…: compile the scene again"
+            )
+
     def save(self, path: str | Path) -> None:
         """Write to a file, whole or not at all; the same Program gives the same bytes.
 

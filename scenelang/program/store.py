@@ -10,8 +10,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy.typing as npt
-
 from scenelang.files import read_regular
 from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
 from scenelang.tensors import MOST_HEADER, TensorError, TensorFile, read_tensors
@@ -24,6 +22,15 @@ _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
     "bounds": ("F32", (4,)),
     "objects": ("I32", ()),
     "places": ("I32", (5,)),
+}
+_HEADER: dict[str, Any] = {
+    "background": list | None,
+    "canvas": list,
+    "files": list,
+    "format": int,
+    "geometries": list,
+    "model": str,
+    "weights": str,
 }
 
 
@@ -39,12 +46,7 @@ def load_program(path: str | Path, *, weights: str | None = None) -> Program:
         OSError: the file cannot be read.
     """
     program = parse_program(read_regular(path, MOST_BYTES))
-    expected = weights if weights is not None else _shipped(program.model)
-    if program.weights != expected:
-        raise ProgramError(
-            f"the program was compiled for weights {program.weights[:12]}… of model `{program.model}`, "
-            f"these are {expected[:12]}…: compile the scene again"
-        )
+    program.check_weights(weights if weights is not None else _shipped(program.model))
     return program
 
 
@@ -56,32 +58,38 @@ def parse_program(data: bytes) -> Program:
     """
     try:
         file = read_tensors(data, MOST_BYTES)
-        _check_layout(file)
+        count = _count(file)
         tensors = file.arrays()
     except TensorError as error:
         raise ProgramError(f"not a program: {error}") from None
-    header = _header(file)
-    geometries, files = _names(header, "geometries"), _names(header, "files")
-    objects = _indexed(tensors["objects"], len(geometries), "objects")
-    background, canvas = header["background"], header["canvas"]
-    if not isinstance(canvas, list) or not (background is None or isinstance(background, list)):
-        raise ProgramError("a damaged header")
-    if not isinstance(header["model"], str) or not isinstance(header["weights"], str):
-        raise ProgramError("a damaged header")
+    header = file.header
+    if header.keys() != _HEADER.keys() or not all(isinstance(header[k], _HEADER[k]) for k in _HEADER):
+        raise ProgramError("the header has missing, unknown or damaged fields")
+    geometries, files = header["geometries"], header["files"]
+    if not all(isinstance(name, str) for name in (*geometries, *files)):
+        raise ProgramError("names in the header that are not text")
+    objects, places = tensors["objects"], tensors["places"]
+    known = places[:, 0] >= 0
+    if count and not 0 <= objects.min() <= objects.max() < len(geometries):
+        raise ProgramError("`objects` name what the header does not list")
+    if (places[known, 0] >= len(files)).any() or (places[known, 1:] < 1).any():
+        raise ProgramError("places that no file has")
+    background = header["background"]
     return Program(
         vectors=tensors["vectors"],
         tokens=tensors["tokens"],
         bounds=tensors["bounds"],
-        canvas=tuple(canvas),
+        canvas=tuple(header["canvas"]),
         background=None if background is None else tuple(background),
         model=header["model"],
         weights=header["weights"],
-        objects=tuple(geometries[index] for index in objects),
-        places=_places(tensors["places"], files),
+        objects=tuple(geometries[index] for index in objects.tolist()),
+        places=tuple(Place(files[at], *rest) if at >= 0 else None for at, *rest in places.tolist()),
     )
 
 
-def _check_layout(file: TensorFile) -> None:
+def _count(file: TensorFile) -> int:
+    """Objects of a file whose tensors are those of a Program."""
     if file.tensors.keys() != _LAYOUT.keys():
         raise TensorError("it holds other tensors")
     count = (*file.tensors["vectors"].shape, 0)[0]
@@ -91,33 +99,7 @@ def _check_layout(file: TensorFile) -> None:
         tensor = file.tensors[name]
         if tensor.type != kind or tensor.shape != (count, *rest):
             raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")
-
-
-def _header(file: TensorFile) -> dict[str, Any]:
-    fields = {"background", "canvas", "files", "format", "geometries", "model", "weights"}
-    if file.header.keys() != fields:
-        raise ProgramError("the header has missing or unknown fields")
-    return file.header
-
-
-def _names(header: dict[str, Any], key: str) -> list[str]:
-    names = header[key]
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise ProgramError(f"`{key}` in the header are not names")
-    return names
-
-
-def _indexed(array: npt.NDArray[Any], count: int, what: str) -> list[int]:
-    if ((array < 0) | (array >= count)).any():
-        raise ProgramError(f"`{what}` name what the header does not list")
-    return array.tolist()  # type: ignore[no-any-return]
-
-
-def _places(array: npt.NDArray[Any], files: list[str]) -> tuple[Place | None, ...]:
-    known = array[:, 0] >= 0
-    if (array[known][:, 0] >= len(files)).any() or (array[known][:, 1:] < 1).any():
-        raise ProgramError("places that no file has")
-    return tuple(Place(files[file], *rest) if file >= 0 else None for file, *rest in array.tolist())
+    return count
 
 
 def _shipped(model: str) -> str:

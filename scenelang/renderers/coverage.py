@@ -98,9 +98,9 @@ class Coverage:
         """Leaf units from its origin up to which points meet an object; inf where all do."""
         return row.reach if self.skip else float("inf")
 
-    def tile(self, canvas: tuple[int, int], rows: range, adaptive: bool, refine: bool) -> Tile:
+    def tile(self, canvas: tuple[int, int], rows: range, samples: str) -> Tile:
         """Draw some rows of a picture; see `scenelang.renderers.draw.draw`."""
-        xp = self.xp
+        xp, refine = self.xp, samples == "adaptive"
         width, height = canvas
         px = 2 / min(width, height)  # world units
         # float64 up to here: at 8192 pixels float32 would move samples by a hundredth of a pixel
@@ -110,7 +110,7 @@ class Coverage:
         grid[0], grid[1] = x, y[:, None]
         centres = grid.reshape(2, -1)
         points = xp.array(centres, self.field.network.codes)
-        if not adaptive:
+        if samples == "four":
             shade = self._four(points, centres[1], px)
             met = int(shade.met.reshape(-1, 4).any(1).sum())
             return Tile(xp.to_numpy(self._means(shade)).T, shade.evaluated, centres.shape[1], met)

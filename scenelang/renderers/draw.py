@@ -6,10 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from scenelang.image import Image, from_samples
-from scenelang.program.program import ProgramError
+from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.coverage import Coverage, Tile
 from scenelang.renderers.field import Field
 from scenelang.renderers.kept import Kept
@@ -37,34 +36,26 @@ class Drawing:
 
 def draw(
     network: FramedNetwork,
-    vectors: npt.NDArray[np.float32],
-    tokens: npt.NDArray[np.int8],
-    canvas: tuple[int, int],
-    background: tuple[float, float, float] | None,
+    program: Program,
     *,
     threads: int = 1,
     split: int | None = None,
     kept: Kept | None = None,
     skip: bool = True,
-    adaptive: bool = True,
-    refine: bool = True,
+    samples: str = "adaptive",
     tile: int = TILE,
     progress: Callable[[float], None] | None = None,
 ) -> Drawing:
-    """Draw objects in stream order.
+    """Draw a Program's objects in stream order.
 
     Args:
         network: trained parameters; the picture is computed on their device.
-        vectors: (N, 64).
-        tokens: (N,).
-        canvas: width and height in pixels.
-        background: colour as written, or None for alpha.
+        program: compiled for them.
         threads: tiles drawn at the same time.
         split: tiles are as high as for so many threads; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
         skip: leave out points that an object cannot reach.
-        adaptive: sample once where no outline is near, instead of four times everywhere.
-        refine: sample four times near outlines; without it pixels are hard-edged and faster.
+        samples: of a pixel: ``"adaptive"``, four near outlines and one elsewhere, ``"four"`` or ``"one"``.
         tile: pixels at a time, at least one row.
         progress: called with the share done, from any thread.
 
@@ -72,23 +63,26 @@ def draw(
         ProgramError: an object's vector holds no way from the world to a leaf, or numbers out of all
             proportion; no compiled scene has such.
     """
-    width, height = canvas
-    frames = kept.frames if kept is not None else None
-    coverage = Coverage(Field(network, vectors, tokens, frames=frames), skip=skip)
+    width, height = program.canvas
+    field = Field(network, program.vectors, program.tokens, frames=kept.frames if kept is not None else None)
+    coverage = Coverage(field, skip=skip)
     rows = max(1, min(tile // width, -(-height // (split or threads))))
     tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     out = np.empty((height, width, 4), np.float32)
     drawn: list[Tile] = []
     finished: list[int] = []
-
-    shown = kept.compare(coverage, canvas, tiles) if kept is not None and skip and adaptive else None
+    seen = (
+        kept.look(coverage, program.canvas, tiles)
+        if kept is not None and skip and samples != "four"
+        else None
+    )
 
     def one(index: int) -> None:
         band = tiles[index]
-        if shown is not None and shown.same[index]:
-            out[band.start : band.stop] = shown.before[band.start : band.stop]
+        if kept is not None and seen is not None and kept.shows(index, seen, out.shape):
+            out[band.start : band.stop] = kept.picture[band.start : band.stop]
         else:
-            found = coverage.tile(canvas, band, adaptive, refine)
+            found = coverage.tile(program.canvas, band, samples)
             out[band.start : band.stop] = found.picture.reshape(len(band), width, 4)
             drawn.append(found)
         finished.append(index)
@@ -104,15 +98,13 @@ def draw(
         # every worker computes on one core; torch would otherwise split each small product again
         with ThreadPoolExecutor(threads, initializer=network.xp.one_core) as pool:
             list(pool.map(one, range(len(tiles))))
-    if kept is not None and shown is not None:
-        kept.keep(out, shown, coverage.field.frames)
+    if kept is not None and seen is not None:
+        kept.picture, kept.keys, kept.frames = out.copy(), seen, field.frames
     if not np.isfinite(out).all():
-        raise ProgramError("numbers that the network cannot draw with")
-    cost = [sum(counts) for counts in zip(*((t.pairs, t.refined, t.met) for t in drawn), strict=True)] or [
-        0
-    ] * 3
+        raise ProgramError("a damaged program: numbers that the network cannot draw with")
+    cost = [sum(getattr(t, name) for t in drawn) for name in ("pairs", "refined", "met")]
     colour, alpha = out[..., :3], out[..., 3]
-    if background is None:
+    if program.background is None:
         return Drawing(from_samples(colour, alpha), *cost)
-    colour += (1 - alpha)[..., None] * np.asarray(background, np.float32)
+    colour += (1 - alpha)[..., None] * np.asarray(program.background, np.float32)
     return Drawing(from_samples(colour, None), *cost)

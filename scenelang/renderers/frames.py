@@ -121,7 +121,7 @@ def read_frame(g: np.ndarray, layout: Layout = PLANE_LAYOUT) -> ObjectFrame:
     scale = stretches(p, q, r, s)[0]
     largest = max(map(abs, (*last, *outer, *middle, *inner)))
     if not (largest < MOST and 1 / MOST < scale < MOST):
-        raise ProgramError("a frame beyond float32")
+        raise ProgramError("a damaged program: a frame beyond float32")
     if any(outer):
         centre, across, along = (u, v), hypot(e, f), hypot(g_, h)
         half = (across * reach, across * moved), (along * reach, along * moved)
@@ -142,10 +142,10 @@ def _inverse(frame: list[float]) -> tuple[float, ...]:
     a, b, x, c, d, y = frame
     det = a * d - b * c
     if det == 0.0:
-        raise ProgramError("a frame without an inverse")
+        raise ProgramError("a damaged program: a frame without an inverse")
     a, b, c, d = d / det, -b / det, -c / det, a / det
     if not max(abs(a), abs(b), abs(c), abs(d)) < MOST:  # before squares of it overflow
-        raise ProgramError("a frame beyond float32")
+        raise ProgramError("a damaged program: a frame beyond float32")
     return a, b, c, d, -(a * x + b * y), -(c * x + d * y)
 
 

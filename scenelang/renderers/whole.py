@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor
 
 from scenelang.image import from_samples
-from scenelang.program.program import ProgramError
+from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing
 from scenelang.renderers.reading import Reading
 from scenelang.renderers.streaming import Streaming
@@ -22,57 +21,37 @@ from scenelang.renderers.streaming import Streaming
 TILE = 1 << 13  # samples that `reading` answers at a time
 
 
-def need_white(background: tuple[float, float, float] | None) -> None:
-    """Raise ProgramError for a background that networks without coverage do not paint over."""
-    if background is None or min(background) < 1.0:
-        raise ProgramError("this model draws on white only")
-
-
-def need_side(canvas: tuple[int, int], side: int) -> None:
-    """Raise ProgramError for a canvas of another size than a network draws."""
-    if canvas != (side, side):
-        width, height = canvas
-        raise ProgramError(f"this model draws {side} x {side} pixels, not {width} x {height}")
-
-
 @torch.no_grad()
 def draw_whole(
-    network: Streaming | Reading,
-    vectors: npt.NDArray[np.float32],
-    tokens: npt.NDArray[np.int8],
-    canvas: tuple[int, int],
-    background: tuple[float, float, float] | None,
-    *,
-    progress: Callable[[float], None] | None = None,
+    network: Streaming | Reading, program: Program, *, progress: Callable[[float], None] | None = None
 ) -> Drawing:
-    """Draw objects in stream order.
+    """Draw a Program's objects in stream order.
 
     Args:
         network: trained, in evaluation mode.
-        vectors: (N, D) float32.
-        tokens: (N,) boolean tokens 0 to 3.
-        canvas: width and height in pixels.
-        background: white, which is what these networks were trained on.
+        program: compiled for it.
         progress: called with the share done, in [0, 1].
 
     Raises:
         ProgramError: the canvas or the background is one that the network was not trained for.
     """
-    need_white(background)
-    width, height = canvas
-    if not len(vectors):
+    if program.background is None or min(program.background) < 1.0:
+        raise ProgramError("this model draws on white only")
+    width, height = program.canvas
+    if not len(program):
         return Drawing(from_samples(np.ones((height, width, 3), np.float32), None), 0, 0, 0)
     device = next(network.parameters()).device
-    v = torch.from_numpy(vectors.copy())[None].to(device)
-    t = torch.from_numpy(tokens.astype(np.int64))[None].to(device)
+    v = torch.from_numpy(program.vectors.copy())[None].to(device)
+    t = torch.from_numpy(program.tokens.astype(np.int64))[None].to(device)
     if isinstance(network, Streaming):
         side = network.config.resolution
-        need_side(canvas, side)
+        if program.canvas != (side, side):
+            raise ProgramError(f"this model draws {side} x {side} pixels, not {width} x {height}")
         found = network(v, t)[0].permute(1, 2, 0)
-        pairs = len(vectors) * side * side
+        pairs = len(program) * side * side
     else:
         found = _sampled(network, v, t, width, height, progress)
-        pairs = len(vectors) * 4 * width * height
+        pairs = len(program) * 4 * width * height
     if progress is not None:
         progress(1.0)
     picture = found.clamp(0.0, 1.0).cpu().numpy()

@@ -88,7 +88,7 @@ def program(scene: nsg.Scene | str, canvas: tuple[int, int] = (36, 28)) -> Progr
 
 
 def drawn(network, p: Program, **options: object) -> tuple[Array, Drawing]:
-    drawing = draw(network, p.vectors, p.tokens, p.canvas, p.background, **options)
+    drawing = draw(network, p, **options)
     return premultiplied(np.asarray(drawing.image)), drawing
 
 
@@ -110,7 +110,7 @@ def assert_draws(network, p: Program) -> None:
     """Sampled four times everywhere the loop's picture; adaptively the same, but for running colours."""
     exact = SLOW.picture(p.vectors, p.tokens, p.canvas)
     assert np.ptp(exact) > 0.2
-    everywhere, _ = drawn(network, p, adaptive=False)
+    everywhere, _ = drawn(network, p, samples="four")
     np.testing.assert_allclose(everywhere, exact, rtol=0, atol=EQUAL)
     some, _ = drawn(network, p)
     np.testing.assert_allclose(some, exact, rtol=0, atol=BLENDED if 1 in p.tokens else EQUAL)
@@ -130,7 +130,7 @@ def test_over_a_background_and_as_straight_alpha(network) -> None:
     p = program(SCENES["unions"])
     exact = SLOW.picture(p.vectors, p.tokens, p.canvas)
     over, blue = (
-        np.asarray(draw(network, p.vectors, p.tokens, p.canvas, b).image) for b in (None, (0, 0.5, 1))
+        np.asarray(draw(network, dataclasses.replace(p, background=b)).image) for b in (None, (0, 0.5, 1))
     )
     np.testing.assert_allclose(blue, exact[..., :3] + (1 - exact[..., 3:]) * [0, 0.5, 1], rtol=0, atol=EQUAL)
     covered = exact[..., 3] > 0.2
@@ -145,7 +145,7 @@ def test_without_refining_a_pixel_is_its_centre(network) -> None:
         state, shown, _ = SLOW.at(p.vectors, p.tokens, points)
         clear = (np.abs(state) > 1e-4).reshape(p.canvas[::-1])
         exact = np.concatenate([shown, np.ones((len(shown), 1))], 1) * (state < 0)[:, None]
-        hard, drawing = drawn(network, p, refine=False)
+        hard, drawing = drawn(network, p, samples="one")
         np.testing.assert_allclose(hard[clear], exact.reshape(hard.shape)[clear], rtol=0, atol=EQUAL)
         assert drawing.refined == 0
         assert 0 < drawing.pairs < len(p) * len(points)
@@ -169,8 +169,8 @@ def test_objects_are_met_where_they_reach_and_nowhere_else(network, name: str) -
     p = program(SCENES[name])
     points, px = sample_points(p.canvas), 2 / min(p.canvas)
     centres = points.mean(2)
-    four, once, some = (drawn(network, p, **o)[1] for o in ({"adaptive": False}, {"refine": False}, {}))
-    everything = drawn(network, p, adaptive=False, skip=False)[1]
+    four, once, some = (drawn(network, p, **o)[1] for o in ({"samples": "four"}, {"samples": "one"}, {}))
+    everything = drawn(network, p, samples="four", skip=False)[1]
     assert everything.pairs == len(p) * points[..., 0].size
     assert four.refined == everything.refined == everything.met == centres[..., 0].size
     for at, drawing in ((points, four), (centres, once)):
@@ -188,7 +188,7 @@ def test_objects_are_met_where_they_reach_and_nowhere_else(network, name: str) -
 def test_a_cut_is_met_where_something_was_drawn(network) -> None:
     cut = program(f"subtract {{ {leaf('square', '#fff', 'scale(0.2);')} star {{ scale(3); }} }}")
     only = program(leaf("square", "#fff", "scale(0.2);"))
-    whole, alone = (drawn(network, p, adaptive=False)[1] for p in (cut, only))
+    whole, alone = (drawn(network, p, samples="four")[1] for p in (cut, only))
     assert whole.met == alone.met
     assert whole.pairs == 2 * alone.pairs
     assert not drawn(network, cut)[0].any()
@@ -242,7 +242,7 @@ def test_what_stays_is_taken_over(network) -> None:
         costs.append(drawing.pairs)
         met.append((drawing.met, drawing.refined))
     last = np.array(frames[-1].canvas)  # what draws otherwise takes nothing over and leaves what is kept
-    assert drawn(network, frames[-1], split=8, kept=kept, adaptive=False)[1].refined == last.prod()
+    assert drawn(network, frames[-1], split=8, kept=kept, samples="four")[1].refined == last.prod()
     assert drawn(network, frames[-1], split=8, kept=kept)[1].pairs == 0
     assert costs[:2] == [whole[0], 0]
     assert met[1] == (0, 0)
@@ -289,8 +289,9 @@ def test_vectors_that_nobody_can_draw(network, at: slice, numbers: object) -> No
     p = program(SCENES["unions"])
     vectors = p.vectors.copy()
     vectors[1, at] = numbers
+    object.__setattr__(p, "vectors", vectors)  # a Program itself refuses what is not a number
     with pytest.raises(ProgramError):
-        draw(network, vectors, p.tokens, p.canvas, None)
+        draw(network, p)
 
 
 @pytest.mark.parametrize(

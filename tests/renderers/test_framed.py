@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -36,8 +38,7 @@ def programs(name: str, count: int, canvas: tuple[int, int] = (64, 64)) -> list[
 
 
 def picture(network: Framed, program: Program, **options: object) -> np.ndarray:
-    args = (network, program.vectors, program.tokens, program.canvas, program.background)
-    return np.asarray(draw(*args, **options).image)  # type: ignore[arg-type]
+    return np.asarray(draw(network, program, **options).image)  # type: ignore[arg-type]
 
 
 def one_object(geometry: str) -> Scene:
@@ -64,7 +65,7 @@ def test_swapping_two_codes_swaps_the_shapes(model: Model, a: int, b: int) -> No
     first, second = (compile_scene(one_object(GEOMETRIES[i])) for i in (a, b))
     swapped = first.vectors.copy()
     swapped[:, :4] = second.vectors[:, :4]
-    got = draw(model.network, swapped, first.tokens, first.canvas, first.background).image
+    got = draw(model.network, replace(first, vectors=swapped)).image
     np.testing.assert_array_equal(got, picture(model.network, second))
     assert psnr(got, picture(model.network, first)) < 25
 
@@ -72,16 +73,16 @@ def test_swapping_two_codes_swaps_the_shapes(model: Model, a: int, b: int) -> No
 @pytest.mark.parametrize("name", ["shapes2d", "chains", "tiny", "many"])
 def test_skipping_changes_nothing_to_see(model: Model, name: str) -> None:
     for program in programs(name, 4):
-        whole = picture(model.network, program, skip=False, adaptive=False)
-        fast = picture(model.network, program, skip=True, adaptive=False)
+        whole = picture(model.network, program, skip=False, samples="four")
+        fast = picture(model.network, program, skip=True, samples="four")
         assert psnr(fast, whole) > 45
 
 
 @pytest.mark.parametrize("name", ["shapes2d", "chains", "tiny", "many"])
 def test_sampling_where_outlines_are_is_enough(model: Model, name: str) -> None:
     for program in programs(name, 4):
-        four = picture(model.network, program, adaptive=False)
-        some = picture(model.network, program, adaptive=True)
+        four = picture(model.network, program, samples="four")
+        some = picture(model.network, program, samples="adaptive")
         assert psnr(some, four) > 45
 
 

@@ -6,17 +6,30 @@ import numpy as np
 import pytest
 import torch
 
-from scenelang.program.program import ProgramError
+from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.reading import Reading, ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 from scenelang.renderers.whole import draw_whole
 
-WHITE = (1.0, 1.0, 1.0)
+Colour = tuple[float, float, float]
+WHITE: Colour = (1.0, 1.0, 1.0)
 
 
-def some(count: int) -> tuple[np.ndarray, np.ndarray]:
+def some(count: int, canvas: tuple[int, int], background: Colour | None = WHITE) -> Program:
     rng = np.random.default_rng(3)
-    return rng.normal(size=(count, 64)).astype(np.float32), rng.integers(0, 4, count).astype(np.int8)
+    tokens = rng.integers(0, 4, count).astype(np.int8)
+    tokens[:1] = 0
+    return Program(
+        vectors=rng.normal(size=(count, 64)).astype(np.float32),
+        tokens=tokens,
+        bounds=np.zeros((count, 4), np.float32),
+        canvas=canvas,
+        background=background,
+        model="any",
+        weights="0" * 64,
+        objects=("star",) * count,
+        places=(None,) * count,
+    )
 
 
 def reading() -> Reading:
@@ -25,10 +38,10 @@ def reading() -> Reading:
 
 
 def test_a_pixel_is_the_mean_of_its_four_samples() -> None:
-    network, (vectors, tokens) = reading(), some(3)
-    picture = np.asarray(draw_whole(network, vectors, tokens, (6, 4), WHITE).image)
+    network, p = reading(), some(3, (6, 4))
+    picture = np.asarray(draw_whole(network, p).image)
     assert picture.shape == (4, 6, 3)
-    v, t = torch.from_numpy(vectors)[None], torch.from_numpy(tokens.astype(np.int64))[None]
+    v, t = torch.from_numpy(p.vectors.copy())[None], torch.from_numpy(p.tokens.astype(np.int64))[None]
     for row, column in ((0, 0), (1, 4), (3, 5)):
         # the shorter side spans [-1, 1]: a pixel is half a unit wide
         x, y = (column + 0.5 - 3) * 0.5, (2 - 0.5 - row) * 0.5
@@ -40,19 +53,20 @@ def test_a_pixel_is_the_mean_of_its_four_samples() -> None:
 
 def test_streaming_draws_its_own_size_alone() -> None:
     torch.manual_seed(2)
-    network, (vectors, tokens) = Streaming(StreamingConfig(resolution=8, width=1 / 32)).eval(), some(2)
-    picture = np.asarray(draw_whole(network, vectors, tokens, (8, 8), WHITE).image)
+    network, p = Streaming(StreamingConfig(resolution=8, width=1 / 32)).eval(), some(2, (8, 8))
+    picture = np.asarray(draw_whole(network, p).image)
     with torch.no_grad():
-        image = network(torch.from_numpy(vectors)[None], torch.from_numpy(tokens.astype(np.int64))[None])[0]
+        image = network(
+            torch.from_numpy(p.vectors.copy())[None], torch.from_numpy(p.tokens.astype(np.int64))[None]
+        )[0]
     np.testing.assert_allclose(picture, image.clamp(0, 1).permute(1, 2, 0).numpy(), atol=1e-6)
     with pytest.raises(ProgramError, match="8 x 8"):
-        draw_whole(network, vectors, tokens, (16, 16), WHITE)
+        draw_whole(network, some(2, (16, 16)))
 
 
 def test_white_only_and_nothing_is_white() -> None:
-    vectors, tokens = some(1)
     for background in (None, (1.0, 0.9, 1.0)):
         with pytest.raises(ProgramError, match="white"):
-            draw_whole(reading(), vectors, tokens, (4, 4), background)
-    empty = draw_whole(reading(), vectors[:0], tokens[:0], (5, 4), WHITE)
+            draw_whole(reading(), some(1, (4, 4), background))
+    empty = draw_whole(reading(), some(0, (5, 4)))
     assert np.array_equal(np.asarray(empty.image), np.ones((4, 5, 3), np.float32))

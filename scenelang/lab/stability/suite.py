@@ -131,9 +131,7 @@ def picture_of(model: Model, program: Program, **options: Any) -> Image:
     """A Program's picture; options are those of `renderers.draw.draw`."""
     if not isinstance(model.network, Framed):
         return draw_program(program, model, threads=1).image
-    return draw(
-        model.network, program.vectors, program.tokens, program.canvas, program.background, **options
-    ).image
+    return draw(model.network, program, **options).image
 
 
 def _drawn(model: Model, scene: Scene, folded: bool) -> Image:
