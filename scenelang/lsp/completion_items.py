@@ -6,17 +6,19 @@ import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final
 
 from lsprotocol import types
 
 from scenelang.evaluate.vocabulary import Vocabulary
-from scenelang.lsp.workspace import Document, Workspace
+from scenelang.lsp.workspace import Document, Workspace, scenes_below
 from scenelang.scene import library
 from scenelang.words import UNITS
 
 Kind = types.CompletionItemKind
-_MAX_PATHS: Final = 200
+_MOST_PATHS: Final = 200
+_MOST_FILES: Final = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,13 +72,6 @@ def _paths(docs: Workspace, document: Document) -> Iterator[Item]:
     folder = document.path.parent if document.path is not None else next(iter(docs.folders), None)
     if folder is None:
         return
-    count = 0
-    for where, inner, files in os.walk(folder):
-        inner[:] = sorted(name for name in inner if not name.startswith("."))[:20]
-        for name in sorted(files):
-            path = os.path.join(where, name)
-            if name.endswith(".nsg") and path != str(document.path):
-                count += 1
-                if count > _MAX_PATHS:
-                    return
-                yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
+    for path in islice(scenes_below(folder, _MOST_FILES), _MOST_PATHS):
+        if path != document.path:
+            yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)

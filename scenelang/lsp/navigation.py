@@ -8,7 +8,7 @@ from typing import Final
 from lsprotocol import types
 
 from scenelang.lsp.workspace import Document, Workspace, uri_of
-from scenelang.resolve.symbols import Symbol, Use
+from scenelang.resolve.symbols import Scope, Symbol, Use
 from scenelang.scene import library
 from scenelang.syntax import nodes
 from scenelang.words import LANGUAGE, RESERVED
@@ -56,21 +56,17 @@ def highlights(docs: Workspace, document: Document, offset: int) -> list[types.D
     if use is None:
         return []
     found = docs.definition(document, use)
-    if found is None:  # a word of the language: the same word elsewhere
-        alike = [u for u in document.names.uses if u.text == use.text and u.role == use.role]
-    else:
-        alike = [
-            u
-            for u in document.names.uses
-            if u.text == use.text and (d := docs.definition(document, u)) is not None and d[1] is found[1]
-        ]
-    kinds = types.DocumentHighlightKind
-    return [
-        types.DocumentHighlight(
-            document.lines.range(u.start, u.end), kinds.Write if u.defines else kinds.Read
-        )
-        for u in alike
-    ]
+
+    def alike(other: Use) -> bool:
+        if found is None:  # a word of the language: the same word elsewhere
+            return other.role == use.role
+        meant = docs.definition(document, other)
+        return meant is not None and meant[1] is found[1]
+
+    same = [other for other in document.names.uses if other.text == use.text and alike(other)]
+    read, write = types.DocumentHighlightKind.Read, types.DocumentHighlightKind.Write
+    place = document.lines.range
+    return [types.DocumentHighlight(place(u.start, u.end), write if u.defines else read) for u in same]
 
 
 # ---------------------------------------------------------------- rename
@@ -152,17 +148,13 @@ def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
     if place.role in ("member", "argument"):
         return
     scope = symbol.scope if place.defines else other.names.scope_at(place.start)
-    inner = scope
+    inner: Scope | None = scope
     while inner is not None:
         taken = inner.symbols.get(new)
         if taken is not None:
             line = taken.span.locate()[0][0]
             raise Refused(f"`{new}` is already defined in line {line} of {_called(other)}")
-        if inner is symbol.scope:
-            return
-        if inner.parent is None:
-            return
-        inner = inner.parent
+        inner = None if inner is symbol.scope else inner.parent
 
 
 def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) -> None:

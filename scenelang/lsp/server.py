@@ -111,6 +111,15 @@ class Incoming:
         return self._stream.read(size)
 
 
+def _plain(method: str) -> Any:
+    """A method of the protocol that only calls the handler."""
+
+    def handle(self: Protocol, params: Any) -> Any:
+        yield self.fm.features[method], (params,), None
+
+    return lsp_method(method)(handle)
+
+
 class Protocol(LanguageServerProtocol):
     """pygls's protocol without its own copies of documents, which split lines by other rules."""
 
@@ -129,17 +138,9 @@ class Protocol(LanguageServerProtocol):
             raise JsonRpcInvalidRequest("the server is initialized already")
         return (yield from super().lsp_initialize(params))
 
-    @lsp_method(types.TEXT_DOCUMENT_DID_OPEN)
-    def lsp_text_document__did_open(self, params: types.DidOpenTextDocumentParams) -> Any:
-        yield self.fm.features[types.TEXT_DOCUMENT_DID_OPEN], (params,), None
-
-    @lsp_method(types.TEXT_DOCUMENT_DID_CHANGE)
-    def lsp_text_document__did_change(self, params: types.DidChangeTextDocumentParams) -> Any:
-        yield self.fm.features[types.TEXT_DOCUMENT_DID_CHANGE], (params,), None
-
-    @lsp_method(types.TEXT_DOCUMENT_DID_CLOSE)
-    def lsp_text_document__did_close(self, params: types.DidCloseTextDocumentParams) -> Any:
-        yield self.fm.features[types.TEXT_DOCUMENT_DID_CLOSE], (params,), None
+    lsp_text_document__did_open = _plain(types.TEXT_DOCUMENT_DID_OPEN)
+    lsp_text_document__did_change = _plain(types.TEXT_DOCUMENT_DID_CHANGE)
+    lsp_text_document__did_close = _plain(types.TEXT_DOCUMENT_DID_CLOSE)
 
 
 class Server(LanguageServer):

@@ -102,20 +102,12 @@ def applied(lines: Lines, change: types.TextDocumentContentChangeEvent) -> tuple
 
 def difference(old: str, new: str) -> Edit:
     """The shortest single edit from one text to another."""
-    limit = min(len(old), len(new))
-    start = _common(old, new, limit)
-    rest = limit - start
-    end = _common(old[len(old) - rest :][::-1], new[len(new) - rest :][::-1], rest) if rest else 0
+    start = _common(old, new)
+    end = _common(old[start:][::-1], new[start:][::-1])
     return Edit(start, len(old) - end, len(new) - end)
 
 
-def _common(left: str, right: str, limit: int) -> int:
+def _common(left: str, right: str) -> int:
     """How many characters two texts begin with alike."""
-    low, high = 0, limit
-    while low < high:
-        middle = (low + high + 1) // 2
-        if left[low:middle] == right[low:middle]:
-            low = middle
-        else:
-            high = middle - 1
-    return low
+    pairs = enumerate(zip(left, right, strict=False))
+    return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))

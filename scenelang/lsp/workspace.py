@@ -200,18 +200,8 @@ class Workspace:
 
     def _scenes(self) -> Iterator[Path]:
         folders = self.folders or sorted({d.path.parent for d in self.open.values() if d.path is not None})
-        count = 0
         for folder in folders:
-            for where, inner, files in os.walk(folder):
-                inner[:] = sorted(
-                    name for name in inner if not name.startswith(".") and name != "node_modules"
-                )
-                for name in sorted(files):
-                    count += 1
-                    if count > MAX_FILES * 10:
-                        return
-                    if name.endswith(".nsg"):
-                        yield Path(where, name).resolve()
+            yield from (path.resolve() for path in scenes_below(folder, MAX_FILES * 10))
 
     # ------------------------------------------------------------ names across files
 
@@ -273,6 +263,19 @@ def _parsed(source: SourceFile, edited: tuple[Parsed, Edit] | None = None) -> Pa
     message = f"a text of more than {MAX_TEXT // 1_000_000} MB, which the language server does not read"
     help = "`scenelang check` does, up to 10 MB"
     return Parsed(source, [], [], tokens, (Diagnostic("E0324", message, Span(source, 0, 0), help=help),), [])
+
+
+def scenes_below(folder: Path, most: int) -> Iterator[Path]:
+    """The scenes in a folder, hidden folders left out; so many files are looked at."""
+    count = 0
+    for where, inner, files in os.walk(folder):
+        inner[:] = sorted(name for name in inner if not name.startswith(".") and name != "node_modules")
+        for name in sorted(files):
+            count += 1
+            if count > most:
+                return
+            if name.endswith(".nsg"):
+                yield Path(where, name)
 
 
 def path_of(uri: str) -> Path | None:

@@ -144,145 +144,109 @@ def parse_edited(old: Parsed, source: SourceFile, edit: Edit) -> Parsed:
         What `parse_whole` gives, for less work.
     """
     if old.pieces and old.is_local:
-        splice = _Splice(old, source, edit)
         for reach in (1, _REACH):
-            new = None if splice.is_hopeless else splice.run(reach)
-            if new is not None:
+            new = _spliced(old, source, edit, reach)
+            if new is not None and new.is_local:
                 return new
     return parse_whole(source)
 
 
-class _Splice:
-    """One attempt to replace a run of statements."""
+def _spliced(old: Parsed, source: SourceFile, edit: Edit, reach: int) -> Parsed | None:
+    """The new version, or None where reading so little does not tell.
 
-    def __init__(self, old: Parsed, source: SourceFile, edit: Edit) -> None:
-        self.old = old
-        self.source = source
-        self.edit = edit
-        self.is_hopeless = False  # reading more would not help: braces or comments are open
-
-    def run(self, reach: int) -> Parsed | None:
-        """The new version, or None where reading so little does not tell.
-
-        Args:
-            reach: how many unchanged tokens to read after the edit; `_REACH` allows for mistakes.
-        """
-        old, delta = self.old, self.edit.delta
-        first = self._first()
-        last = self._last(reach)
-        to_end = last == len(old.pieces)
-        begin = old.starts[first] if first else 0
-        end = len(self.source.text) if to_end else old.ends[last] + delta
-        report = Report(self.source)
-        tokens = scan(self.source, report, begin, end)
-        if tokens.cut or not _settled(tokens.kinds):
-            self.is_hopeless = True
+    Args:
+        old: the older version.
+        source: the new text.
+        edit: the difference.
+        reach: how many unchanged tokens to read after the edit; `_REACH` allows for mistakes.
+    """
+    delta = edit.delta
+    first, last = _first(old, edit.start), _last(old, edit.old_end, reach)
+    to_end = last == len(old.pieces)
+    begin = old.starts[first] if first else 0
+    end = len(source.text) if to_end else old.ends[last] + delta
+    report = Report(source)
+    tokens = scan(source, report, begin, end)
+    if tokens.cut or not _settled(tokens.kinds):
+        return None
+    pristine = _copy(tokens)
+    fresh = parse_tokens(tokens, report).statements
+    found = Diagnostics()
+    report.flush(found)
+    others = len(old.diagnostics)
+    if not _is_sound(found, others, reach, pristine, source.text[begin:end], begin, to_end):
+        return None
+    if not to_end:
+        # The statement that was read again to be sure has to come out as it was.
+        before = old.pieces[last].node
+        if not fresh or fresh[-1].span.end != end:
             return None
-        pristine = _copy(tokens)
-        file = parse_tokens(tokens, report)
-        found = Diagnostics()
-        report.flush(found)
-        if not self._is_sound(found, reach, pristine, end, to_end):
+        if fresh[-1] != move(before, fresh[-1].span.start - before.span.start, source):
             return None
-        fresh = file.statements
-        kept = [] if to_end else old.pieces[last + 1 :]
-        if not to_end:
-            # The statement that was read again to be sure has come out as it was.
-            before = old.pieces[last].node
-            if not fresh or fresh[-1].span.end != end:
-                return None
-            if fresh[-1] != move(before, fresh[-1].span.start - before.span.start, self.source):
-                return None
-        return self._joined(first, last, pristine, found, fresh, kept, begin, end, to_end)
+    placed = [(d, d.span.start) for d in old.diagnostics if d.span is not None]
+    before_it = [move(d, 0, source) for d, start in placed if start < begin]
+    after_it = [move(d, delta, source) for d, start in placed if not to_end and start > end - delta]
+    rest = slice(last + 1, None)
+    version = old.version + 1
+    return Parsed(
+        source,
+        [*old.starts[:first], *(s.span.start for s in fresh), *(s + delta for s in old.starts[rest])],
+        [*old.ends[:first], *(s.span.end for s in fresh), *(e + delta for e in old.ends[rest])],
+        _joined(old.tokens, pristine, source, begin, end - delta, delta),
+        (*before_it, *found, *after_it),
+        [*old.pieces[:first], *(_Piece(stmt, version) for stmt in fresh), *old.pieces[rest]],
+        len(fresh),
+        version,
+    )
 
-    def _first(self) -> int:
-        """Index of the first statement to read: a sound one before the edit, after one that is."""
-        old, start = self.old, self.edit.start
-        index = bisect_left(old.ends, start)  # statements before this one end before the edit
-        index = max(0, index - 1)
-        touched = bisect_left(old.tokens.starts, start)
-        near = old.tokens.starts[max(0, touched - _REACH)] if old.tokens.starts else 0
-        for d in old.diagnostics:
-            if d.span is not None and d.span.start >= near:
-                index = min(index, max(0, bisect_left(old.ends, d.span.start) - 1))
-                break
-        while index and not (self._is_clean(index) and self._is_clean(index - 1)):
-            index -= 1
-        return index
 
-    def _last(self, reach: int) -> int:
-        """Index of the last statement to read: a sound one, far enough after the edit."""
-        old, end = self.old, self.edit.old_end
-        index = bisect_right(old.starts, end)  # statements from here on begin after the edit
-        if index < len(old.starts):
-            token = bisect_left(old.tokens.starts, old.starts[index])
-            far = min(token + reach, len(old.tokens.starts) - 1)
-            index = bisect_left(old.ends, old.tokens.starts[far])
-        while index < len(old.pieces) and not self._is_clean(index):
-            index += 1
-        return index
+def _first(old: Parsed, start: int) -> int:
+    """Index of the first statement to read: a sound one before the edit, after one that is."""
+    index = max(0, bisect_left(old.ends, start) - 1)
+    touched = bisect_left(old.tokens.starts, start)
+    near = old.tokens.starts[max(0, touched - _REACH)] if old.tokens.starts else 0
+    for d in old.diagnostics:
+        if d.span is not None and d.span.start >= near:
+            index = min(index, max(0, bisect_left(old.ends, d.span.start) - 1))
+            break
+    while index and not (_is_clean(old, index) and _is_clean(old, index - 1)):
+        index -= 1
+    return index
 
-    def _is_clean(self, index: int) -> bool:
-        """Whether no mistake touches a statement or what stands before it."""
-        low = self.old.ends[index - 1] if index else 0
-        high = self.old.ends[index]
-        return not any(
-            d.span is not None and d.span.start <= high and d.span.end >= low for d in self.old.diagnostics
-        )
 
-    def _is_sound(self, found: Diagnostics, reach: int, tokens: Tokens, end: int, to_end: bool) -> bool:
-        """Whether the mistakes found are those that a parse of the whole text finds there."""
-        if not found.items:
-            return True
-        others = len(self.old.diagnostics)
-        if len(found) + others > _MOST_MISTAKES or any(d.code in _GLOBAL for d in found):
-            return False
-        if to_end or reach < _REACH:
-            return to_end
-        furthest = max(d.span.end for d in found if d.span is not None)
-        behind = len(tokens.starts) - bisect_left(tokens.starts, furthest)
-        # A string that is not closed might be closed further on in its line.
-        return behind >= _REACH and "\n" in self.source.text[furthest:end]
+def _last(old: Parsed, end: int, reach: int) -> int:
+    """Index of the last statement to read: a sound one, far enough after the edit."""
+    index = bisect_right(old.starts, end)  # statements from here on begin after the edit
+    if index < len(old.starts):
+        token = bisect_left(old.tokens.starts, old.starts[index])
+        far = min(token + reach, len(old.tokens.starts) - 1)
+        index = bisect_left(old.ends, old.tokens.starts[far])
+    while index < len(old.pieces) and not _is_clean(old, index):
+        index += 1
+    return index
 
-    def _joined(
-        self,
-        first: int,
-        last: int,
-        tokens: Tokens,
-        found: Diagnostics,
-        fresh: tuple[nodes.Stmt, ...],
-        kept: list[_Piece],
-        begin: int,
-        end: int,
-        to_end: bool,
-    ) -> Parsed | None:
-        old, delta, source = self.old, self.edit.delta, self.source
-        rest = slice(last + 1, None)
-        before = [d for d in old.diagnostics if d.span is not None and d.span.start < begin]
-        after = [d for d in old.diagnostics if d.span is not None and d.span.start > end - delta]
-        everything = Diagnostics()
-        for part in (
-            (move(d, 0, source) for d in before),
-            found,
-            (move(d, delta, source) for d in after if not to_end),
-        ):
-            for d in part:
-                everything.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
-        new = Parsed(
-            source,
-            [
-                *old.starts[:first],
-                *(s.span.start for s in fresh),
-                *(s + delta for s in old.starts[rest]),
-            ],
-            [*old.ends[:first], *(s.span.end for s in fresh), *(e + delta for e in old.ends[rest])],
-            _spliced(old.tokens, tokens, source, begin, end - delta, delta),
-            tuple(everything),
-            [*old.pieces[:first], *(_Piece(stmt, old.version + 1) for stmt in fresh), *kept],
-            len(fresh),
-            old.version + 1,
-        )
-        return new if new.is_local else None
+
+def _is_clean(old: Parsed, index: int) -> bool:
+    """Whether no mistake touches a statement or what stands before it."""
+    low, high = old.ends[index - 1] if index else 0, old.ends[index]
+    spans = [d.span for d in old.diagnostics if d.span is not None]
+    return not any(span.start <= high and span.end >= low for span in spans)
+
+
+def _is_sound(
+    found: Diagnostics, others: int, reach: int, tokens: Tokens, text: str, begin: int, to_end: bool
+) -> bool:
+    """Whether the mistakes found in a part are those that a parse of the whole text finds there."""
+    if not found.items:
+        return True
+    if len(found) + others > _MOST_MISTAKES or any(d.code in _GLOBAL for d in found):
+        return False
+    if to_end or reach < _REACH:
+        return to_end
+    furthest = max(d.span.end for d in found if d.span is not None)
+    behind = len(tokens.starts) - bisect_left(tokens.starts, furthest)
+    # A string that is not closed might be closed further on in its line.
+    return behind >= _REACH and "\n" in text[furthest - begin :]
 
 
 def _copy(tokens: Tokens) -> Tokens:
@@ -292,7 +256,7 @@ def _copy(tokens: Tokens) -> Tokens:
     return copy
 
 
-def _spliced(old: Tokens, new: Tokens, source: SourceFile, begin: int, old_end: int, delta: int) -> Tokens:
+def _joined(old: Tokens, new: Tokens, source: SourceFile, begin: int, old_end: int, delta: int) -> Tokens:
     """The old tokens with those in ``[begin, old_end)`` replaced by the new ones, and moved after them."""
     low, high = bisect_left(old.starts, begin), bisect_left(old.starts, old_end)
     whole = Tokens(source)
