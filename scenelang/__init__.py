@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from scenelang.formatting.format import format_text as format_text
     from scenelang.image import Image as Image
     from scenelang.measure.metrics import compare as compare
-    from scenelang.program.checking import check as check
-    from scenelang.program.checking import check_text as check_text
-    from scenelang.program.checking import fix_text as fix_text
+    from scenelang.program.check import check as check
+    from scenelang.program.check import check_text as check_text
+    from scenelang.program.check import fix_text as fix_text
     from scenelang.program.compile import compile as compile
     from scenelang.program.program import Place as Place
     from scenelang.program.program import Program as Program
@@ -67,7 +67,7 @@ _HOME: Final = {
     "scenelang.formatting.format": "format_text",
     "scenelang.image": "Image",
     "scenelang.measure.metrics": "compare",
-    "scenelang.program.checking": "check check_text fix_text",
+    "scenelang.program.check": "check check_text fix_text",
     "scenelang.program.compile": "compile",
     "scenelang.program.program": "Place Program ProgramError",
     "scenelang.program.store": "load_program",

@@ -62,30 +62,7 @@ def lower(
         diagnostics: receives E03xx and E05xx.
         memory: of the frame before; holds this one afterwards.
     """
-    width, height = scene.canvas
-    most = manifest.limits.get("canvas", 8192)
-    if max(width, height) > most:
-        diagnostics.add(
-            "E0507",
-            f"a canvas of {width} x {height} pixels; model `{manifest.name}` draws at most {most} x {most}",
-            spans.span(scene) if spans else None,
-            help="render smaller with `canvas(w, h)` or `--size`",
-        )
-    elif manifest.sizes and scene.canvas not in manifest.sizes:
-        sizes = " or ".join(f"{w} x {h}" for w, h in manifest.sizes)
-        diagnostics.add(
-            "E0509",
-            f"a canvas of {width} x {height} pixels; model `{manifest.name}` draws {sizes} alone",
-            spans.span(scene) if spans else None,
-            help="give that size with `canvas(w, h)` or `--size`, or draw with another model",
-        )
-    if manifest.white and scene.background != WHITE:
-        diagnostics.add(
-            "E0510",
-            f"model `{manifest.name}` draws over white alone",
-            spans.span(scene) if spans else None,
-            help="leave `background` out, or draw with another model",
-        )
+    _check_canvas(scene, manifest, spans.span(scene) if spans else None, diagnostics)
     space = SPACES[manifest.dimension]
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
     lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {})
@@ -95,16 +72,43 @@ def lower(
     return Graph(root, scene.canvas, scene.background, space)
 
 
+def _check_canvas(
+    scene: schema.Scene, manifest: Manifest, place: Span | None, diagnostics: Diagnostics
+) -> None:
+    width, height = scene.canvas
+    most, model = manifest.limits.get("canvas", 8192), f"model `{manifest.name}`"
+    if max(width, height) > most:
+        fact = f"a canvas of {width} x {height} pixels; {model} draws at most {most} x {most}"
+        diagnostics.add("E0507", fact, place, help="render smaller with `canvas(w, h)` or `--size`")
+    elif manifest.sizes and scene.canvas not in manifest.sizes:
+        sizes = " or ".join(f"{w} x {h}" for w, h in manifest.sizes)
+        fact = f"a canvas of {width} x {height} pixels; {model} draws {sizes} alone"
+        help = "give that size with `canvas(w, h)` or `--size`, or draw with another model"
+        diagnostics.add("E0509", fact, place, help=help)
+    if manifest.white and scene.background != WHITE:
+        help = "leave `background` out, or draw with another model"
+        diagnostics.add("E0510", f"{model} draws over white alone", place, help=help)
+
+
+Composite = schema.Scene | schema.Group | schema.Boolean | schema.Chain
+
+
 @dataclass(slots=True)
 class _Open:
     """A composite whose children are being lowered, and the operator that joins it to what came before."""
 
     op: Combine
-    node: schema.Group | schema.Boolean | schema.Chain | None
-    kind: str
-    todo: Iterator[tuple[Combine, schema.SceneNode]]
+    node: Composite
     material: schema.Material | None
+    todo: Iterator[tuple[Combine, schema.SceneNode]]
     links: list[Link] = field(default_factory=list)
+
+
+def _children(node: Composite) -> Iterator[tuple[Combine, schema.SceneNode]]:
+    if isinstance(node, schema.Chain):
+        return ((link.op, link.node) for link in node.children)
+    op: Combine = node.op if isinstance(node, schema.Boolean) else "union"
+    return ((op, child) for child in (node.nodes if isinstance(node, schema.Scene) else node.children))
 
 
 @dataclass(slots=True)
@@ -121,15 +125,16 @@ class _Lowering:
     steps: dict[int, Step | Refusal] = field(default_factory=dict)
 
     def run(self, scene: schema.Scene) -> Fold:
-        stack = [_Open("union", None, "scene", _unions(scene.nodes), None)]
+        stack = [_Open("union", scene, None, _children(scene))]
         while True:
             here = stack[-1]
             item = next(here.todo, None)
             if item is None:
                 stack.pop()
-                if here.node is None:
+                if isinstance(here.node, schema.Scene):
                     return Fold("scene", tuple(here.links))
-                fold = Fold(here.kind, tuple(here.links), self.moves(here.node), self.place(here.node))
+                kind = here.node.op if isinstance(here.node, schema.Boolean) else here.node.kind
+                fold = Fold(kind, tuple(here.links), self.moves(here.node), self.place(here.node))
                 stack[-1].links.append(Link(here.op, fold))
                 continue
             op, node = item
@@ -147,34 +152,21 @@ class _Lowering:
                 self.say("E0405", fact, node, "a group of a single child can be dropped")
                 return Fold("scene", ())
             else:
-                kind = node.op if isinstance(node, schema.Boolean) else node.kind
-                stack.append(_Open(op, node, kind, self.children(node), material))
-
-    def children(
-        self, node: schema.Group | schema.Boolean | schema.Chain
-    ) -> Iterator[tuple[Combine, schema.SceneNode]]:
-        if isinstance(node, schema.Group):
-            return _unions(node.children)
-        if isinstance(node, schema.Boolean):
-            return ((node.op, child) for child in node.children)
-        return ((link.op, link.node) for link in node.children)
+                stack.append(_Open(op, node, material, _children(node)))
 
     def leaf(self, node: schema.Object, material: schema.Material | None) -> Leaf:
-        if self.kept is None:
-            return self.lowered(node, material, None)
         seen = self.old.get(id(node))
-        if seen is None or seen[0] is not node or seen[1] is not material:
-            seen = node, material, self.lowered(node, material, {})
-        self.kept[id(node)] = seen
-        return seen[2]
-
-    def lowered(
-        self, node: schema.Object, material: schema.Material | None, notes: dict[Any, Any] | None
-    ) -> Leaf:
-        if node.geometry not in self.manifest.geometries:
-            self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
-        look = Look(self.manifest.default_material) if material is None else self.look(material)
-        return Leaf(node.geometry, look, self.moves(node), self.place(node), notes)
+        if seen is not None and seen[0] is node and seen[1] is material:
+            leaf = seen[2]
+        else:
+            if node.geometry not in self.manifest.geometries:
+                self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
+            look = Look(self.manifest.default_material) if material is None else self.look(material)
+            notes: dict[Any, Any] | None = None if self.kept is None else {}
+            leaf = Leaf(node.geometry, look, self.moves(node), self.place(node), notes)
+        if self.kept is not None:
+            self.kept[id(node)] = node, material, leaf
+        return leaf
 
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
         found = []
@@ -227,9 +219,3 @@ class _Lowering:
 
     def place(self, node: object) -> Span | None:
         return None if self.spans is None else self.spans.span(node)
-
-
-def _unions(
-    nodes: Sequence[schema.SceneNode],
-) -> Iterator[tuple[Combine, schema.SceneNode]]:
-    return (("union", node) for node in nodes)

@@ -28,22 +28,19 @@ def check_levels(graph: Graph, context: Context) -> Graph:
 
 
 def _check(leaf: Leaf, space: Space, context: Context) -> None:
-    limits = context.manifest.limits
-    levels = context.manifest.lifting == "exact"  # others take any chain
-    if levels and any(isinstance(move.step, Warp) for move in leaf.moves):
-        try:
-            split_levels(leaf.steps, limits)
+    manifest = context.manifest
+    if manifest.lifting == "exact" and any(isinstance(move.step, Warp) for move in leaf.moves):
+        try:  # other liftings take any chain
+            split_levels(leaf.steps, manifest.limits)
         except LevelsError as error:
-            inner, outer = limits.get("inner_warps", 0), limits.get("outer_warps", 0)
-            context.diagnostics.add(
-                "E0506",
-                f"the deformations of `{leaf.geometry}` do not fit model `{context.manifest.name}`: {error}",
-                leaf.span,
-                labels=_places(leaf),
-                help=f"the model holds up to {inner} deformations, an affine map, up to {outer} deformations "
+            inner, outer = manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)
+            fact = f"the deformations of `{leaf.geometry}` do not fit model `{manifest.name}`: {error}"
+            help = (
+                f"the model holds up to {inner} deformations, an affine map, up to {outer} deformations "
                 "and an affine map; a `twirl` merges with the deformation after it, also across rotations "
-                "and uniform scales about the origin",
+                "and uniform scales about the origin"
             )
+            context.diagnostics.add("E0506", fact, leaf.span, labels=_places(leaf), help=help)
             return
     # Each map is lifted by itself, so each needs an inverse, and so does what they compose to.
     maps = [move.step.rows for move in leaf.moves if isinstance(move.step, Affine)]
@@ -51,22 +48,13 @@ def _check(leaf: Leaf, space: Space, context: Context) -> None:
     bad = next((rows for rows in maps if not space.usable(rows)), None)
     if bad is not None:
         smallest, largest = space.stretches(bad)
-        context.diagnostics.add(
-            "E0406",
-            f"the transforms of `{leaf.geometry}` compose to a singular one, "
-            f"which stretches by {smallest:.3g} to {largest:.3g}",
-            leaf.span,
-            labels=_places(leaf),
-            help="scale less along one direction, or less often",
-        )
+        fact = f"the transforms of `{leaf.geometry}` compose to a singular one, which stretches by "
+        fact, help = f"{fact}{smallest:.3g} to {largest:.3g}", "scale less along one direction, or less often"
     elif not all(_mild(move.step) for move in leaf.moves if isinstance(move.step, Warp)):
-        context.diagnostics.add(
-            "E0406",
-            f"the deformations of `{leaf.geometry}` compose to one beyond float32",
-            leaf.span,
-            labels=_places(leaf),
-            help="deform less",
-        )
+        fact, help = f"the deformations of `{leaf.geometry}` compose to one beyond float32", "deform less"
+    else:
+        return
+    context.diagnostics.add("E0406", fact, leaf.span, labels=_places(leaf), help=help)
 
 
 def _mild(warp: Warp) -> bool:

@@ -141,37 +141,40 @@ def _attach(above: _Frame, done: _Frame, context: Context) -> None:
     )
 
 
+_REFUSALS: dict[Combine, tuple[str, str, str, str]] = {
+    "union": (
+        "E0401",
+        "in a union that a `smooth` follows",
+        "stands before it in the union",
+        "put it before the others, or give the `smooth` to a leaf of its own",
+    ),
+    "subtract": (
+        "E0402",
+        "as an operand of `subtract`",
+        "is subtracted from",
+        "only leaves and unions of them can be subtracted",
+    ),
+    "intersect": (
+        "E0403",
+        "as an operand of `intersect`",
+        "is intersected",
+        "only leaves, intersections and differences can be intersected with: put the composite first "
+        "where its colours may show",
+    ),
+    "smooth": (
+        "E0404",
+        "as an operand of `smooth` that is not the first",
+        "is blended",
+        "put it first: of two operands `smooth` makes the same picture either way round",
+    ),
+}
+"""Code, where a composite stands, what its left operand does, and advice."""
+
+
 def _refuse(op: Combine, fold: Fold, before: Node, context: Context) -> None:
-    what = _named(fold)
-    code, message, label, advice = {
-        "union": (
-            "E0401",
-            f"{what} in a union that a `smooth` follows",
-            "this stands before it in the union",
-            "put it before the others, or give the `smooth` to a leaf of its own",
-        ),
-        "subtract": (
-            "E0402",
-            f"{what} as an operand of `subtract`",
-            "this is subtracted from",
-            "only leaves and unions of them can be subtracted",
-        ),
-        "intersect": (
-            "E0403",
-            f"{what} as an operand of `intersect`",
-            "this is intersected",
-            "only leaves, intersections and differences can be intersected with: put the composite first "
-            "where its colours may show",
-        ),
-        "smooth": (
-            "E0404",
-            f"{what} as an operand of `smooth` that is not the first",
-            "this is blended",
-            "put it first: of two operands `smooth` makes the same picture either way round",
-        ),
-    }[op]
-    labels = [Label(before.span, label)] if before.span is not None else []
-    context.diagnostics.add(code, message, fold.span, labels=labels, help=advice)
+    code, where, what, advice = _REFUSALS[op]
+    labels = [Label(before.span, f"this {what}")] if before.span is not None else []
+    context.diagnostics.add(code, f"{_named(fold)} {where}", fold.span, labels=labels, help=advice)
 
 
 def _named(fold: Fold) -> str:
