@@ -1,77 +1,77 @@
-"""The command: ``python -m fuzz TARGET [--minutes M | --replay FILE | --minimise FILE]`` or ``--table``."""
+"""The command: ``python -m fuzz TARGET [--minutes M | --replay FILE | --minimise FILE]``."""
 
 from __future__ import annotations
 
 import argparse
+import os
+import subprocess
 import sys
 from pathlib import Path
 
-from fuzz.target import PROPERTIES, PUMPED, TARGETS, load_target
+from fuzz.target import PROPERTIES, PUMPED, TARGETS, Target, load_target
+
+TIMEOUT_S = 120
+"""Wall time after which one input counts as a hang; processes may get little of a busy machine."""
+MOST_RSS_MB = 3000
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; returns the exit status, 1 where there are findings."""
+    """Run the command; returns the exit status, other than 0 where there is a finding."""
     parser = argparse.ArgumentParser(prog="python -m fuzz", description="Fuzz scenelang.")
-    parser.add_argument("target", nargs="?", choices=(*TARGETS, PROPERTIES), help="what to fuzz")
+    parser.add_argument("target", choices=(*TARGETS, PROPERTIES), help="what to fuzz")
     parser.add_argument("--minutes", type=float, default=60.0, help="wall time of the run (60)")
     parser.add_argument("--seed", type=int, default=1, help="of the fuzzer's random numbers (1)")
-    parser.add_argument(
-        "--work", type=Path, default=Path("out/fuzz"), help="corpus, log and findings (out/fuzz)"
-    )
-    parser.add_argument("--record", action="store_true", help="keep the record in fuzz/records")
+    parser.add_argument("--work", type=Path, default=Path("out/fuzz"), help="corpus and findings (out/fuzz)")
     parser.add_argument("--replay", type=Path, metavar="FILE", help="run the target once on this input")
     parser.add_argument(
         "--minimise", type=Path, metavar="FILE", help="print a smaller input that fails alike"
     )
-    parser.add_argument(
-        "--table", action="store_true", help="write the table of records into docs/fuzzing.md"
-    )
     wanted = parser.parse_args(arguments)
-    if wanted.table:
-        from fuzz.table import update
-
-        update()
-        return 0
-    if wanted.target is None:
-        parser.error("which target? " + ", ".join(TARGETS))
+    target = load_target(wanted.target)
     if wanted.replay is not None:
-        load_target(wanted.target).check(wanted.replay.read_bytes())
+        target.check(wanted.replay.read_bytes())
         return 0
     if wanted.minimise is not None:
-        return _minimise(wanted.target, wanted.minimise)
-    try:
-        if wanted.target not in (PROPERTIES, PUMPED):
-            import atheris  # type: ignore[import-untyped]  # noqa: F401
-    except ImportError:
-        print("fuzzing needs atheris: pip install 'scenelang[fuzz]'", file=sys.stderr)
-        return 2
-    from fuzz.runner import RECORDS, fuzz
+        return _minimise(target, wanted.minimise.read_bytes())
+    if target.name == PROPERTIES:
+        from fuzz.properties import turns
 
-    records = RECORDS if wanted.record else None
-    if wanted.target == PUMPED:
+        return turns(60 * wanted.minutes, wanted.seed)
+    folder = wanted.work / target.name
+    (folder / "findings").mkdir(parents=True, exist_ok=True)
+    if target.name == PUMPED:
         from fuzz.hunt import hunt
 
-        record = hunt(wanted.minutes, wanted.work, wanted.seed, records)
-    else:
-        record = fuzz(wanted.target, wanted.minutes, wanted.work, wanted.seed, records)
-    print(f"{record.executions:,} executions in {record.wall_s:.0f} s, {record.edges} edges")
-    for finding in record.findings:
-        print(f"{finding['kind']}: {finding['signature']} ({finding['times']} times), {finding['file']}")
-    return 1 if record.findings else 0
+        return hunt(wanted.minutes, folder / "findings", wanted.seed)
+    return _fuzz(target, wanted.minutes, folder, wanted.seed)
 
 
-def _minimise(name: str, path: Path) -> int:
-    from fuzz.keeper import minimise, shows_signature, signature_of
+def _fuzz(target: Target, minutes: float, folder: Path, seed: int) -> int:
+    """Have libFuzzer run a target, in a process of its own, from the seeds and the corpus so far."""
+    (folder / "corpus").mkdir(exist_ok=True)
+    for index, data in enumerate(target.seeds()):
+        (folder / "corpus" / f"seed-{index:04}").write_bytes(data[: target.most_bytes])
+    options = [
+        f"-max_total_time={round(60 * minutes)}",
+        f"-timeout={TIMEOUT_S}",
+        f"-rss_limit_mb={MOST_RSS_MB}",
+        f"-artifact_prefix={folder}/findings/",
+        "-print_final_stats=1",
+    ]
+    command = [sys.executable, "-m", "fuzz.drive", target.name, str(folder), str(seed), *options]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
+    return subprocess.run(command, env=environment, check=False).returncode
 
-    target, data = load_target(name), path.read_bytes()
-    try:
-        target.check(data)
-    except Exception as error:
-        small = minimise(data, shows_signature(target, signature_of(error)[1]))
-        sys.stdout.buffer.write(small)
-        return 0
-    print("this input does not fail", file=sys.stderr)
-    return 2
+
+def _minimise(target: Target, data: bytes) -> int:
+    from fuzz.minimise import failure_of, minimise
+
+    failure = failure_of(target, data)
+    if failure is None:
+        print("this input does not fail", file=sys.stderr)
+        return 2
+    sys.stdout.buffer.write(minimise(data, lambda smaller: failure_of(target, smaller) == failure))
+    return 0
 
 
 if __name__ == "__main__":

@@ -6,19 +6,15 @@ What coverage is followed by says nothing about time, so no fuzzer drives this: 
 from __future__ import annotations
 
 import hashlib
-import json
+import itertools
 import os
 import resource
 import time
-from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 from random import Random
 from typing import Final
 
 from fuzz import pumps
-from fuzz.keeper import Finding
-from fuzz.runner import Record, children_s, revision
 
 LETTERS: Final = 100_000
 MOST_S: Final = 2.0
@@ -29,47 +25,38 @@ _NOTED_S: Final = 0.15
 """A small text that takes longer is tried at full length."""
 
 
-def hunt(minutes: float, work: Path, seed: int = 1, records: Path | None = None) -> Record:
-    """Read pumps, first those that thought found, until the time is over.
+def hunt(minutes: float, findings: Path, seed: int = 1) -> int:
+    """Read pumps, first those that thought found, until the time is over; the exit status.
 
     Args:
         minutes: wall time.
-        work: folder for findings.
+        findings: folder that takes what is slow.
         seed: of what is drawn.
-        records: folder that takes the record.
     """
-    folder = work / "slow"
-    (folder / "findings").mkdir(parents=True, exist_ok=True)
-    now, start_s, cpu_s = datetime.now(UTC), time.monotonic(), children_s()
-    known = pumps.seeds()
-    record = Record("slow", now.isoformat(timespec="seconds"), revision(), 60 * minutes, seeds=len(known))
+    known, end_s = pumps.seeds(), time.monotonic() + 60 * minutes
     for read in pumps.READERS.values():
         read("")  # what is imported at the first reading is no part of any
-    generator, slowest = Random(seed), 0.0
-    while time.monotonic() - start_s < record.asked_s:
-        first = record.executions < len(known)
-        pump = known[record.executions] if first else pumps.drawn(generator)
-        record.executions += 1
-        taken_s, _ = reading(pump, _SMALL)
-        if taken_s <= _NOTED_S and not first:
+    generator, slowest_s, found = Random(seed), 0.0, 0
+    for count in itertools.count():
+        if time.monotonic() > end_s:
+            print(f"{count:,} pumps, the slowest {slowest_s:.2f} s; findings: {found}")
+            return int(found > 0)
+        pump = known[count] if count < len(known) else pumps.drawn(generator)
+        if reading(pump, _SMALL) <= _NOTED_S and count >= len(known):
             continue
-        taken_s, peak = reading(pump, LETTERS)
-        record.peak_bytes = max(record.peak_bytes, peak)
-        if taken_s > slowest:
-            slowest = taken_s
-            record.slowest = {"cpu_s": taken_s, "bytes": LETTERS, "start": repr(pump)}
+        taken_s = reading(pump, LETTERS)
+        slowest_s = max(slowest_s, taken_s)
         if taken_s > MOST_S:
-            _note(record, folder, pump, taken_s)
-    record.wall_s = round(time.monotonic() - start_s, 1)
-    record.cpu_s = round(children_s() - cpu_s, 1)
-    told = json.dumps(asdict(record), indent=2) + "\n"
-    for place in [folder / "record.json", *([records / f"{now:%Y%m%dT%H%M%S}-slow.json"] if records else [])]:
-        place.write_text(told, encoding="utf-8")
-    return record
+            found += 1
+            data = pump.data()
+            path = findings / f"slow-{hashlib.sha256(data).hexdigest()[:8]}.json"
+            path.write_bytes(data)
+            print(f"{pump.reader}: {pump.unit[:60]!r} took {taken_s:.2f} s: {path}")
+    raise AssertionError
 
 
-def reading(pump: pumps.Pump, letters: int) -> tuple[float, int]:
-    """Processor seconds and peak bytes of the reader of a pump, in a child that ends after `KILLED_S`."""
+def reading(pump: pumps.Pump, letters: int) -> float:
+    """Processor seconds of the reader of a pump, in a child that ends after `KILLED_S`."""
     text = pump.text(letters)
     readable, writable = os.pipe()
     child = os.fork()
@@ -80,21 +67,10 @@ def reading(pump: pumps.Pump, letters: int) -> tuple[float, int]:
         try:
             pumps.READERS[pump.reader](text)
         finally:
-            os.write(writable, json.dumps(time.process_time() - begin).encode())
+            os.write(writable, str(time.process_time() - begin).encode())
             os._exit(0)
     os.close(writable)
     with os.fdopen(readable, "rb") as answer:
         told = answer.read()
-    _, _, used = os.wait4(child, 0)
-    return (json.loads(told) if told else float(KILLED_S)), used.ru_maxrss * 1024
-
-
-def _note(record: Record, folder: Path, pump: pumps.Pump, taken_s: float) -> None:
-    data = pump.data()
-    name = f"slow-{hashlib.sha256(data).hexdigest()[:8]}.json"
-    (folder / "findings" / name).write_bytes(data)
-    signature = f"{pump.reader}: {pump.unit[:60]!r}"
-    record.findings.append(
-        asdict(Finding(signature, "slow", f"{taken_s:.2f} s", 1, len(data), name, taken_s))
-    )
-    record.crashes = len(record.findings)
+    os.waitpid(child, 0)
+    return float(told or KILLED_S)

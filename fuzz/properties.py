@@ -1,19 +1,19 @@
 """Properties that Hypothesis holds the library to: a few dozen examples in the tests, or an hour of them.
 
-``python -m fuzz properties --minutes 60`` runs this file as a process of its own, as it runs libFuzzer.
+``python -m fuzz properties --minutes 60`` runs them with new seeds until the time is over.
 """
 
 from __future__ import annotations
 
+import itertools
 import sys
 import time
-from pathlib import Path
+import traceback
 from typing import Final
 
 from fuzz import language_properties as language
 from fuzz import value_properties as values
 from fuzz.drawn import Property
-from fuzz.keeper import Keeper
 from fuzz.target import Target
 
 PROPERTIES: Final[tuple[Property, ...]] = (
@@ -49,19 +49,18 @@ TARGET = Target(
 )
 
 
-def main(folder: Path, seconds: float, first: int) -> None:
-    """Turn after turn until the time is over; the state file counts examples."""
-    keeper = Keeper(TARGET, folder)
+def turns(seconds: float, first: int) -> int:
+    """Turn after turn until the time is over, or one fails, which is told; returns the exit status."""
     end_s = time.monotonic() + seconds
-    turn = first
-    while time.monotonic() < end_s:
+    for turn in itertools.count(first):
         for held in PROPERTIES:
-            if time.monotonic() < end_s:
-                keeper.run(f"{held.name} {turn}".encode())
-                keeper.state.executions += EXAMPLES - 1
-        turn += 1
-    keeper.write()
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3]))
+            if time.monotonic() > end_s:
+                print(f"no mistakes up to turn {turn}")
+                return 0
+            try:
+                check(told := f"{held.name} {turn}".encode())
+            except Exception:
+                traceback.print_exc()
+                print(f"the input is: {told.decode()}", file=sys.stderr)
+                return 1
+    raise AssertionError

@@ -104,7 +104,7 @@ def _edit(scene: str) -> None:
     """What an editor asks for when a document is opened, and again when a letter is typed in it."""
     from lsprotocol import types
 
-    from scenelang.lsp import completion, hover, outline, signatures, tokens
+    from scenelang.lsp import callees, completion, hover, outline, tokens
     from scenelang.lsp.workspace import Workspace
 
     docs = Workspace()
@@ -120,7 +120,7 @@ def _edit(scene: str) -> None:
     for place in (offset, len(document.text)):
         tokens.semantic_tokens(docs, document)
         completion.complete(docs, document, place, snippets=True)
-        signatures.signature_help(docs, document, place)
+        callees.signature_help(docs, document, place)
 
 
 def _gltf(file: str) -> None:
