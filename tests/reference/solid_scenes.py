@@ -1,0 +1,36 @@
+"""Scenes of solids by hand, for tests: a leaf from its steps, folds from words."""
+
+from __future__ import annotations
+
+from scenelang.graph import affine
+from scenelang.graph.looks import Look
+from scenelang.graph.nodes import Fold, Leaf, Link, Move, Node
+from scenelang.graph.stage import Triple
+from scenelang.graph.steps import Affine, Step
+
+
+def leaf(geometry: str, material: str, rgb: Triple, *steps: Step) -> Leaf:
+    """An object of one linear colour."""
+    return Leaf(geometry, Look(material, rgb=rgb), tuple(map(Move, steps)))
+
+
+def fold(*links: Node | tuple[str, Node] | tuple[str, Node, float], steps: tuple[Step, ...] = ()) -> Fold:
+    """Children with their words, a union where there is none, and widths of blends."""
+    whole = [link if isinstance(link, tuple) else ("union", link) for link in links]
+    return Fold("scene", tuple(Link(*link) for link in whole), tuple(map(Move, steps)))
+
+
+def scaled(x: float, y: float | None = None, z: float | None = None) -> Affine:
+    return Affine(affine.scaling(x, x if y is None else y, x if z is None else z))
+
+
+def moved(x: float, y: float, z: float) -> Affine:
+    return Affine(affine.translation(x, y, z))
+
+
+def turned(angle_rad: float, *axis: float) -> Affine:
+    return Affine(affine.rotation(angle_rad, (axis[0], axis[1], axis[2])))
+
+
+def sheared(axes: str, k: float) -> Affine:
+    return Affine(affine.shearing(axes, k))

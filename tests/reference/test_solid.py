@@ -1,0 +1,204 @@
+"""The reference of solid scenes against a slow loop in plain floats, and against facts in closed form."""
+
+from __future__ import annotations
+
+from math import exp, tan
+
+import numpy as np
+import pytest
+
+from scenelang.graph.nodes import Fold
+from scenelang.graph.stage import Camera, Ground, Light, Stage
+from scenelang.graph.steps import Displace, Twist, Warp
+from scenelang.reference.solid.body import Body
+from scenelang.reference.solid.image import solid_image
+from tests.reference import solid_oracle
+from tests.reference.solid_scenes import fold, leaf, moved, scaled, sheared, turned
+
+GOLD, SKY, RED = (0.8, 0.53, 0.12), (0.07, 0.21, 1.0), (0.7, 0.05, 0.04)
+SIDE = Camera(eye=(-2.0, 2.0, 4.5), target=(0.1, 0.2, 0.0), fov_rad=0.5)
+TWIRL, BEND = Warp(0.8, (0.0, 0.0)), Warp(0.0, (0.8, 0.0))
+AXES = np.eye(3)[:, :, None]
+
+SCENES: dict[str, tuple[Fold, Stage]] = {
+    "diffuse": (
+        fold(
+            leaf("sphere", "diffuse", GOLD, scaled(0.6), moved(0, 0.6, 0)),
+            leaf("torus", "diffuse", SKY, scaled(1.2, 1.2, 0.4), turned(1.22, 1, 0, 0)),
+            leaf("sphere", "diffuse", RED, scaled(0.9, 0.2, 0.5), sheared("xy", 0.6), moved(0.5, -0.8, 0.5)),
+        ),
+        Stage(),
+    ),
+    "media": (
+        fold(
+            leaf("sphere", "volumetric", SKY, scaled(0.9, 0.7, 0.8)),
+            leaf("sphere", "diffuse", GOLD, scaled(0.35), moved(0.22, 0.13, 0.3)),
+            leaf("torus", "volumetric", RED, turned(0.9, 1, 0, 1), moved(-0.3, 0.2, 0.1)),
+        ),
+        Stage(light=Light(position=(1.0, 3.0, 2.0), power=12.0, rgb=(1.0, 0.8, 0.5))),
+    ),
+    "warped": (
+        fold(
+            leaf(
+                "sphere", "diffuse", GOLD, Displace(0.06, 7), TWIRL, BEND, Twist(0.8), scaled(0.8, 0.5, 0.6)
+            ),
+            (
+                "smooth",
+                leaf("torus", "diffuse", SKY, BEND, scaled(0.7), TWIRL, moved(0.5, 0.3, 0), Twist(1.2)),
+            ),
+            ("subtract", leaf("sphere", "diffuse", RED, scaled(0.4), moved(0.2, 0.5, 0.4))),
+        ),
+        Stage(camera=SIDE),
+    ),
+    "folds": (
+        fold(
+            fold(
+                leaf("sphere", "diffuse", GOLD, scaled(0.7)),
+                ("smooth", leaf("sphere", "volumetric", SKY, scaled(0.6), moved(0.7, 0.2, 0)), 0.4),
+                steps=(sheared("zx", 0.3), moved(-0.3, 0, 0)),
+            ),
+            ("subtract", fold(leaf("torus", "diffuse", RED), leaf("sphere", "diffuse", RED, scaled(0.3)))),
+            (
+                "smooth",
+                leaf("torus", "volumetric", RED, scaled(0.6), turned(1.5, 1, 0, 0), moved(0.2, 0.6, 0.3)),
+            ),
+            ("intersect", leaf("sphere", "diffuse", RED, scaled(0.95))),
+        ),
+        Stage(horizon=(0.2, 0.1, 0.3), zenith=(0.2, 0.1, 0.3), ground=Ground(-0.4, (0.1, 0.6, 0.2))),
+    ),
+    "alpha": (
+        fold(
+            leaf("sphere", "volumetric", SKY, scaled(0.8), moved(0.3, 0, 0)),
+            leaf("torus", "diffuse", GOLD, turned(0.7, 0, 0, 1), moved(-0.3, 0.2, -0.4)),
+        ),
+        Stage(transparent=True, ground=None, light=Light(position=(0.0, -3.0, 2.0))),
+    ),
+    "inside": (
+        fold(
+            leaf("sphere", "volumetric", SKY, scaled(1.7)),
+            leaf("sphere", "diffuse", GOLD, scaled(0.5), moved(0.4, 0.3, 0)),
+        ),
+        Stage(camera=Camera(eye=(0.3, 0.5, 1.4)), transparent=True, light=Light((-1.0, 1.0, 1.0), 4.0)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_picture_equals_the_slow_loop(name: str) -> None:
+    root, stage = SCENES[name]
+    canvas = (6, 5)
+    slow = np.array(solid_oracle.draw(root, stage, canvas))
+    fast = np.asarray(solid_image(root, stage, canvas))
+    np.testing.assert_allclose(fast, slow, atol=6e-3)
+    assert abs(fast - slow).mean() < 3e-4
+
+
+def one_ball(centre: np.ndarray, radius: float, medium: bool, rgb: np.ndarray, stage: Stage, size: int):
+    """The picture of one ball of the world, sample by sample in closed form; in a medium a sum of 2,000."""
+    eye, light = np.array(stage.camera.eye), np.array(stage.light.position)
+    forward, right, up = np.array(stage.camera.axes())
+    x = (np.arange(2 * size) + 0.5) / size - 1.0
+    d = forward / tan(stage.camera.fov_rad / 2) + x[None, :, None] * right - x[:, None, None] * up
+    d /= np.linalg.norm(d, axis=2, keepdims=True)
+
+    def chord(o, d):
+        """Where rays enter and leave the ball, both 0 where they miss it; what lies behind is cut off."""
+        o = o - centre
+        b = (o * d).sum(-1)
+        root = b * b - (o * o).sum(-1) + radius**2
+        enter, leave = -b - np.sqrt(np.maximum(root, 0)), -b + np.sqrt(np.maximum(root, 0))
+        met = (root > 0) & (leave > 0)
+        return np.where(met, np.maximum(enter, 0), 0), np.where(met, leave, 0)
+
+    def received(p, n):
+        way = light - p
+        r = np.linalg.norm(way, axis=-1, keepdims=True)
+        enter, leave = chord(p + 1e-4 * n, way / r)
+        through = np.exp(-3.0 * (leave - enter)) if medium else leave == enter
+        facing = np.maximum(0, (n * way / r).sum(-1))
+        direct = stage.light.power * facing / r[..., 0] ** 2 * through
+        return direct[..., None] * stage.light.rgb + 0.12 + 0.06 * n[..., 1:2]
+
+    horizon, zenith = np.array(stage.horizon), np.array(stage.zenith)
+    behind = horizon + (zenith - horizon) * np.clip(2 * d[..., 1:2], 0, 1)
+    p = eye + (stage.ground.y - eye[1]) / d[..., 1:2] * d
+    fade = np.exp(-(p[..., :1] ** 2 + p[..., 2:] ** 2) / 64)
+    shade = np.array(stage.ground.rgb) * received(p, np.array([0.0, 1.0, 0.0]))
+    behind = np.where(d[..., 1:2] < 0, fade * shade + (1 - fade) * horizon, behind)
+    enter, leave = (v[..., None] for v in chord(eye, d))
+    if medium:
+        behind = behind * np.exp(-3.0 * (leave - enter))
+        dt = (leave - enter) / 2000
+        for i in range(2000):
+            p = eye + (enter + (i + 0.5) * dt) * d
+            way = light - p
+            r = np.linalg.norm(way, axis=2, keepdims=True)
+            through = np.exp(-3.0 * chord(p, way / r)[1][..., None])
+            direct = stage.light.power / (4 * r * r) * through * stage.light.rgb
+            behind = behind + np.exp(-3.0 * (i + 0.5) * dt) * 3.0 * dt * rgb * (direct + 0.12)
+    else:
+        p = eye + enter * d
+        behind = np.where(leave > 0, rgb * received(p, (p - centre) / radius), behind)
+    pixels = np.clip(behind.reshape(size, 2, size, 2, 3).mean((1, 3)), 0, 1)
+    return np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * pixels ** (1 / 2.4) - 0.055)
+
+
+@pytest.mark.parametrize("material", ["diffuse", "volumetric"])
+def test_one_ball_is_as_closed_forms_have_it(material: str) -> None:
+    stage = Stage(camera=SIDE, light=Light((1.0, 2.5, 2.0), 11.0, (1.0, 0.9, 0.6)), ground=Ground(-0.7))
+    ball = leaf("sphere", material, GOLD, scaled(0.8), moved(0.2, 0.1, 0.0))
+    exact = one_ball(np.array([0.2, 0.1, 0.0]), 0.8, material == "volumetric", np.array(GOLD), stage, 32)
+    np.testing.assert_allclose(solid_image(fold(ball), stage, (32, 32)), exact, atol=2e-4)
+
+
+def test_a_black_medium_shows_its_transmittance_as_alpha() -> None:
+    ball = leaf("sphere", "volumetric", (0.0, 0.0, 0.0), scaled(0.5))
+    stage = Stage(camera=Camera(eye=(0.0, 0.0, 5.0), fov_rad=1e-4), ground=None, transparent=True)
+    image = np.asarray(solid_image(fold(ball), stage, (2, 2)))
+    np.testing.assert_allclose(image[..., 3], 1 - exp(-3.0), atol=1e-4)
+    assert not image[..., :3].any()
+
+
+def test_an_eye_in_a_solid_sees_nothing() -> None:
+    with pytest.raises(ValueError, match="the eye is inside an opaque object"):
+        solid_image(fold(leaf("sphere", "diffuse", GOLD, scaled(9.0))), Stage(), (2, 2))
+
+
+@pytest.mark.parametrize("geometry", ["sphere", "torus"])
+def test_gradients_are_differences_and_no_distance_changes_faster_than_its_bound(geometry: str) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        kinds = [
+            Warp(float(rng.uniform(-2, 2)), tuple(rng.uniform(-1, 1, 2).tolist())),
+            Twist(float(rng.uniform(-2, 2))),
+            scaled(*rng.uniform(0.3, 1.5, 3).tolist()),
+            sheared("yz", float(rng.uniform(-1, 1))),
+            moved(*rng.uniform(-1, 1, 3).tolist()),
+        ]
+        steps = [Displace(0.1, 6.0), *(kinds[i] for i in rng.integers(0, 5, 5))]
+        body = Body(leaf(geometry, "diffuse", GOLD), steps, 0.0)
+        p = rng.uniform(-2, 2, (3, 200))
+        d, bound = body.distance(p)
+        h = 1e-6
+        differences = [(body.distance(p + h * e)[0] - body.distance(p - h * e)[0]) / (2 * h) for e in AXES]
+        np.testing.assert_allclose(body.gradient(p), differences, rtol=1e-4, atol=1e-5)
+        assert (np.linalg.norm(differences, axis=0) <= bound + 1e-9).all()
+        way = rng.normal(size=(3, 200))
+        way *= min(body.reach, 0.2) / np.linalg.norm(way, axis=0)
+        assert (abs(body.distance(p + way)[0] - d) <= bound * np.linalg.norm(way, axis=0) + 1e-9).all()
+
+
+def test_no_ray_passes_through_what_is_warped() -> None:
+    """Against each ray's least distance over many small steps."""
+    ring = leaf("torus", "diffuse", GOLD, Warp(3.0, (1.0, 0.5)), Twist(6.0), scaled(1.4))
+    stage = Stage(ground=None, transparent=True)
+    alpha = np.asarray(solid_image(fold(ring), stage, (40, 40), per_side=1))[..., 3]
+    forward, right, up = np.array(stage.camera.axes())
+    x = (np.arange(40) + 0.5) / 20 - 1.0
+    d = (3 * forward + x[None, :, None] * right - x[:, None, None] * up).reshape(-1, 3).T
+    d /= np.linalg.norm(d, axis=0)
+    body = Body(ring, ring.steps, 0.0)
+    eye = np.array(stage.camera.eye)[:, None]
+    least = np.min([body.distance(eye + t * d)[0] for t in np.arange(4.5, 7.8, 0.004)], axis=0)
+    sure = abs(least) > 1e-3
+    np.testing.assert_array_equal(alpha.ravel()[sure], (least < 0)[sure])
