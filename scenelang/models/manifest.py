@@ -110,41 +110,29 @@ def _are_words(value: Any) -> bool:
     return isinstance(value, list) and all(map(_is_word, value)) and len(set(value)) == len(value)
 
 
-def _are_limits(value: Any) -> bool:
-    return isinstance(value, dict) and all(
-        type(v) is int and 0 <= v <= _LIMITS.get(key, -1) for key, v in value.items()
-    )
-
-
 def _is_range(value: Any) -> bool:
     """Two numbers that float64 holds, the lower first."""
-    if not isinstance(value, list) or len(value) != 2 or not all(type(v) in (int, float) for v in value):
+    if not isinstance(value, list) or not all(type(v) in (int, float) for v in value):
         return False
-    return bool(-MOST <= value[0] <= value[1] <= MOST)
+    return len(value) == 2 and bool(-MOST <= value[0] <= value[1] <= MOST)
 
 
-def _are_sizes(value: Any) -> bool:
-    """Pairs of sides in pixels."""
-    return isinstance(value, list) and all(
-        isinstance(size, list) and len(size) == 2 and all(type(v) is int and 1 <= v <= 8192 for v in size)
-        for size in value
-    )
+def _is_size(value: Any) -> bool:
+    """Two sides in pixels."""
+    sides = isinstance(value, list) and len(value) == 2
+    return sides and all(type(v) is int and 1 <= v <= 8192 for v in value)
 
 
-def _are_ranges(value: Any) -> bool:
-    return isinstance(value, dict) and value.keys() <= _RANGES and all(map(_is_range, value.values()))
+def _are(holds: Callable[[Any, Any], bool]) -> Callable[[Any], bool]:
+    """Whether a value is an object of whose entries all are as they should be."""
+    return lambda value: isinstance(value, dict) and all(holds(k, v) for k, v in value.items())
 
 
-def _are_figures(value: Any) -> bool:
-    """Whatever was measured; of the stability suite a line of text for each quantity."""
-    if not isinstance(value, dict):
-        return False
-    lines, sets = value.get("stability", {}), value.get("sets", {})
-    if not isinstance(sets, dict) or not all(isinstance(figures, dict) for figures in sets.values()):
-        return False
-    if not all(_is_range([0, figures.get("flip", 1)]) for figures in sets.values()):
-        return False
-    return isinstance(lines, dict) and all(map(_is_text, lines.values()))
+def _is_figure(key: str, value: Any) -> bool:
+    """Sets are objects of figures; the stability suite says a line of text of each quantity."""
+    if key == "sets":
+        return _are(lambda _, v: isinstance(v, dict) and _is_range([0, v.get("flip", 1)]))(value)
+    return key != "stability" or _are(lambda _, v: _is_text(v))(value)
 
 
 _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
@@ -159,11 +147,11 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "default_material": _is_word,
     "transforms": _are_words,
     "material_ops": _are_words,
-    "limits": _are_limits,
-    "trained": _are_ranges,
-    "measured": _are_figures,
+    "limits": _are(lambda key, v: type(v) is int and 0 <= v <= _LIMITS.get(key, -1)),
+    "trained": _are(lambda key, v: key in _RANGES and _is_range(v)),
+    "measured": _are(_is_figure),
     "set": _is_name,
-    "sizes": _are_sizes,
+    "sizes": lambda value: isinstance(value, list) and all(map(_is_size, value)),
     "white": lambda value: type(value) is bool,
 }
 """What each field may hold."""

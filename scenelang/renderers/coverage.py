@@ -27,15 +27,13 @@ class Shade:
     """What `Coverage.shade` gives at M points.
 
     Args:
-        colour: (3, M), not multiplied by coverage.
-        coverage: (M,) in [0, 1].
+        picture: premultiplied colour, and coverage in [0, 1], (4, M).
         edge: (M,) world distance to the nearest outline, as the network sees it, at most.
         evaluated: number of (object, point) pairs that went through the network.
         met: (M,) which points went through it at all; the others show the background.
     """
 
-    colour: Array
-    coverage: Array
+    picture: Array
     edge: Array
     evaluated: int
     met: Array
@@ -113,31 +111,20 @@ class Coverage:
         if samples == "four":
             shade = self._four(points, centres[1], px)
             met = int(shade.met.reshape(-1, 4).any(1).sum())
-            return Tile(xp.to_numpy(self._means(shade)).T, shade.evaluated, centres.shape[1], met)
+            return Tile(xp.to_numpy(_means(shade)).T, shade.evaluated, centres.shape[1], met)
         shade = self.shade(points, CORNER * px if refine else 0.0, PixelRows(-centres[1]))
-        picture, pairs, refined = self._premultiplied(shade), shade.evaluated, 0
-        if refine:
-            near = xp.where(shade.edge < NEAR * px)
-            refined = len(near)
-        if refined:
+        pairs, refined = shade.evaluated, 0
+        if refine and (refined := len(near := xp.where(shade.edge < NEAR * px))):
             closer = self._four(xp.take(points, near), centres[1][xp.to_numpy(near)], px)
-            xp.put(picture, near, self._means(closer))
+            xp.put(shade.picture, near, _means(closer))
             pairs += closer.evaluated
-        return Tile(xp.to_numpy(picture).T, pairs, refined, int(shade.met.sum()))
+        return Tile(xp.to_numpy(shade.picture).T, pairs, refined, int(shade.met.sum()))
 
     def _four(self, p: Array, y: np.ndarray, px: float) -> Shade:
         """The four samples, side by side, of pixels centred at points (2, M), whose y are (M,)."""
         quarter = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)
         samples = p[:, :, None] + self.xp.array(quarter * np.float32(px), p)[:, None]  # (2, M, 4)
         return self.shade(samples.reshape(2, -1), 0.0, PixelRows(-y, 4, 0.3 * px))
-
-    def _premultiplied(self, shade: Shade) -> Array:
-        """Colour times coverage, and coverage (4, M)."""
-        return self.xp.concat([shade.colour * shade.coverage, shade.coverage[None]], 0)
-
-    def _means(self, shade: Shade) -> Array:
-        """Premultiplied colour and coverage (4, M) of pixels of four samples each."""
-        return self._premultiplied(shade).reshape(4, -1, 4).mean(2)
 
     def shade(self, p: Array, pad: float = 0.0, rows: PixelRows | None = None) -> Shade:
         """Draw at world points.
@@ -168,9 +155,9 @@ class Coverage:
                     new, near = field.meet(row, points, lengths, xp.take(memory, part))
                     xp.put(memory, part, new)
                     xp.put(edge, part, xp.minimum(xp.take(edge, part), near))
-            edge = xp.minimum(edge, field.depth(memory))
+            edge = xp.minimum(edge, abs(memory[0]) / field.unit)
             met = touched if self.skip else touched | bool(field.rows)
-            return Shade(field.colour(memory), field.coverage(memory), edge, evaluated, met)
+            return Shade(field.picture(memory), edge, evaluated, met)
 
     def _near(self, rows: PixelRows, pad: float) -> list[Row]:
         """The objects that may meet points in some rows; `_meet` finds none for the others."""
@@ -209,3 +196,8 @@ class Coverage:
         if row.draws:
             touched[index] = True
         return index, xp.take(q, kept), xp.take(radius, kept) if reach > RADIUS else None
+
+
+def _means(shade: Shade) -> Array:
+    """Premultiplied colour and coverage (4, M) of pixels of four samples each."""
+    return shade.picture.reshape(4, -1, 4).mean(2)

@@ -6,12 +6,11 @@ the network meets them. Nothing here knows a pixel.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from scenelang.lifting.layout import Layout
 from scenelang.renderers.arrays import Array
 from scenelang.renderers.frames import FAR, ObjectFrame, local_points, read_frame
 from scenelang.renderers.network import EMPTY, Cell, Decoder, FramedNetwork
@@ -71,14 +70,16 @@ class Field:
         self.layout = layout = network.layout
         self.codes = np.array(sorted(set(map(tuple, vectors[:, : layout.code].tolist()))), np.float32)
         """Of the leaves in use (K, C)."""
-        self.frames = dict(_frames(vectors[:, : layout.geometry], layout, frames or {}))
+        geometry = {vector.tobytes(): vector for vector in vectors[:, : layout.geometry]}
+        known = frames or {}
+        self.frames = {k: known.get(k) or read_frame(vector, layout) for k, vector in geometry.items()}
         with self.xp.inference():
             self.cells = [
                 Cell(*map(self.xp.packed, cell)) for cell in zip(*network.cell_weights(), strict=True)
             ]
             self.slope = float(self.xp.exp(network.read_slope)) / 4
-            # growth of the margin per world unit
             self.unit = float(np.linalg.norm(self.xp.to_numpy(self.cells[UNION].candidate[0])))
+            """Growth of the margin per world unit."""
             self.rows = self._rows(vectors, tokens)
 
     def _rows(self, vectors: np.ndarray, tokens: np.ndarray) -> list[Row]:
@@ -137,23 +138,7 @@ class Field:
         new = self.network.step(features, memory[:s], memory[s:], row.colour, self.cells[row.token])
         return self.xp.concat(new, 0), abs(features[0]) / row.frame.stretch
 
-    def coverage(self, memory: Array) -> Array:
-        """Coverage (M,) in [0, 1] of points that have met all objects."""
-        return (0.5 - memory[0] * self.slope).clip(0.0, 1.0)
-
-    def colour(self, memory: Array) -> Array:
-        """Their colours (3, M), not multiplied by coverage."""
-        return memory[self.network.config.state :]
-
-    def depth(self, memory: Array) -> Array:
-        """A bound (M,) on how far from all outlines they are, world units."""
-        return abs(memory[0]) / self.unit
-
-
-def _frames(
-    g: np.ndarray, layout: Layout, known: Mapping[bytes, ObjectFrame]
-) -> Iterator[tuple[bytes, ObjectFrame]]:
-    """The frame of each geometry vector (N, 32), by its bytes; most of the work of a stream of many."""
-    for vector in g:
-        key = vector.tobytes()
-        yield key, known.get(key) or read_frame(vector, layout)
+    def picture(self, memory: Array) -> Array:
+        """Premultiplied colour and coverage (4, M), in [0, 1], of points that have met all objects."""
+        coverage = (0.5 - memory[0] * self.slope).clip(0.0, 1.0)
+        return self.xp.concat([memory[self.network.config.state :] * coverage, coverage[None]], 0)

@@ -101,7 +101,7 @@ def test_streaming_equals_the_network_it_was_trained_as(model: Model) -> None:
         p = torch.from_numpy(np.random.default_rng(0).uniform(-1, 1, (2, 500)).astype(np.float32))
         shade = Coverage(field, skip=False).shade(p)
         skipping = Coverage(field).shade(p)
-        torch.testing.assert_close(skipping.coverage, shade.coverage, atol=2e-3, rtol=0)
+        torch.testing.assert_close(skipping.picture[3], shade.picture[3], atol=2e-3, rtol=0)
         q = torch.stack([field.local(r, p) for r in field.rows])
         scale = torch.tensor([r.frame.scale for r in field.rows])
         codes = torch.from_numpy(program.vectors[:, :4].copy())
@@ -109,8 +109,9 @@ def test_streaming_equals_the_network_it_was_trained_as(model: Model) -> None:
         tokens = torch.from_numpy(program.tokens.astype(np.int64))
         trace = network.trace(q[None], scale[None], codes[None], colours[None], tokens[None])
         coverage = (0.5 - trace.margin[0, -1] / 4).clamp(0, 1)
-        torch.testing.assert_close(shade.coverage, coverage, atol=2e-3, rtol=0)
-        torch.testing.assert_close(shade.colour.T, trace.colour[0, -1], atol=2e-3, rtol=0)
+        torch.testing.assert_close(shade.picture[3], coverage, atol=2e-3, rtol=0)
+        colour = trace.colour[0, -1] * coverage[:, None]
+        torch.testing.assert_close(shade.picture[:3].T, colour, atol=4e-3, rtol=0)
 
 
 def test_an_object_out_of_sight_costs_nothing_and_shows_nothing(model: Model) -> None:
