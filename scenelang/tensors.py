@@ -32,33 +32,22 @@ class TensorError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Tensor:
-    """One tensor of a file.
+    """One tensor of a file."""
 
-    Args:
-        type: as safetensors calls it, ``F32``.
-        shape: sides.
-        first, last: where its bytes begin and end, counted from the end of the file's header.
-    """
-
-    type: str
-    shape: tuple[int, ...]
+    type: str  # as safetensors calls it, `F32`
+    shape: tuple[int, ...]  # sides
+    # where its bytes begin and end, counted from the end of the file's header
     first: int
     last: int
 
 
 @dataclass(frozen=True, slots=True)
 class TensorFile:
-    """A file whose layout was checked.
+    """A file whose layout was checked."""
 
-    Args:
-        header: our own, of format 1.
-        tensors: by name.
-        body: the tensors' bytes.
-    """
-
-    header: dict[str, Any]
-    tensors: dict[str, Tensor]
-    body: memoryview
+    header: dict[str, Any]  # our own, of format 1
+    tensors: dict[str, Tensor]  # by name
+    body: memoryview  # the tensors' bytes
 
     def arrays(self, *, finite: bool = True) -> dict[str, npt.NDArray[Any]]:
         """All tensors, copied.

@@ -32,30 +32,19 @@ STILL = Animation(seconds=1.0, fps=1.0)
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """One frame.
+    """One frame."""
 
-    Args:
-        number: from 0.
-        scene: evaluated.
-        spans: where its nodes were written.
-    """
-
-    number: int
-    scene: Scene
-    spans: SpanMap
+    number: int  # from 0
+    scene: Scene  # evaluated
+    spans: SpanMap  # where its nodes were written
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """Frames that are Scenes already.
+    """Frames that are Scenes already."""
 
-    Args:
-        scenes: at least one.
-        fps: frames a second; None for those of the first scene's animation.
-    """
-
-    scenes: tuple[Scene, ...]
-    fps: float | None = None
+    scenes: tuple[Scene, ...]  # at least one
+    fps: float | None = None  # frames a second; None for those of the first scene's animation
     wanted: tuple[Path, ...] = ()
 
     @property

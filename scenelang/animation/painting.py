@@ -23,42 +23,26 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True)
 class Drawable:
-    """A frame ready to be drawn.
+    """A frame ready to be drawn."""
 
-    Args:
-        number: from 0.
-        key: digest of all that decides its pixels.
-        shot: the frame.
-        program: what the network draws; None for the reference.
-        small: whether numpy draws it.
-    """
-
-    number: int
-    key: str
-    shot: Shot
-    program: Program | None
-    small: bool = False
+    number: int  # from 0
+    key: str  # digest of all that decides its pixels
+    shot: Shot  # the frame
+    program: Program | None  # what the network draws; None for the reference
+    small: bool = False  # whether numpy draws it
 
 
 @dataclass(slots=True)
 class Painter:
-    """Draws a clip's frames.
+    """Draws a clip's frames."""
 
-    Args:
-        clip: the animation.
-        backend: ``"neural"`` or ``"reference"``.
-        device: where the network runs.
-        threads: tiles drawn at the same time; by default one for each usable core.
-        kept: the picture before, of which what is the same is taken over.
-        load_s: what loading torch took.
-    """
-
-    clip: Clip
+    clip: Clip  # the animation
     backend: Backend = "neural"
-    device: Device = "auto"
-    threads: int | None = None
+    device: Device = "auto"  # where the network runs
+    threads: int | None = None  # tiles drawn at the same time; by default one for each usable core
+    # the picture before, of which what is the same is taken over
     kept: Kept | None = field(default=None, repr=False)
-    load_s: float = 0.0
+    load_s: float = 0.0  # what loading torch took
 
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
         """Compile a frame and say what its picture depends on.

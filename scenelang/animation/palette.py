@@ -37,13 +37,9 @@ def opaque(pixels: Pixels) -> npt.NDArray[np.uint32]:
 
 @dataclass(slots=True)
 class Census:
-    """How often each colour comes up in all pictures, counted one picture at a time.
+    """How often each colour comes up in all pictures, counted one picture at a time."""
 
-    Args:
-        most: whether any single picture has more colours than this is noted in `crowded`.
-    """
-
-    most: int
+    most: int  # whether any single picture has more colours than this is noted in `crowded`
     colours: npt.NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
     counts: npt.NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     crowded: bool = False

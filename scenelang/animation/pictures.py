@@ -23,21 +23,13 @@ class Encoder(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """Finished frames in the order in which they are shown; read from the disk one at a time.
+    """Finished frames in the order in which they are shown; read from the disk one at a time."""
 
-    Args:
-        files: one for each frame; equal frames have the same.
-        fps: frames a second.
-        loop: whether it starts again at its end.
-        size: width and height in pixels.
-        alpha: whether the pictures are transparent.
-    """
-
-    files: Sequence[Path]
-    fps: float
-    loop: bool
-    size: tuple[int, int]
-    alpha: bool
+    files: Sequence[Path]  # one for each frame; equal frames have the same
+    fps: float  # frames a second
+    loop: bool  # whether it starts again at its end
+    size: tuple[int, int]  # width and height in pixels
+    alpha: bool  # whether the pictures are transparent
 
     def read(self, file: Path) -> Pixels:
         """The pixels (H, W, 3 or 4) of a frame.

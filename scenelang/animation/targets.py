@@ -30,17 +30,11 @@ class TargetError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Where an animation goes.
+    """Where an animation goes."""
 
-    Args:
-        kind: how.
-        path: the file; for a sequence the folder of its files.
-        pattern: name of each file of a sequence, with ``%04d`` for its number.
-    """
-
-    kind: Kind
-    path: Path
-    pattern: str = ""
+    kind: Kind  # how
+    path: Path  # the file; for a sequence the folder of its files
+    pattern: str = ""  # name of each file of a sequence, with `%04d` for its number
 
     def file(self, frame: int) -> Path:
         """The file of a frame of a sequence."""

@@ -20,15 +20,10 @@ class FramesError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class FrameRange:
-    """Frames as they are asked for.
+    """Frames as they are asked for."""
 
-    Args:
-        first: from 0.
-        last: the last one; None for that of the animation.
-    """
-
-    first: int = 0
-    last: int | None = None
+    first: int = 0  # from 0
+    last: int | None = None  # the last one; None for that of the animation
 
     @classmethod
     def parse(cls, text: str) -> FrameRange:

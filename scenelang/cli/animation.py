@@ -33,28 +33,20 @@ SIZES = ("B", "kB", "MB", "GB")
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What the command line says about animations.
+    """What the command line says about animations."""
 
-    Args:
-        range: ``--frames``; None for all.
-        fps: frames a second instead of the scene's.
-        jobs: processes that draw.
-        palette, dither: of a GIF.
-        backend, device, threads: how frames are drawn.
-        strict: count warnings as errors.
-        verbose: say where the time went.
-    """
-
-    range: str | None
-    fps: float | None
-    jobs: int | None = None
+    range: str | None  # `--frames`; None for all
+    fps: float | None  # frames a second instead of the scene's
+    jobs: int | None = None  # processes that draw
+    # of a GIF
     palette: Palette = "auto"
     dither: bool = False
+    # how frames are drawn
     backend: Backend = "neural"
     device: Device = "auto"
     threads: int | None = None
-    strict: bool = False
-    verbose: bool = False
+    strict: bool = False  # count warnings as errors
+    verbose: bool = False  # say where the time went
 
     @property
     def certain(self) -> bool:

@@ -18,15 +18,11 @@ from scenelang.program.check import Frames, check_evaluated
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Which warnings count; errors always do.
+    """Which warnings count; errors always do."""
 
-    Args:
-        select: codes, or beginnings of codes, of the warnings that are wanted; empty for all.
-        ignore: of the warnings that are not.
-    """
-
+    # codes, or beginnings of codes, of the warnings that are wanted; empty for all
     select: tuple[str, ...] = ()
-    ignore: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()  # of the warnings that are not
 
     def keeps(self, diagnostic: Diagnostic) -> bool:
         code = diagnostic.code
@@ -37,20 +33,14 @@ class Selection:
 
 @dataclass(slots=True)
 class Scenes:
-    """The scenes of a command line.
+    """The scenes of a command line."""
 
-    Args:
-        request: what holds for all of them.
-        selection: which warnings count.
-        frames: which frames are looked at.
-        sources: their texts, by the names that the user wrote.
-        unread: what there is to say of those that are not text.
-    """
-
-    request: Request
-    selection: Selection = field(default_factory=Selection)
-    frames: Frames = "some"
+    request: Request  # what holds for all of them
+    selection: Selection = field(default_factory=Selection)  # which warnings count
+    frames: Frames = "some"  # which frames are looked at
+    # their texts, by the names that the user wrote
     sources: dict[str, SourceFile] = field(default_factory=dict)
+    # what there is to say of those that are not text
     unread: Diagnostics = field(default_factory=Diagnostics)
     names: dict[str, str] = field(default_factory=dict)
     """The names by the files' places on the disk."""

@@ -25,44 +25,27 @@ JSON = ".json"
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What the command line says about every scene.
+    """What the command line says about every scene."""
 
-    Args:
-        defines: values for params, shared by all scenes.
-        model: name of the model to use.
-        root: folder that imports cannot leave.
-        frame: frame of the animation.
-        size: canvas instead of the scene's.
-        texts: what to read instead of some imported files, by their resolved paths.
-    """
-
-    defines: Defines
-    model: str | None = None
-    root: str | None = None
-    frame: int = 0
-    size: tuple[int, int] | None = None
+    defines: Defines  # values for params, shared by all scenes
+    model: str | None = None  # name of the model to use
+    root: str | None = None  # folder that imports cannot leave
+    frame: int = 0  # frame of the animation
+    size: tuple[int, int] | None = None  # canvas instead of the scene's
+    # what to read instead of some imported files, by their resolved paths
     texts: Mapping[Path, str] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
 class Input:
-    """A scene as it was read.
+    """A scene as it was read."""
 
-    Args:
-        name: as the user wrote it.
-        tree: None if it is not text.
-        scene: None if it has errors.
-        spans: where its nodes were written.
-        diagnostics: what was found so far.
-        evaluation: runs its other frames; None for JSON.
-    """
-
-    name: str
-    tree: nodes.File | None = None
-    scene: Scene | None = None
-    spans: SpanMap = field(default_factory=SpanMap)
-    diagnostics: Diagnostics = field(default_factory=Diagnostics)
-    evaluation: Evaluation | None = None
+    name: str  # as the user wrote it
+    tree: nodes.File | None = None  # None if it is not text
+    scene: Scene | None = None  # None if it has errors
+    spans: SpanMap = field(default_factory=SpanMap)  # where its nodes were written
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)  # what was found so far
+    evaluation: Evaluation | None = None  # runs its other frames; None for JSON
 
 
 def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:

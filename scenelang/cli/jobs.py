@@ -30,23 +30,15 @@ PROGRAM = ".safetensors"
 
 @dataclass(slots=True)
 class Job:
-    """One input, ready to be drawn or with the reason why not.
+    """One input, ready to be drawn or with the reason why not."""
 
-    Args:
-        name: as the user wrote it.
-        source: the scene, where there is one.
-        trouble: why a compiled program cannot be drawn.
-        program: what the network draws.
-        graphs: the graph after ``lower`` and each pass, in order.
-        notes: what to say about it on ``-v``.
-    """
-
-    name: str
-    source: Input | None = None
-    trouble: str | None = None
-    program: Program | None = None
+    name: str  # as the user wrote it
+    source: Input | None = None  # the scene, where there is one
+    trouble: str | None = None  # why a compiled program cannot be drawn
+    program: Program | None = None  # what the network draws
+    # the graph after `lower` and each pass, in order
     graphs: dict[str, Graph] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)  # what to say about it on `-v`
 
     @property
     def diagnostics(self) -> list[Diagnostic]:

@@ -23,17 +23,11 @@ class NothingFits(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """A point and what it promises for a scene on this machine.
+    """A point and what it promises for a scene on this machine."""
 
-    Args:
-        point: from the frontier.
-        ms: what 95 of 100 frames stay under.
-        flip: what 97.5 of 100 scenes stay under.
-    """
-
-    point: Point
-    ms: float
-    flip: float
+    point: Point  # from the frontier
+    ms: float  # what 95 of 100 frames stay under
+    flip: float  # what 97.5 of 100 scenes stay under
 
     def told(self) -> str:
         digits = 0 if self.ms >= 10 else 1
@@ -42,19 +36,12 @@ class Offer:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The point that draws, and why.
+    """The point that draws, and why."""
 
-    Args:
-        offer: the chosen one.
-        runner_up: the one that would be next.
-        refused: names of points that cannot draw the scene, and the reason.
-        notes: lines for people.
-    """
-
-    offer: Offer
-    runner_up: Offer | None
-    refused: dict[str, str]
-    notes: tuple[str, ...]
+    offer: Offer  # the chosen one
+    runner_up: Offer | None  # the one that would be next
+    refused: dict[str, str]  # names of points that cannot draw the scene, and the reason
+    notes: tuple[str, ...]  # lines for people
 
 
 def error_scale(canvas: tuple[int, int], objects: int) -> float:

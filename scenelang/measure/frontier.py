@@ -30,15 +30,10 @@ _STRICT: Final = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a picture may take; None for no limit.
+    """What a picture may take; None for no limit."""
 
-    Args:
-        ms: most milliseconds of a frame on this machine.
-        flip: most mean FLIP.
-    """
-
-    ms: float | None
-    flip: float | None
+    ms: float | None  # most milliseconds of a frame on this machine
+    flip: float | None  # most mean FLIP
 
     def __bool__(self) -> bool:
         return self.ms is not None or self.flip is not None
@@ -55,17 +50,12 @@ class Times:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """FLIP of frames, in [0, 1], over scenes.
-
-    Args:
-        mean, p95, worst: as they say.
-        bound: what is promised: the 97.5th percentile.
-    """
+    """FLIP of frames, in [0, 1], over scenes."""
 
     __pydantic_config__ = _STRICT
     mean: Amount
     p95: Amount
-    bound: Amount
+    bound: Amount  # what is promised: the 97.5th percentile
     worst: Amount
 
 
@@ -81,72 +71,50 @@ class Quality:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Milliseconds of a frame as a sum; each coefficient is at least 0.
-
-    Args:
-        frame: of any frame.
-        thousand_objects: for each 1,000 objects.
-        megapixel: for each million pixels of the canvas.
-        megameeting: for each million pixels within objects' bounds, summed over objects; where nothing is
-            skipped every object meets every pixel.
-        outline: for each 1,000 pixels around those bounds, where pixels are sampled four times.
-        spread: 95 of 100 measured frames took at most so many times what the sum says.
-    """
+    """Milliseconds of a frame as a sum; each coefficient is at least 0."""
 
     __pydantic_config__ = _STRICT
-    frame: Amount
-    thousand_objects: Amount
-    megapixel: Amount
+    frame: Amount  # of any frame
+    thousand_objects: Amount  # for each 1,000 objects
+    megapixel: Amount  # for each million pixels of the canvas
+    # for each million pixels within objects' bounds, summed over objects; where nothing is skipped every
+    # object meets every pixel
     megameeting: Amount
-    outline: Amount
-    spread: Amount
+    outline: Amount  # for each 1,000 pixels around those bounds, where pixels are sampled four times
+    spread: Amount  # 95 of 100 measured frames took at most so many times what the sum says
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A way to draw and its figures.
-
-    Args:
-        name: what charts call it.
-        backend: ``"neural"`` or ``"reference"``.
-        model: name of the model; None for the reference and for what has no trained weights.
-        renderer: of the network, or ``"reference"``.
-        samples, skip: how it draws.
-        spp: samples a pixel of the reference.
-        side: pixels along a side that it draws, enlarged for the comparison; 0 where it draws any canvas.
-        offered: whether `scenelang render` chooses it.
-        why_not: why it does not.
-        scenes: on how many it was measured.
-        ms, flip, psnr: figures; no errors where only the time was measured.
-        ratio_to_streaming: how many times as fast as the paper's streaming renderer at its full size, on the
-            same scenes; 0 where that was not measured.
-        cost: what a frame takes elsewhere; None where it is not offered.
-        parameters, bytes: numbers of the network and size of its file.
-        on_front: whether nothing offered is both faster and nearer, in FLIP.
-        command: what draws a scene this way; None where nothing does.
-    """
+    """A way to draw and its figures."""
 
     __pydantic_config__ = _STRICT
-    name: str
+    name: str  # what charts call it
     backend: Literal["neural", "reference"]
-    model: str | None
-    renderer: str
+    model: str | None  # name of the model; None for the reference and for what has no trained weights
+    renderer: str  # of the network, or `"reference"`
+    # how it draws
     samples: Samples
     skip: bool
-    spp: Count
+    spp: Count  # samples a pixel of the reference
+    # pixels along a side that it draws, enlarged for the comparison; 0 where it draws any canvas
     side: Count
-    offered: bool
-    why_not: str | None
-    scenes: Count
+    offered: bool  # whether `scenelang render` chooses it
+    why_not: str | None  # why it does not
+    scenes: Count  # on how many it was measured
+    # figures; no errors where only the time was measured
     ms: Times
+    # how many times as fast as the paper's streaming renderer at its full size, on the same scenes; 0 where
+    # that was not measured
     ratio_to_streaming: Amount
     flip: Errors | None
     psnr: Quality | None
-    cost: Cost | None
+    cost: Cost | None  # what a frame takes elsewhere; None where it is not offered
+    # numbers of the network and size of its file
     parameters: Count
     bytes: Count
-    on_front: bool
-    command: str | None
+    on_front: bool  # whether nothing offered is both faster and nearer, in FLIP
+    command: str | None  # what draws a scene this way; None where nothing does
 
     @property
     def title(self) -> str:
@@ -156,35 +124,25 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Frontier:
-    """All points of one run.
-
-    Args:
-        set: the scenes' set.
-        seed, scenes: of the scenes.
-        canvas: pixels.
-        threads: cores that drew.
-        clock: ``"processor"`` time, which other work on the machine changes little, or ``"wall"``.
-        machine, revision, torch: where and what.
-        yardstick_ms: what `scenelang.measure.cost.yardstick` took there.
-        streaming_ms: a frame of the paper's streaming renderer at its full size, in the same run.
-        converged: mean FLIP of some points against 64 samples a pixel, by name: how near the definition is.
-        points: in the order of their time.
-    """
+    """All points of one run."""
 
     __pydantic_config__ = _STRICT
-    set: str
+    set: str  # the scenes' set
+    # of the scenes
     seed: Count
     scenes: Count
-    canvas: tuple[PositiveInt, PositiveInt]
-    threads: Count
-    clock: str
+    canvas: tuple[PositiveInt, PositiveInt]  # pixels
+    threads: Count  # cores that drew
+    clock: str  # `"processor"` time, which other work on the machine changes little, or `"wall"`
+    # where and what
     machine: str
     revision: str
     torch: str
-    yardstick_ms: Amount
-    streaming_ms: Amount
+    yardstick_ms: Amount  # what `scenelang.measure.cost.yardstick` took there
+    streaming_ms: Amount  # a frame of the paper's streaming renderer at its full size, in the same run
+    # mean FLIP of some points against 64 samples a pixel, by name: how near the definition is
     converged: dict[str, Amount]
-    points: tuple[Point, ...]
+    points: tuple[Point, ...]  # in the order of their time
 
     def to_json(self) -> str:
         """The file's text."""

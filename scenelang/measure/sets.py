@@ -39,28 +39,18 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True, slots=True)
 class SetConfig:
-    """What the scenes of a set are like.
+    """What the scenes of a set are like."""
 
-    Args:
-        objects: fewest and most objects.
-        deformed: with twirl and bend.
-        unions: share of scenes that are unions only.
-        size: factor on scales and translations of the objects.
-        warp: largest twirl and bend.
-        canvas: pixels.
-        affine_steps: random scales, rotations, translations and shears instead of one each; 0 for one each.
-        shuffled: scale, rotate, translate and shear once each, in random order.
-        nest: how objects are put together: "chain", "groups" (each in two nested groups) or "tree".
-    """
-
-    objects: tuple[int, int] = (1, 4)
-    deformed: bool = True
-    unions: float = 0.4
-    size: float = 1.0
-    warp: float = 0.8
-    canvas: tuple[int, int] = (256, 256)
+    objects: tuple[int, int] = (1, 4)  # fewest and most objects
+    deformed: bool = True  # with twirl and bend
+    unions: float = 0.4  # share of scenes that are unions only
+    size: float = 1.0  # factor on scales and translations of the objects
+    warp: float = 0.8  # largest twirl and bend
+    canvas: tuple[int, int] = (256, 256)  # pixels
+    # random scales, rotations, translations and shears instead of one each; 0 for one each
     affine_steps: int = 0
-    shuffled: bool = False
+    shuffled: bool = False  # scale, rotate, translate and shear once each, in random order
+    # how objects are put together: "chain", "groups" (each in two nested groups) or "tree"
     nest: str = "chain"
 
 

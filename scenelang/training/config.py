@@ -20,48 +20,30 @@ _MOST_BYTES = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """A stretch of training with its own streams.
+    """A stretch of training with its own streams."""
 
-    Args:
-        iterations: optimiser steps.
-        objects: most objects of a stream; 0 trains on the leaves alone, without frames or cell.
-        streams: streams B of a batch; for leaves alone the factor on the number of points of each.
-        decoder_rate: the decoder's learning rate as a share of the cell's; 0 leaves it as it is.
-        rate: the phase's highest learning rate as a share of the whole training's.
-        smooth: share of streams of unions and smooth unions only, in place of the scenes' own.
-        forced: start every step from the exact state instead of the network's own.
-    """
-
-    iterations: int
-    objects: int
-    streams: int
-    decoder_rate: float = 1.0
-    rate: float = 1.0
+    iterations: int  # optimiser steps
+    objects: int  # most objects of a stream; 0 trains on the leaves alone, without frames or cell
+    streams: int  # streams B of a batch; for leaves alone the factor on the number of points of each
+    decoder_rate: float = 1.0  # the decoder's learning rate as a share of the cell's; 0 leaves it as it is
+    rate: float = 1.0  # the phase's highest learning rate as a share of the whole training's
+    # share of streams of unions and smooth unions only, in place of the scenes' own
     smooth: float | None = None
-    forced: bool = False
+    forced: bool = False  # start every step from the exact state instead of the network's own
 
 
 @checked(frozen=True, config={"extra": "forbid"})
 class TrainConfig:
-    """Everything that decides what a training yields, besides the code.
+    """Everything that decides what a training yields, besides the code."""
 
-    Args:
-        model: name of the model that the weights are for.
-        seed: seeds parameters and scenes.
-        rate: highest learning rate; every phase warms up over 200 steps and falls by a cosine.
-        phases: run one after the other.
-        network: sizes of the renderer.
-        scenes: the training distribution.
-        cell: name of a model whose cell and colours the weights get, so that the phases train the decoder
-            alone: a cell works on distances, whichever decoder they come from.
-    """
-
-    model: str
-    seed: int
-    rate: float
-    phases: tuple[Phase, ...]
-    network: FramedConfig
-    scenes: SceneConfig
+    model: str  # name of the model that the weights are for
+    seed: int  # seeds parameters and scenes
+    rate: float  # highest learning rate; every phase warms up over 200 steps and falls by a cosine
+    phases: tuple[Phase, ...]  # run one after the other
+    network: FramedConfig  # sizes of the renderer
+    scenes: SceneConfig  # the training distribution
+    # name of a model whose cell and colours the weights get, so that the phases train the decoder alone: a
+    # cell works on distances, whichever decoder they come from
     cell: str | None = None
 
     @property
@@ -74,22 +56,15 @@ class TrainConfig:
 
 @checked(frozen=True, config={"extra": "forbid"})
 class SolidsConfig:
-    """Everything that decides what a training of solids yields, besides the code.
+    """Everything that decides what a training of solids yields, besides the code."""
 
-    Args:
-        model: name of the model that the weights are for.
-        seed: seeds parameters and points.
-        cell, leaves: steps of Adam for the cell and for all leaves together.
-        polish: Gauss-Newton steps for each leaf, a multiple of 20.
-        network: sizes.
-    """
-
-    model: str
-    seed: int
+    model: str  # name of the model that the weights are for
+    seed: int  # seeds parameters and points
+    # steps of Adam for the cell and for all leaves together
     cell: int
     leaves: int
-    polish: int
-    network: SolidConfig
+    polish: int  # Gauss-Newton steps for each leaf, a multiple of 20
+    network: SolidConfig  # sizes
 
 
 def config_data(name: str) -> bytes:

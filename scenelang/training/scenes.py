@@ -24,55 +24,36 @@ FAR = 1e3  # translation of the objects that pad a stream: off every point
 
 @dataclass(frozen=True, slots=True)
 class SceneConfig:
-    """The training distribution.
+    """The training distribution."""
 
-    Args:
-        points: points P of a stream.
-        union, smooth: shares of streams of unions only and of unions and smooth unions only; the others
-            draw each token evenly.
-        edge: share of points on the edge of one object.
-        blend_focus: world units; other points are drawn with a weight of 1 / (|D| + blend_focus).
-        tiny, large: shares of objects of 0.02 to 0.12 and of 0.8 to 1.8 world units.
-        extent: points and objects lie in [-extent, extent].
-        warp: largest twirl and bend.
-    """
-
-    points: int = 256
+    points: int = 256  # points P of a stream
+    # shares of streams of unions only and of unions and smooth unions only; the others draw each token
+    # evenly
     union: float = 0.25
     smooth: float = 0.3
-    edge: float = 0.5
+    edge: float = 0.5  # share of points on the edge of one object
+    # world units; other points are drawn with a weight of 1 / (|D| + blend_focus)
     blend_focus: float = 0.01
+    # shares of objects of 0.02 to 0.12 and of 0.8 to 1.8 world units
     tiny: float = 0.15
     large: float = 0.1
-    extent: float = 1.3
-    warp: float = 1.2
+    extent: float = 1.3  # points and objects lie in [-extent, extent]
+    warp: float = 1.2  # largest twirl and bend
 
 
 @dataclass(slots=True)
 class Batch:
-    """Streams at points, with what the exact picture shows after every object.
+    """Streams at points, with what the exact picture shows after every object."""
 
-    Args:
-        q: leaf coordinates (B, N, 2, P).
-        scale: distance scale (B, N).
-        leaf: geometry index (B, N).
-        rgb: colours (B, N, 3).
-        tokens: (B, N) int64.
-        count: (B,) objects in use; the rest is padding far off every point.
-        distance: signed distance of each object alone, world units (B, N, P); inside it is negative.
-        depth: distance D of the stream up to the object, world units (B, N, P).
-        colour: exact colour after the object (B, N, P, 3).
-    """
-
-    q: Tensor
-    scale: Tensor
-    leaf: Tensor
-    rgb: Tensor
-    tokens: Tensor
-    count: Tensor
-    distance: Tensor
-    depth: Tensor
-    colour: Tensor
+    q: Tensor  # leaf coordinates (B, N, 2, P)
+    scale: Tensor  # distance scale (B, N)
+    leaf: Tensor  # geometry index (B, N)
+    rgb: Tensor  # colours (B, N, 3)
+    tokens: Tensor  # (B, N) int64
+    count: Tensor  # (B,) objects in use; the rest is padding far off every point
+    distance: Tensor  # signed distance of each object alone, world units (B, N, P); inside it is negative
+    depth: Tensor  # distance D of the stream up to the object, world units (B, N, P)
+    colour: Tensor  # exact colour after the object (B, N, P, 3)
 
 
 def _uniform(shape: tuple[int, ...], low: float, high: float, g: torch.Generator) -> Tensor:
@@ -188,15 +169,10 @@ def points_of(
 
 @dataclass(slots=True)
 class LeafBatch:
-    """Points in the spaces of all leaves G.
+    """Points in the spaces of all leaves G."""
 
-    Args:
-        q: leaf coordinates (G, 2, P).
-        distance: signed distance, leaf units (G, P).
-    """
-
-    q: Tensor
-    distance: Tensor
+    q: Tensor  # leaf coordinates (G, 2, P)
+    distance: Tensor  # signed distance, leaf units (G, P)
 
 
 def leaf_batch(p: int, g: torch.Generator) -> LeafBatch:

@@ -36,57 +36,37 @@ class Outdated(Exception):
 
 @dataclass(slots=True)
 class Outcome:
-    """What came of a drawing.
+    """What came of a drawing."""
 
-    Args:
-        image: a picture that was drawn.
-        good: whether the file that was asked for is as the scene says.
-        same: nothing had to be drawn: the scene means the same picture as before.
-        diagnostics: of the scene.
-        compile_s, load_s, draw_s, save_s: where the time went; `load_s` is torch's import.
-        files: what was written.
-    """
-
-    image: Image | None = None
-    good: bool = False
-    same: bool = False
-    diagnostics: list[Diagnostic] = field(default_factory=list)
+    image: Image | None = None  # a picture that was drawn
+    good: bool = False  # whether the file that was asked for is as the scene says
+    same: bool = False  # nothing had to be drawn: the scene means the same picture as before
+    diagnostics: list[Diagnostic] = field(default_factory=list)  # of the scene
+    # where the time went; `load_s` is torch's import
     compile_s: float = 0.0
     load_s: float = 0.0
     draw_s: float = 0.0
     save_s: float = 0.0
-    files: list[Path] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)  # what was written
 
 
 @dataclass(slots=True)
 class Easel:
-    """Draws a scene as often as it changes; the model, the last picture and its key are kept.
+    """Draws a scene as often as it changes; the model, the last picture and its key are kept."""
 
-    Args:
-        file: the scene.
-        out: the picture, or the animation.
-        target: of an animation; None for a picture.
-        frames: of an animation.
-        frame: of a picture.
-        defines: values for params.
-        options: of `Clip`: model, root, size, fps.
-        backend, device, threads: as for `Painter`.
-        paths: the files that the picture depends on, the scene first.
-        seen: how they were when their names were found out.
-    """
-
-    file: Path
-    out: Path
-    target: Target | None
-    frames: FrameRange
-    frame: int
-    defines: Mapping[str, str]
-    options: Mapping[str, Any]
+    file: Path  # the scene
+    out: Path  # the picture, or the animation
+    target: Target | None  # of an animation; None for a picture
+    frames: FrameRange  # of an animation
+    frame: int  # of a picture
+    defines: Mapping[str, str]  # values for params
+    options: Mapping[str, Any]  # of `Clip`: model, root, size, fps
+    # as for `Painter`
     backend: Backend
     device: Device
     threads: int | None
-    paths: tuple[Path, ...] = ()
-    seen: Stamps = field(default_factory=dict)
+    paths: tuple[Path, ...] = ()  # the files that the picture depends on, the scene first
+    seen: Stamps = field(default_factory=dict)  # how they were when their names were found out
     _key: str | None = None
     _image: Image | None = None
     _kept: Kept | None = None

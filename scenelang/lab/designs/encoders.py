@@ -22,17 +22,11 @@ from scenelang.lifting.learned import GEOMETRY_INPUTS, MATERIAL_INPUTS
 
 @dataclass(frozen=True, slots=True)
 class LiftingConfig:
-    """Sizes of the lifting.
+    """Sizes of the lifting."""
 
-    Args:
-        geometry: numbers d_g of a geometry vector, 1 to 64.
-        material: numbers d_m of a material vector, 1 to 64.
-        width: hidden units W of each encoder's two layers.
-    """
-
-    geometry: int = 32
-    material: int = 32
-    width: int = 64
+    geometry: int = 32  # numbers d_g of a geometry vector, 1 to 64
+    material: int = 32  # numbers d_m of a material vector, 1 to 64
+    width: int = 64  # hidden units W of each encoder's two layers
 
 
 class Encoder(nn.Module):

@@ -23,44 +23,29 @@ from scenelang.training.scenes import sectors
 
 @dataclass(frozen=True, slots=True)
 class PictureConfig:
-    """The training distribution.
+    """The training distribution."""
 
-    Args:
-        objects: most objects N of a scene.
-        warp: largest twirl and bend.
-        low, high: scales along each axis.
-        shift: largest translation along each axis.
-        unions: share of scenes of unions only.
-    """
-
-    objects: int = 4
-    warp: float = 0.8
+    objects: int = 4  # most objects N of a scene
+    warp: float = 0.8  # largest twirl and bend
+    # scales along each axis
     low: float = 0.2
     high: float = 0.55
-    shift: float = 0.7
-    unions: float = 0.4
+    shift: float = 0.7  # largest translation along each axis
+    unions: float = 0.4  # share of scenes of unions only
 
 
 @dataclass(slots=True)
 class Scenes:
-    """Random scenes.
+    """Random scenes."""
 
-    Args:
-        leaf: geometry index (B, N), int64.
-        twirl, bend: (B, N), nearest the leaf, in that order.
-        affine: world-from-leaf maps after them (B, N, 4, 4).
-        rgb: colours (B, N, 3).
-        tokens: (B, N), int64.
-        count: (B,) objects in use; the rest is padding.
-    """
-
-    leaf: Tensor
+    leaf: Tensor  # geometry index (B, N), int64
+    # (B, N), nearest the leaf, in that order
     twirl: Tensor
     bend: Tensor
-    affine: Tensor
-    rgb: Tensor
-    tokens: Tensor
-    count: Tensor
+    affine: Tensor  # world-from-leaf maps after them (B, N, 4, 4)
+    rgb: Tensor  # colours (B, N, 3)
+    tokens: Tensor  # (B, N), int64
+    count: Tensor  # (B,) objects in use; the rest is padding
 
     def pick(self, rows: Tensor) -> Scenes:
         """Some of them."""

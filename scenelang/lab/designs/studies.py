@@ -60,35 +60,22 @@ SIGMA = (0.3, 0.1)  # standard deviation of the likelihood, first and last; anne
 
 @dataclass(frozen=True, slots=True)
 class StudyConfig:
-    """Everything that decides what a study yields, besides the code and the machine.
+    """Everything that decides what a study yields, besides the code and the machine."""
 
-    Args:
-        student: lifting, renderer, sizes.
-        seconds: budget of processor time.
-        rate: learning rate; falls to √0.1 of it after `drop` of the budget, as in the paper, then to a
-            hundredth by a cosine over the last tenth.
-        drop: share of the budget.
-        scenes: scenes B of a batch.
-        points: points P of a scene, for renderers that answer points.
-        grow: train at 4 x 4 first and double; else at the last resolution alone.
-        fixed: train on this many fixed scenes; 0 draws new ones for every batch.
-        seed: of parameters and scenes.
-        data: distribution of the scenes.
-        average: decay of the averaged weights that are evaluated.
-        warm: let each level of growing begin as the one below, enlarged; else as noise, as the paper does.
-    """
-
-    student: StudentConfig
-    seconds: float
+    student: StudentConfig  # lifting, renderer, sizes
+    seconds: float  # budget of processor time
+    # learning rate; falls to √0.1 of it after `drop` of the budget, as in the paper, then to a hundredth by
+    # a cosine over the last tenth
     rate: float = 1e-3
-    drop: float = 0.43
-    scenes: int = 16
-    points: int = 64
-    grow: bool = True
-    fixed: int = 0
-    seed: int = 1
-    data: PictureConfig = field(default_factory=PictureConfig)
-    average: float = 0.995
+    drop: float = 0.43  # share of the budget
+    scenes: int = 16  # scenes B of a batch
+    points: int = 64  # points P of a scene, for renderers that answer points
+    grow: bool = True  # train at 4 x 4 first and double; else at the last resolution alone
+    fixed: int = 0  # train on this many fixed scenes; 0 draws new ones for every batch
+    seed: int = 1  # of parameters and scenes
+    data: PictureConfig = field(default_factory=PictureConfig)  # distribution of the scenes
+    average: float = 0.995  # decay of the averaged weights that are evaluated
+    # let each level of growing begin as the one below, enlarged; else as noise, as the paper does
     warm: bool = False
 
     def to_json(self) -> dict[str, Any]:

@@ -41,17 +41,11 @@ Report = Callable[["Run", "Study", float | None], None]
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How an experiment is run and measured.
+    """How an experiment is run and measured."""
 
-    Args:
-        folder: gets the JSON file, the strips and the runs' checkpoints.
-        scenes: unseen scenes that are measured.
-        device: torch device.
-    """
-
-    folder: Path
-    scenes: int = 200
-    device: str = "cpu"
+    folder: Path  # gets the JSON file, the strips and the runs' checkpoints
+    scenes: int = 200  # unseen scenes that are measured
+    device: str = "cpu"  # torch device
 
 
 def run_experiment(

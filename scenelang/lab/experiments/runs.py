@@ -39,23 +39,14 @@ LABELS = {"decoder_width": "decoder", "code": "code size", "state": "state", "pa
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One training and what it is called.
+    """One training and what it is called."""
 
-    Args:
-        name: in tables.
-        group: runs that are compared with one another.
-        study: what is trained.
-        seen: measure on the fixed scenes it was trained on.
-        side: pixels along a side of the pictures that are measured.
-        blends: measure scenes of smooth unions alone as well.
-    """
-
-    name: str
-    group: str
-    study: StudyConfig
-    seen: bool = False
-    side: int = SIDE
-    blends: bool = False
+    name: str  # in tables
+    group: str  # runs that are compared with one another
+    study: StudyConfig  # what is trained
+    seen: bool = False  # measure on the fixed scenes it was trained on
+    side: int = SIDE  # pixels along a side of the pictures that are measured
+    blends: bool = False  # measure scenes of smooth unions alone as well
 
     @property
     def folder(self) -> str:

@@ -51,25 +51,18 @@ MARGIN = 1.25  # of 40 scenes without it, one scene in ten of another seed was w
 
 @dataclass(slots=True)
 class Record:
-    """What was measured of a way.
+    """What was measured of a way."""
 
-    Args:
-        ms: of each scene, the least of the repeats.
-        all_ms: of every frame.
-        flip, psnr: of each scene.
-        loads, fitted: of the frames that its cost is fitted to, and their milliseconds.
-        pictures: of the first scenes.
-        converged: FLIP against 64 samples a pixel.
-    """
-
-    ms: list[float] = field(default_factory=list)
-    all_ms: list[float] = field(default_factory=list)
+    ms: list[float] = field(default_factory=list)  # of each scene, the least of the repeats
+    all_ms: list[float] = field(default_factory=list)  # of every frame
+    # of each scene
     flip: list[float] = field(default_factory=list)
     psnr: list[float] = field(default_factory=list)
+    # of the frames that its cost is fitted to, and their milliseconds
     loads: list[Load] = field(default_factory=list)
     fitted: list[float] = field(default_factory=list)
-    pictures: list[Image] = field(default_factory=list)
-    converged: list[float] = field(default_factory=list)
+    pictures: list[Image] = field(default_factory=list)  # of the first scenes
+    converged: list[float] = field(default_factory=list)  # FLIP against 64 samples a pixel
 
 
 def measure_frontier(

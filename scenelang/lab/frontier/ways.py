@@ -30,15 +30,10 @@ Prepare = Callable[[Scene], Draw]
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """A way to draw; the fields it shares with `scenelang.measure.frontier.Point` are said there.
-
-    Args:
-        prepare: compiles scenes for it.
-        drawn: whether there is a picture worth comparing; untrained weights are only timed.
-    """
+    """A way to draw; the fields it shares with `scenelang.measure.frontier.Point` are said there."""
 
     name: str
-    prepare: Prepare = field(repr=False)
+    prepare: Prepare = field(repr=False)  # compiles scenes for it
     backend: Literal["neural", "reference"] = "neural"
     model: str | None = None
     renderer: str = "reference"
@@ -47,7 +42,7 @@ class Way:
     spp: int = 0
     side: int = 0
     why_not: str | None = None
-    drawn: bool = True
+    drawn: bool = True  # whether there is a picture worth comparing; untrained weights are only timed
     parameters: int = 0
     bytes: int = 0
     command: str | None = None

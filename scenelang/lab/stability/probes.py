@@ -37,22 +37,14 @@ Make = Callable[[Rng, float], Scene]
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """One quantity and its scenes.
+    """One quantity and its scenes."""
 
-    Args:
-        title: what a chart is headed.
-        quantity: what the axis says.
-        values: of the quantity, ascending.
-        healthy: the value that the others are compared with.
-        make: a scene for a value.
-        folded: whether the compiler may fold affine maps; else the lifting multiplies every one of them.
-    """
-
-    title: str
-    quantity: str
-    values: tuple[float, ...]
-    healthy: float
-    make: Make
+    title: str  # what a chart is headed
+    quantity: str  # what the axis says
+    values: tuple[float, ...]  # of the quantity, ascending
+    healthy: float  # the value that the others are compared with
+    make: Make  # a scene for a value
+    # whether the compiler may fold affine maps; else the lifting multiplies every one of them
     folded: bool = True
 
 
