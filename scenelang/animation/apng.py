@@ -25,13 +25,7 @@ _LONGEST = 65535
 
 
 def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> None:
-    """Encode a film, losslessly, with alpha where it has any; delays are exact fractions of a second.
-
-    Args:
-        film: finished frames.
-        part: file to write.
-        progress: called with the share done.
-    """
+    """Encode a film, losslessly, with alpha where it has any; delays are exact fractions of a second."""
     shown = [
         (file, piece)
         for file, count in runs(film.files, [1] * len(film.files))

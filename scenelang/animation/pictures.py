@@ -5,20 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.animation.timing import runs
+
 Pixels = npt.NDArray[np.uint8]
 Box = tuple[int, int, int, int]
 """left, top, right, bottom; the last two exclusive."""
-
-
-class Encoder(Protocol):
-    """How one format is written."""
-
-    def __call__(self, film: Film, part: Path, progress: Callable[[float], None], **options: Any) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +42,12 @@ class Film:
 
     def runs(self, lengths: Sequence[int]) -> Iterator[tuple[Pixels, int]]:
         """Pictures that differ from their neighbours, and how long each is shown."""
-        from scenelang.animation.timing import runs
-
         for file, length in runs(self.files, lengths):
             yield self.read(file), length
+
+
+Encoder = Callable[[Film, Path, Callable[[float], None]], None]
+"""Writes a film to a file in one format, and says which share of it is done."""
 
 
 def changed(before: Pixels | None, now: Pixels) -> Box:

@@ -10,10 +10,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from scenelang.animation.apng import write_apng
+from scenelang.animation.gif import write_gif
 from scenelang.animation.painting import Painter
-from scenelang.animation.pictures import Film
+from scenelang.animation.pictures import Encoder, Film
 from scenelang.animation.store import Store, deliver
 from scenelang.animation.targets import Target
+from scenelang.animation.video import check_video, write_video
+from scenelang.animation.webp import write_webp
 from scenelang.diagnostics.error import SceneError
 from scenelang.files import output_place, write_whole
 
@@ -237,25 +241,13 @@ def _encode(
     dither: bool,
     progress: Callable[[Progress], None],
 ) -> None:
-    def say(share: float) -> None:
-        progress(Progress("encoding", share, 1.0))
-
-    if target.kind == "gif":
-        from scenelang.animation.gif import write_gif
-
-        write_gif(film, part, say, palette=palette, dither=dither)
-    elif target.kind == "apng":
-        from scenelang.animation.apng import write_apng
-
-        write_apng(film, part, say)
-    elif target.kind == "webp":
-        from scenelang.animation.webp import write_webp
-
-        write_webp(film, part, say)
-    else:
-        from scenelang.animation.video import write_video
-
-        write_video(film, part, say, suffix=target.path.suffix.lower())
+    encoders: dict[str, Encoder] = {
+        "gif": partial(write_gif, palette=palette, dither=dither),
+        "apng": write_apng,
+        "webp": write_webp,
+        "video": partial(write_video, suffix=target.path.suffix.lower()),
+    }
+    encoders[target.kind](film, part, lambda share: progress(Progress("encoding", share, 1.0)))
 
 
 def ready(target: Target) -> None:
@@ -267,8 +259,6 @@ def ready(target: Target) -> None:
     """
     output_place(target.path)
     if target.kind == "video":
-        from scenelang.animation.video import check_video
-
         check_video(target.path.suffix.lower())
     elif target.kind == "webp":
         from PIL import features

@@ -58,17 +58,11 @@ class FrameRange:
         return range(self.first, last + 1)
 
 
-def starts(count: int, fps: float, per_second: int) -> list[int]:
-    """When each of ``count`` frames starts, and when the last ends, on a grid of ``per_second`` ticks.
-
-    Each is rounded by itself, so that errors do not add up and the whole is as long as it should be.
-    """
-    step = Fraction(per_second) / Fraction(fps)
-    return [math.floor(i * step + Fraction(1, 2)) for i in range(count + 1)]
-
-
 def delays(count: int, fps: float, per_second: int, shortest: int = 1) -> list[int]:
     """Ticks that each frame is shown for; 0 where it is left out, as it would be shorter than ``shortest``.
+
+    When a frame starts is rounded by itself, so that errors do not add up and the whole is as long as it
+    should be.
 
     Args:
         count: number of frames, at least 1.
@@ -76,7 +70,8 @@ def delays(count: int, fps: float, per_second: int, shortest: int = 1) -> list[i
         per_second: ticks a second.
         shortest: ticks a frame is shown for at least; the animation as a whole may not be shorter.
     """
-    at = starts(count, fps, per_second)
+    step = Fraction(per_second) / Fraction(fps)
+    at = [math.floor(i * step + Fraction(1, 2)) for i in range(count + 1)]
     shown = [0]
     for index in range(1, count):
         if at[index] - at[shown[-1]] >= shortest:

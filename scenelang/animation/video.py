@@ -92,9 +92,6 @@ def write_video(film: Film, part: Path, progress: Callable[[float], None], *, su
     A side of odd length gets one more row or column, a copy of its neighbour.
 
     Args:
-        film: finished frames.
-        part: file to write.
-        progress: called with the share done.
         suffix: ``.mp4``, ``.mov``, ``.mkv`` or ``.webm``.
 
     Raises:

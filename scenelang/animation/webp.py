@@ -39,13 +39,7 @@ class _Reel(Image.Image):
 
 
 def write_webp(film: Film, part: Path, progress: Callable[[float], None]) -> None:
-    """Encode a film, losslessly, with alpha where it has any.
-
-    Args:
-        film: finished frames.
-        part: file to write.
-        progress: called with the share done.
-    """
+    """Encode a film, losslessly, with alpha where it has any."""
     shown = runs(film.files, delays(len(film.files), film.fps, PER_SECOND))
     reel = _Reel(film, [file for file, _ in shown], progress)
     with part.open("wb") as out:
