@@ -5,21 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final
 
-from scenelang.diagnostics.span import Span
-from scenelang.records import Record
 from scenelang.resolve.names import Names
 from scenelang.resolve.symbols import Kind, Symbol
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Parsed
-
-
-def children(node: Any) -> Iterator[Any]:
-    """The nodes right below a node, in no particular order."""
-    for name in node.__match_args__:
-        value = getattr(node, name)
-        for item in value if value.__class__ is tuple else (value,):
-            if isinstance(item, Record) and item.__class__ is not Span:
-                yield item
+from scenelang.syntax.nodes import children
 
 
 def walk(node: Any) -> Iterator[Any]:

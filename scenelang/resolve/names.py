@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.resolve.symbols import Kind, Role, Scope, Symbol, Use
@@ -30,7 +31,7 @@ class Names:
         self.symbols: list[Symbol] = []
         self.scopes: list[Scope] = [self.top]
         self._unresolved: list[tuple[Use, Scope]] = []
-        self._block(file.statements, self.top, "file")
+        self._statements(file.statements, self.top, "file")
         for use, scope in self._unresolved:
             use.symbol = scope.find(use.text)  # used before its line: still the one that is meant
         self.uses.sort(key=lambda use: (use.start, use.end))
@@ -58,13 +59,11 @@ class Names:
     def visible(self, offset: int) -> Iterator[Symbol]:
         """The definitions in sight of an offset, inner ones first, hidden ones left out."""
         seen: set[str] = set()
-        scope: Scope | None = self.scope_at(offset)
-        while scope is not None:
+        for scope in self.scope_at(offset).outwards():
             for name, symbol in scope.symbols.items():
                 if name not in seen and symbol.since <= offset:
                     seen.add(name)
                     yield symbol
-            scope = scope.parent
 
     def exported(self) -> list[Symbol]:
         """What files that import this one see."""
@@ -72,11 +71,19 @@ class Names:
 
     # ------------------------------------------------------------ definitions
 
-    def _define(self, symbol: Symbol) -> Symbol:
+    def _define(
+        self,
+        name: nodes.Name,
+        kind: Kind,
+        node: nodes.Stmt | nodes.Parameter,
+        scope: Scope,
+        since: int,
+        owner: Symbol | None = None,
+    ) -> Symbol:
+        symbol = Symbol(name.text, kind, name.span, node, scope, since, owner)
         self.symbols.append(symbol)
-        symbol.scope.symbols.setdefault(symbol.name, symbol)
-        span = symbol.span
-        self.uses.append(Use(span.start, span.end, symbol.name, "name", symbol, defines=True))
+        scope.symbols.setdefault(symbol.name, symbol)
+        self._add(name.span, name.text, "name", symbol).defines = True
         return symbol
 
     def _scope(self, start: int, end: int, parent: Scope) -> Scope:
@@ -84,98 +91,110 @@ class Names:
         self.scopes.append(scope)
         return scope
 
-    def _block(self, statements: Iterable[nodes.Stmt], scope: Scope, kind: str) -> None:
+    def _statements(self, statements: Iterable[nodes.Stmt], scope: Scope, kind: str) -> None:
         bodies = []
         for stmt in statements:
             if isinstance(stmt, nodes.Fn | nodes.Module):
                 which: Kind = "fn" if isinstance(stmt, nodes.Fn) else "module"
-                symbol = Symbol(stmt.name.text, which, stmt.name.span, stmt, scope, scope.start)
-                bodies.append((stmt, self._define(symbol)))
+                bodies.append((stmt, self._define(stmt.name, which, stmt, scope, scope.start)))
         for stmt in statements:
-            self._statement(stmt, scope, kind)
+            if not isinstance(stmt, nodes.Fn | nodes.Module):
+                self._walk(stmt, scope, kind)
         for definition, symbol in bodies:
-            self._body(definition, symbol, scope)
+            around = self._scope(definition.name.span.end, definition.span.end, scope)
+            for param in definition.params:
+                if param.default is not None:
+                    self._walk(param.default, around, "group")
+                formal = self._define(param.name, "argument", param, around, param.span.end, symbol)
+                symbol.params.append(formal)
+            self._walk(definition.body, around, "group")
 
-    def _body(self, stmt: nodes.Fn | nodes.Module, symbol: Symbol, scope: Scope) -> None:
-        around = self._scope(stmt.name.span.end, stmt.span.end, scope)
-        for param in stmt.params:
-            if param.default is not None:
-                self._expr(param.default, around)
-            formal = Symbol(
-                param.name.text, "argument", param.name.span, param, around, param.span.end, symbol
-            )
-            symbol.params.append(self._define(formal))
-        if isinstance(stmt, nodes.Fn):
-            self._expr(stmt.body, around)
-        else:
-            inside = self._scope(stmt.body.span.start, stmt.body.span.end, around)
-            self._block(stmt.body.statements, inside, "group")
+    # ------------------------------------------------------------ statements and expressions
 
-    # ------------------------------------------------------------ statements
-
-    def _inner(self, block: nodes.Block, scope: Scope, kind: str) -> None:
-        inside = self._scope(block.span.start, block.span.end, scope)
-        self._block(block.statements, inside, kind)
-
-    def _statement(self, stmt: nodes.Stmt, scope: Scope, kind: str) -> None:
-        match stmt:
+    def _walk(self, node: Any, scope: Scope, kind: str) -> None:
+        """Note the names in a statement or an expression, in a block of some kind."""
+        match node:
+            case nodes.Block():
+                inside = self._scope(node.span.start, node.span.end, scope)
+                self._statements(node.statements, inside, kind)
             case nodes.Model():
-                if isinstance(stmt.name, nodes.String):
-                    self._add(stmt.name.span, stmt.name.value, "model")
+                if isinstance(node.name, nodes.String):
+                    self._add(node.name.span, node.name.value, "model")
             case nodes.Let():
-                self._expr(stmt.value, scope)
-                self._define(Symbol(stmt.name.text, "let", stmt.name.span, stmt, scope, stmt.span.end))
+                self._walk(node.value, scope, kind)
+                self._define(node.name, "let", node, scope, node.span.end)
             case nodes.Param():
-                self._expr(stmt.default, scope)
-                if stmt.range is not None:
-                    self._expr(stmt.range, scope)
-                self._define(Symbol(stmt.name.text, "param", stmt.name.span, stmt, scope, stmt.span.end))
+                self._walk(node.default, scope, kind)
+                if node.range is not None:
+                    self._walk(node.range, scope, kind)
+                self._define(node.name, "param", node, scope, node.span.end)
             case nodes.Import():
-                self._add(stmt.path.span, stmt.path.value, "path")
-                self._define(Symbol(stmt.alias.text, "import", stmt.alias.span, stmt, scope, stmt.span.end))
+                self._add(node.path.span, node.path.value, "path")
+                self._define(node.alias, "import", node, scope, node.span.end)
             case nodes.For():
-                self._expr(stmt.iterable, scope)
-                loop = self._scope(stmt.body.span.start, stmt.span.end, scope)
-                name = stmt.variable
-                self._define(Symbol(name.text, "loop", name.span, stmt, loop, stmt.body.span.start))
-                self._inner(stmt.body, loop, kind)
+                self._walk(node.iterable, scope, kind)
+                loop = self._scope(node.body.span.start, node.span.end, scope)
+                self._define(node.variable, "loop", node, loop, node.body.span.start)
+                self._walk(node.body, loop, kind)
             case nodes.If():
-                at: nodes.If | nodes.Block | None = stmt
+                at: nodes.If | nodes.Block | None = node
                 while isinstance(at, nodes.If):  # there may be very many arms
-                    self._expr(at.condition, scope)
-                    self._inner(at.then, scope, kind)
+                    self._walk(at.condition, scope, kind)
+                    self._walk(at.then, scope, kind)
                     at = at.otherwise
                 if at is not None:
-                    self._inner(at, scope, kind)
+                    self._walk(at, scope, kind)
             case nodes.Node():
-                self._inner(stmt.body, scope, "chain" if stmt.kind == "chain" else "group")
-            case nodes.Combined():
-                self._statement(stmt.child, scope, kind)
-            case nodes.MaterialUse():
-                self._add(stmt.name.span, stmt.name.text, "material")
-                if stmt.body is not None:
-                    self._inner(stmt.body, scope, "material")
+                self._walk(node.body, scope, "chain" if node.kind == "chain" else "group")
+            case nodes.MaterialUse() | nodes.MaterialExpr():
+                self._add(node.name.span, node.name.text, "material")
+                if node.body is not None:
+                    self._walk(node.body, scope, "material")
             case nodes.Call():
-                self._call(stmt, scope, kind)
-            case _:
-                pass
+                self._call(node, scope, kind)
+            case nodes.NameRef():
+                text = node.name.text
+                own = self._own(text) if scope.find(text) is None else None
+                if own is None:
+                    self._reference(node.name, scope, "name")
+                else:
+                    self._add(node.name.span, text, own)
+            case nodes.CallExpr():
+                name = node.name
+                plain = name.text in FUNCTIONS and scope.find(name.text) is None
+                head = self._add(name.span, name.text, "function") if plain else None
+                self._arguments(node.args, scope, head or self._reference(name, scope, "name"))
+            case nodes.Member():
+                self._walk(node.value, scope, kind)
+                symbol = scope.find(node.value.name.text) if isinstance(node.value, nodes.NameRef) else None
+                imported = symbol is not None and symbol.kind == "import"
+                role: Role = "member" if imported else "property"
+                self._add(node.name.span, node.name.text, role, symbol if imported else None)
+            case _ if not isinstance(node, nodes.Name):
+                for child in nodes.children(node):
+                    self._walk(child, scope, kind)
 
     def _call(self, stmt: nodes.Call, scope: Scope, kind: str) -> None:
         name = stmt.name.text
+        role: Role | None = None
         if name in SETTINGS:
-            head: Use | None = self._add(stmt.name.span, name, "setting")
-        elif kind == "material" and name in OPERATIONS:
-            head = self._add(stmt.name.span, name, "operation")
-        elif name in TRANSFORMS or name in OPERATIONS:
-            head = self._add(stmt.name.span, name, "transform" if name in TRANSFORMS else "operation")
-        else:
-            head = self._reference(stmt.name, scope, "geometry")
+            role = "setting"
+        elif name in OPERATIONS and (kind == "material" or name not in TRANSFORMS):
+            role = "operation"
+        elif name in TRANSFORMS:
+            role = "transform"
+        head = (
+            self._add(stmt.name.span, name, role) if role else self._reference(stmt.name, scope, "geometry")
+        )
         self._arguments(stmt.args or (), scope, head)
         if stmt.body is not None:
             value = head is not None and head.symbol is not None and head.symbol.kind in ("let", "argument")
-            self._inner(stmt.body, scope, "material" if value else "object")
+            self._walk(stmt.body, scope, "material" if value else "object")
 
-    # ------------------------------------------------------------ expressions
+    @staticmethod
+    def _own(text: str) -> Role | None:
+        """What a word of the language is in an expression."""
+        return "constant" if text in CONSTANTS else "animated" if text in ANIMATED else None
 
     def _add(self, span: Span, text: str, role: Role, symbol: Symbol | None = None) -> Use:
         use = Use(span.start, span.end, text, role, symbol)
@@ -188,7 +207,7 @@ class Names:
         symbol = scope.find(alias)
         if not rest:
             use = self._add(name.span, alias, "name" if symbol else otherwise, symbol)
-            if symbol is None and otherwise in ("geometry", "name"):
+            if symbol is None:
                 self._unresolved.append((use, scope))
             return use
         source, span = name.span.source, name.span
@@ -201,66 +220,5 @@ class Names:
     def _arguments(self, args: Iterable[nodes.Argument], scope: Scope, head: Use | None) -> None:
         for arg in args:
             if arg.name is not None:
-                use = self._add(arg.name.span, arg.name.text, "argument")
-                use.callee = head
-            self._expr(arg.value, scope)
-
-    def _expr(self, expr: nodes.Expr, scope: Scope) -> None:
-        match expr:
-            case nodes.NameRef():
-                self._value(expr.name, scope)
-            case nodes.CallExpr():
-                name = expr.name
-                plain = name.text in FUNCTIONS and scope.find(name.text) is None
-                head = self._add(name.span, name.text, "function") if plain else None
-                head = head or self._reference(name, scope, "name")
-                self._arguments(expr.args, scope, head)
-            case nodes.Member():
-                self._member(expr, scope)
-            case nodes.MaterialExpr():
-                self._add(expr.name.span, expr.name.text, "material")
-                if expr.body is not None:
-                    self._inner(expr.body, scope, "material")
-            case nodes.Vector():
-                for item in expr.items:
-                    self._expr(item, scope)
-            case nodes.Binary():
-                self._expr(expr.left, scope)
-                self._expr(expr.right, scope)
-            case nodes.Unary():
-                self._expr(expr.operand, scope)
-            case nodes.Range():
-                for part in (expr.start, expr.stop, expr.step):
-                    if part is not None:
-                        self._expr(part, scope)
-            case nodes.Conditional():
-                for part in (expr.condition, expr.then, expr.otherwise):
-                    self._expr(part, scope)
-            case nodes.Index():
-                self._expr(expr.value, scope)
-                self._expr(expr.index, scope)
-            case _:
-                pass
-
-    def _value(self, name: nodes.Name, scope: Scope) -> None:
-        text = name.text
-        if scope.find(text) is None and "." not in text:
-            if text in CONSTANTS:
-                self._add(name.span, text, "constant")
-                return
-            if text in ANIMATED:
-                self._add(name.span, text, "animated")
-                return
-        self._reference(name, scope, "name")
-
-    def _member(self, expr: nodes.Member, scope: Scope) -> None:
-        self._expr(expr.value, scope)
-        role: Role = "property"
-        symbol = None
-        if isinstance(expr.value, nodes.NameRef):
-            symbol = scope.find(expr.value.name.text)
-            if symbol is not None and symbol.kind == "import":
-                role = "member"
-            else:
-                symbol = None
-        self._add(expr.name.span, expr.name.text, role, symbol)
+                self._add(arg.name.span, arg.name.text, "argument").callee = head
+            self._walk(arg.value, scope, "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -66,14 +67,16 @@ class Scope:
     parent: Scope | None = None
     symbols: dict[str, Symbol] = field(default_factory=dict)
 
-    def find(self, name: str) -> Symbol | None:
-        """What a name stands for here."""
+    def outwards(self) -> Iterator[Scope]:
+        """This scope, and those around it."""
         scope: Scope | None = self
         while scope is not None:
-            if name in scope.symbols:
-                return scope.symbols[name]
+            yield scope
             scope = scope.parent
-        return None
+
+    def find(self, name: str) -> Symbol | None:
+        """What a name stands for here."""
+        return next((scope.symbols[name] for scope in self.outwards() if name in scope.symbols), None)
 
 
 @dataclass(eq=False, slots=True)

@@ -6,7 +6,8 @@ a diagnostic has been given; later stages skip such nodes silently.
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Iterator
+from typing import Any, Literal
 
 from scenelang.diagnostics.span import Span
 from scenelang.records import Record
@@ -301,3 +302,15 @@ class File(Record):
 
     statements: tuple[Stmt, ...]
     span: Span
+
+
+# ---------------------------------------------------------------- walking
+
+
+def children(node: Any) -> Iterator[Any]:
+    """The nodes right below a node, names included, in the order of its fields."""
+    for field in node.__match_args__:
+        value = getattr(node, field)
+        for item in value if value.__class__ is tuple else (value,):
+            if isinstance(item, Record) and item.__class__ is not Span:
+                yield item

@@ -2,58 +2,62 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
-FUNCTIONS: Final = {
-    "pow": "a b -> a ^ b",
-    "mod": "a b -> a % b",
-    "fmod": "write a % b, which takes the sign of b",
-    "fract": "x -> x % 1",
-    "frac": "x -> x % 1",
-    "length": "len counts items; for a norm write sqrt(v.x ^ 2 + v.y ^ 2)",
-    "norm": "write sqrt(v.x ^ 2 + v.y ^ 2)",
-    "distance": "write sqrt((a.x - b.x) ^ 2 + (a.y - b.y) ^ 2)",
-    "dot": "write a.x * b.x + a.y * b.y",
-    "normalize": "divide by sqrt(v.x ^ 2 + v.y ^ 2)",
-    "atan": "write atan2(y, x)",
-    "ln": "log is the natural logarithm",
-    "log10": "x -> log(x) / log(10)",
-    "log2": "x -> log(x) / log(2)",
-    "cbrt": "write x ^ (1 / 3)",
-    "sqr": "write x ^ 2",
-    "exp2": "x -> 2 ^ x",
-    "cot": "write 1 / tan(x)",
-    "sec": "write 1 / cos(x)",
-    "csc": "write 1 / sin(x)",
-    "sinh": "write (exp(x) - exp(-x)) / 2",
-    "cosh": "write (exp(x) + exp(-x)) / 2",
-    "tanh": "write 1 - 2 / (exp(2 * x) + 1)",
-    "square": "x -> x ^ 2",
-    "lerp": "a b t -> mix(a, b, t)",
-    "step": "e x -> x < e ? 0 : 1",
-    "sign": "x -> x < 0 ? -1 : x > 0 ? 1 : 0",
-    "trunc": "write floor(x), or ceil(x) below 0",
-    "int": "write floor(x)",
-    "float": "x -> x",
-    "saturate": "x -> clamp(x, 0, 1)",
-    "random": "write rand(seed)",
-    "rands": "write rand(seed)",
-    "noise": "write rand(seed), or rand([seed, i]) for one of many",
-    "range": "n -> 0..<n; a b -> a..<b; a b s -> a..<b step s",
-    "vec2": "x y -> [x, y]",
-    "vec3": "x y z -> [x, y, z]; x -> [x, x, x]",
-    "vec4": "write [x, y, z]; colours have no alpha",
-    "float2": "x y -> [x, y]",
-    "float3": "x y z -> [x, y, z]",
-    "point": "x y -> [x, y]",
-    "rgba": "write rgb(r, g, b); colours have no alpha",
-    "hsl": "write hsv(h, s, v)",
-    "rad": "glue the unit to the number: 30deg; what is computed is multiplied by 1deg",
-    "radians": "glue the unit to the number: 30deg; what is computed is multiplied by 1deg",
-    "degrees": "divide by 1deg for a number of degrees",
-    "concat": "vectors are not joined; write all items into one",
-    "str": "strings are not put together",
-}
+
+def _each_word(meanings: Mapping[str, str]) -> dict[str, str]:
+    """A table by each of the words that share a meaning."""
+    return {word: meaning for words, meaning in meanings.items() for word in words.split()}
+
+
+FUNCTIONS: Final = _each_word(
+    {
+        "pow": "a b -> a ^ b",
+        "mod": "a b -> a % b",
+        "fmod": "write a % b, which takes the sign of b",
+        "fract frac": "x -> x % 1",
+        "length": "len counts items; for a norm write sqrt(v.x ^ 2 + v.y ^ 2)",
+        "norm": "write sqrt(v.x ^ 2 + v.y ^ 2)",
+        "distance": "write sqrt((a.x - b.x) ^ 2 + (a.y - b.y) ^ 2)",
+        "dot": "write a.x * b.x + a.y * b.y",
+        "normalize": "divide by sqrt(v.x ^ 2 + v.y ^ 2)",
+        "atan": "write atan2(y, x)",
+        "ln": "log is the natural logarithm",
+        "log10": "x -> log(x) / log(10)",
+        "log2": "x -> log(x) / log(2)",
+        "cbrt": "write x ^ (1 / 3)",
+        "sqr": "write x ^ 2",
+        "exp2": "x -> 2 ^ x",
+        "cot": "write 1 / tan(x)",
+        "sec": "write 1 / cos(x)",
+        "csc": "write 1 / sin(x)",
+        "sinh": "write (exp(x) - exp(-x)) / 2",
+        "cosh": "write (exp(x) + exp(-x)) / 2",
+        "tanh": "write 1 - 2 / (exp(2 * x) + 1)",
+        "square": "x -> x ^ 2",
+        "lerp": "a b t -> mix(a, b, t)",
+        "step": "e x -> x < e ? 0 : 1",
+        "sign": "x -> x < 0 ? -1 : x > 0 ? 1 : 0",
+        "trunc": "write floor(x), or ceil(x) below 0",
+        "int": "write floor(x)",
+        "float": "x -> x",
+        "saturate": "x -> clamp(x, 0, 1)",
+        "random rands": "write rand(seed)",
+        "noise": "write rand(seed), or rand([seed, i]) for one of many",
+        "range": "n -> 0..<n; a b -> a..<b; a b s -> a..<b step s",
+        "vec2 float2 point": "x y -> [x, y]",
+        "vec3": "x y z -> [x, y, z]; x -> [x, x, x]",
+        "vec4": "write [x, y, z]; colours have no alpha",
+        "float3": "x y z -> [x, y, z]",
+        "rgba": "write rgb(r, g, b); colours have no alpha",
+        "hsl": "write hsv(h, s, v)",
+        "rad radians": "glue the unit to the number: 30deg; what is computed is multiplied by 1deg",
+        "degrees": "divide by 1deg for a number of degrees",
+        "concat": "vectors are not joined; write all items into one",
+        "str": "strings are not put together",
+    }
+)
 """Functions, and what to write: advice, or `parameters -> what stands for a call` for each number of them."""
 
 LIBRARIES: Final = ("Math", "math", "np", "numpy")
@@ -62,103 +66,82 @@ LIBRARIES: Final = ("Math", "math", "np", "numpy")
 VALUES: Final = {"e": "write exp(1)", "phi": "write (1 + sqrt(5)) / 2"}
 """Constants, in small letters, and what to write."""
 
-NAMES: Final = {
-    "pi": "PI",
-    "tau": "TAU",
-    "true": "true",
-    "false": "false",
-    "yes": "true",
-    "no": "false",
-    "null": "none",
-    "nil": "none",
-    "undef": "none",
-    "transparent": "none",
-    "time": "t",
-    "itime": "t",
-    "framecount": "frames",
-}
+NAMES: Final = _each_word(
+    {
+        "pi": "PI",
+        "tau": "TAU",
+        "true yes": "true",
+        "false no": "false",
+        "null nil undef transparent": "none",
+        "time itime": "t",
+        "framecount": "frames",
+    }
+)
 """Values under another name, in small letters."""
 
-COLOURS: Final = {
-    "black": "#000",
-    "white": "#fff",
-    "red": "#f00",
-    "green": "#008000",
-    "lime": "#0f0",
-    "blue": "#00f",
-    "yellow": "#ff0",
-    "cyan": "#0ff",
-    "magenta": "#f0f",
-    "orange": "#ffa500",
-    "pink": "#ffc0cb",
-    "purple": "#800080",
-    "brown": "#a52a2a",
-    "gray": "#808080",
-    "grey": "#808080",
-    "gold": "#ffd700",
-}
+COLOURS: Final = _each_word(
+    {
+        "black": "#000",
+        "white": "#fff",
+        "red": "#f00",
+        "green": "#008000",
+        "lime": "#0f0",
+        "blue": "#00f",
+        "yellow": "#ff0",
+        "cyan": "#0ff",
+        "magenta": "#f0f",
+        "orange": "#ffa500",
+        "pink": "#ffc0cb",
+        "purple": "#800080",
+        "brown": "#a52a2a",
+        "gray grey": "#808080",
+        "gold": "#ffd700",
+    }
+)
 """Colours by their names on the web."""
 
-WORDS: Final = {
-    "ball": "sphere",
-    "donut": "torus",
-    "doughnut": "torus",
-    "move": "translate",
-    "shift": "translate",
-    "position": "translate",
-    "turn": "rotate",
-    "spin": "rotate",
-    "rotation": "rotate",
-    "zoom": "scale",
-    "skew": "shear",
-    "multmatrix": "matrix",
-    "swirl": "twirl",
-    "curl": "bend",
-    "colour": "color",
-    "fill": "color",
-    "tint": "color",
-    "pigment": "color",
-    "greyscale": "grayscale",
-    "desaturate": "grayscale",
-    "mirror": "flip",
-    "intersection": "intersect",
-    "difference": "subtract",
-    "minus": "subtract",
-    "merge": "union",
-    "add": "union",
-    "join": "union",
-    "blend": "smooth",
-    "smooth_union": "smooth",
-    "texture": "material",
-    "size_px": "canvas",
-    "resolution": "canvas",
-    "viewport": "canvas",
-    "animation": "animate",
-    "elif": "else if",
-    "elsif": "else if",
-    "elseif": "else if",
-}
+WORDS: Final = _each_word(
+    {
+        "ball": "sphere",
+        "donut doughnut": "torus",
+        "move shift position": "translate",
+        "turn spin rotation": "rotate",
+        "zoom": "scale",
+        "skew": "shear",
+        "multmatrix": "matrix",
+        "swirl": "twirl",
+        "curl": "bend",
+        "colour fill tint pigment": "color",
+        "greyscale desaturate": "grayscale",
+        "mirror": "flip",
+        "intersection": "intersect",
+        "difference minus": "subtract",
+        "merge add join": "union",
+        "blend smooth_union": "smooth",
+        "texture": "material",
+        "size_px resolution viewport": "canvas",
+        "animation": "animate",
+        "elif elsif elseif": "else if",
+    }
+)
 """Words that head statements, under another name."""
 
-STATEMENTS: Final = {
-    "children": "what is called has no children: put what it draws into its block",
-    "blend": "it is called `smooth` here, and always blends over a distance of 0.15",
-    "smooth_union": "it is called `smooth` here, and always blends over a distance of 0.15",
-    "hull": "there is no hull; smooth { … } blends objects into each other",
-    "minkowski": "there is no Minkowski sum; smooth { … } blends objects into each other",
-    "linear_extrude": "a 2D scene is not extruded",
-    "rotate_extrude": "a 2D scene is not extruded",
-    "mirror": "write scale(-1, 1);",
-    "offset": "a move is translate(x, y); outlines are not offset",
-    "size": "write scale(sx, sy), in factors",
-    "resize": "write scale(sx, sy), in factors",
-    "transform": "write matrix([[…4], […4], […4], […4]]), in rows",
-    "text": "no model draws text",
-    "echo": "nothing is printed while a scene is made",
-    "print": "nothing is printed while a scene is made",
-    "return": "a function is one expression: fn f(x) = x ^ 2;",
-    "while": "loops run over a range or a vector: for (i in 0..<n) { … }",
-    "opacity": "objects are opaque",
-    "alpha": "objects are opaque",
-}
+STATEMENTS: Final = _each_word(
+    {
+        "children": "what is called has no children: put what it draws into its block",
+        "blend smooth_union": "it is called `smooth` here, and always blends over a distance of 0.15",
+        "hull": "there is no hull; smooth { … } blends objects into each other",
+        "minkowski": "there is no Minkowski sum; smooth { … } blends objects into each other",
+        "linear_extrude rotate_extrude": "a 2D scene is not extruded",
+        "mirror": "write scale(-1, 1);",
+        "offset": "a move is translate(x, y); outlines are not offset",
+        "size resize": "write scale(sx, sy), in factors",
+        "transform": "write matrix([[…4], […4], […4], […4]]), in rows",
+        "text": "no model draws text",
+        "echo print": "nothing is printed while a scene is made",
+        "return": "a function is one expression: fn f(x) = x ^ 2;",
+        "while": "loops run over a range or a vector: for (i in 0..<n) { … }",
+        "opacity alpha": "objects are opaque",
+    }
+)
 """Statements that are built otherwise."""

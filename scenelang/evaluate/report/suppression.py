@@ -10,6 +10,7 @@ import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.span import Span
@@ -142,23 +143,13 @@ def _holds_mark(block: nodes.Block, mark: Span) -> bool:
 
 def _inside(stmt: nodes.Stmt) -> Iterator[nodes.Block]:
     """The blocks of statements that a statement has."""
-    match stmt:
-        case nodes.For() | nodes.Module() | nodes.Node():
-            yield stmt.body
-        case nodes.Call() | nodes.MaterialUse():
-            if stmt.body:
-                yield stmt.body
-        case nodes.Combined():
-            yield from _inside(stmt.child)
-        case nodes.If():
-            at: nodes.If | nodes.Block | None = stmt
-            while isinstance(at, nodes.If):
-                yield at.then
-                at = at.otherwise
-            if at is not None:
-                yield at
-        case _:
-            pass
+    stack: list[Any] = [stmt]
+    while stack:
+        for child in nodes.children(stack.pop()):
+            if isinstance(child, nodes.Block):
+                yield child
+            elif isinstance(child, nodes.Stmt):
+                stack.append(child)
 
 
 def _bad(statements: tuple[nodes.Stmt, ...]) -> Iterator[nodes.BadStmt]:
