@@ -56,9 +56,9 @@ def show_value(value: Any) -> str | None:
         short: str = value if len(value) <= 60 else value[:57] + "…"
         return '"' + short.replace("\\", "\\\\").replace('"', '\\"') + '"'
     if cls is Angle:
-        return _angle(value.rad)
+        return _angle(value.size)
     if cls is Time:
-        return f"{show(value.s)}s"
+        return f"{show(value.size)}s"
     if cls is Vec:
         items = [show_value(item) or "?" for item in value.items[:_MOST_ITEMS]]
         more = [f"… {len(value.items)} items"] if len(value.items) > _MOST_ITEMS else []

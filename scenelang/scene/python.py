@@ -9,8 +9,8 @@ from typing import Final
 from scenelang.deep import deep_stack
 from scenelang.scene.fields import Rgb
 from scenelang.scene.modifiers import MaterialOp, Transform
-from scenelang.scene.nodes import Link, Material, Object, SceneData, SceneNode
-from scenelang.scene.text import degrees, hex_colour, number
+from scenelang.scene.nodes import Link, Object, SceneData, SceneNode
+from scenelang.scene.text import degrees, hex_colour, number, numbers
 
 _WIDTH: Final = 88
 _INDENT: Final = "    "
@@ -65,26 +65,22 @@ class _Maker:
 
     def node(self, prefix: str, node: SceneNode) -> tuple[_Code, int]:
         """The code of a node, and how deep nodes nest in it."""
-        height = 0
+        height, name = 0, type(node).__name__
         parts: list[_Code] = []
         if isinstance(node, Object):
-            name = "Object"
             parts.append(f'"{node.geometry}"')
         else:
-            name = type(node).__name__
             if node.kind == "boolean":
                 parts.append(f'op="{node.op}"')
-            children: list[_Code] = []
-            for child in node.children:
-                code, inner = self.child(child)
-                height = max(height, inner + 1)
-                children.append(code)
+            children = [self.child(child) for child in node.children]
+            height = max([inner + 1 for _, inner in children], default=0)
             if children:
-                parts.append(_tuple("children=", children))
+                parts.append(_tuple("children=", [code for code, _ in children]))
         if node.transforms:
             parts.append(_tuple("transforms=", map(_step, node.transforms)))
         if node.material is not None:
-            parts.append(_material(node.material))
+            ops = (_tuple("ops=", map(_step, node.material.ops)),) if node.material.ops else ()
+            parts.append(_Call("material=nsg.Material", (f'"{node.material.name}"', *ops)))
         if height < _DEEPEST:
             return _Call(f"{prefix}nsg.{name}", tuple(parts)), height
         variable = f"part_{len(self.parts) + 1}"
@@ -99,45 +95,29 @@ class _Maker:
         return _Call("nsg.Link", (*op, code)), height
 
 
-def _material(material: Material) -> _Code:
-    ops = (_tuple("ops=", map(_step, material.ops)),) if material.ops else ()
-    return _Call("material=nsg.Material", (f'"{material.name}"', *ops))
-
-
 def _step(step: Transform | MaterialOp) -> _Code:
     """A transform or a texture operation."""
+    parts: list[_Code]
+    head = ""
     match step.kind:
-        case "translate":
-            z = (number(step.z),) if number(step.z) != "0" else ()
-            return _Call("nsg.Translate", (number(step.x), number(step.y), *z))
         case "rotate":
-            head, turn = _angle(step.angle)
-            axis = () if repr(step.axis) == "(0.0, 0.0, 1.0)" else (_numbers("axis=", step.axis),)
-            return _Call(f"nsg.Rotate{head}", (turn, *axis))
-        case "scale":
-            if step.x == step.y == step.z:
-                return _Call("nsg.Scale", (number(step.x),))
-            z = (number(step.z),) if step.z != 1.0 else ()
-            return _Call("nsg.Scale", (number(step.x), number(step.y), *z))
+            exact = degrees(step.angle)
+            head = "" if exact is None else ".degrees"
+            parts = [f"angle={number(step.angle)}" if exact is None else number(exact)]
+            if repr(step.axis) != "(0.0, 0.0, 1.0)":
+                parts.append(_numbers("axis=", step.axis))
         case "shear":
-            return _Call("nsg.Shear", (f'"{step.axes}"', number(step.k)))
+            parts = [f'"{step.axes}"', number(step.k)]
         case "matrix":
-            return _Call("nsg.Matrix", (_tuple("", [_numbers("", row) for row in step.rows]),))
+            parts = [_tuple("", [_numbers("", row) for row in step.rows])]
         case "color":
             written = hex_colour(step.rgb)
-            if written is not None:
-                return _Call("nsg.Color", (f'"{written}"',))
-            return _Call("nsg.Color", (_numbers("", step.rgb),))
+            parts = [_numbers("", step.rgb) if written is None else f'"{written}"']
         case "hue":
-            return _Call("nsg.Hue", (f"angle={number(step.angle)}",))
+            parts = [f"angle={number(step.angle)}"]
         case _:
-            numbers = (number(value) for name, value in step if name != "kind")
-            return _Call(f"nsg.{type(step).__name__}", tuple(numbers))
-
-
-def _angle(rad: float) -> tuple[str, str]:
-    exact = degrees(rad)
-    return ("", f"angle={number(rad)}") if exact is None else (".degrees", number(exact))
+            parts = [*map(number, numbers(step))]
+    return _Call(f"nsg.{type(step).__name__}{head}", tuple(parts))
 
 
 def _numbers(head: str, values: Rgb | Iterable[float]) -> _Call:

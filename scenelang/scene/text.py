@@ -10,7 +10,7 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.formatting import format_text
 from scenelang.scene.fields import Rgb
 from scenelang.scene.modifiers import MaterialOp, Transform
-from scenelang.scene.nodes import Boolean, Chain, Material, Object, SceneData, SceneNode
+from scenelang.scene.nodes import Boolean, Link, Material, Object, SceneData, SceneNode
 
 _INDENT: Final = "  "
 _AXES: Final = {"[1, 0, 0]": "X", "[0, 1, 0]": "Y"}
@@ -61,17 +61,12 @@ def _node(word: str, node: SceneNode, depth: int) -> list[str | tuple[str, Scene
     statements = [material(node.material)] if node.material is not None else []
     statements += [transform(t) for t in node.transforms]
     if isinstance(node, Object):
-        return [
-            f"{margin}{word}{head} {{ {' '.join(statements)} }}"
-            if statements
-            else f"{margin}{word}{head} {{}}"
-        ]
+        return [f"{margin}{word}{head} {{ {' '.join(statements)} }}"]  # the formatter makes `{}` of `{  }`
     parts: list[str | tuple[str, SceneNode, int]] = [f"{margin}{word}{head} {{"]
-    if isinstance(node, Chain):
-        words = ["" if link.op == "union" else link.op + " " for link in node.children]
-        parts.extend([(w, link.node, depth + 1) for w, link in zip(words, node.children, strict=True)])
-    else:
-        parts.extend([("", child, depth + 1) for child in node.children])
+    for child in node.children:
+        op = child.op if isinstance(child, Link) else "union"
+        inner = child.node if isinstance(child, Link) else child
+        parts.append(("" if op == "union" else f"{op} ", inner, depth + 1))
     parts.extend([inside + statement for statement in statements])
     parts.append(margin + "}")
     return parts
@@ -115,38 +110,39 @@ def _vector(values: tuple[float, ...]) -> str:
     return f"[{', '.join(map(number, values))}]"
 
 
-def _axis(axis: tuple[float, float, float]) -> str:
-    text = _vector(axis)
-    return _AXES.get(text, text)
-
-
 def material(value: Material) -> str:
     """A material statement."""
-    ops = " ".join(transform(op) for op in value.ops)
+    ops = " ".join(map(transform, value.ops))
     return f"material {value.name} {{ {ops} }}" if ops else f"material {value.name};"
+
+
+def numbers(step: Transform | MaterialOp) -> list[float]:
+    """The numbers that a transform or an operation is called with, in both languages."""
+    match step.kind:
+        case "translate":
+            return [step.x, step.y, *([step.z] if number(step.z) != "0" else [])]
+        case "scale":
+            even = step.x == step.y == step.z
+            return [step.x] if even else [step.x, step.y, *([step.z] if step.z != 1.0 else [])]
+        case _:
+            return [value for name, value in step if name != "kind"]
 
 
 def transform(t: Transform | MaterialOp) -> str:
     """A transform, or a statement in a material's block."""
     match t.kind:
-        case "translate":
-            return (
-                f"translate({number(t.x)}, {number(t.y)}{f', {number(t.z)}' if number(t.z) != '0' else ''});"
-            )
         case "rotate":
-            axis = "" if _vector(t.axis) == "[0, 0, 1]" else f", axis = {_axis(t.axis)}"
-            return f"rotate({angle(t.angle)}{axis});"
-        case "scale":
-            if t.x == t.y == t.z:
-                return f"scale({number(t.x)});"
-            return f"scale({number(t.x)}, {number(t.y)}{f', {number(t.z)}' if t.z != 1.0 else ''});"
+            axis = _vector(t.axis)
+            about = "" if axis == "[0, 0, 1]" else f", axis = {_AXES.get(axis, axis)}"
+            given = angle(t.angle) + about
         case "shear":
-            return f"shear({t.axes} = {number(t.k)});"
+            given = f"{t.axes} = {number(t.k)}"
         case "matrix":
-            return f"matrix([{', '.join(map(_vector, t.rows))}]);"
+            given = f"[{', '.join(map(_vector, t.rows))}]"
         case "color":
-            return f"color({rgb(t.rgb)});"
+            given = rgb(t.rgb)
         case "hue":
-            return f"hue({angle(t.angle)});"
+            given = angle(t.angle)
         case _:
-            return f"{t.kind}({', '.join(number(value) for name, value in t if name != 'kind')});"
+            given = ", ".join(map(number, numbers(t)))
+    return f"{t.kind}({given});"

@@ -15,16 +15,11 @@ from scenelang.evaluate.values.value import POISON, unexpected
 from scenelang.syntax import nodes
 
 _FAST: Final[dict[str, Callable[[Any, Any], Any]]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
+    **operators.ARITHMETIC,
+    **operators.COMPARE,
     "/": operator.truediv,
     "%": operator.mod,
     "^": math.pow,
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
     "==": operator.eq,
     "!=": operator.ne,
 }

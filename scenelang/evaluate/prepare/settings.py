@@ -139,7 +139,7 @@ def _background(session: Session, span: Span, value: Any) -> None:
 
 
 def _animate(session: Session, span: Span, seconds: Any, fps: Any, loop: Any) -> None:
-    length = seconds.s if seconds.__class__ is Time else number(seconds, 0)
+    length = seconds.size if seconds.__class__ is Time else number(seconds, 0)
     rate = number(fps, 1)
     for operand, (what, value) in enumerate((("length", length), ("frame rate", rate))):
         if value <= 0.0:

@@ -28,7 +28,8 @@ def report_problem(
         report.error(problem.code, problem.message, place, help=problem.help)
         return
     blamed = operand or (operands[0] if operands else None)
-    variable = _variable(report, blamed) if problem.code in _KINDS and problem.found else None
+    odd = problem.code in _KINDS and problem.found not in ("", "a number")
+    variable = _variable(report, blamed) if odd else None
     key = None if variable is None else (problem.code, problem.found, variable.source, variable)
     shared = report.shared.get(key)
     if shared is not None and not report.follows(problem.code, place):

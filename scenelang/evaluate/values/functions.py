@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import math
+import operator
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -56,13 +57,11 @@ def number(value: Any, operand: int = 0) -> float:
 def angle(value: Any, operand: int = 0, fix: Literal["angle", "hue"] = "angle") -> float:
     """An angle in radians; 0 needs no unit."""
     if value.__class__ is Angle:
-        return value.rad
+        return float(value.size)
     if value.__class__ is float:
         if value == 0.0:
             return 0.0
-        raise Problem(
-            "E0302", "expected an angle, found a bare number", operand=operand, fix=fix, found="a bare number"
-        )
+        raise Problem("E0302", operand=operand, fix=fix, found="a bare number", expected="an angle")
     raise unexpected("an angle", value, None, operand)
 
 
@@ -127,14 +126,6 @@ def _pick(a: Any, b: Any, better: Callable[[float, float], bool]) -> Any:
     return pack(x if better(x, y) else y, unit)
 
 
-def _less(x: float, y: float) -> bool:
-    return x <= y
-
-
-def _greater(x: float, y: float) -> bool:
-    return x >= y
-
-
 def _whole(function: Callable[..., Any]) -> Callable[..., Any]:
     """``function`` with its problems blamed on the call, where steps inside know no argument."""
 
@@ -166,12 +157,11 @@ def _best(better: Callable[[float, float], bool]) -> Callable[..., Any]:
 
 def _clamp(x: Any, low: Any, high: Any) -> Any:
     if low.__class__ in UNITS and high.__class__ in UNITS:
-        bottom, ua = unpack(low)
-        top, ub = unpack(high)
+        (bottom, ua), (top, ub) = unpack(low), unpack(high)
         same_unit(bottom, ua, top, ub)
         if bottom > top:
             raise Problem("E0305", f"clamp from {bottom:.6g} down to {top:.6g}", operand=1)
-    return _pick(_pick(x, low, _greater), high, _less)
+    return _pick(_pick(x, low, operator.ge), high, operator.le)
 
 
 def round_half_away(x: float) -> float:
@@ -231,7 +221,7 @@ def _rgb(*components: Any) -> Vec:
 
 
 def _hsv(h: Any, s: Any, v: Any) -> Vec:
-    turns = h.rad / math.tau if h.__class__ is Angle else number(h, 0)
+    turns = h.size / math.tau if h.__class__ is Angle else number(h, 0)
     return Vec(colorsys.hsv_to_rgb(turns % 1.0, number(s, 1), number(v, 2)))
 
 
@@ -250,8 +240,8 @@ _MEANINGS: Final[dict[str, Callable[..., Any]]] = {
     "acos": _to_angle(math.acos),
     "atan2": _atan2,
     "abs": _abs,
-    "min": _whole(_best(_less)),
-    "max": _whole(_best(_greater)),
+    "min": _whole(_best(operator.le)),
+    "max": _whole(_best(operator.ge)),
     "clamp": _whole(_clamp),
     "floor": _of_number(lambda x: float(math.floor(x)), ""),
     "ceil": _of_number(lambda x: float(math.ceil(x)), ""),

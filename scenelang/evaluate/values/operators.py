@@ -6,16 +6,16 @@ Everything here raises `Problem` and nothing else; results are finite.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
 from typing import Any, Final
 
 from scenelang.evaluate.values.value import (
+    NAMED,
     UNITS,
-    Angle,
     MaterialValue,
     Problem,
     RangeValue,
-    Time,
     Vec,
     describe,
     pack,
@@ -33,22 +33,10 @@ def finite(value: float) -> float:
     raise Problem("E0306", "the result is too large for a number")
 
 
-def add(a: float, b: float) -> float:
-    return finite(a + b)
-
-
-def subtract(a: float, b: float) -> float:
-    return finite(a - b)
-
-
-def multiply(a: float, b: float) -> float:
-    return finite(a * b)
-
-
 def divide(a: float, b: float) -> float:
     if b == 0.0:
         raise Problem("E0304", "division by zero", operand=1)
-    return finite(a / b)
+    return a / b
 
 
 def modulo(a: float, b: float) -> float:
@@ -60,7 +48,7 @@ def modulo(a: float, b: float) -> float:
 
 def power(a: float, b: float) -> float:
     try:
-        return finite(math.pow(a, b))
+        return math.pow(a, b)
     except OverflowError:
         raise Problem("E0306", "the result is too large for a number") from None
     except ValueError:
@@ -70,18 +58,18 @@ def power(a: float, b: float) -> float:
 
 
 ARITHMETIC: Final[dict[str, Callable[[float, float], float]]] = {
-    "+": add,
-    "-": subtract,
-    "*": multiply,
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
     "/": divide,
     "%": modulo,
     "^": power,
 }
 COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
-    "<": lambda a, b: a < b,
-    "<=": lambda a, b: a <= b,
-    ">": lambda a, b: a > b,
-    ">=": lambda a, b: a >= b,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
 }
 
 
@@ -124,19 +112,19 @@ def _unit_of(op: str, a: float, ua: str, b: float, ub: str) -> str:
             return ua
         if ua == "number" and ub == "time":
             return "number"
-    verb, joint = _VERBS[op], _PREPOSITIONS[op]
     raise Problem(
         "E0303",
-        f"cannot {verb} {'an angle' if ua == 'angle' else 'a ' + ua} {joint} "
-        f"{'an angle' if ub == 'angle' else 'a ' + ub}",
+        f"cannot {_VERBS[op]} {NAMED[ua]} {_PREPOSITIONS[op]} {NAMED[ub]}",
         "divide an angle by 1rad, or a time by 1s, for a bare number",
     )
 
 
-def _odd(a: Any, b: Any) -> str:
-    """The kind of the one of two values that is not a number; empty where both are or neither is."""
+def _unfit(message: str, a: Any, b: Any, operand: int, shared: bool = True) -> Problem:
+    """Two values that an operator does not take; ``shared`` where the odd kind of one is the cause."""
     odd = [kind for kind in (describe(a), describe(b)) if kind != "a number"]
-    return odd[0] if len(odd) == 1 else ""
+    found = odd[0] if shared and len(odd) == 1 else ""
+    notes = {1 - operand: describe((a, b)[1 - operand])}
+    return Problem("E0303", message, operand=operand, notes=notes, found=found)
 
 
 def binary(op: str, a: Any, b: Any) -> Any:
@@ -149,7 +137,7 @@ def binary(op: str, a: Any, b: Any) -> Any:
     if ca in UNITS and cb in UNITS:
         x, ua = unpack(a)
         y, ub = unpack(b)
-        return pack(ARITHMETIC[op](x, y), _unit_of(op, x, ua, y, ub))
+        return pack(finite(ARITHMETIC[op](x, y)), _unit_of(op, x, ua, y, ub))
     if ca is Vec and cb is Vec:
         if len(a.items) != len(b.items):
             lengths = [f"{len(v.items)} items" for v in (a, b)]
@@ -160,25 +148,16 @@ def binary(op: str, a: Any, b: Any) -> Any:
         return Vec(tuple([binary(op, x, b) for x in a.items]))
     if ca in UNITS and cb is Vec:
         return Vec(tuple([binary(op, a, y) for y in b.items]))
-    operand = 0 if ca not in UNITS and ca is not Vec else 1
-    raise Problem(
-        "E0303",
-        f"cannot {_VERBS[op]} {describe(a)} {_PREPOSITIONS[op]} {describe(b)}",
-        operand=operand,
-        notes={1 - operand: describe((a, b)[1 - operand])},
-        found=_odd(a, b) if op in "+-*" else "",
-    )
+    message = f"cannot {_VERBS[op]} {describe(a)} {_PREPOSITIONS[op]} {describe(b)}"
+    raise _unfit(message, a, b, int(ca in UNITS or ca is Vec), op in "+-*")
 
 
 def negate(value: Any) -> Any:
     """``-value``."""
     cls = value.__class__
-    if cls is float:
-        return -value
-    if cls is Angle:
-        return Angle(-value.rad)
-    if cls is Time:
-        return Time(-value.s)
+    if cls in UNITS:
+        x, unit = unpack(value)
+        return pack(-x, unit)
     if cls is Vec:
         return Vec(tuple([negate(item) for item in value.items]))
     raise Problem("E0303", f"{describe(value)} has no negative", operand=0)
@@ -194,15 +173,7 @@ def plus(value: Any) -> Any:
 def compare(op: str, a: Any, b: Any) -> bool:
     """``a op b`` for ``< <= > >=``."""
     if a.__class__ not in UNITS or b.__class__ not in UNITS:
-        operand = 0 if a.__class__ not in UNITS else 1
-        notes = {1 - operand: describe((a, b)[1 - operand])}
-        raise Problem(
-            "E0303",
-            f"cannot order {describe(a)} and {describe(b)}",
-            operand=operand,
-            notes=notes,
-            found=_odd(a, b),
-        )
+        raise _unfit(f"cannot order {describe(a)} and {describe(b)}", a, b, int(a.__class__ in UNITS))
     x, ua = unpack(a)
     y, ub = unpack(b)
     same_unit(x, ua, y, ub)
@@ -220,8 +191,7 @@ def equal(a: Any, b: Any) -> bool:
     if a is None or b is None:
         return a is b
     if ca is not cb:
-        message = f"cannot compare {describe(a)} with {describe(b)}"
-        raise Problem("E0303", message, operand=1, notes={0: describe(a)})
+        raise _unfit(f"cannot compare {describe(a)} with {describe(b)}", a, b, 1, shared=False)
     if ca is Vec:
         return len(a.items) == len(b.items) and all(
             equal(x, y) for x, y in zip(a.items, b.items, strict=True)
@@ -233,8 +203,3 @@ def equal(a: Any, b: Any) -> bool:
     if ca is MaterialValue:
         return bool(a.material == b.material)
     return bool(a == b)
-
-
-def size(value: Any) -> int:
-    """How many numbers an operation on ``value`` touches."""
-    return value.count if value.__class__ is Vec else 1

@@ -7,7 +7,7 @@ three numbers. `POISON` stands for a value whose mistake has been reported; what
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -22,70 +22,60 @@ class Problem(Exception):
 
     Args:
         code: diagnostic code.
-        message: the fact.
+        message: the fact; made of ``expected`` and ``found`` where a kind of value was expected.
         help: advice.
         operand: which operand or argument is to blame, from 0; None for all of it.
         fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, for which the help comes
             with the fix; a ``colour`` of a string; of three ``turns`` the last.
         notes: words for further operands, by their numbers.
-        found: what is odd about a value, whatever was going to be done with it: its kind, or ``outside`` of
-            an index; empty where only the message tells. Problems that found the same may have one cause.
+        found: the kind that is odd about a value, whatever was going to be done with it. Problems that found
+            the same may have one cause.
+        expected: the kind that was expected.
     """
 
     def __init__(
         self,
         code: str,
-        message: str,
+        message: str = "",
         help: str | None = None,
         operand: int | None = None,
         fix: str = "",
         notes: Mapping[int, str] = MappingProxyType({}),
         found: str = "",
+        expected: str = "",
     ) -> None:
-        super().__init__(message)
-        self.code = code
-        self.message = message
-        self.help = help
-        self.operand = operand
-        self.fix = fix
-        self.notes = notes
-        self.found = found
+        self.code, self.help, self.operand, self.fix, self.notes = code, help, operand, fix, notes
+        self.message = message or f"expected {expected}, found {found}"
+        self.expected, self.found = expected, found
+        super().__init__(self.message)
 
 
-class Poison:
-    """The one value of an expression that has a reported mistake."""
+POISON: Final = object()
+"""The one value of an expression that has a reported mistake."""
+
+
+class _Quantity:
+    """A number of some unit."""
+
+    __slots__ = ("size",)
+
+    def __init__(self, size: float) -> None:
+        self.size = size
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.size!r})"
+
+
+class Angle(_Quantity):
+    """An angle in radians."""
 
     __slots__ = ()
 
-    def __repr__(self) -> str:
-        return "POISON"
 
-
-POISON: Final = Poison()
-
-
-class Angle:
-    """An angle in radians."""
-
-    __slots__ = ("rad",)
-
-    def __init__(self, rad: float) -> None:
-        self.rad = rad
-
-    def __repr__(self) -> str:
-        return f"Angle({self.rad!r})"
-
-
-class Time:
+class Time(_Quantity):
     """A time in seconds."""
 
-    __slots__ = ("s",)
-
-    def __init__(self, s: float) -> None:
-        self.s = s
-
-    def __repr__(self) -> str:
-        return f"Time({self.s!r})"
+    __slots__ = ()
 
 
 class Vec:
@@ -100,24 +90,20 @@ class Vec:
 
     __slots__ = ("count", "depth", "items")
 
-    count: int
-    depth: int
-
     def __init__(self, items: tuple[Any, ...]) -> None:
         self.items = items
-        count, depth = 0, 0
+        self.count = self.depth = 0
         for item in items:
             if item.__class__ is Vec:
-                count += item.count
-                depth = max(depth, item.depth)
+                self.count += item.count
+                self.depth = max(self.depth, item.depth)
             else:
-                count += 1
-        if count > MAX_VECTOR:
+                self.count += 1
+        self.depth += 1
+        if self.count > MAX_VECTOR:
             raise Problem("E0323", f"a vector of more than {MAX_VECTOR:,} numbers")
-        if depth >= MAX_VECTOR_DEPTH:
+        if self.depth > MAX_VECTOR_DEPTH:
             raise Problem("E0323", f"vectors nested deeper than {MAX_VECTOR_DEPTH}")
-        self.count = count
-        self.depth = depth + 1
 
     def __repr__(self) -> str:
         return f"Vec({self.items!r})"
@@ -187,54 +173,44 @@ class MaterialValue:
         self.material = material
 
 
-Value = float | bool | str | Angle | Time | Vec | RangeValue | MaterialValue | Poison | None
-
 COMPONENTS: Final = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
 UNITS: Final[dict[type, str]] = {float: "number", Angle: "angle", Time: "time"}
+_OF_UNIT: Final[dict[str, Callable[[float], Any]]] = {"number": float, "angle": Angle, "time": Time}
+NAMED: Final = {"number": "a number", "angle": "an angle", "time": "a time"}
+_KINDS: Final[dict[type, str]] = {
+    **{cls: NAMED[unit] for cls, unit in UNITS.items()},
+    bool: "a boolean",
+    str: "a string",
+    RangeValue: "a range",
+    MaterialValue: "a material",
+    type(None): "none",
+}
 
 
 def unpack(value: Any) -> tuple[float, str]:
     """A scalar as a number in base units (radians, seconds) and its unit's name."""
-    if value.__class__ is float:
-        return value, "number"
-    if value.__class__ is Angle:
-        return value.rad, "angle"
-    return value.s, "time"
+    cls = value.__class__
+    return (value, "number") if cls is float else (value.size, UNITS[cls])
 
 
 def pack(number: float, unit: str) -> Any:
     """The inverse of `unpack`."""
-    if unit == "number":
-        return number
-    return Angle(number) if unit == "angle" else Time(number)
+    return number if unit == "number" else _OF_UNIT[unit](number)
 
 
 def describe(value: Any) -> str:
     """What kind of value it is, for messages."""
-    cls = value.__class__
-    if cls is Vec:
+    if value.__class__ is Vec:
         count = len(value.items)
         return f"a vector of {count} item{'' if count == 1 else 's'}"
-    names = {
-        float: "a number",
-        Angle: "an angle",
-        Time: "a time",
-        bool: "a boolean",
-        str: "a string",
-        RangeValue: "a range",
-        MaterialValue: "a material",
-        type(None): "none",
-    }
-    return names.get(cls, "another value")
+    return _KINDS.get(value.__class__, "another value")
 
 
 def unexpected(
     expected: str, value: Any, help: str | None = None, operand: int | None = None, fix: str = ""
 ) -> Problem:
     """A value of another kind than is expected; arguments as of `Problem`."""
-    kind = describe(value)
-    found = "" if kind == "a number" else kind  # which is odd in no way of its own
-    return Problem("E0301", f"expected {expected}, found {kind}", help, operand, fix, found=found)
+    return Problem("E0301", "", help, operand, fix, found=describe(value), expected=expected)
 
 
 def show(number: float) -> str:
