@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final
 
+from scenelang.diagnostics.span import Span
 from scenelang.resolve.names import Names
 from scenelang.resolve.symbols import Kind, Symbol
 from scenelang.syntax import nodes
