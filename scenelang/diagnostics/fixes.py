@@ -6,7 +6,7 @@ editor sends the edits of one `Fix`, or what `settle` makes of its open buffers.
 
 from __future__ import annotations
 
-from bisect import bisect_left
+from bisect import bisect_left, insort_left
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from typing import Final, Generic, TypeVar
 
@@ -33,25 +33,23 @@ def apply_fixes(text: str, diagnostics: Iterable[Diagnostic]) -> tuple[str, tupl
     Returns:
         The text with the fixes, and the diagnostics whose fixes went into it, in the order of the text.
     """
-    candidates = [(d, d.fix.edits) for d in diagnostics if d.fix is not None and _fits(d.fix, text)]
-    candidates.sort(key=lambda c: [(e.span.start, e.span.end) for e in c[1]])
     taken: list[Edit] = []  # in the order of the text, none touching another
     done: list[Diagnostic] = []
     whole: set[tuple[Edit, ...]] = set()
-    for diagnostic, edits in candidates:
+    candidates = [(d, d.fix.edits) for d in diagnostics if d.fix is not None and _fits(d.fix, text)]
+    for diagnostic, edits in sorted(candidates, key=lambda candidate: [*map(_order, candidate[1])]):
         if edits not in whole:
             if any(_meets(taken, edit) for edit in edits):
                 continue
             whole.add(edits)
             for edit in edits:
-                taken.insert(_place(taken, edit), edit)
+                insort_left(taken, edit, key=_order)
         done.append(diagnostic)
-    return _edited(text, taken), tuple(done)
-
-
-def apply_fix(text: str, fix: Fix) -> str:
-    """The text with one fix, whose edits must not overlap; for previews and code actions."""
-    return _edited(text, sorted(fix.edits, key=lambda e: (e.span.start, e.span.end)))
+    parts, at = [], 0
+    for edit in taken:
+        parts += [text[at : edit.span.start], edit.replacement]
+        at = edit.span.end
+    return "".join([*parts, text[at:]]), tuple(done)
 
 
 def removal(source: SourceFile, start: int, end: int) -> Fix:
@@ -79,27 +77,19 @@ def _fits(fix: Fix, text: str) -> bool:
     )
 
 
-def _place(taken: list[Edit], edit: Edit) -> int:
-    return bisect_left(taken, (edit.span.start, edit.span.end), key=lambda e: (e.span.start, e.span.end))
+def _order(edit: Edit) -> tuple[int, int]:
+    return edit.span.start, edit.span.end
 
 
 def _meets(taken: list[Edit], edit: Edit) -> bool:
     """Whether an edit shares text with a neighbour, or an insertion its place: then order would matter."""
-    at = _place(taken, edit)
+    at = bisect_left(taken, _order(edit), key=_order)
     for other in taken[max(0, at - 1) : at + 1]:
-        first, second = sorted((edit.span, other.span), key=lambda s: (s.start, s.end))
-        empty = first.start == first.end or second.start == second.end
-        if second.start < first.end or (empty and second.start == first.end):
+        (start, end), (next_start, next_end) = sorted((_order(edit), _order(other)))
+        empty = start == end or next_start == next_end
+        if next_start < end or (empty and next_start == end):
             return True
     return False
-
-
-def _edited(text: str, edits: Iterable[Edit]) -> str:
-    parts, at = [], 0
-    for edit in edits:
-        parts += [text[at : edit.span.start], edit.replacement]
-        at = edit.span.end
-    return "".join([*parts, text[at:]])
 
 
 # ---------------------------------------------------------------- until nothing changes

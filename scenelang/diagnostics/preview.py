@@ -91,9 +91,8 @@ def _inserted(
         tail = len(in_cells(text[len(text.rstrip()) :]).cells)
         if left - moved + lead < len(cells):
             canvas.put(1, max(left - moved + lead, 0), "+" * (right - left - lead - tail), "added")
-    head = paint("frame", f"{number:>{gutter}} |", color)
-    bare = paint("frame", " " * gutter + " |", color)
     shown, under = (*canvas.lines(color), "")[:2]
+    head, bare = (paint("frame", f"{n:>{gutter}} |", color) for n in (number, ""))
     return [f"{head} {shown}", f"{bare} {under}".rstrip()]
 
 
@@ -104,23 +103,20 @@ def _changed(
     stop = start
     for _ in range(first, last + 1):
         stop = source.text.find("\n", stop) + 1 or len(source.text) + 1
-    at_first = edits[0].span.start - start
     old = source.text[start:stop]
     new, at = "", 0
     for edit in edits:
         new += old[at : edit.span.start - start] + edit.replacement
         at = edit.span.end - start
-    new += old[at:]
     rows = []
-    for sign, text, style in (("-", old, "removed"), ("+", new, "added")):
+    for sign, text, style in (("-", old, "removed"), ("+", new + old[at:], "added")):
         lines = text.removesuffix("\n").split("\n") if text.strip() or sign == "-" else []
         for offset, line in enumerate(lines[:_MOST_LINES]):
-            cells = _shown(line.rstrip("\r"), 0 if offset else at_first, max(width - gutter - 3, 30))
+            near = 0 if offset else edits[0].span.start - start
+            shown = "".join(_shown(line.rstrip("\r"), near, max(width - gutter - 3, 30)))
             head = paint("frame", f"{first + offset:>{gutter}}", color)
-            shown = "".join(cells)
             rows.append(f"{head} {paint(style, f'{sign} {shown}'.rstrip(), color)}")
-        if len(lines) > _MOST_LINES:
-            rows.append(paint("frame", "...", color))
+        rows += [paint("frame", "...", color)] * (len(lines) > _MOST_LINES)
     return rows
 
 

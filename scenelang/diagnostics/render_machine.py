@@ -26,6 +26,8 @@ def render_json(diagnostics: Iterable[Diagnostic]) -> str:
 
 
 def _plain(diagnostic: Diagnostic) -> dict[str, Any]:
+    fix = diagnostic.fix
+    edits = [{**_place(edit.span), "replacement": edit.replacement} for edit in fix.edits] if fix else []
     return {
         "code": diagnostic.code,
         "severity": diagnostic.severity,
@@ -33,26 +35,15 @@ def _plain(diagnostic: Diagnostic) -> dict[str, Any]:
         **_place(diagnostic.span),
         "labels": [{"message": label.message, **_place(label.span)} for label in diagnostic.labels],
         "help": diagnostic.help,
-        "fix": _plain_fix(diagnostic.fix),
+        "fix": {"message": fix.message, "edits": edits} if fix else None,
     }
-
-
-def _plain_fix(fix: Fix | None) -> dict[str, Any] | None:
-    if fix is None:
-        return None
-    edits = [{**_place(edit.span), "replacement": edit.replacement} for edit in fix.edits]
-    return {"message": fix.message, "edits": edits}
 
 
 def _place(span: Span | None) -> dict[str, Any]:
     if span is None:
         return {"file": None, "start": None, "end": None}
-    start, end = span.locate()
-    return {
-        "file": span.source.name,
-        "start": {"line": start[0], "column": start[1]},
-        "end": {"line": end[0], "column": end[1]},
-    }
+    start, end = ({"line": line, "column": column} for line, column in span.locate())
+    return {"file": span.source.name, "start": start, "end": end}
 
 
 def render_concise(diagnostics: Iterable[Diagnostic]) -> str:
@@ -106,15 +97,12 @@ def render_sarif(diagnostics: Iterable[Diagnostic], version: str | None = None) 
     if version is not None:
         driver["version"] = version
     errors = sum(d.severity == "error" for d in found)
+    counts = {"errors": errors, "warnings": len(found) - errors}
     run = {
         "tool": {"driver": driver},
         "columnKind": "unicodeCodePoints",
         "results": [_result(d, used.index(d.code)) for d in found],
-        "properties": {
-            "errors": errors,
-            "warnings": len(found) - errors,
-            "fixable": sum(d.fix is not None for d in found),
-        },
+        "properties": {**counts, "fixable": sum(d.fix is not None for d in found)},
     }
     log = {"$schema": _SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
     return json.dumps(log, indent=2, ensure_ascii=False) + "\n"
@@ -180,10 +168,9 @@ def _uri(name: str) -> str:
 
     path = _relative(name)
     try:
-        data = path.encode("utf-8", "surrogateescape")  # how Python names files that are no UTF-8
+        path = quote(path.encode("utf-8", "surrogateescape"), safe="/~")  # names not in UTF-8
     except UnicodeEncodeError:
-        data = path.encode("utf-8", "surrogatepass")
-    path = quote(data, safe="/~")
+        path = quote(path.encode("utf-8", "surrogatepass"), safe="/~")
     return f"file://{path}" if path.startswith("/") else path
 
 
@@ -191,11 +178,6 @@ def _sarif_fix(fix: Fix) -> dict[str, Any]:
     changes: dict[str, list[dict[str, Any]]] = {}
     for edit in fix.edits:
         replacement = {"deletedRegion": _region(edit.span), "insertedContent": {"text": edit.replacement}}
-        changes.setdefault(edit.span.source.name, []).append(replacement)
-    return {
-        "description": {"text": fix.message},
-        "artifactChanges": [
-            {"artifactLocation": {"uri": _uri(name)}, "replacements": replacements}
-            for name, replacements in changes.items()
-        ],
-    }
+        changes.setdefault(_uri(edit.span.source.name), []).append(replacement)
+    files = [{"artifactLocation": {"uri": uri}, "replacements": own} for uri, own in changes.items()]
+    return {"description": {"text": fix.message}, "artifactChanges": files}

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix
-from scenelang.diagnostics.fixes import apply_fix, apply_fixes, removal, settle
+from scenelang.diagnostics.fixes import apply_fixes, removal, settle
 from scenelang.diagnostics.span import SourceFile, Span
 
 TEXT = "abcdef"
@@ -56,10 +56,8 @@ def test_diagnostics_without_a_fix_and_of_other_texts_are_left_out() -> None:
     assert apply_fixes(TEXT, [other, none]) == (TEXT, ())
 
 
-def test_one_fix() -> None:
-    change = fix((4, 5, "Y"), (0, 0, "X")).fix
-    assert change is not None
-    assert apply_fix(TEXT, change) == "XabcdYf"
+def test_one_fix_of_two_edits() -> None:
+    assert apply_fixes(TEXT, [fix((4, 5, "Y"), (0, 0, "X"))])[0] == "XabcdYf"
 
 
 @pytest.mark.parametrize(
@@ -75,7 +73,9 @@ def test_one_fix() -> None:
 )
 def test_removal(text: str, after: str) -> None:
     at = text.index("b;")
-    assert apply_fix(text, removal(SourceFile("a.nsg", text), at, at + 2)) == after
+    source = SourceFile("a.nsg", text)
+    gone = Diagnostic("E0101", "m", Span(source, at, at + 2), fix=removal(source, at, at + 2))
+    assert apply_fixes(text, [gone])[0] == after
 
 
 @given(
