@@ -12,10 +12,10 @@ from functools import cache
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
-from scenelang.records import Record
 from scenelang.syntax.automaton import advance, completion, fits, reach
 from scenelang.syntax.layout import Slip, find_slips
 from scenelang.syntax.mistakes import report_broken_off, report_instead
+from scenelang.syntax.repairs import Repair
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
 
@@ -33,14 +33,6 @@ def balance(tokens: Tokens, report: Report) -> None:
     for slip in reversed(find_slips(tokens)):  # from the last on, so that indices hold
         mender.mend(slip)
     mender.match_the_rest()
-
-
-class _Mend(Record):
-    """Put ``insert`` in the place of ``delete`` tokens at index ``at``."""
-
-    at: int
-    delete: int
-    insert: tuple[int, ...]
 
 
 @cache
@@ -86,7 +78,7 @@ class _Mender:
             return
         reach(start, kinds, 0, at)
         end = min(at + 2 * _BEHIND, len(kinds))
-        for mend in (_Mend(at, 1, ()), *(_Mend(at, 1, (other,)) for other in _instead())):
+        for mend in (Repair(at, 1, ()), *(Repair(at, 1, (other,)) for other in _instead())):
             trial = start.copy()
             if all(advance(trial, kind) for kind in mend.insert) and reach(trial, kinds, at + 1, end) == end:
                 self._apply(mend)
@@ -107,7 +99,7 @@ class _Mender:
                 stop += len(mend.insert) - mend.delete
             self._apply(mend)
 
-    def _best(self, slip: Slip, stop: int, count: int) -> tuple[_Mend, bool]:
+    def _best(self, slip: Slip, stop: int, count: int) -> tuple[Repair, bool]:
         """How to mend a line, and whether all fits then.
 
         Args:
@@ -132,9 +124,9 @@ class _Mender:
         for at in range(first, places.start):
             depth += (kinds[at] == self.opening) - (kinds[at] == self.closing)
             advance(stack, kinds[at])
-        found = []  # how far all fits then, how likely it is, and what to do
+        found = []  # how far all fits then, and what to do
         for at in places:
-            for likely, mend in self._mends(stack, at, stop, limit, opens, count):
+            for mend in self._mends(stack, at, stop, limit, opens, count):
                 if mend.insert.count(self.closing) > depth:
                     continue  # it would close more than is open
                 trial = stack.copy()
@@ -142,67 +134,64 @@ class _Mender:
                     got = reach(trial, kinds, at + mend.delete, end)
                     if got == end == len(kinds) - 1 and not fits(trial, self.closing):
                         got -= 1  # the text would end in the middle of a statement
-                    found.append((got, likely, at, mend))
+                    found.append((got, mend))
             depth += (kinds[at] == self.opening) - (kinds[at] == self.closing)
             if not advance(stack, kinds[at]):
                 break
-        got, _, _, mend = max(found, key=lambda one: one[:3], default=(-1, 0.0, 0, self._at_end(stop, opens)))
+        default = -1, self._at_end(stop, opens)
+        got, mend = max(found, key=lambda one: (one[0], -one[1].cost, one[1].at), default=default)
         if got <= misfit < end:  # another mistake is in the way: the end of the line is as good a guess
             last = [index for index in places if kinds[index] == surplus and index < limit][-1:]
-            return (_Mend(last[0], 1, ()) if opens and last else self._at_end(stop, opens)), False
+            return (Repair(last[0], 1, ()) if opens and last else self._at_end(stop, opens)), False
         return mend, got == end
 
-    def _at_end(self, stop: int, opens: bool) -> _Mend:
-        return _Mend(stop, 0, (self.opening if opens else self.closing,))
+    def _at_end(self, stop: int, opens: bool) -> Repair:
+        return Repair(stop, 0, (self.opening if opens else self.closing,))
 
     def _mends(
         self, stack: list[int], at: int, stop: int, limit: int, opens: bool, count: int
-    ) -> Iterator[tuple[float, _Mend]]:
-        """What may be done at one place, and how likely each is."""
+    ) -> Iterator[Repair]:
+        """What may be done at one place, each the cheaper the likelier it is."""
         kind = self.tokens.kinds[at]
         surplus, missing = (self.closing, self.opening) if opens else (self.opening, self.closing)
         wanted = (missing,) * count
         if at <= stop:
-            yield 0.3, _Mend(at, 0, wanted)
+            yield Repair(at, 0, wanted, -0.3)
         if at == stop:
             yield from self._broken_off(stack, at, wanted)
         if at >= limit:
             return
         if kind == surplus:
             if count == 1:
-                yield 0.5 if opens else 0.2, _Mend(at, 1, ())
+                yield Repair(at, 1, (), -0.5 if opens else -0.2)
                 for rank, other in enumerate(_instead()):
-                    yield 0.1 - 0.001 * rank, _Mend(at, 1, (other,))
+                    yield Repair(at, 1, (other,), 0.001 * rank - 0.1)
             else:
-                yield 0.4, _Mend(at, 1, (missing,) * (count - 1))
+                yield Repair(at, 1, (missing,) * (count - 1), -0.4)
         elif kind != missing:
-            yield 0.1, _Mend(at, 1, wanted)
+            yield Repair(at, 1, wanted, -0.1)
 
-    def _broken_off(
-        self, stack: list[int], at: int, wanted: tuple[int, ...]
-    ) -> Iterator[tuple[float, _Mend]]:
+    def _broken_off(self, stack: list[int], at: int, wanted: tuple[int, ...]) -> Iterator[Repair]:
         """The line breaks off before a token: what its statement lacks, and the braces after that."""
         semicolon = tables().literals[";"]
         if fits(stack, self.closing):  # nothing is unfinished inside the block
             if wanted[0] == self.closing:
-                yield 0.25, _Mend(at, 0, (*wanted, semicolon))
+                yield Repair(at, 0, (*wanted, semicolon), -0.25)
             return
-        if wanted[0] == self.opening:
-            missing = completion(stack, self.opening)
-        else:
-            missing = completion(stack, semicolon)
-            missing = None if missing is None else (*missing, semicolon)
-        if not missing or (len(wanted) > 1 and wanted[0] == self.opening):
+        opens = wanted[0] == self.opening
+        missing = completion(stack, self.opening if opens else semicolon)
+        if missing is None or (opens and (not missing or len(wanted) > 1)):
             return
+        missing += () if opens else (semicolon,)
         insert = (*missing, *wanted)
         trial = stack.copy()
         if all(advance(trial, kind) for kind in insert) and not fits(trial, self.tokens.kinds[at]):
             insert += (*(completion(trial, semicolon) or ()), semicolon)
-        yield 0.6, _Mend(at, 0, insert)
+        yield Repair(at, 0, insert, -0.6)
 
     # ------------------------------------------------------------ mending
 
-    def _apply(self, mend: _Mend) -> None:
+    def _apply(self, mend: Repair) -> None:
         tokens, at = self.tokens, mend.at
         names = [tables().kinds[kind] for kind in mend.insert]
         end = tokens.end_before(at)
@@ -220,49 +209,37 @@ class _Mender:
 
     def _report_unclosed(self, at: int, count: int, ends: bool = False) -> None:
         end = self.tokens.end_before(at)
-        labels = [
-            Label(self._span(index), "this block is not closed") for index in self._open(at)[-count:][-3:]
-        ]
+        places = [Span(self.tokens.source, *self.tokens.place(index)) for index in self._unmatched(at)[0]]
+        labels = [Label(place, "this block is not closed") for place in places[-count:][-3:]]
         times = f" {count} times" if count > 1 else ""
         brace = "`};`" if ends else "`}`"
         self.report.add("E0104", f"missing {brace}{times}", end, end, labels=labels)
 
     def _report_unmatched(self, at: int) -> None:
-        span = self._span(at)
-        self.report.add("E0105", f"unmatched `{span.text}`", span.start, span.end)
+        self.report.add("E0105", f"unmatched `{self.tokens.text(at)}`", *self.tokens.place(at))
 
     def match_the_rest(self) -> None:
         """Drop what still closes nothing and close what is still open."""
         tokens = self.tokens
-        depth = 0
-        stray = []
-        for at, kind in enumerate(tokens.kinds):
-            if kind == self.opening:
-                depth += 1
-            elif kind == self.closing and depth:
-                depth -= 1
-            elif kind == self.closing:
-                stray.append(at)
+        open_, stray = self._unmatched(len(tokens.kinds))
         for at in stray:
             self._report_unmatched(at)
         tokens.drop(stray)
-        if not depth:
-            return
         last = len(tokens.kinds) - 1
-        if not tokens.cut:
-            self._report_unclosed(last, depth)
-        tokens.replace(last, 0, [self.closing] * depth)
+        if open_ and not tokens.cut:
+            self._report_unclosed(last, len(open_))
+        tokens.replace(last, 0, [self.closing] * len(open_))
 
-    def _open(self, at: int) -> list[int]:
-        """Indices of the braces open before a token."""
+    def _unmatched(self, stop: int) -> tuple[list[int], list[int]]:
+        """Indices of the braces before a token that are open there, and of those that close nothing."""
         open_: list[int] = []
-        for index in range(at):
-            kind = self.tokens.kinds[index]
+        stray: list[int] = []
+        for index, kind in enumerate(self.tokens.kinds[:stop]):
             if kind == self.opening:
                 open_.append(index)
-            elif kind == self.closing and open_:
-                open_.pop()
-        return open_
-
-    def _span(self, index: int) -> Span:
-        return Span(self.tokens.source, self.tokens.starts[index], self.tokens.ends[index])
+            elif kind == self.closing:
+                if open_:
+                    open_.pop()
+                else:
+                    stray.append(index)
+        return open_, stray

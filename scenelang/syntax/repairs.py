@@ -34,7 +34,7 @@ class Repair(Record):
     at: int
     delete: int
     insert: tuple[int, ...]
-    cost: float
+    cost: float = 0
 
     @property
     def end(self) -> int:
@@ -72,29 +72,23 @@ _NEW_LINE = 0.6  # a token that begins a line is seldom the slip
 _CLOSING, _CLOSING_AND_SEMICOLON = 1.1, 1.8
 
 
-@cache
-def _insertions() -> list[tuple[Kinds, float, int, int]]:
-    """What may be forgotten, in kinds: the tokens, the cost, what has to stand after and before, or -1."""
-    kind = tables().kind
-    return [
-        (
-            tuple(map(kind, names.split())),
-            cost,
-            kind(_ONLY_BEFORE[names]) if names in _ONLY_BEFORE else -1,
-            kind(_ONLY_AFTER[names]) if names in _ONLY_AFTER else -1,
-        )
-        for names, cost in _INSERTIONS.items()
-    ]
+def _kinds(names: str) -> Kinds:
+    return tuple(map(tables().kind, names.split()))
 
 
 @cache
-def _replacements() -> dict[int, list[tuple[Kinds, float]]]:
+def _insertions() -> list[tuple[Kinds, float, Kinds, Kinds]]:
+    """What may be forgotten: the tokens, the cost, what has to stand after and before, if that matters."""
+    only = [(_ONLY_BEFORE.get(names, ""), _ONLY_AFTER.get(names, "")) for names in _INSERTIONS]
+    costs = zip(_INSERTIONS.items(), only, strict=True)
+    return [(_kinds(names), cost, _kinds(after), _kinds(before)) for (names, cost), (after, before) in costs]
+
+
+@cache
+def _replacements() -> dict[Kinds, list[tuple[Kinds, float]]]:
     """What may be written for something else, in kinds."""
-    kind = tables().kind
-    return {
-        kind(name): [(tuple(map(kind, names.split())), cost) for names, cost in costs.items()]
-        for name, costs in REPLACEMENTS.items()
-    }
+    rows = REPLACEMENTS.items()
+    return {_kinds(name): [(_kinds(new), cost) for new, cost in costs.items()] for name, costs in rows}
 
 
 Found = tuple[float, float, Repair, list[int]]
@@ -207,16 +201,16 @@ class Search:
         before = kinds[at - 1] if at else END
         after = kinds[at + 1] if kind != END else END
         for insert, cost, needed_after, needed_before in _insertions():
-            if needed_before not in (-1, before) or not fits(stack, insert[0]):
+            if needed_before not in ((), (before,)) or not fits(stack, insert[0]):
                 continue
             if (
-                needed_after in (-1, after)
+                needed_after in ((), (after,))
                 and kind not in self.fixed
                 and insert != (kind,)
                 and not insert[1:]
             ):
                 yield Repair(at, 1, insert, cost + _SUBSTITUTION + _NEW_LINE * new_line)
-            if needed_after not in (-1, kind):
+            if needed_after not in ((), (kind,)):
                 continue
             if insert[0] == self.semicolon and (new_line or kind in self.ends):
                 cost = 1.0
@@ -229,7 +223,7 @@ class Search:
             yield Repair(at, 2, (kinds[at + 1], kind), _SWAP)
         if kind in self.fixed:
             return
-        for insert, cost in _replacements().get(kind, ()):
+        for insert, cost in _replacements().get((kind,), ()):
             header = kind == self.equal and self.kinds[self.first] in self.bodies
             yield Repair(at, 1, insert, cost + 0.5 * header)
         if kind in self.keywords:
