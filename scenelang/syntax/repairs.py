@@ -121,10 +121,6 @@ class Search:
                 break
         self.name = tables().kind("NAME")
         self.keywords = {kind for text, kind in literals.items() if text.isalpha()}
-        self.equal = literals["="]
-        self.bodies = {literals["fn"], literals["module"]}
-        self.definitions = {literals["let"], literals["param"], *self.bodies}
-        self.comma = literals[","]
 
     def run(self, base: list[int], stack: list[int]) -> Repair | None:
         """The best repair, or None where none helps.
@@ -134,8 +130,7 @@ class Search:
             stack: the states at the mistake; used as they are where the statement is too long to replay.
         """
         if self.at - self.first > MAX_REPLAY:
-            best = self._settle(self._try_all(stack, self.at))
-            return best[1] if best is not None else None
+            return self._settle(self._try_all(stack, self.at))[1]
         # Replayed, since the parser may have applied rules that only the bad token asked for.
         prefixes = []
         prefix = base.copy()
@@ -150,13 +145,12 @@ class Search:
         for at, prefix in prefixes:
             if self._begins_statement(at):
                 found += self._try(prefix, at, self._broken_off(prefix, at, 0.7 - 0.1 * (self.at - at)))
-        best = self._settle(found)
-        if best is not None and best[0] >= self._worth(self.at + FOLLOWED) - 2:
-            return best[1]
-        for at, prefix in prefixes:
-            found += self._try_all(prefix, at)
-        best = self._settle(found)
-        return best[1] if best is not None else None
+        score, best = self._settle(found)
+        if best is None or score < self._worth(self.at + FOLLOWED) - 2:
+            for at, prefix in prefixes:
+                found += self._try_all(prefix, at)
+            best = self._settle(found)[1]
+        return best
 
     def _worth(self, stop: int) -> float:
         """What it is worth that the tokens up to ``stop`` fit: those of later statements count little."""
@@ -185,13 +179,13 @@ class Search:
             found.append((self._worth(stop) - cost, cost, repair, trial))
         return found
 
-    def _settle(self, found: list[Found]) -> tuple[float, Repair] | None:
-        """The best of several repairs: the few that look best are followed further."""
-        settled = []
+    def _settle(self, found: list[Found]) -> tuple[float, Repair | None]:
+        """The best of several repairs and its score: the few that look best are followed further."""
+        settled: list[tuple[float, Repair | None]] = []
         for _, cost, repair, trial in sorted(found, key=lambda one: -one[0])[:8]:
             stop = reach(trial.copy(), self.kinds, repair.end, max(self.at, repair.end) + FOLLOWED)
             settled.append((self._worth(stop) - cost, repair))
-        return max(settled, key=lambda one: one[0], default=None)
+        return max(settled, key=lambda one: one[0], default=(0.0, None))
 
     def _candidates(self, stack: list[int], at: int) -> Iterator[Repair]:
         tokens, kinds = self.tokens, self.kinds
@@ -219,12 +213,13 @@ class Search:
             yield Repair(at, 0, insert, cost)
         if new_line or kind in self.ends:
             yield from self._broken_off(stack, at)
-        if kinds[at + 1 :] and self._swappable(kind, kinds[at + 1]):
+        # Two tokens the wrong way round; at most one of them is a brace.
+        if END not in (kind, after) and kind != after and not self.fixed.issuperset((kind, after)):
             yield Repair(at, 2, (kinds[at + 1], kind), _SWAP)
         if kind in self.fixed:
             return
         for insert, cost in _replacements().get((kind,), ()):
-            header = kind == self.equal and self.kinds[self.first] in self.bodies
+            header = kind == tables().literals["="] and self._is(self.first, "fn", "module")
             yield Repair(at, 1, insert, cost + 0.5 * header)
         if kind in self.keywords:
             yield Repair(at, 1, (self.name,), _KEYWORD_AS_NAME + (at < self.at))
@@ -245,16 +240,18 @@ class Search:
     def _misspelt(self, at: int) -> Iterator[Repair]:
         """A keyword with a slip, or an operator written as a word."""
         if self.kinds[at] == self.name:
-            if operator := OPERATORS.get(self.tokens.text(at)):
-                yield Repair(at, 1, (tables().literals[operator],), _MISSPELT)
-            for word in keywords_near(self.tokens.text(at)):
+            text = self.tokens.text(at)
+            for word in (*([OPERATORS[text]] if text in OPERATORS else []), *keywords_near(text)):
                 yield Repair(at, 1, (tables().literals[word],), _MISSPELT)
+
+    def _is(self, at: int, *words: str) -> bool:
+        return any(self.kinds[at] == tables().literals[word] for word in words)
 
     def _begins_statement(self, at: int) -> bool:
         """Whether a line inside brackets is laid out like a statement of its own."""
         if not self.tokens.on_new_line(at):
             return False
-        inside = self.kinds[at - 1] in self.definitions or self.open_brackets(at)
+        inside = self._is(at - 1, "let", "param", "fn", "module") or self.open_brackets(at)
         return bool(inside) and self.kinds[at] in (self.name, *self.keywords) and leaves_open(self.kinds, at)
 
     def _broken_off(self, stack: list[int], at: int, cost: float = _BREAK) -> Iterator[Repair]:
@@ -265,17 +262,13 @@ class Search:
             if missing:
                 yield Repair(at, 0, (*missing, goal, *rest), cost + 0.05 * len(missing))
 
-    def _swappable(self, left: int, right: int) -> bool:
-        """Whether two tokens may be the wrong way round; at most one of them is a brace."""
-        return END not in (left, right) and left != right and not (left in self.fixed and right in self.fixed)
-
     def _closings(self, at: int) -> Iterator[Repair]:
         """Close one bracket, or all that are open, perhaps ending the statement too."""
         open_ = self.open_brackets(at)
         if not open_:
             return
         # Nobody forgets to close what holds nothing, or after a comma.
-        dangling = at - 1 == open_[-1] or self.kinds[at - 1] == self.comma
+        dangling = at - 1 == open_[-1] or self._is(at - 1, ",")
         closings = tuple(self.closing_of[self.kinds[index]] for index in reversed(open_))
         yield Repair(at, 0, closings[:1], _CLOSING + dangling)
         if len(closings) > 1:
@@ -284,7 +277,7 @@ class Search:
         if self.kinds[at] not in self.fixed and self.kinds[at] not in self.closings:
             yield Repair(at, 1, closings[:1], _CLOSING + dangling + _SUBSTITUTION)
         if self.tokens.on_new_line(at):
-            yield Repair(at, 0, (closings[0], self.comma), _CLOSING_AND_SEMICOLON + dangling)
+            yield Repair(at, 0, (closings[0], tables().literals[","]), _CLOSING_AND_SEMICOLON + dangling)
 
     def open_brackets(self, at: int) -> list[int]:
         """Indices of the brackets of the statement that are open before a token."""
