@@ -67,9 +67,8 @@ HABITS: Final = (
     # loops and conditions
     Habit("for (<i> = [<A>:<S>:<B>])", "for (<i> in <A>..<B> step <S>)", _LOOP),
     Habit("for (<i> = [<A>:<B>])", "for (<i> in <A>..<B>)", _LOOP),
-    Habit("for (<let|var|int?> <i> = <A>; <i> < <B>; <i>++)", "for (<i> in <A>..<<B>)", _LOOP, code="E0126"),
-    Habit("for (<let|var|int?> <i> = <A>; <i> <= <B>; <i>++)", "for (<i> in <A>..<B>)", _LOOP, code="E0126"),
-    _unsafe("for (<type> <i> = <A>; <B?>; <C?>)", "for (<i> in BAD_EXPRESSION)", _LOOP, _PASSES, "E0126"),
+    Habit("for (<let?> <i> = <A>; <i> < <B>; <i>++)", "for (<i> in <A>..<<B>)", _LOOP, code="E0126"),
+    Habit("for (<let?> <i> = <A>; <i> <= <B>; <i>++)", "for (<i> in <A>..<B>)", _LOOP, code="E0126"),
     _unsafe("for (<let?> <i> = <A>; <B?>; <C?>)", "for (<i> in BAD_EXPRESSION)", _LOOP, _PASSES, "E0126"),
     Habit("for (<let?> <i> <=|of|in> <E>)", "for (<i> in <E>)", _LOOP),
     Habit("for <i> in <E>: <BODY>", "for (<i> in <E>) { <BODY> }", _BRACES),
@@ -78,11 +77,9 @@ HABITS: Final = (
     Habit("<A> if <C> else <B>", "<C> ? <A> : <B>", "`if` does not choose between values"),
     # functions and modules
     Habit("<fn> <f>(<PARAMS?>) { return <E> <;?> }", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
-    Habit("<type> <f>(<PARAMS?>) { return <E> <;?> }", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     Habit("<fn> <f>(<PARAMS?>): return <LINE> <;?>", "fn <f>(<PARAMS>) = <LINE>;", _FUNCTION),
     Habit("<fn> <f>(<PARAMS?>) <=|-> > <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     _unsafe("<fn> <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, "write fn <f>(x) = x ^ 2;"),
-    _unsafe("<type> <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, "write fn <f>(x) = x ^ 2;"),
     _unsafe(
         "void <f>(<P?>) <BLOCK>",
         "BAD_STATEMENT",
@@ -94,7 +91,6 @@ HABITS: Final = (
     Habit("<let> <f> = lambda <P?>: <E>;", "fn <f>(<P>) = <E>;", _FUNCTION),
     Habit("<let> <f> = function(<P?>) { return <E> <;?> } <;?>", "fn <f>(<P>) = <E>;", _FUNCTION),
     Habit("<let> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
-    Habit("<type> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     Habit("module <f>(<P?>) = <E>;", "fn <f>(<P>) = <E>;", "`module` where `fn` belongs", code="E0130"),
     Habit("fn <f>(<PARAMS>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _TYPES),
     Habit("module <f>(<PARAMS>) {", "module <f>(<PARAMS>) {", _TYPES),

@@ -34,8 +34,8 @@ MOST: Final = 200
 TYPES: Final = ("float", "int", "bool", "double", "number", "string", *(f"vec{n}" for n in "234"), "color")
 WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "type": TYPES,
-    "fn": ("fn", "function", "func", "fun", "def"),
-    "let": ("let", "var", "const"),
+    "fn": ("fn", "function", "func", "fun", "def", *TYPES),
+    "let": ("let", "var", "const", *TYPES),
     "node": tuple(NODES),
     "call": (*(TRANSFORMS | OPERATIONS), "canvas", "background"),
     "control": ("for", "if"),
