@@ -84,10 +84,6 @@ def comments_of(tokens: Tokens) -> list[str]:
     return found
 
 
-def _stripped(text: str) -> str:
-    return "\n".join(line.rstrip() for line in text.split("\n"))
-
-
 class _Gap:
     """What stands between the token before ``index`` and that token."""
 
@@ -96,12 +92,9 @@ class _Gap:
         self.notes = notes
         self.index = index
 
-    def _note(self, index: int) -> Notes:
-        return self.notes.setdefault(index, Notes())
-
     def attach(self, start: int, end: int) -> None:
         comments, newlines = self._read(start, end)
-        here = self._note(self.index)
+        here = self.notes.setdefault(self.index, Notes())
         behind = self._behind(comments, newlines) if self.index else 0
         ahead = self._ahead(comments, newlines, behind)
         here.blank = newlines[ahead] > 1
@@ -110,9 +103,9 @@ class _Gap:
         leading = comments[ahead:]
         if last := comments[:behind]:
             if last[-1].ends_line or ahead > behind:
-                self._note(self.index - 1).after += last
+                self.notes.setdefault(self.index - 1, Notes()).after += last
             elif self._closes(self.index) or (newlines[behind] and self._separates(self.index - 1)):
-                self._note(self.index - 1).trailing = last
+                self.notes.setdefault(self.index - 1, Notes()).trailing = last
             else:
                 leading = [*last, *leading]
                 here.blank = False
@@ -128,17 +121,13 @@ class _Gap:
             begins = match.start()
             newlines.append(text.count("\n", at, begins))
             at = match.end()
-            words = _stripped(match[0])
+            words = "\n".join(line.rstrip() for line in match[0].split("\n"))
             several = "\n" in words
-            column = self._column(begins) if several else None
+            line = text[text.rfind("\n", 0, begins) + 1 : begins]
+            column = len(line) if several and "\t" not in line else None
             comments.append(Comment(words, column, several or words.startswith("//")))
         newlines.append(text.count("\n", at, end))
         return comments, newlines
-
-    def _column(self, offset: int) -> int | None:
-        text = self.tokens.source.text
-        line = text[text.rfind("\n", 0, offset) + 1 : offset]
-        return None if "\t" in line else len(line)
 
     def _behind(self, comments: Sequence[Comment], newlines: Sequence[int]) -> int:
         """How many comments stand on the line of the token before."""

@@ -15,7 +15,6 @@ from scenelang.syntax.patterns import (
     MOST,
     Change,
     Match,
-    block,
     change,
     closing,
     find,
@@ -32,15 +31,8 @@ _SOLID: Final = frozenset(("sphere", "torus"))
 """What is drawn in two and in three dimensions; the scene of a text tells which materials there are."""
 
 _MOVES: Final = {*TRANSFORMS, "color"}
-_PREFIXES: Final = _MOVES | {
-    "mirror",
-    "resize",
-    "offset",
-    "multmatrix",
-    "linear_extrude",
-    "rotate_extrude",
-    "hull",
-}
+_ELSEWHERE: Final = ("mirror", "resize", "offset", "multmatrix", "linear_extrude", "rotate_extrude", "hull")
+_PREFIXES: Final = _MOVES.union(_ELSEWHERE)
 
 _INSIDE: Final = (
     "it stands in the block: square { translate(1, 0); }, square { material flat { color(#d33); } }"
@@ -177,17 +169,13 @@ class Habits(Slips):
         while self._is(stop, "."):
             stop += 2
         stop = closing(tokens, stop) if self._is(stop, "(") else stop
-        end = block(tokens, stop)
+        end = closing(tokens, stop, "{}")
         inside = text[tokens.starts[calls[0][0]] : tokens.ends[max(stop, end - 1)]]
         words = [tokens.text(call) for call, _ in calls]
         colours = words.count("color")
-        if (
-            self._is(child, "for", "if")
-            or not set(words) <= _MOVES
-            or colours > 1
-            or "//" in inside
-            or "/*" in inside
-        ):
+        if self._is(child, "for", "if") or not set(words) <= _MOVES or colours > 1:
+            return None
+        if "//" in inside or "/*" in inside:
             return None
         if colours and (self._materials[0] is None or "material" in inside):
             return None
@@ -196,12 +184,10 @@ class Habits(Slips):
         gone = Edit(Span(tokens.source, tokens.starts[calls[0][0]], tokens.starts[child]), "")
         written = " ".join(moves)
         if self._is(stop, ";"):
-            place = Span(tokens.source, tokens.starts[stop], tokens.ends[stop])
-            return Fix("put them into its block", (gone, Edit(place, f" {{ {written} }}")))
-        if end == stop:
+            place, text = tokens.place(stop), f" {{ {written} }}"
+        elif end > stop:
+            last = tokens.ends[end - 2]
+            place, text = (last, last), f" {written}{' ' * self._is(end - 2, '{')}"
+        else:
             return None
-        last = tokens.ends[end - 2]
-        place = Span(tokens.source, last, last)
-        return Fix(
-            "put them into its block", (gone, Edit(place, f" {written}{' ' * self._is(end - 2, '{')}"))
-        )
+        return Fix("put them into its block", (gone, Edit(Span(tokens.source, *place), text)))

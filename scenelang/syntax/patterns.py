@@ -21,6 +21,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from functools import cache
+from itertools import takewhile
 from typing import Final
 
 from scenelang.records import Record
@@ -146,7 +147,7 @@ def _taken(piece: Piece, following: Piece | None, tokens: Tokens, at: int, start
     if piece.text.islower():
         return at + (kind == tables().kind("NAME"))
     if piece.text == "BLOCK":
-        return block(tokens, at)
+        return closing(tokens, at, "{}")
     if piece.text == "BODY":
         return _body(tokens, at, start)
     one_line = piece.text == "LINE"
@@ -190,11 +191,6 @@ def closing(tokens: Tokens, at: int, brackets: str = "()") -> int:
     return at
 
 
-def block(tokens: Tokens, at: int) -> int:
-    """Index after the block that begins at an index; ``at`` where none does."""
-    return closing(tokens, at, "{}")
-
-
 def _body(tokens: Tokens, at: int, head: int) -> int:
     """Index after the rest of a line, or after the lines that stand further in than a head's."""
 
@@ -236,6 +232,11 @@ class Change(Record):
     text: str
 
 
+def _alike(keys: list[str], others: list[str]) -> int:
+    """How many of two lists are equal, from the first on."""
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(keys, others, strict=False)))
+
+
 def change(match: Match, replacement: str, extra: Mapping[str, str]) -> Change | None:
     """What to do to a match for it to become a replacement; None where nothing would change.
 
@@ -256,9 +257,8 @@ def change(match: Match, replacement: str, extra: Mapping[str, str]) -> Change |
         "" if key == "<PARAMS>" and without_types(match.text(i, j)) != match.text(i, j) else key
         for key, i, j in match.parts
     ]
-    shorter = min(len(keys), len(had))
-    before = next((n for n in range(shorter) if keys[n] != had[n]), shorter)
-    behind = next((n for n in range(shorter - before) if keys[-1 - n] != had[-1 - n]), shorter - before)
+    before = _alike(keys, had)
+    behind = _alike(keys[before:][::-1], had[before:][::-1])
     middle, gone = wanted[before : len(wanted) - behind], match.parts[before : len(had) - behind]
     if not middle and not gone:
         return None
@@ -287,9 +287,9 @@ def _written(match: Match, pieces: list[Piece], first: int, stop: int) -> tuple[
     for number, piece in enumerate(pieces):
         text, typed = piece.text, piece.text == "PARAMS"
         place = holes.get(f"<{text}>") if piece.is_hole else None
-        if place is not None and tokens.starts[place[0]] >= at:
-            part = tokens.part(*place)
-            new += [part[index - place[0]] for index in _untyped(tokens, place)] if typed else part
+        if place is not None and (begin := tokens.starts[place[0]]) >= at:
+            types = [found.span() for found in _TYPED.finditer(match.text(*place))] if typed else []
+            new += (one for one in tokens.part(*place) if not any(i <= one[1] - begin < j for i, j in types))
             at = tokens.ends[place[1] - 1]
         elif text.startswith("BAD_"):
             end = tokens.ends[stop - 1] if stop > first else at
@@ -303,14 +303,3 @@ def _written(match: Match, pieces: list[Piece], first: int, stop: int) -> tuple[
             text = without_types(match.text(*place)) if typed else match.text(*place)
         written += " " * (piece.spaced and number > 0) + text
     return written, new
-
-
-def _untyped(tokens: Tokens, place: tuple[int, int]) -> list[int]:
-    """The tokens of parameters without those of types."""
-    name = tables().kind("NAME")
-    kept = []
-    for index in range(*place):
-        before = tokens.text(index) in TYPES and tokens.kinds[index + 1] == name
-        if not before and ":" not in (tokens.text(index), tokens.text(index - 1)):
-            kept.append(index)
-    return kept
