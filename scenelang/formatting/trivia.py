@@ -12,7 +12,7 @@ from dataclasses import field
 from typing import NamedTuple
 
 from scenelang.records import Record
-from scenelang.syntax.tables import END, tables
+from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Tokens
 
 _COMMENT = re.compile(r"//[^\n]*|/\*(?:[\s\S]*?\*/|[\s\S]*)")
@@ -67,7 +67,7 @@ def attach(tokens: Tokens) -> dict[int, Notes]:
         if start - end > 1:
             gap = text[end:start]
             if "/" in gap or gap.count("\n") > 1:
-                _Gap(tokens, notes, index).attach(end, start)
+                _attach(tokens, notes, index, *_read(text, end, start))
         end = tokens.ends[index]
     return notes
 
@@ -84,71 +84,48 @@ def comments_of(tokens: Tokens) -> list[str]:
     return found
 
 
-class _Gap:
-    """What stands between the token before ``index`` and that token."""
+def _attach(
+    tokens: Tokens, notes: dict[int, Notes], index: int, comments: list[Comment], newlines: list[int]
+) -> None:
+    """Note what stands between the token before ``index`` and that token."""
+    before, kind = (tables().kinds[tokens.kinds[at]] for at in (index - 1, index))
+    closes = kind in ("$END", ")", "]", "}", ",", ";")
+    here = notes.setdefault(index, Notes())
+    behind = 0  # so many stand on the line of the token before
+    while index and behind < len(comments) and not newlines[behind]:
+        behind += 1
+        if comments[behind - 1].ends_line:
+            break
+    ahead = len(comments)  # the first of those on the line of the token
+    while not closes and ahead > behind and not newlines[ahead] and not comments[ahead - 1].ends_line:
+        ahead -= 1
+    here.blank = newlines[ahead] > 1
+    for comment, lines in zip(comments[behind:ahead], newlines[behind:], strict=False):
+        here.before.append(comment._replace(own_line=True, blank=lines > 1))
+    here.leading = comments[ahead:]
+    if last := comments[:behind]:
+        if last[-1].ends_line or ahead > behind:
+            notes.setdefault(index - 1, Notes()).after += last
+        elif closes or (newlines[behind] and before in (",", ";", "{", "}")):
+            notes.setdefault(index - 1, Notes()).trailing = last
+        else:
+            here.leading = [*last, *here.leading]
+            here.blank = False
 
-    def __init__(self, tokens: Tokens, notes: dict[int, Notes], index: int) -> None:
-        self.tokens = tokens
-        self.notes = notes
-        self.index = index
 
-    def attach(self, start: int, end: int) -> None:
-        comments, newlines = self._read(start, end)
-        here = self.notes.setdefault(self.index, Notes())
-        behind = self._behind(comments, newlines) if self.index else 0
-        ahead = self._ahead(comments, newlines, behind)
-        here.blank = newlines[ahead] > 1
-        for comment, lines in zip(comments[behind:ahead], newlines[behind:], strict=False):
-            here.before.append(comment._replace(own_line=True, blank=lines > 1))
-        leading = comments[ahead:]
-        if last := comments[:behind]:
-            if last[-1].ends_line or ahead > behind:
-                self.notes.setdefault(self.index - 1, Notes()).after += last
-            elif self._closes(self.index) or (newlines[behind] and self._separates(self.index - 1)):
-                self.notes.setdefault(self.index - 1, Notes()).trailing = last
-            else:
-                leading = [*last, *leading]
-                here.blank = False
-        here.leading = leading
-
-    def _read(self, start: int, end: int) -> tuple[list[Comment], list[int]]:
-        """The comments, and how many newlines stand before each of them and after the last."""
-        text = self.tokens.source.text
-        comments: list[Comment] = []
-        newlines: list[int] = []
-        at = start
-        for match in _COMMENT.finditer(text, start, end):
-            begins = match.start()
-            newlines.append(text.count("\n", at, begins))
-            at = match.end()
-            words = "\n".join(line.rstrip() for line in match[0].split("\n"))
-            several = "\n" in words
-            line = text[text.rfind("\n", 0, begins) + 1 : begins]
-            column = len(line) if several and "\t" not in line else None
-            comments.append(Comment(words, column, several or words.startswith("//")))
-        newlines.append(text.count("\n", at, end))
-        return comments, newlines
-
-    def _behind(self, comments: Sequence[Comment], newlines: Sequence[int]) -> int:
-        """How many comments stand on the line of the token before."""
-        count = 0
-        while count < len(comments) and not newlines[count]:
-            count += 1
-            if comments[count - 1].ends_line:
-                break
-        return count
-
-    def _ahead(self, comments: Sequence[Comment], newlines: Sequence[int], behind: int) -> int:
-        """The first comment of those, ``behind`` at the earliest, that stand on the line of the token."""
-        first = len(comments)
-        if not self._closes(self.index):
-            while first > behind and not newlines[first] and not comments[first - 1].ends_line:
-                first -= 1
-        return first
-
-    def _closes(self, index: int) -> bool:
-        kind = self.tokens.kinds[index]
-        return kind == END or tables().kinds[kind] in {")", "]", "}", ",", ";"}
-
-    def _separates(self, index: int) -> bool:
-        return tables().kinds[self.tokens.kinds[index]] in {",", ";", "{", "}"}
+def _read(text: str, start: int, end: int) -> tuple[list[Comment], list[int]]:
+    """The comments between two places, and how many newlines stand before each and after the last."""
+    comments: list[Comment] = []
+    newlines: list[int] = []
+    at = start
+    for match in _COMMENT.finditer(text, start, end):
+        begins = match.start()
+        newlines.append(text.count("\n", at, begins))
+        at = match.end()
+        words = "\n".join(line.rstrip() for line in match[0].split("\n"))
+        several = "\n" in words
+        line = text[text.rfind("\n", 0, begins) + 1 : begins]
+        column = len(line) if several and "\t" not in line else None
+        comments.append(Comment(words, column, several or words.startswith("//")))
+    newlines.append(text.count("\n", at, end))
+    return comments, newlines
