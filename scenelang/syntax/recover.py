@@ -112,24 +112,21 @@ class Recovery(Habits):
     def _start_mistake(self, states: list[int], at: int) -> bool:
         """A token that no statement begins with."""
         tokens = self.tokens
-        start, end = tokens.starts[at], tokens.ends[at]
         if self._is(at, ";", "{") and self._better_swapped(states, at):
             return False
         if self._is(at, ";"):
-            self.report.add("W0101", "stray `;`", start, end, help="no `;` follows a block", fix="")
+            self.report.add("W0101", "stray `;`", *tokens.place(at), help="no `;` follows a block", fix="")
             tokens.replace(at, 1, [])
-            return True
-        if self._is(at, "{"):
+        elif self._is(at, "{"):
             self._headless(at)
             self._insert(at, "BAD_HEAD")
-            return True
-        if self._is(at, "else"):
-            self.report.add("E0101", "`else` without `if`", start, end)
-            tokens.replace(at, 1, [] if self._is(at + 1, "if") else [tables().kind("BAD_HEAD")])
-            if not self._is(at, "if") and not self._is(at + 1, "{"):
-                tokens.replace(at, 1, [])
-            return True
-        return False
+        elif self._is(at, "else"):
+            self.report.add("E0101", "`else` without `if`", *tokens.place(at))
+            headed = self._is(at + 1, "{")
+            tokens.replace(at, 1, [tables().kind("BAD_HEAD")] if headed else [])
+        else:
+            return False
+        return True
 
     def _better_swapped(self, states: list[int], at: int) -> bool:
         """Whether more fits when a `;` or `{` changes places with the next token than otherwise."""
@@ -160,10 +157,8 @@ class Recovery(Habits):
         text = tokens.source.text[start:end]
         rest = tokens.kinds[first + 1 : at + FOLLOWED]
         words = {HEADS[text]} if text in HEADS else set(keywords_near(text)).intersection(_WORDS)
-        read = {
-            word: reach(stack.copy(), [self.literals[word], *rest], 0, len(rest) + 1)
-            for word in sorted(words)
-        }
+        trials = {word: [self.literals[word], *rest] for word in sorted(words)}
+        read = {word: reach(stack.copy(), trial, 0, len(trial)) for word, trial in trials.items()}
         word = max(read, key=read.__getitem__, default=None)
         if word is None or read[word] <= at + 1 - first:
             return False
@@ -177,16 +172,15 @@ class Recovery(Habits):
         """`fi (a) { … } else { … }`: where `if` was meant, for parsing to go on from there."""
         kinds, tokens = self.tokens.kinds, self.tokens
         block = self._opening_of(at - 1, "{", "}")
-        bracket = self._opening_of(block - 1, "(", ")") if block else 0
-        first = bracket - 1
+        first = self._opening_of(block - 1, "(", ")") - 1 if block else -1
         if (
             first < 0
             or kinds[first] != tables().kind("NAME")
             or "if" not in keywords_near(tokens.text(first))
         ):
             return None
-        starts = [i for i, value in enumerate(values) if isinstance(value, nodes.Name | nodes.NameRef)]
-        depth = next((i for i in reversed(starts) if values[i].span.start == tokens.starts[first]), None)
+        names = [i for i, value in enumerate(values) if isinstance(value, nodes.Name | nodes.NameRef)]
+        depth = next((i for i in reversed(names) if values[i].span.start == tokens.starts[first]), None)
         if depth is None:
             return None
         mistakes.report_misspelt(tokens, self.report, first, "if")
