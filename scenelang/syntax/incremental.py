@@ -27,7 +27,7 @@ from scenelang.syntax import nodes
 from scenelang.syntax.lexer import scan
 from scenelang.syntax.move import move
 from scenelang.syntax.parser import parse, parse_tokens
-from scenelang.syntax.repairs import FOLLOWED
+from scenelang.syntax.recovery.repairs import FOLLOWED
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
 

@@ -1,4 +1,4 @@
-"""Text to tree: braces, the automaton, and `syntax.recover` where a token does not fit."""
+"""Text to tree: braces, the automaton, and `syntax.recovery.recover` where a token does not fit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
 
 if TYPE_CHECKING:
-    from scenelang.syntax.recover import Recovery
+    from scenelang.syntax.recovery.recover import Recovery
 
 
 def parse(source: SourceFile, diagnostics: Diagnostics) -> nodes.File:
@@ -32,7 +32,7 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> nodes.File:
     tokens = scan(source, report)
     if _unbalanced(tokens):
         # What only mistakes need is loaded at the first one: most runs start and end without any.
-        from scenelang.syntax.braces import balance
+        from scenelang.syntax.recovery.braces import balance
 
         balance(tokens, report)
     file = parse_tokens(tokens, report)
@@ -63,7 +63,7 @@ def parse_tokens(tokens: Tokens, report: Report) -> nodes.File:
     def mend(states: list[int], values: list[Any], at: int) -> int | None:
         nonlocal recovery, unfinished
         if recovery is None:
-            from scenelang.syntax.recover import Recovery
+            from scenelang.syntax.recovery.recover import Recovery
 
             recovery = Recovery(tokens, report)
         unfinished = values

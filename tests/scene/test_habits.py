@@ -9,8 +9,8 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.fixes import apply_fixes, settle
-from scenelang.syntax.foreign import HABITS
-from scenelang.syntax.patterns import WORDS, pieces
+from scenelang.syntax.recovery.foreign import HABITS
+from scenelang.syntax.recovery.patterns import WORDS, pieces
 from tests.scene.scene_cases import HERE, mismatch, run_text
 
 CASES = [

@@ -183,7 +183,7 @@ def report_rebound(report: Reporter, name: nodes.Name, known: Binding | None) ->
         return  # a `let` does stand there
     for index, d in enumerate(items):
         if d.code == "E0126" and d.span is not None and d.span.start == start:
-            from scenelang.syntax.foreign import ONCE, ONCE_HELP  # only mistakes need it
+            from scenelang.syntax.recovery.foreign import ONCE, ONCE_HELP  # only mistakes need it
 
             message = ONCE.replace("<n>", name.text)
             items[index] = Diagnostic("E0133", message, name.span, known.labels(), ONCE_HELP)

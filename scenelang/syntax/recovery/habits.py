@@ -1,4 +1,4 @@
-"""What people write out of habit: looking for it at a mistake, by the table of `syntax.foreign`."""
+"""What people write out of habit: looking for it at a mistake, by the table of `syntax.recovery.foreign`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
-from scenelang.syntax import mistakes
 from scenelang.syntax.automaton import reach
-from scenelang.syntax.foreign import HABITS, OPERATORS, Habit
-from scenelang.syntax.patterns import (
+from scenelang.syntax.recovery import mistakes
+from scenelang.syntax.recovery.foreign import HABITS, OPERATORS, Habit
+from scenelang.syntax.recovery.patterns import (
     MOST,
     Change,
     Match,
@@ -20,8 +20,8 @@ from scenelang.syntax.patterns import (
     find,
     pieces,
 )
-from scenelang.syntax.repairs import FOLLOWED
-from scenelang.syntax.slips import Slips
+from scenelang.syntax.recovery.repairs import FOLLOWED
+from scenelang.syntax.recovery.slips import Slips
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Token
 from scenelang.words import NODES, TRANSFORMS

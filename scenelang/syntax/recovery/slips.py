@@ -7,9 +7,9 @@ from bisect import bisect_left
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
-from scenelang.syntax import mistakes
 from scenelang.syntax.automaton import fits, reach
 from scenelang.syntax.lexer import UNIT_ALIASES
+from scenelang.syntax.recovery import mistakes
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 from scenelang.words import UNITS

@@ -32,7 +32,7 @@ class Habit(Record):
     """One habit.
 
     Args:
-        pattern: what is written (see `syntax.patterns`).
+        pattern: what is written (see `syntax.recovery.patterns`).
         meant: what is written here. It is also read in its place, so that the rest can be checked.
         message: the fact; names and words that the pattern has found may stand in it.
         help: advice.

@@ -1,6 +1,6 @@
 """Matching braces before parsing, so that every block is closed and a mistake stays inside one.
 
-Where braces do not match, the layout tells on which line the slip is (`syntax.layout`), and trying the
+Where braces do not match, the layout tells on which line the slip is (`layout`), and trying the
 parser out on that line tells which brace is missing or too many. A text whose braces match is left alone,
 however it is laid out.
 """
@@ -13,9 +13,9 @@ from functools import cache
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.syntax.automaton import advance, completion, fits, reach
-from scenelang.syntax.layout import Slip, find_slips
-from scenelang.syntax.mistakes import report_broken_off, report_instead
-from scenelang.syntax.repairs import Repair
+from scenelang.syntax.recovery.layout import Slip, find_slips
+from scenelang.syntax.recovery.mistakes import report_broken_off, report_instead
+from scenelang.syntax.recovery.repairs import Repair
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import Report, Tokens
 

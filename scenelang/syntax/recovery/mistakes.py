@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.syntax.foreign import OPERATORS, keywords_near
-from scenelang.syntax.repairs import MAX_REPLAY, REPLACEMENTS, Repair
+from scenelang.syntax.recovery.foreign import OPERATORS, keywords_near
+from scenelang.syntax.recovery.repairs import MAX_REPLAY, REPLACEMENTS, Repair
 from scenelang.syntax.tables import END, tables
 from scenelang.syntax.tokens import Report, Tokens
 

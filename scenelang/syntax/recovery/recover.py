@@ -1,6 +1,6 @@
 """At a mistake: say what it is, mend the tokens, go on.
 
-Well known mistakes are told apart first; then the best small repair is looked for (`syntax.repairs`); where
+Well known mistakes are told apart first; then the best small repair is looked for (`repairs`); where
 none helps, the statement is skipped. Braces are balanced before parsing, so a skip stays inside its block.
 """
 
@@ -10,11 +10,12 @@ from bisect import bisect_left
 from typing import Any
 
 from scenelang.diagnostics.span import Span
-from scenelang.syntax import mistakes, nodes
+from scenelang.syntax import nodes
 from scenelang.syntax.automaton import advance, reach, statement_depth
-from scenelang.syntax.foreign import HEADS, keywords_near
-from scenelang.syntax.habits import Habits
-from scenelang.syntax.repairs import FOLLOWED, MAX_REPLAY, Repair, Search
+from scenelang.syntax.recovery import mistakes
+from scenelang.syntax.recovery.foreign import HEADS, keywords_near
+from scenelang.syntax.recovery.habits import Habits
+from scenelang.syntax.recovery.repairs import FOLLOWED, MAX_REPLAY, Repair, Search
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
 from scenelang.words import DECLARING, NODES
