@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from scenelang.cli.jobs import Job, program_notes
+from scenelang.diagnostics.error import SceneError
 
 if TYPE_CHECKING:
     from scenelang.measure.choose import Choice
@@ -111,7 +112,6 @@ def _compiled(job: Job, program: Program, point: Point) -> Program | str:
     if point.model in (None, program.model):
         return program
     from scenelang.diagnostics.diagnostic import Diagnostics
-    from scenelang.diagnostics.error import SceneError
     from scenelang.program.compile import compile_scene
 
     source = job.source

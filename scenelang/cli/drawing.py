@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from scenelang.cli.clock import Clock
 from scenelang.cli.inputs import Request
 from scenelang.cli.jobs import Job
+from scenelang.cli.say import say_trouble
 
 if TYPE_CHECKING:
     from scenelang.backend.options import Device, Samples
@@ -39,7 +40,6 @@ def chosen(
         code: the exit code so far.
     """
     from scenelang.cli.choosing import choose_point
-    from scenelang.cli.say import say_trouble
     from scenelang.measure.cost import yardstick
 
     with clock("choose"):

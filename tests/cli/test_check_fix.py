@@ -77,7 +77,7 @@ def test_a_file_that_cannot_be_written(folder: Folder, monkeypatch: pytest.Monke
             raise PermissionError(13, "Permission denied", first)
         (folder.path / str(path)).write_bytes(data)
 
-    monkeypatch.setattr("scenelang.files.write_whole", refuse)
+    monkeypatch.setattr("scenelang.cli.commands.check.write_whole", refuse)
     result = folder.run("check", first, other, "--fix")
     assert result.exit_code == 2
     assert result.stderr.splitlines() == [

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from scenelang.cli import options
+from scenelang.cli.diffs import show_difference
+from scenelang.cli.main import describe
+from scenelang.cli.say import say_trouble, wants_color, width_of
+from scenelang.diagnostics.cells import printable
+from scenelang.files import followed, write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -95,7 +101,6 @@ def command(
     cannot be read or written.
     """
     from scenelang.cli.checking import Scenes, Selection
-    from scenelang.cli.diffs import show_difference
     from scenelang.cli.inputs import STDIN, Request
 
     if frame is not None and all_frames:
@@ -130,8 +135,6 @@ def command(
 def _read(paths: tuple[str, ...], scenes: Scenes) -> bool:
     """Take in all scenes, folders' too; False where something cannot be read."""
     from scenelang.cli import folders
-    from scenelang.cli.main import describe
-    from scenelang.cli.say import say_trouble
 
     lost: list[OSError] = []
     names = list(folders.named(paths, lost.append))
@@ -153,13 +156,8 @@ def _wrong(left: Sequence[Diagnostic], strict: bool) -> bool:
 
 def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> set[str]:
     """Write what changed, and standard input to standard output; returns what cannot be written."""
-    from pathlib import Path
-
     from scenelang.cli.checking import in_bytes
     from scenelang.cli.inputs import STDIN
-    from scenelang.cli.main import describe
-    from scenelang.cli.say import say_trouble
-    from scenelang.files import followed, write_whole
 
     lost = set()
     for name, text in changed.items():
@@ -192,7 +190,6 @@ class _Output:
         if self.kind != "human":
             text = _for_machines(found, self.kind, self.most)
         elif found:
-            from scenelang.cli.say import wants_color, width_of
             from scenelang.diagnostics.render_text import in_order, render_text
 
             text = render_text(
@@ -214,7 +211,6 @@ class _Output:
 
     def fixed(self, settled: Settled[str], done: str, lost: Collection[str] = ()) -> None:
         """Say what was fixed, file by file, but for files that could not be written."""
-        from scenelang.diagnostics.cells import printable
         from scenelang.diagnostics.render_text import plural
 
         if self.quiet:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from scenelang.cli import options
+from scenelang.cli.say import need_metrics
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
@@ -34,7 +35,6 @@ def command(
     """
     from scenelang.cli.jobs import prepare_scene
     from scenelang.cli.outputs import composed
-    from scenelang.cli.say import need_metrics
 
     need_metrics()
     stem = "stdin" if scene == "-" else Path(scene).stem

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from scenelang.cli import options
+from scenelang.cli.clock import Clock
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
@@ -31,7 +32,6 @@ def command(
 
     FILE is a scene, or - for standard input. `scenelang dump` shows what the compiler made of it.
     """
-    from scenelang.cli.clock import Clock
     from scenelang.cli.jobs import PROGRAM, prepare_scene
 
     if not out.endswith(PROGRAM):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import click
 
 from scenelang.cli import options
+from scenelang.cli.say import put_out, say_diagnostics
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
@@ -40,7 +41,6 @@ def command(
     loops or imports left, only objects and numbers, which are kept exactly: it reads back as the same scene.
     """
     from scenelang.cli.inputs import read_input, unused_defines
-    from scenelang.cli.say import put_out, say_diagnostics
 
     wanted = kind or SUFFIXES.get(Path(out or "").suffix.lower())
     if wanted is None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from scenelang.cli import options
+from scenelang.cli.say import put_out
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Input, Request
@@ -45,7 +46,6 @@ def command(
     shown as far as it goes; then the exit code is 1.
     """
     from scenelang.cli.jobs import prepare_scene
-    from scenelang.cli.say import put_out
     from scenelang.cli.stages import STAGES, check_stages
 
     if stages == ("help",):

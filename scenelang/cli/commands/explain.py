@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import sys
+from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 import click
 
 from scenelang.cli import options
+from scenelang.cli.say import wants_color
 
 if TYPE_CHECKING:
     from scenelang.diagnostics.pages import Page
@@ -34,9 +37,6 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
 
     A word instead of a code lists the codes whose pages have it.
     """
-    from difflib import get_close_matches
-
-    from scenelang.cli.say import wants_color
     from scenelang.diagnostics.pages import CODES, read_page
 
     paint = wants_color(sys.stdout, color)
@@ -72,8 +72,6 @@ def _print_list(codes: list[str], kind: str, paint: bool) -> None:
     from scenelang.diagnostics.pages import AREAS, read_page
 
     if kind == "json":
-        import json
-
         data = [{"code": p.code, "severity": p.severity, "title": p.title} for p in map(read_page, codes)]
         click.echo(json.dumps({"version": 1, "codes": data}, indent=2))
         return
@@ -88,8 +86,6 @@ def _print_list(codes: list[str], kind: str, paint: bool) -> None:
 
 def _print_page(page: Page, kind: str, paint: bool) -> None:
     if kind == "json":
-        import json
-
         data = {
             "version": 1,
             "code": page.code,

@@ -13,6 +13,7 @@ from scenelang.cli.folders import SUFFIX, named
 from scenelang.cli.main import describe
 from scenelang.cli.say import say_diagnostics, say_trouble
 from scenelang.deep import deep_stack
+from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.files import followed, read_regular, write_whole
 
@@ -70,7 +71,6 @@ class _Run:
 
     def take(self, name: str) -> None:
         """Format one file."""
-        from scenelang.diagnostics.error import SceneError
         from scenelang.formatting import format_text
 
         try:

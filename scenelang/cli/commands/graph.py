@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from scenelang.cli import options
+from scenelang.cli.main import Trouble
+from scenelang.cli.say import put_out
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
@@ -55,7 +57,6 @@ def command(
     of Graphviz. Large scenes are cut, and a box says how many nodes are left out.
     """
     from scenelang.cli.jobs import prepare_scene
-    from scenelang.cli.say import put_out
     from scenelang.cli.stages import STAGES, check_stages
     from scenelang.interchange.drawing import draw_graph, draw_program, draw_scene, to_dot, to_mermaid
 
@@ -103,8 +104,6 @@ def _find_dot(kind: str) -> str | None:
 
 
 def _picture(dot: str, kind: str, text: str) -> bytes:
-    from scenelang.cli.main import Trouble
-
     try:
         done = subprocess.run(
             [dot, f"-T{kind}"], input=text.encode(), capture_output=True, timeout=_PATIENCE_S, check=False

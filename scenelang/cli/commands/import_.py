@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Final, Literal
 import click
 
 from scenelang.cli import options
+from scenelang.cli.main import Trouble
+from scenelang.cli.say import put_out, say_diagnostics
 
 if TYPE_CHECKING:
     from scenelang.interchange.gltf import Imported
@@ -42,8 +44,6 @@ def command(
     that of a geometry of the model; case and endings such as .001 do not count. It gets the base colour of
     its material. What is left out is said, with the path of its node.
     """
-    from scenelang.cli.main import Trouble
-    from scenelang.cli.say import put_out, say_diagnostics
     from scenelang.diagnostics.diagnostic import Diagnostics
     from scenelang.interchange.gltf import load_gltf
     from scenelang.interchange.gltf_file import GltfError

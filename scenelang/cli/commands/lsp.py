@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from scenelang.cli.main import Trouble
+
 
 @click.command("lsp")
 @click.option("--stdio", is_flag=True, help="Speak over standard input and output; the default.")
@@ -19,8 +21,6 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
     import logging
     import socket
     import sys
-
-    from scenelang.cli.main import Trouble
 
     if stdio and tcp is not None:
         raise click.UsageError("--stdio and --tcp exclude each other.")

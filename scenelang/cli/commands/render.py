@@ -8,6 +8,10 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from scenelang.cli import options
+from scenelang.cli.clock import Clock
+from scenelang.cli.main import describe
+from scenelang.cli.progress import Bar
+from scenelang.cli.say import say_diagnostics, say_trouble
 
 if TYPE_CHECKING:
     from scenelang.backend.options import Samples
@@ -118,12 +122,10 @@ def command(
     """
     from scenelang.cli.animation import Wanted, animate, wanted_target
     from scenelang.cli.choosing import check_options
-    from scenelang.cli.clock import Clock
     from scenelang.cli.drawing import chosen, exact, neural
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import PROGRAM
     from scenelang.cli.outputs import targets
-    from scenelang.cli.progress import Bar
     from scenelang.measure.frontier import Limits
 
     clock = Clock()
@@ -185,8 +187,6 @@ def _prepared(
     """Every input read and compiled, None where it cannot be read; reports mistakes; the exit code so far."""
     from scenelang.cli.inputs import merged, unused_defines
     from scenelang.cli.jobs import prepare
-    from scenelang.cli.main import describe
-    from scenelang.cli.say import say_diagnostics, say_trouble
 
     jobs: list[Job | None] = []
     code = 0

@@ -7,6 +7,7 @@ import json
 import click
 
 from scenelang.cli import options
+from scenelang.cli.say import put_out
 
 
 @click.command("schema")
@@ -24,7 +25,6 @@ def command(kind: str, out: str | None) -> None:
     Editors complete and check by it; validators refuse by it what scenelang refuses, as far as a schema
     can say.
     """
-    from scenelang.cli.say import put_out
     from scenelang.interchange.schemas import SCHEMAS
 
     put_out(json.dumps(SCHEMAS[kind](), indent=2, ensure_ascii=False) + "\n", out)

@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 
 from scenelang.cli import options
+from scenelang.cli.progress import Bar
 
 
 def training(made: Callable[..., None]) -> Callable[..., None]:
@@ -67,7 +68,6 @@ def command(
     CONFIG is a JSON file or the name of a shipped configuration. By default one thread computes, as for
     the shipped weights. Exits with 0 also when the budget ends first.
     """
-    from scenelang.cli.progress import Bar
     from scenelang.training.config import (
         SolidsConfig,
         config_data,

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from scenelang.cli import options
+from scenelang.cli.main import describe
+from scenelang.cli.say import wants_color
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -62,7 +65,6 @@ def command(
     from scenelang.animation.targets import is_animation
     from scenelang.cli.animation import Wanted, wanted_target
     from scenelang.cli.outputs import composed, targets
-    from scenelang.cli.say import wants_color
     from scenelang.watching.changes import stamps, wait
     from scenelang.watching.picture import Easel, Outdated
     from scenelang.watching.screen import Screen
@@ -101,10 +103,7 @@ def command(
 
 
 def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] | None]) -> None:
-    import time
-
     from scenelang.backend.errors import RenderError
-    from scenelang.cli.main import describe
     from scenelang.diagnostics.render_text import plural
 
     clock = time.strftime("%H:%M:%S")

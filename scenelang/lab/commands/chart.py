@@ -7,6 +7,8 @@ from pathlib import Path
 
 import click
 
+from scenelang.files import write_whole
+
 
 @click.command("chart")
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
@@ -27,7 +29,6 @@ def command(folder: Path, out: Path | None) -> None:
         from scenelang.lab.experiments.charts import experiment_chart, strips
     except ImportError:
         raise click.UsageError("charts need matplotlib; pip install 'scenelang[charts]'") from None
-    from scenelang.files import write_whole
     from scenelang.lab.experiments.runs import EXPERIMENTS
     from scenelang.lab.experiments.tables import table_of
 

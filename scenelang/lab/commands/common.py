@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from scenelang.files import write_whole
+
 if TYPE_CHECKING:
     from scenelang.models.load import Model
 
@@ -38,16 +40,12 @@ def check_names(what: str, wanted: Iterable[str], known: Iterable[str]) -> None:
 
 def write_json(path: Path, value: Any) -> None:
     """Write a record whole, and its folder."""
-    from scenelang.files import write_whole
-
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, (json.dumps(value, indent=1) + "\n").encode())
 
 
 def write_chart(path: Path, draw: Callable[[], bytes]) -> None:
     """Write a chart; says what is missing where none can be drawn."""
-    from scenelang.files import write_whole
-
     try:
         write_whole(path, draw())
     except ImportError:

@@ -9,6 +9,7 @@ import click
 
 from scenelang.cli.progress import Bar
 from scenelang.cli.say import need_metrics
+from scenelang.files import read_regular, write_whole
 from scenelang.lab.commands import common
 
 if TYPE_CHECKING:
@@ -72,7 +73,6 @@ def command(
 
 
 def _measure(base: str, out: Path, scenes: int, seed: int, threads: int) -> None:
-    from scenelang.files import write_whole
     from scenelang.lab.frontier.chart import frontier_chart
     from scenelang.lab.frontier.measure import measure_frontier
     from scenelang.lab.frontier.page import frontier_page
@@ -101,7 +101,6 @@ def _table(frontier: Frontier) -> str:
 
 
 def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path | None) -> bool:
-    from scenelang.files import read_regular
     from scenelang.lab.frontier.verify import KEPT, verify
     from scenelang.measure.frontier import MOST_BYTES, Frontier, frontier_path
 
