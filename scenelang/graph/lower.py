@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from scenelang.diagnostics.diagnostic import Diagnostics
@@ -63,7 +63,7 @@ def lower(
         memory: of the frame before; holds this one afterwards.
     """
     _check_canvas(scene, manifest, spans.span(scene) if spans else None, diagnostics)
-    space = SPACES[manifest.dimension]
+    space = replace(SPACES[manifest.dimension], outlines=manifest.outlines)
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
     lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {})
     root = lowering.run(scene)

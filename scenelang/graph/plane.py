@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from math import asin, atan2, cos, hypot, pi, sqrt, tau
 
 from scenelang.graph import affine
-from scenelang.graph.outlines import HULLS, INNER_RADII
-from scenelang.graph.space import EVERYWHERE, AffineTransform, Box, Refusal, Space
+from scenelang.graph.space import EVERYWHERE, Box, Refusal, Space
 from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Warp
+from scenelang.models.manifest import Outline
 from scenelang.scene import schema
 
 _ALIKE = 1e-12
@@ -32,7 +32,7 @@ class Plane(Space):
     shown = ((0, 1, 3), (4, 5, 7))
     thinner = "a line or a point"
 
-    def fitted(self, transform: AffineTransform, rows: Rows) -> Rows | Refusal:
+    def fitted(self, transform: schema.Transform, rows: Rows) -> Rows | Refusal:
         kind = transform.kind
         if isinstance(transform, schema.Rotate) and transform.angle != 0.0 and any(transform.axis[:2]):
             axis = ", ".join(f"{v:g}" for v in transform.axis)
@@ -79,16 +79,16 @@ class Plane(Space):
             reach = level / stretch
         if any(isinstance(step, Warp) for step in steps):
             return _grown(_warped(steps, 1.0 + reach))
-        return _grown(_straight(geometry, rows, reach))
+        return _grown(_straight(self.outlines.get(geometry), rows, reach))
 
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
         """Warps before the first affine map leave a disc about the origin in place."""
-        radius = INNER_RADII.get(geometry)
-        if radius is None or not all(isinstance(step, Affine) for step in steps[-1:]):
+        outline = self.outlines.get(geometry)
+        if outline is None or not all(isinstance(step, Affine) for step in steps[-1:]):
             return None
         if any(isinstance(step, Affine) for step in steps[:-1]):
             return None
-        return radius, _inverted(affine.composed(steps))
+        return outline.inner, _inverted(affine.composed(steps))
 
 
 def flattened(rows: Rows) -> Rows:
@@ -137,16 +137,15 @@ def _grown(box: Box) -> Box:
     return grown if grown[0] < grown[2] and grown[1] < grown[3] else EVERYWHERE
 
 
-def _straight(geometry: str, rows: Rows, reach: float) -> Box:
+def _straight(outline: Outline | None, rows: Rows, reach: float) -> Box:
     a, b, x = rows[0], rows[1], rows[3]
     c, d, y = rows[4], rows[5], rows[7]
     wide, high = reach * hypot(a, b), reach * hypot(c, d)
-    corners = HULLS.get(geometry)
-    if corners is None:
+    if outline is None:
         wide, high = wide + hypot(a, b), high + hypot(c, d)
         return x - wide, y - high, x + wide, y + high
-    across = [a * p + b * q for p, q in corners]
-    along = [c * p + d * q for p, q in corners]
+    across = [a * p + b * q for p, q in outline.corners]
+    along = [c * p + d * q for p, q in outline.corners]
     return x + min(across) - wide, y + min(along) - high, x + max(across) + wide, y + max(along) + high
 
 

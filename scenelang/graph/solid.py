@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot, sqrt
 
-from scenelang.graph.space import EVERYWHERE, AffineTransform, Box, Refusal, Space
+from scenelang.graph.space import EVERYWHERE, Box, Refusal, Space
 from scenelang.graph.steps import Rows, Step, Warp
 
 
@@ -16,7 +16,7 @@ class Solid(Space):
     shown = ((0, 1, 2, 3), (4, 5, 6, 7), (8, 9, 10, 11))
     thinner = "a plane, a line or a point"
 
-    def fitted(self, transform: AffineTransform, rows: Rows) -> Rows | Refusal:
+    def fitted(self, transform: schema.Transform, rows: Rows) -> Rows | Refusal:
         return rows
 
     def holds(self, rows: Rows) -> bool:

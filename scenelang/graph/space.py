@@ -7,11 +7,13 @@ else in the compiler asks whether a scene is flat.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from math import inf
 from typing import ClassVar, Final, NamedTuple
 
 from scenelang.graph.steps import Rows, Step, Warp
+from scenelang.models.manifest import Outline
 from scenelang.scene import schema
 
 Box = tuple[float, float, float, float]
@@ -29,8 +31,6 @@ so that ratio is still known to four digits here, while nothing that thin can be
 REACH: Final = 1e30
 """Stretches outside ``1/REACH .. REACH`` leave the range of float32 when inverted, as do far offsets."""
 
-AffineTransform = schema.Translate | schema.Rotate | schema.Scale | schema.Shear | schema.Matrix
-
 
 class Refusal(NamedTuple):
     """Why a transform has no step: a code, the fact and advice."""
@@ -40,8 +40,15 @@ class Refusal(NamedTuple):
     help: str
 
 
+@dataclass(frozen=True)
 class Space(ABC):
-    """The geometry of one dimension."""
+    """The geometry of one dimension.
+
+    Args:
+        outlines: what the model's manifest says of its leaves' extent.
+    """
+
+    outlines: Mapping[str, Outline] = field(default_factory=dict, hash=False)
 
     dimension: ClassVar[int]
     shown: ClassVar[tuple[tuple[int, ...], ...]]
@@ -50,7 +57,7 @@ class Space(ABC):
     """What a singular map flattens everything to."""
 
     @abstractmethod
-    def fitted(self, transform: AffineTransform, rows: Rows) -> Rows | Refusal:
+    def fitted(self, transform: schema.Transform, rows: Rows) -> Rows | Refusal:
         """The map as this space has it, or why the transform leaves the space."""
 
     def idle(self, transform: schema.Transform) -> str | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scenelang.graph import affine
-from scenelang.graph.space import REACH, SINGULAR, AffineTransform, Refusal, Space
+from scenelang.graph.space import REACH, SINGULAR, Refusal, Space
 from scenelang.graph.steps import Affine, Rows, Step, Warp
 from scenelang.scene import schema
 
@@ -33,7 +33,7 @@ def step_of(transform: schema.Transform, space: Space) -> Step | Refusal:
     return Affine(fitted)
 
 
-def _rows(transform: AffineTransform) -> Rows:
+def _rows(transform: schema.Transform) -> Rows:
     if isinstance(transform, schema.Translate):
         return affine.translation(transform.x, transform.y, transform.z)
     if isinstance(transform, schema.Scale):
@@ -42,6 +42,7 @@ def _rows(transform: AffineTransform) -> Rows:
         return affine.rotation(transform.angle, transform.axis)
     if isinstance(transform, schema.Shear):
         return affine.shearing(transform.axes, transform.k)
+    assert isinstance(transform, schema.Matrix)
     first, second, third, _ = transform.rows
     return (*first, *second, *third)
 

@@ -99,9 +99,16 @@ def manifest_schema() -> dict[str, Any]:
                 "type": "array",
                 "items": size,
             },
+            "outlines": {
+                "description": "extents of geometries: corners of a convex hull, radius of a disc inside",
+                "type": "object",
+                "additionalProperties": _object(
+                    {"corners": {"type": "array", "items": pair, "minItems": 3}, "inner": {"type": "number"}}
+                ),
+            },
             "white": {"description": "whether it draws over white alone", "type": "boolean"},
         },
-        optional=("layout", "set", "sizes", "white"),
+        optional=("layout", "set", "sizes", "white", "outlines"),
         title="Manifest",
         description="What a model states about itself.",
     )

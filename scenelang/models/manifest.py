@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from scenelang.files import read_json, read_regular
 
@@ -16,6 +17,18 @@ _MOST_BYTES: Final = 1 << 20
 _LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
 """Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""
 _RANGES: Final = {"objects", "smooth", "twirl", "bend", "scale", "thin", "blend"}
+
+
+class Outline(NamedTuple):
+    """What is known of a flat geometry's extent; of one without, that it stays within the unit disc.
+
+    Args:
+        corners: of a convex polygon that contains it, all within the unit disc.
+        inner: radius of a disc about the origin that lies inside.
+    """
+
+    corners: tuple[tuple[float, float], ...]
+    inner: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +54,7 @@ class Manifest:
         set: name of the scenes it was trained on, which models of different speed and error share.
         sizes: canvases (width, height) that it draws; any within its limits where there are none.
         white: whether it draws over white alone, knowing colours but no coverage.
+        outlines: of its geometries, for bounds; see `Outline`.
     """
 
     name: str
@@ -60,6 +74,7 @@ class Manifest:
     sizes: tuple[tuple[int, int], ...] = ()
     white: bool = False
     layout: str = "plane"
+    outlines: dict[str, Outline] = field(default_factory=dict)
 
     @staticmethod
     def from_json(text: str | bytes) -> Manifest:
@@ -74,7 +89,14 @@ class Manifest:
         data = read_json(text)
         if not isinstance(data, dict) or data.pop("format", None) != 1:
             raise ValueError("not a model manifest of format 1")
-        data = {"set": data.get("name"), "layout": "plane", "sizes": [], "white": False, **data}
+        data = {
+            "set": data.get("name"),
+            "layout": "plane",
+            "sizes": [],
+            "white": False,
+            "outlines": {},
+            **data,
+        }
         if data.keys() != _KINDS.keys():
             raise ValueError(f"fields missing or unknown: {', '.join(sorted(data.keys() ^ _KINDS.keys()))}")
         for key, fits in _KINDS.items():
@@ -85,7 +107,11 @@ class Manifest:
         lists = {key: tuple(data[key]) for key in ("geometries", "materials", "transforms", "material_ops")}
         trained = {key: (float(low), float(high)) for key, (low, high) in data["trained"].items()}
         sizes = tuple((width, height) for width, height in data["sizes"])
-        return Manifest(**{**data, **lists, "trained": trained, "sizes": sizes})
+        outlines = {
+            name: Outline(tuple((float(x), float(y)) for x, y in shape["corners"]), float(shape["inner"]))
+            for name, shape in data["outlines"].items()
+        }
+        return Manifest(**{**data, **lists, "trained": trained, "sizes": sizes, "outlines": outlines})
 
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
@@ -128,6 +154,24 @@ def _are(holds: Callable[[Any, Any], bool]) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, dict) and all(holds(k, v) for k, v in value.items())
 
 
+def _is_corner(value: Any) -> bool:
+    """A point of the unit disc, but for rounding."""
+    fits = isinstance(value, list) and len(value) == 2
+    return (
+        fits
+        and all(_is_range([-1, v]) and _is_range([v, 1]) for v in value)
+        and math.hypot(*value) < 1.000001
+    )
+
+
+def _is_outline(value: Any) -> bool:
+    if not isinstance(value, dict) or value.keys() != {"corners", "inner"}:
+        return False
+    corners, inner = value["corners"], value["inner"]
+    fits = isinstance(corners, list) and len(corners) >= 3 and all(map(_is_corner, corners))
+    return fits and _is_range([0, inner]) and _is_range([inner, 1])
+
+
 def _is_figure(key: str, value: Any) -> bool:
     """Sets are objects of figures; the stability suite says a line of text of each quantity."""
     if key == "sets":
@@ -153,6 +197,7 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "set": _is_name,
     "sizes": lambda value: isinstance(value, list) and all(map(_is_size, value)),
     "white": lambda value: type(value) is bool,
+    "outlines": _are(lambda _, value: _is_outline(value)),
 }
 """What each field may hold."""
 
