@@ -7,6 +7,7 @@ from math import hypot, sqrt
 
 from scenelang.graph.space import EVERYWHERE, Box, Refusal, Space
 from scenelang.graph.steps import Rows, Step, Warp
+from scenelang.scene import schema
 
 
 class Solid(Space):
