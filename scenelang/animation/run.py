@@ -14,7 +14,7 @@ from scenelang.animation.apng import write_apng
 from scenelang.animation.gif import write_gif
 from scenelang.animation.painting import Painter
 from scenelang.animation.pictures import Encoder, Film
-from scenelang.animation.store import Store, deliver
+from scenelang.animation.store import Store, deliver, put_frame
 from scenelang.animation.targets import Target
 from scenelang.animation.video import check_video, write_video
 from scenelang.animation.webp import write_webp
@@ -177,7 +177,7 @@ def _drawn(
                         workers.submit(frame.program, store.file(frame.key))
                     else:
                         say = partial(_part, progress, index, len(numbers))
-                        store.put(frame.key, painter.draw(frame, say))
+                        put_frame(store.file(frame.key), painter.draw(frame, say))
                         spent_s += time.perf_counter() - started
                     made.drawn += 1
             made.draw_s += time.perf_counter() - started

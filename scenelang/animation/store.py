@@ -12,7 +12,6 @@ import hashlib
 import os
 import re
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Final
 
 from scenelang.backend.errors import RenderError
@@ -68,9 +67,7 @@ class Store:
     def __enter__(self) -> Store:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is not None and not self._named(_FRAME):
             self.remove()  # nothing worth keeping
         self._lock.close()
@@ -83,14 +80,6 @@ class Store:
         """Whether a frame is there, whole and of a size (width, height)."""
         file = self.file(key)
         return not file.is_symlink() and file.is_file() and _whole(file, size)
-
-    def put(self, key: str, image: Image) -> None:
-        """Keep a frame.
-
-        Raises:
-            OSError: it cannot be written.
-        """
-        put_frame(self.file(key), image)
 
     def remove(self) -> None:
         """Take our files away, and where nothing else is there the folder and those that were made for it."""

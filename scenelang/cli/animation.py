@@ -14,7 +14,7 @@ import click
 from scenelang.animation.clip import Clip
 from scenelang.animation.targets import PICTURES, Target, TargetError, find_target, is_animation
 from scenelang.animation.timing import FrameRange, FramesError
-from scenelang.cli.inputs import STDIN, Request, read_text, unused_defines
+from scenelang.cli.inputs import STDIN, Request, read_text, stem_of, unused_defines
 from scenelang.cli.main import Trouble, describe
 from scenelang.cli.progress import Bar
 from scenelang.cli.say import say_diagnostics
@@ -76,7 +76,7 @@ def wanted_target(name: str, out: str, wanted: Wanted) -> Target | None:
     if not (is_animation(out) or folder or wanted.certain):
         return None
     try:
-        return find_target(out, "stdin" if name == STDIN else Path(name).stem)
+        return find_target(out, stem_of(name))
     except TargetError as error:
         raise click.UsageError(f"{error}.") from None
 

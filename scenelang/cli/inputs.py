@@ -48,6 +48,11 @@ class Input:
     evaluation: Evaluation | None = None  # runs its other frames; None for JSON
 
 
+def stem_of(name: str) -> str:
+    """What files made of a scene are called."""
+    return "stdin" if name == STDIN else Path(name).stem
+
+
 def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
     """The text of a scene; None after a report that it is none.
 

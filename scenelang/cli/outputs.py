@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import click
 
 from scenelang.animation.targets import is_animation
-from scenelang.cli.inputs import STDIN
+from scenelang.cli.inputs import stem_of
 
 
 def targets(names: Sequence[str], out: str) -> list[Path]:
@@ -37,10 +38,12 @@ def targets(names: Sequence[str], out: str) -> list[Path]:
     if path.exists() and not path.is_dir():
         raise click.UsageError(f"`{out}` is a file; {len(names)} scenes need a folder.")
     if not path.exists() and not out.endswith(("/", "\\")):
-        what = "a picture" if _is_picture(path) else "an animation" if is_animation(out) else None
-        if what is not None:
+        with suppress(ValueError):  # no format has the suffix
+            what = "an animation" if is_animation(out) else "a picture"
+            if what == "a picture":
+                image_format(path)
             raise click.UsageError(f"`{out}` names {what}; {len(names)} scenes need a folder.")
-    files = [composed(path / f"{_stem(name)}.png") for name in names]
+    files = [composed(path / f"{stem_of(name)}.png") for name in names]
     owner: dict[str, str] = {}
     for name, file in zip(names, files, strict=True):
         first = owner.setdefault(file.name.casefold(), name)
@@ -59,16 +62,3 @@ def composed(file: Path) -> Path:
     if file.is_symlink():
         raise click.UsageError(f"`{file}` is a link; it is followed only where -o names it.")
     return file
-
-
-def _is_picture(path: Path) -> bool:
-    from scenelang.image import image_format
-
-    try:
-        return bool(image_format(path))
-    except ValueError:
-        return False
-
-
-def _stem(name: str) -> str:
-    return "stdin" if name == STDIN else Path(name).stem

@@ -33,12 +33,12 @@ def command(
 
     Prints PSNR (at most 50 dB), SSIM and FLIP. Transparent pictures are compared over white.
     """
+    from scenelang.cli.inputs import stem_of
     from scenelang.cli.jobs import prepare_scene
     from scenelang.cli.outputs import composed
 
     need_metrics()
-    stem = "stdin" if scene == "-" else Path(scene).stem
-    target = out if out is not None else composed(Path(f"{stem}-compare.png"))
+    target = out if out is not None else composed(Path(f"{stem_of(scene)}-compare.png"))
     job, found = prepare_scene(scene, request)
     if job.program is None or found.scene is None or job.failed():
         ctx.exit(1)
