@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -13,10 +13,10 @@ from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import listing, nearest
 from scenelang.evaluate.session import Watch
 from scenelang.models.manifest import Manifest
+from scenelang.records import Record
 
 
-@dataclass(slots=True)
-class Defines:
+class Defines(Record, frozen=False):
     """Values for params from outside, and the params that files have.
 
     Args:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path, PureWindowsPath
 from typing import Final
 
@@ -14,6 +14,7 @@ from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.evaluate.session import Session
 from scenelang.files import read_regular
+from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.syntax import nodes, parse
 
@@ -53,8 +54,7 @@ def decode_source(data: bytes, name: str) -> SourceFile:
         raise Unreadable("E0214", f"it is not UTF-8 text: byte {error.start}") from None
 
 
-@dataclass(slots=True)
-class Loader:
+class Loader(Record, frozen=False):
     """Finds imported files inside the import root.
 
     Args:

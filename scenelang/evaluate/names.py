@@ -7,11 +7,12 @@ list of slots; slot 0 of a function's or module's list is the list it was define
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Final, Literal
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
+from scenelang.records import Record
 from scenelang.syntax import nodes
 
 Env = list[Any]
@@ -20,8 +21,7 @@ UNBOUND: Final = object()
 """What a slot holds before its ``let``, ``param`` or ``animate`` has run."""
 
 
-@dataclass(slots=True, eq=False)
-class Needs:
+class Needs(Record, frozen=False):
     """What a statement, or the body of a function or module, depends on.
 
     Args:
@@ -44,8 +44,7 @@ class Needs:
         return False
 
 
-@dataclass(slots=True, eq=False)
-class Slots:
+class Slots(Record, frozen=False):
     """The slots of a file, or of one call of a function or module.
 
     Args:
@@ -65,8 +64,7 @@ class Slots:
         return self.size - 1
 
 
-@dataclass(slots=True)
-class Definition:
+class Definition(Record, frozen=False):
     """A fn or module: what calls refer to; ``run`` is set once its body is prepared.
 
     Args:
@@ -88,8 +86,7 @@ class Definition:
     needs: Needs = field(default_factory=Needs)
 
 
-@dataclass(slots=True)
-class Binding:
+class Binding(Record, frozen=False):
     """What a name stands for.
 
     Args:
@@ -115,8 +112,7 @@ class Binding:
         return () if self.span is None else (Label(self.span, words),)
 
 
-@dataclass(slots=True, eq=False)
-class Scope:
+class Scope(Record, frozen=False):
     """The names of one block, and the block around it."""
 
     slots: Slots

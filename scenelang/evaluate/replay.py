@@ -9,18 +9,17 @@ which later stages know again.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.names import Needs
 from scenelang.evaluate.session import Session
+from scenelang.records import Record
 from scenelang.scene.spans import SpanMap
 
 
-@dataclass(slots=True)
-class Replayed:
+class Replayed(Record, frozen=False):
     """The action of a statement of a file or a group that runs at most once in a frame.
 
     Args:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from scenelang.diagnostics.diagnostic import Label
@@ -12,6 +12,7 @@ from scenelang.evaluate.limits import MAX_OBJECTS, MAX_PARTS, MAX_STEPS, Halt
 from scenelang.evaluate.names import UNBOUND, Needs
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.vocabulary import Vocabulary
+from scenelang.records import Record
 from scenelang.scene.schema import Animation
 from scenelang.scene.spans import SpanMap
 
@@ -19,8 +20,7 @@ Watch = Callable[[Span, Any], None]
 """What an editor looks on with; it may raise `Halt` to end the evaluation."""
 
 
-@dataclass(slots=True)
-class Settings:
+class Settings(Record, frozen=False):
     """What the top level sets, and where each was given.
 
     Args:
@@ -36,8 +36,7 @@ class Settings:
     given: dict[str, Span] = field(default_factory=dict)
 
 
-@dataclass(slots=True)
-class Session:
+class Session(Record, frozen=False):
     """The state of one evaluation over all its files.
 
     Args:

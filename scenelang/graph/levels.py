@@ -9,13 +9,12 @@ then ``inner`` from its last to its first.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Warp
+from scenelang.records import Record
 
 
-@dataclass(frozen=True, slots=True)
-class Levels:
+class Levels(Record):
     """A chain of steps as a model's lifting takes it.
 
     Args:

@@ -7,10 +7,10 @@ in the space it was written in: such a look folds to a colour.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from math import floor, tau
 from typing import Final
 
+from scenelang.records import Record
 from scenelang.scene.schema import Color, Flip, Grayscale, Hue, MaterialOp, Rotate, Scale, Shear, Translate
 
 Triple = tuple[float, float, float]
@@ -24,8 +24,7 @@ CONSTANT: Final = frozenset({"flat", "diffuse", "volumetric"})
 """Materials whose texture is white everywhere; see docs/language.md."""
 
 
-@dataclass(frozen=True, slots=True)
-class Look:
+class Look(Record):
     """A material as an object wears it.
 
     Args:

@@ -15,14 +15,14 @@ from scenelang.diagnostics.span import Span
 from scenelang.graph.looks import Look
 from scenelang.graph.space import Space
 from scenelang.graph.steps import Step
+from scenelang.records import Record
 from scenelang.words import Combine
 
 BLEND = 0.15
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Move:
+class Move(Record):
     """A step and where it was written; a step that merges several keeps the place of the first."""
 
     step: Step
@@ -66,8 +66,7 @@ class Leaf:
         return tuple([move.step for move in self.moves])
 
 
-@dataclass(frozen=True, slots=True)
-class Link:
+class Link(Record):
     """A child of a fold with the operator that joins it to what came before; the first is a union.
 
     ``k`` is the width of a ``smooth`` blend, in world units, over 0.
@@ -78,8 +77,7 @@ class Link:
     k: float = BLEND
 
 
-@dataclass(frozen=True, slots=True)
-class Fold:
+class Fold(Record):
     """Children folded from the left. Without links it is the empty set: distance +infinity.
 
     Args:
@@ -98,8 +96,7 @@ class Fold:
 Node = Leaf | Fold
 
 
-@dataclass(frozen=True, slots=True)
-class Graph:
+class Graph(Record):
     """A whole scene as a graph for one model.
 
     Args:

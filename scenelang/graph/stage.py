@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import atan, degrees, hypot, pi
+
+from scenelang.records import Record
 
 Triple = tuple[float, float, float]
 
@@ -25,8 +26,7 @@ def decoded(srgb: Triple) -> Triple:
     return r, g, b
 
 
-@dataclass(frozen=True, slots=True)
-class Camera:
+class Camera(Record):
     """Where the picture is taken from.
 
     Args:
@@ -54,8 +54,7 @@ class Camera:
         return f, right, _cross(right, f)
 
 
-@dataclass(frozen=True, slots=True)
-class Light:
+class Light(Record):
     """A point light: at distance r it sends ``power rgb / r²``."""
 
     position: Triple = (2.5, 4.0, 3.0)
@@ -67,16 +66,14 @@ class Light:
         return f"a power of {self.power:g} is negative" if self.power < 0.0 else None
 
 
-@dataclass(frozen=True, slots=True)
-class Ground:
+class Ground(Record):
     """A diffuse plane at height ``y``."""
 
     y: float = -1.0
     rgb: Triple = (0.50, 0.48, 0.45)
 
 
-@dataclass(frozen=True, slots=True)
-class Stage:
+class Stage(Record):
     """All of a 3D scene that is not an object.
 
     Args:

@@ -9,7 +9,7 @@ same sense, and a `Displace` leaves points alone: it adds to the leaf's distance
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from scenelang.records import Record
 
 Rows = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float
@@ -17,8 +17,7 @@ Rows = tuple[
 IDENTITY: Rows = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Affine:
+class Affine(Record):
     """An affine map of R^3 as the upper three rows of a 4 x 4 matrix, row by row, column vectors."""
 
     rows: Rows
@@ -29,8 +28,7 @@ class Affine:
         return self.rows == IDENTITY
 
 
-@dataclass(frozen=True, slots=True)
-class Warp:
+class Warp(Record):
     """A turn of each point about the z axis by ``twirl |p| + bend . (p.x, p.y)`` radians."""
 
     twirl: float
@@ -41,8 +39,7 @@ class Warp:
         return self.twirl == 0.0 and self.bend == (0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Twist:
+class Twist(Record):
     """A turn of each point about the y axis by ``twist p.y`` radians; see the module for its sense."""
 
     twist: float
@@ -52,8 +49,7 @@ class Twist:
         return self.twist == 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Displace:
+class Displace(Record):
     """Adds ``amount sin(f x) sin(f y) sin(f z)`` to the leaf's distance, f the ``frequency``.
 
     It stands first in a chain, and once: (x, y, z) is the leaf's own point.

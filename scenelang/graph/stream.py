@@ -21,12 +21,13 @@ still looks at it.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from scenelang.graph.bounds import BLEND, leaf_box
 from scenelang.graph.grid import Grid
 from scenelang.graph.nodes import Leaf
 from scenelang.graph.space import Space
+from scenelang.records import Record
 from scenelang.words import Combine
 
 Row = tuple[Combine, Leaf]
@@ -35,8 +36,7 @@ _MOST_CUTS = 64
 """A stream that subtracts more often than this is not moved behind another one."""
 
 
-@dataclass(slots=True)
-class Stream:
+class Stream(Record, frozen=False):
     """Rows in order; the first one is a union.
 
     Args:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.models.manifest import Manifest
+from scenelang.records import Record
 
 
-@dataclass(frozen=True, slots=True)
-class Context:
+class Context(Record):
     """The model a graph is compiled for and where its mistakes go.
 
     Args:

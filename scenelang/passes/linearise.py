@@ -15,18 +15,18 @@ otherwise             refused: ``S - (x n y)``, ``S - (x - y)``, ``S n (x u y)``
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node
 from scenelang.graph.space import Space
 from scenelang.graph.stream import Stream
 from scenelang.passes.context import Context
+from scenelang.records import Record
 from scenelang.words import Combine
 
 
-@dataclass(slots=True)
-class _Frame:
+class _Frame(Record, frozen=False):
     """One fold being streamed.
 
     Args:

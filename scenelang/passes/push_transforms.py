@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from scenelang.graph.chain import Moves, merged
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node
 from scenelang.passes.context import Context
+from scenelang.records import Record
 
 
-@dataclass(slots=True)
-class _Open:
+class _Open(Record, frozen=False):
     """A fold whose children are being visited, and the moves from its children's space to the world."""
 
     fold: Fold

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 from scenelang.diagnostics.span import Span
+from scenelang.records import Record
 from scenelang.syntax import nodes
 
 Kind = Literal["let", "param", "fn", "module", "import", "argument", "loop"]
@@ -28,8 +29,7 @@ Role = Literal[
 ]
 
 
-@dataclass(eq=False, slots=True)
-class Symbol:
+class Symbol(Record, frozen=False):
     """A definition.
 
     Args:
@@ -58,8 +58,7 @@ class Symbol:
         return self.scope.parent is None and self.kind in ("let", "param", "fn", "module")
 
 
-@dataclass(eq=False, slots=True)
-class Scope:
+class Scope(Record, frozen=False):
     """A block, a function or a loop: its names, where it reaches, and what is around it."""
 
     start: int
@@ -79,8 +78,7 @@ class Scope:
         return next((scope.symbols[name] for scope in self.outwards() if name in scope.symbols), None)
 
 
-@dataclass(eq=False, slots=True)
-class Use:
+class Use(Record, frozen=False):
     """A place where a name stands.
 
     Args:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.records import Record
 from scenelang.scene.modifiers import Transform
 from scenelang.scene.nodes import Chain, Object, SceneData, SceneNode
 from scenelang.scene.spans import SpanMap, Written
@@ -19,8 +20,7 @@ Key = str | int
 _TOKENS: Final = re.compile(r'"(?:[^"\\]++|\\.)*+"?|[\[\]{},:]|[^\s\[\]{},:"]++', re.DOTALL)
 
 
-@dataclass(slots=True)
-class Value:
+class Value(Record, frozen=False):
     """A JSON value: its place in the text and, in a list or an object, the values in it."""
 
     start: int

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from scenelang.deep import deep_stack
+from scenelang.records import Record
 from scenelang.scene.fields import Rgb
 from scenelang.scene.modifiers import MaterialOp, Transform
 from scenelang.scene.nodes import Link, Object, SceneData, SceneNode
@@ -18,8 +19,7 @@ _DEEPEST: Final = 10
 """Nodes within nodes of one expression; Python itself takes no more than 200 brackets."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Call:
+class _Call(Record):
     """Brackets with something before them and something in them: a call, or a tuple."""
 
     head: str
@@ -41,8 +41,7 @@ def to_python(scene: SceneData) -> str:
         return "\n".join(lines) + "\n"
 
 
-@dataclass(slots=True)
-class _Maker:
+class _Maker(Record, frozen=False):
     """Makes code of nodes; what nests too deep becomes a variable of its own in ``parts``."""
 
     parts: list[tuple[str, _Code]] = field(default_factory=list)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 from scenelang.diagnostics.span import Span
+from scenelang.records import Record
 from scenelang.scene import library
 
 
@@ -35,8 +36,7 @@ class Calls(NamedTuple):
         return next((call for call in self.outwards() if not library.holds(call.source)), None)
 
 
-@dataclass(slots=True)
-class SpanMap:
+class SpanMap(Record, frozen=False):
     """Spans of a Scene's nodes, transforms and materials, by identity.
 
     It answers for the very objects that the evaluator made; for any other it answers None. Nodes that one

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import islice
 from typing import Final
 
@@ -12,6 +12,7 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import Effort
 from scenelang.evaluate.limits import MAX_COMPARED, Halt
 from scenelang.evaluate.report.suppression import NONE, Damage
+from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.scene.spans import Calls
 from scenelang.syntax.lexer import scan
@@ -24,8 +25,7 @@ Advice = tuple[str | None, Fix | None]
 _SHOWN: Final = 3  # places of one report
 
 
-@dataclass(slots=True)
-class Shared:
+class Shared(Record, frozen=False):
     """A report that several places share.
 
     Args:
@@ -56,8 +56,7 @@ def shown_places(places: Collection[Span], words: str, rest: str = "") -> tuple[
     return tuple(labels)
 
 
-@dataclass(slots=True)
-class Reporter:
+class Reporter(Record, frozen=False):
     """Where the mistakes of one evaluation go, and what is known of those reported.
 
     Args:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.file_context import FileContext, Place
+from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.syntax import nodes
 
 _LEAVES: Final = frozenset(("square", "triangle", "pentagon"))  # what the library is made of
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
+class Shape(Record):
     """A module of ``std/shapes``.
 
     Args:

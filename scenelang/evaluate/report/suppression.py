@@ -9,11 +9,11 @@ from __future__ import annotations
 import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.span import Span
+from scenelang.records import Record
 from scenelang.syntax import nodes
 from scenelang.syntax.tables import tables
 
@@ -29,8 +29,7 @@ _CERTAIN = frozenset(("E0116", "E0117", "E0123", "E0127", "E0132"))
 _PLACES = frozenset(("E0330", "E0331", "E0332", "E0333", "E0334", "E0335"))
 
 
-@dataclass(frozen=True, slots=True)
-class Damage:
+class Damage(Record):
     """The damage of one file.
 
     Args:

@@ -7,7 +7,6 @@ import math
 import operator
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from scenelang import words
@@ -24,12 +23,12 @@ from scenelang.evaluate.values.value import (
     unexpected,
     unpack,
 )
+from scenelang.records import Record
 
 _MASK = (1 << 64) - 1
 
 
-@dataclass(frozen=True, slots=True)
-class Builtin:
+class Builtin(Record):
     """A function of the language.
 
     Args:

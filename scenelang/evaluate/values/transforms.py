@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 from scenelang.evaluate.builder import make
 from scenelang.evaluate.values.functions import angle, number
 from scenelang.evaluate.values.value import Problem, Vec, describe, unexpected
+from scenelang.records import Record
 from scenelang.scene.fields import Frozen
 from scenelang.scene.modifiers import (
     Bend,
@@ -29,8 +29,7 @@ from scenelang.scene.modifiers import (
 from scenelang.words import OPERATIONS, TRANSFORMS, Word
 
 
-@dataclass(frozen=True, slots=True)
-class Spec:
+class Spec(Record):
     """One transform or operation.
 
     Args:
