@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 from scenelang.cli.inputs import STDIN, Request, merged, read_input, read_text, unused_defines
@@ -14,10 +14,10 @@ from scenelang.diagnostics.fixes import Settled, settle
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.inputs import Defines
 from scenelang.program.check import Frames, check_evaluated
+from scenelang.records import Record
 
 
-@dataclass(frozen=True, slots=True)
-class Selection:
+class Selection(Record):
     """Which warnings count; errors always do."""
 
     # codes, or beginnings of codes, of the warnings that are wanted; empty for all
@@ -31,8 +31,7 @@ class Selection:
         return code.startswith(self.select or ("W",)) and not (self.ignore and code.startswith(self.ignore))
 
 
-@dataclass(slots=True)
-class Scenes:
+class Scenes(Record, frozen=False):
     """The scenes of a command line."""
 
     request: Request  # what holds for all of them

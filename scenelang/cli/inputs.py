@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from scenelang.cli.clock import Clock
@@ -15,6 +15,7 @@ from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.evaluate.loader import Unreadable, decode_source, read_source
 from scenelang.files import note_input
+from scenelang.records import Record
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap
 from scenelang.syntax import nodes, parse
@@ -23,8 +24,7 @@ STDIN = "-"
 JSON = ".json"
 
 
-@dataclass(frozen=True, slots=True)
-class Request:
+class Request(Record):
     """What the command line says about every scene."""
 
     defines: Defines  # values for params, shared by all scenes
@@ -36,8 +36,7 @@ class Request:
     texts: Mapping[Path, str] = field(default_factory=dict)
 
 
-@dataclass(slots=True)
-class Input:
+class Input(Record, frozen=False):
     """A scene as it was read."""
 
     name: str  # as the user wrote it

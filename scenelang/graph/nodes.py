@@ -8,7 +8,7 @@ new graph.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any, TypeVar, cast
 
 from scenelang.diagnostics.span import Span
@@ -29,8 +29,7 @@ class Move(Record):
     span: Span | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Leaf:
+class Leaf(Record):
     """One object: a leaf geometry of a model, its look and its moves.
 
     Args:
@@ -46,7 +45,9 @@ class Leaf:
     look: Look
     moves: tuple[Move, ...] = ()
     span: Span | None = None
-    notes: dict[Any, Any] | None = field(default=None, compare=False, repr=False)
+    notes: dict[Any, Any] | None = None
+
+    _key = attrgetter("geometry", "look", "moves", "span")
 
     def changed(self, look: Look, moves: tuple[Move, ...]) -> Leaf:
         """The same object with another look or other moves."""

@@ -30,6 +30,8 @@ Format = Literal["human", "json", "sarif", "github", "concise"]
 
 def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
     """Codes of warnings, or beginnings of them, from ``W0501`` and ``W02,W05``."""
+    if not values:
+        return ()
     from scenelang.diagnostics.pages import CODES
 
     found = [code.strip().upper() for value in values for code in value.split(",") if code.strip()]
