@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -58,30 +58,23 @@ def read_lifting(tensors: Mapping[str, npt.NDArray[Any]], prefix: str = "lifting
     def array(name: str) -> Array:
         return np.asarray(tensors[prefix + name], np.float64)
 
-    kinds = [("geometry", kind) for kind in GEOMETRY_INPUTS] + [
-        ("material", kind) for kind in MATERIAL_INPUTS
-    ]
-    encoders = {
-        kind: tuple(
-            (array(f"{side}.{kind}.layers.{i}.weight"), array(f"{side}.{kind}.layers.{i}.bias"))
-            for i in range(3)
-        )
-        for side, kind in kinds
-    }
-    lifting = Lifting(array("codes"), array("material_codes"), encoders)
-    held = 2 + sum(2 * len(layers) for layers in encoders.values())
-    if sum(name.startswith(prefix) for name in tensors) > held:
+    lifting = Lifting(array("codes"), array("material_codes"), {})
+    encoders: dict[str, tuple[tuple[Array, Array], ...]] = {}
+    for side, kinds, size in (
+        ("geometry", GEOMETRY_INPUTS, lifting.codes.shape[1]),
+        ("material", MATERIAL_INPUTS, lifting.material_codes.shape[1]),
+    ):
+        for kind, width in kinds.items():
+            names = [f"{side}.{kind}.layers.{i}" for i in range(3)]
+            encoders[kind] = tuple((array(f"{name}.weight"), array(f"{name}.bias")) for name in names)
+            _check(kind, encoders[kind], width, size)
+    if sum(name.startswith(prefix) for name in tensors) > 2 + 6 * len(encoders):
         raise ValueError("it holds tensors that no encoder has")
-    for side, kind in kinds:
-        _check(
-            kind, encoders[kind], (lifting.codes if side == "geometry" else lifting.material_codes).shape[1]
-        )
-    return lifting
+    return replace(lifting, encoders=encoders)
 
 
-def _check(kind: str, layers: tuple[tuple[Array, Array], ...], size: int) -> None:
-    """An encoder's layers must fit one another and end in a matrix (size, size)."""
-    width = {**GEOMETRY_INPUTS, **MATERIAL_INPUTS}[kind]
+def _check(kind: str, layers: tuple[tuple[Array, Array], ...], width: int, size: int) -> None:
+    """An encoder's layers must fit one another, take ``width`` numbers and end in a matrix (size, size)."""
     for weight, bias in layers:
         if weight.ndim != 2 or bias.shape != weight.shape[:1] or weight.shape[1] != width:
             raise ValueError(f"a layer of `{kind}` has the wrong shape")

@@ -35,63 +35,53 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     if manifest.lifting != "exact" and codes.lifting is None:
         raise ProgramError(f"model `{manifest.name}` needs the lifting `{manifest.lifting}`")
     rows = graph.rows()
+    leaves = [leaf for _, leaf in rows]
     return Program(
-        vectors=_vectors(rows, manifest, codes),
+        vectors=_vectors(leaves, manifest, codes),
         tokens=np.array([TOKENS[op] for op, _ in rows], dtype=np.int8),
         bounds=_bounds(rows, graph),
         canvas=graph.canvas,
         background=graph.background,
         model=manifest.name,
         weights=codes.digest,
-        objects=tuple(leaf.geometry for _, leaf in rows),
-        places=_places([leaf.span for _, leaf in rows]),
+        objects=tuple([leaf.geometry for leaf in leaves]),
+        places=_places([leaf.span for leaf in leaves]),
     )
 
 
-def _vectors(rows: Rows, manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
+def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
     """Vectors (N, 64). Leaves that stay from frame to frame note theirs; a row depends on nothing else."""
     note = "vector", codes.digest
-    fresh = [row for row in rows if row[1].notes is None or note not in row[1].notes]
+    known = {id(leaf): leaf.notes[note] for leaf in leaves if leaf.notes and note in leaf.notes}
+    fresh = [leaf for leaf in leaves if id(leaf) not in known]
     made = _lifted(fresh, manifest, codes)
-    if len(fresh) == len(rows) and all(leaf.notes is None for _, leaf in rows):
-        return made
-    for (_, leaf), vector in zip(fresh, made, strict=True):
+    for leaf, vector in zip(fresh, made, strict=True):
         if leaf.notes is not None:
             leaf.notes[note] = vector.copy()
-    lifted = iter(made)
-    vectors = np.empty((len(rows), WIDTH), dtype=np.float32)
-    asked = {id(leaf) for _, leaf in fresh}
-    for index, (_, leaf) in enumerate(rows):
-        vectors[index] = next(lifted) if id(leaf) in asked else (leaf.notes or {})[note]
-    return vectors
+    if not known:
+        return made
+    known |= {id(leaf): vector for leaf, vector in zip(fresh, made, strict=True)}
+    return np.stack([known[id(leaf)] for leaf in leaves])
 
 
-def _lifted(rows: Rows, manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
-    vectors = np.zeros((len(rows), WIDTH), dtype=np.float32)  # (N, 64)
-    if rows and codes.lifting is not None:
-        lifting = codes.lifting
-        geometry = lift_geometry(
-            lifting,
-            [leaf.steps for _, leaf in rows],
-            [manifest.geometries.index(leaf.geometry) for _, leaf in rows],
-        )
-        materials = [manifest.materials.index(leaf.look.material) for _, leaf in rows]
-        made = [geometry, lift_material(lifting, [leaf.look.rgb for _, leaf in rows], materials)]
-        if (width := sum(v.shape[1] for v in made)) != WIDTH:
-            raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")
-        vectors[:] = np.concatenate(made, 1)
-    elif rows:
-        levels = [split_levels(leaf.steps, manifest.limits) for _, leaf in rows]
-        layout = LAYOUTS[manifest.layout]
-        geometry = lift_many(levels, [codes.geometry[leaf.geometry] for _, leaf in rows], layout)
-        material = lift_colours(
-            [leaf.look.rgb for _, leaf in rows],
-            [codes.material[leaf.look.material] for _, leaf in rows],
-            layout,
-        )
-        vectors[:] = np.concatenate([geometry, material], 1)
-    vectors += 0.0  # one zero only, so that equal scenes give equal bytes
-    return vectors
+def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
+    if not leaves:
+        return np.zeros((0, WIDTH), np.float32)
+    chains, colours = [leaf.steps for leaf in leaves], [leaf.look.rgb for leaf in leaves]
+    if codes.lifting is not None:
+        geometries = [manifest.geometries.index(leaf.geometry) for leaf in leaves]
+        materials = [manifest.materials.index(leaf.look.material) for leaf in leaves]
+        geometry = lift_geometry(codes.lifting, chains, geometries)
+        material = lift_material(codes.lifting, colours, materials)
+    else:
+        layout, levels = LAYOUTS[manifest.layout], [split_levels(chain, manifest.limits) for chain in chains]
+        geometry = lift_many(levels, [codes.geometry[leaf.geometry] for leaf in leaves], layout)
+        material = lift_colours(colours, [codes.material[leaf.look.material] for leaf in leaves], layout)
+    vectors = np.concatenate([geometry, material], 1)
+    if (width := vectors.shape[1]) != WIDTH:
+        raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")
+    # one zero only, so that equal scenes give equal bytes
+    return vectors.astype(np.float32) + np.float32(0.0)
 
 
 def _bounds(rows: Rows, graph: Graph) -> npt.NDArray[np.float32]:
@@ -113,15 +103,10 @@ def _bounds(rows: Rows, graph: Graph) -> npt.NDArray[np.float32]:
 
 
 def _places(spans: list[Span | None]) -> tuple[Place | None, ...]:
-    known: dict[tuple[str, int, int], Place] = {}
-    places: list[Place | None] = []
-    for span in spans:
-        if span is None:
-            places.append(None)
-            continue
-        key = (span.source.name, span.start, span.end)
-        if key not in known:
-            (line, column), (end_line, end_column) = span.locate()
-            known[key] = Place(span.source.name, line, column, end_line, end_column)
-        places.append(known[key])
-    return tuple(places)
+    known: dict[tuple[str, int, int] | None, Place | None] = {None: None}
+    keys = [None if span is None else (span.source.name, span.start, span.end) for span in spans]
+    for key, span in zip(keys, spans, strict=True):
+        if span is not None and key not in known:
+            start, end = span.locate()
+            known[key] = Place(span.source.name, *start, *end)
+    return tuple([known[key] for key in keys])

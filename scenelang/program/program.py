@@ -172,16 +172,13 @@ def _check_rows(program: Program) -> None:
 
 
 def _check_settings(program: Program) -> None:
-    if len(program.canvas) != 2 or not all(
-        type(side) is int and 1 <= side <= MOST_PIXELS for side in program.canvas
-    ):
-        raise ProgramError(f"a canvas of {program.canvas!r}, where sides from 1 to {MOST_PIXELS} are allowed")
-    colour = program.background
-    if colour is not None and not (
-        len(colour) == 3 and all(type(v) in (int, float) and 0 <= v <= 1 for v in colour)
-    ):
+    canvas, colour = program.canvas, program.background
+    if len(canvas) != 2 or not all(type(side) is int and 1 <= side <= MOST_PIXELS for side in canvas):
+        raise ProgramError(f"a canvas of {canvas!r}, where sides from 1 to {MOST_PIXELS} are allowed")
+    shares = colour is None or all(type(v) in (int, float) and 0 <= v <= 1 for v in colour)
+    if not shares or (colour is not None and len(colour) != 3):
         raise ProgramError(f"a background of {colour!r}, which is not a colour")
     if not program.model:
         raise ProgramError("no model is named")
-    if len(program.weights) != 64 or any(c not in "0123456789abcdef" for c in program.weights):
+    if len(program.weights) != 64 or not set(program.weights) <= set("0123456789abcdef"):
         raise ProgramError("the digest of the weights is not 64 hexadecimal digits")

@@ -21,7 +21,7 @@ No point looks at another and nothing here knows a leaf, an operator's formula, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -54,9 +54,6 @@ class FramedConfig:
     state: int = 1
     decoder_width: int = 32
     paint_lines: int = 2
-
-    def to_json(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 class Decoder(NamedTuple):

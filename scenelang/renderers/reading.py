@@ -15,8 +15,7 @@ unions do not need.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
@@ -40,9 +39,6 @@ class ReadingConfig:
     hidden: int = 128
     reads: int = 8
     octaves: int = 6
-
-    def to_json(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def fourier_features(points: Tensor, octaves: int) -> Tensor:

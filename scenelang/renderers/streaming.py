@@ -14,8 +14,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
@@ -55,9 +54,6 @@ class StreamingConfig:
     def levels(self) -> tuple[int, ...]:
         """Resolutions of the deconvolutions' outputs, 2, 4, …, R."""
         return tuple(2 ** (i + 1) for i in range(int(math.log2(self.resolution))))
-
-    def to_json(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 class ConvLSTM(nn.Module):

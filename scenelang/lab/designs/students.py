@@ -6,7 +6,7 @@ Letters: B scenes, N objects, P points, R pixels along a side, D = d_g + d_m.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar, Literal
 
 import torch
@@ -105,7 +105,7 @@ class StreamingStudent(Student):
 
     def __init__(self, config: StudentConfig, *, grown: bool = False) -> None:
         super().__init__(config)
-        sizes: dict[str, Any] = config.streaming.to_json() | {"vector": self.vector}
+        sizes: dict[str, Any] = asdict(config.streaming) | {"vector": self.vector}
         self.renderer = Streaming(StreamingConfig(**sizes), grown=grown)
 
     def image(self, scenes: Scenes, r: int, blend: float = 1.0) -> Tensor:
@@ -135,7 +135,7 @@ class ReadingStudent(PointStudent):
 
     def __init__(self, config: StudentConfig) -> None:
         super().__init__(config)
-        sizes: dict[str, Any] = config.reading.to_json() | {"vector": self.vector}
+        sizes: dict[str, Any] = asdict(config.reading) | {"vector": self.vector}
         self.renderer = Reading(ReadingConfig(**sizes))
 
     def points(self, scenes: Scenes, x: Tensor, y: Tensor) -> Tensor:

@@ -6,7 +6,7 @@ An experiment is a list of runs, each of which trains a student (`scenelang.lab.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from scenelang.lab.designs.ablations import VARIANTS
 from scenelang.lab.designs.encoders import LiftingConfig
@@ -155,7 +155,7 @@ def ablation_runs(budget_s: float, seed: int) -> list[tuple[str, str, StudyConfi
         for value in values:
             if value == getattr(shipped, size):
                 continue
-            sizes = FramedConfig(**{**shipped.to_json(), size: value})
+            sizes = FramedConfig(**{**asdict(shipped), size: value})
             student = replace(whole.student, framed=sizes, variant="code" if size == "code" else "")
             runs.append((f"{LABELS[size]} {value}", size, replace(whole, student=student)))
     return runs
