@@ -272,19 +272,17 @@ def _shade(
 
 
 def _rough(picture: np.ndarray) -> np.ndarray:
-    """Pixels (H, W) of (4, H, W) that differ from one of their eight neighbours."""
+    """Pixels (H, W) of (4, H, W) that differ from what lies evenly between neighbours on opposite sides."""
     shown = np.sqrt(np.clip(picture, 0.0, 1.0))  # nearly as bright as it looks
-    rough = np.zeros(shown.shape[1:], bool)
-    for a, b in (
-        ((slice(None), slice(1, None)), (slice(None), slice(None, -1))),
-        ((slice(1, None), slice(None)), (slice(None, -1), slice(None))),
-        ((slice(1, None), slice(1, None)), (slice(None, -1), slice(None, -1))),
-        ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))),
-    ):
-        far = (abs(shown[(slice(None), *a)] - shown[(slice(None), *b)]) > CONTRAST).any(0)
-        rough[a] |= far
-        rough[b] |= far
-    return rough
+    wide = np.pad(shown, ((0, 0), (1, 1), (1, 1)), "edge")
+    h, w = shown.shape[1:]
+
+    def bend(y: int, x: int) -> np.ndarray:
+        ends = wide[:, 1 + y : 1 + y + h, 1 + x : 1 + x + w] + wide[:, 1 - y : 1 - y + h, 1 - x : 1 - x + w]
+        return np.asarray(abs(ends - 2 * shown).max(0))
+
+    most = np.maximum(bend(0, 1), bend(1, 0))
+    return np.asarray(np.maximum(most, np.maximum(bend(1, 1), bend(1, -1))) > CONTRAST)
 
 
 def _dot(a: Array, b: Array) -> Array:
