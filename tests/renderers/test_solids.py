@@ -24,7 +24,8 @@ rng = np.random.default_rng(7)
 
 def everywhere(solids: SolidField, p: np.ndarray, **asked: bool) -> Meeting:
     """What a field answers where every object is met."""
-    return solids.meet(p, [np.ones(p.shape[1], bool)] * len(solids.solids), **asked)
+    with solids.xp.inference():
+        return solids.meet(p, [np.ones(p.shape[1], bool)] * len(solids.solids), **asked)
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:
@@ -60,7 +61,7 @@ def test_leaves_are_exact_near_their_surfaces(leaf: str) -> None:
     exact = leaf_distance(leaf, q)
     q, exact = q[:, abs(exact) < 0.05], exact[abs(exact) < 0.05]
     found = everywhere(field([Object(leaf)]), q.astype(np.float32), gradient=True)
-    assert abs(found.distance - exact).mean() < 3e-4
+    assert abs(found.distance - exact).mean() < 6e-4
     h = 1e-5
     normal = np.stack([leaf_distance(leaf, q + h * e[:, None]) - exact for e in np.eye(3)]) / h
     across = np.cross(normal, found.gradient, axis=0)
@@ -79,7 +80,7 @@ def test_the_cell_is_the_fold(token: str) -> None:
         depth, paint = combine(past, np.zeros((n, 1)), own, np.ones((n, 1)), TOKENS[token])
         assert joined.state == pytest.approx(depth * width / 0.15, abs=2e-4, rel=3e-4)
         register = net.register(joined, np.zeros((4, n), np.float32), np.ones((4, 1), np.float32))
-        clear = (abs(own - past) > 1e-3) & (abs(own) > 1e-3)
+        clear = (abs(own - past) > 1e-3) & (abs(own) > 1e-3) & (abs(past) < 2)
         assert register[0, clear] == pytest.approx(paint[clear, 0], abs=2e-3)
         assert register[3, clear] == pytest.approx(paint[clear, 0].round(), abs=2e-3)
 
@@ -104,7 +105,7 @@ def test_objects_change_nothing_out_of_their_reach() -> None:
     origin = np.array([0.3, 1.0, 4.0], np.float32)
     p = rng.uniform(-1.5, 1.5, (3, 20000)).astype(np.float32)
     t = np.linalg.norm(p - origin[:, None], axis=0)
-    begin, end, _ = solids.spans(origin, (p - origin[:, None]) / t)
+    begin, end, _ = solids.spans(origin, (p - origin[:, None]) / t, t + 10)
     near = solids.meet(p, list((begin <= t) & (t <= end)), register=True)
     whole = everywhere(solids, p, register=True)
     inside = whole.distance < -1e-4
@@ -119,8 +120,8 @@ def test_steps_pass_no_surface() -> None:
     origin = np.array([0.3, 1.0, 4.0], np.float32)
     way = rng.normal(size=(3, 3000)).astype(np.float32) * 0.1 - origin[:, None]
     way /= np.linalg.norm(way, axis=0)
-    _, _, rate = solids.spans(origin, way)
     t = rng.uniform(3, 5, 3000).astype(np.float32)
+    _, _, rate = solids.spans(origin, way, t + 10)
     a, b = (everywhere(solids, origin[:, None] + way * at).distance for at in (t, t + 0.02))
     assert (abs(a - b) / 0.02 <= rate.max(0) + 1e-3).all()
 

@@ -22,7 +22,7 @@ CLEAR = 2e-4  # world units before a surface where rays from the light end
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2  # of a way through a medium, by what it takes of the light
 TILE = 1 << 16  # samples at a time
-CONTRAST = 0.02  # sRGB: pixels that differ more from a neighbour are sampled four times
+CONTRAST = 0.04  # sRGB: pixels that differ more from a neighbour are sampled four times
 
 
 class Shade(NamedTuple):

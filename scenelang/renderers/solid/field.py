@@ -56,12 +56,14 @@ class Meeting(NamedTuple):
         register: colour and medium (4, M), if asked for.
         gradient: of D (3, M), if asked for.
         change: a bound on D and on how far another object's material may begin, if asked for.
+        met: pairs of points and objects that met.
     """
 
     distance: Array
     register: Array = None
     gradient: Array = None
     change: Array = None
+    met: int = 0
 
 
 class SolidField:
@@ -85,6 +87,8 @@ class SolidField:
         """Whether every object draws."""
         self.media = any(float(solid.look[3, 0]) > 0.5 for solid in self.solids)
         """Whether some object is a medium."""
+        self.mixed = self.media and any(float(solid.look[3, 0]) <= 0.5 for solid in self.solids)
+        """Whether not all are."""
 
     def _solids(self, vectors: np.ndarray, tokens: np.ndarray) -> list[Solid]:
         xp, layout, like = self.xp, self.network.layout, self.network.codes
@@ -121,13 +125,14 @@ class SolidField:
             )
         return solids[::-1]
 
-    def spans(self, origin: Array, way: Array) -> tuple[Array, Array, Array]:
+    def spans(self, origin: Array, way: Array, limit: Array) -> tuple[Array, Array, Array]:
         """Where rays may meet each object: begin and end (N, M), inf and -inf for never, and a bound (N, M)
         on how fast its distance changes along them.
 
         Args:
             origin: of all rays (3,).
             way: unit directions (3, M).
+            limit: where the rays end (M,).
         """
         xp, count = self.xp, way.shape[1]
         shape = len(self.solids), count
@@ -141,13 +146,15 @@ class SolidField:
             near = b[:, None] + middle * a  # the point closest to the ball's centre
             left = frame.ball(solid.radius) ** 2 - near[0] * near[0] - near[1] * near[1] - near[2] * near[2]
             half = xp.sqrt((left / square).clip(0.0))
-            hit = left > 0
-            begin[i] = xp.select(hit, middle - half, begin[i])
-            end[i] = xp.select(hit, middle + half, end[i])
+            first, last = (middle - half).clip(0.0), xp.minimum(middle + half, limit)
+            hit = (left > 0) & (first <= last)
+            begin[i] = xp.select(hit, first, begin[i])
+            end[i] = xp.select(hit, last, end[i])
             rate[i] = (frame.scale * frame.growth(solid.radius)) * xp.sqrt(square)
             if solid.token == INTERSECT:  # outside its ball nothing is left of what came before
                 begin[:i] = xp.maximum(begin[:i], begin[i])
                 end[:i] = xp.minimum(end[:i], end[i])
+                begin[:i] = xp.select(begin[:i] <= end[:i], begin[:i], xp.full((), float("inf"), way))
         return begin, end, rate
 
     def meet(
@@ -170,6 +177,7 @@ class SolidField:
         memory = xp.full((4, count), 0.0, p) if register else None
         slope = xp.full((3, count), 0.0, p) if gradient else None
         bound = xp.full((count,), EMPTY, p) if change else None
+        pairs = 0
         touched = None if self.plain else inside[0] & ~inside[0]
         for solid, mask in zip(self.solids, inside, strict=True):
             if touched is not None:
@@ -181,6 +189,7 @@ class SolidField:
             met = len(index)
             if not met:
                 continue
+            pairs += met
             every = met == count
             q = p if every else xp.take(p, index)
             before = state if every else xp.take(state, index)
@@ -202,7 +211,8 @@ class SolidField:
                 held = memory if every else xp.take(memory, index)
                 memory = _update(xp, memory, index, every, self.network.register(joined, held, solid.look))
             state = _update(xp, state, index, every, joined.state)
-        return Meeting(state, memory, slope, None if bound is None else xp.minimum(bound, abs(state)))
+        bound = None if bound is None else xp.minimum(bound, abs(state))
+        return Meeting(state, memory, slope, bound, pairs)
 
     def _distance(self, solid: Solid, p: Array, gradient: bool) -> tuple[Array, Array | None]:
         """An object's world distance (M,) at world points (3, M), and its gradient (3, M) if asked for."""
