@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenelang.animation.clip import Clip, open_clip
 from scenelang.animation.painting import Painter
-from scenelang.animation.run import Made, Progress, make
+from scenelang.animation.run import Progress, RenderResult, make
 from scenelang.animation.targets import find_target
 from scenelang.animation.timing import FrameRange
 from scenelang.scene.schema import Scene
@@ -90,7 +90,7 @@ def animate(
     palette: Palette = "auto",
     dither: bool = False,
     progress: Callable[[Progress], None] = lambda _: None,
-) -> Made:
+) -> RenderResult:
     """Draw a scene file or Scenes to an animation; a call that was interrupted goes on where it stopped.
 
     Args:

@@ -50,7 +50,7 @@ class Progress:
 
 
 @dataclass(slots=True)
-class Made:
+class RenderResult:
     """An animation that was written.
 
     Args:
@@ -94,7 +94,7 @@ def make(
     dither: bool = False,
     strict: bool = False,
     progress: Callable[[Progress], None] = lambda _: None,
-) -> Made:
+) -> RenderResult:
     """Draw frames and write them whole: nothing is put in place before all of it is there.
 
     Frames are kept in `Target.work` on the way. If the run ends before its time, they stay there, and the
@@ -117,7 +117,7 @@ def make(
     """
     ready(target)
     suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
-    made = Made([], len(numbers))
+    made = RenderResult([], len(numbers))
     with Store(target.work, suffix) as store:
         keys, alpha = _drawn(painter, store, numbers, jobs, strict, progress, made)
         started = time.perf_counter()
@@ -145,7 +145,7 @@ def _drawn(
     jobs: int | None,
     strict: bool,
     progress: Callable[[Progress], None],
-    made: Made,
+    made: RenderResult,
 ) -> tuple[list[str], bool]:
     """Have every frame in the store; the key of each, and whether any has alpha."""
     keys: list[str] = []

@@ -15,7 +15,7 @@ _RANGE: Final = re.compile(r"\s*(\d{1,9})\s*(?:\.\.\s*(<?)\s*(\d{1,9})?\s*)?")
 
 
 class FramesError(ValueError):
-    """A range of frames that is none, or that an animation does not have."""
+    """Not a range of frames, or one that an animation does not have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class FrameRange:
         """``a..b`` inclusive, ``a..<b`` without b, ``a..`` to the end, or ``a`` alone.
 
         Raises:
-            FramesError: it is none of these, or empty.
+            FramesError: it has none of these forms, or is empty.
         """
         found = _RANGE.fullmatch(text)
         if found is None or (found[2] and found[3] is None):

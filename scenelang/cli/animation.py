@@ -25,14 +25,14 @@ from scenelang.diagnostics.suggest import listing
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
-    from scenelang.animation.run import Made
+    from scenelang.animation.run import RenderResult
     from scenelang.backend.options import Backend, Device
 
 SIZES = ("B", "kB", "MB", "GB")
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class Requested:
     """What the command line says about animations."""
 
     range: str | None  # `--frames`; None for all
@@ -66,7 +66,7 @@ class Wanted:
             raise click.BadParameter(str(error), param_hint="--frames") from None
 
 
-def wanted_target(name: str, out: str, wanted: Wanted) -> Target | None:
+def wanted_target(name: str, out: str, wanted: Requested) -> Target | None:
     """Where the animation of a scene goes if it has one; None where ``out`` is a single picture.
 
     Raises:
@@ -81,7 +81,7 @@ def wanted_target(name: str, out: str, wanted: Wanted) -> Target | None:
         raise click.UsageError(f"{error}.") from None
 
 
-def still_picture(clip: Clip, target: Target, wanted: Wanted, out: str) -> bool:
+def still_picture(clip: Clip, target: Target, wanted: Requested, out: str) -> bool:
     """Whether a scene without an animation is drawn as one picture; reports where it cannot be.
 
     Raises:
@@ -103,7 +103,7 @@ def still_picture(clip: Clip, target: Target, wanted: Wanted, out: str) -> bool:
     )
 
 
-def frames_of(clip: Clip, wanted: Wanted) -> range | None:
+def frames_of(clip: Clip, wanted: Requested) -> range | None:
     """The numbers of the frames that are asked for; None after a report that some are not there."""
     try:
         return wanted.frames.among(clip.animation.frames)
@@ -114,7 +114,7 @@ def frames_of(clip: Clip, wanted: Wanted) -> range | None:
         return None
 
 
-def animate(name: str, out: str, target: Target, request: Request, wanted: Wanted) -> int | SourceFile:
+def animate(name: str, out: str, target: Target, request: Request, wanted: Requested) -> int | SourceFile:
     """Draw an animation; the exit code, or the scene's text if it is to be drawn as one picture.
 
     Raises:
@@ -184,7 +184,7 @@ def animate(name: str, out: str, target: Target, request: Request, wanted: Wante
     return 0
 
 
-def summary(made: Made, seconds: float) -> str:
+def summary(made: RenderResult, seconds: float) -> str:
     """A line about what was written."""
     first, last = made.files[0], made.files[-1]
     name = f"{first} … {last.name}" if len(made.files) > 1 else str(first)
@@ -197,7 +197,7 @@ def summary(made: Made, seconds: float) -> str:
     return f"{name}: {', '.join(parts)}, {seconds:.1f} s"
 
 
-def strays(target: Target, made: Made) -> str | None:
+def strays(target: Target, made: RenderResult) -> str | None:
     """A line about files of a sequence that this run did not write."""
     if target.kind != "sequence":
         return None

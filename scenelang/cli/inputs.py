@@ -53,7 +53,7 @@ def stem_of(name: str) -> str:
 
 
 def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
-    """The text of a scene; None after a report that it is none.
+    """The text of a scene; None after a report that it cannot be read as text.
 
     Raises:
         OSError: it cannot be opened.

@@ -107,17 +107,17 @@ class _Commands(Commands):
         parent: click.Context | None = None,
         **extra: Any,
     ) -> click.Context:
-        with _told():
+        with _reporting():
             return super().make_context(info_name, args, parent, **extra)
 
     def invoke(self, ctx: click.Context) -> object:
-        with _told(), inputs_kept():
+        with _reporting(), inputs_kept():
             return super().invoke(ctx)
 
 
 @contextmanager
-def _told() -> Iterator[None]:
-    """What goes wrong without being a bug, told in a line."""
+def _reporting() -> Iterator[None]:
+    """Report in one line what goes wrong without being a bug."""
     try:
         yield
     except KeyboardInterrupt:

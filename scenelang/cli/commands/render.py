@@ -120,7 +120,7 @@ def command(
     With --max-ms or --max-flip each scene is drawn by what was measured to suffice, model and samples; -v
     says which, why, and what was next.
     """
-    from scenelang.cli.animation import Wanted, animate, wanted_target
+    from scenelang.cli.animation import Requested, animate, wanted_target
     from scenelang.cli.choosing import check_options
     from scenelang.cli.drawing import chosen, exact, neural
     from scenelang.cli.inputs import Request
@@ -129,7 +129,7 @@ def command(
     from scenelang.measure.frontier import Limits
 
     clock = Clock()
-    wanted = Wanted(frames, fps, jobs, palette, dither, backend, device, threads, strict, verbose)
+    wanted = Requested(frames, fps, jobs, palette, dither, backend, device, threads, strict, verbose)
     _ = wanted.frames
     if frame is not None and wanted.certain:
         raise click.UsageError("--frame asks for a picture, --frames and --fps for an animation.")

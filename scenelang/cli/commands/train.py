@@ -82,7 +82,7 @@ def command(
     if is_study(config_data(config)):
         raise click.UsageError(f"`{config}` configures a study; scenelang lab train trains it.")
     last: dict[str, float] = {}
-    with mistakes_told(config, out), Bar() as bar:
+    with reporting_mistakes(config, out), Bar() as bar:
         wanted = read_solids_config(config) if is_solids(config_data(config)) else read_config(config)
         place = prepare_torch(device, threads)
 
@@ -124,8 +124,8 @@ def command(
 
 
 @contextmanager
-def mistakes_told(config: str, out: Path) -> Iterator[None]:
-    """Tell what is wrong with a configuration or a checkpoint, and how an interrupted training goes on."""
+def reporting_mistakes(config: str, out: Path) -> Iterator[None]:
+    """Report mistakes in a configuration or a checkpoint, and how an interrupted training goes on."""
     from pydantic import ValidationError
 
     try:

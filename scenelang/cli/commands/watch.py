@@ -63,14 +63,14 @@ def command(
     import sys
 
     from scenelang.animation.targets import is_animation
-    from scenelang.cli.animation import Wanted, wanted_target
+    from scenelang.cli.animation import Requested, wanted_target
     from scenelang.cli.outputs import composed, targets
     from scenelang.watching.changes import stamps, wait
     from scenelang.watching.picture import Easel, Outdated
     from scenelang.watching.screen import Screen
 
     out = str(composed(Path(f"{file.stem}.png"))) if out is None else out
-    wanted = Wanted(frames, fps)
+    wanted = Requested(frames, fps)
     target = None
     if frame is None and (is_animation(out) or wanted.certain or out.endswith(("/", "\\"))):
         target = wanted_target(str(file), out, wanted)

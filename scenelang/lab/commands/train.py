@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from scenelang.cli.commands.train import begin, mistakes_told, prepare_torch, training
+from scenelang.cli.commands.train import begin, prepare_torch, reporting_mistakes, training
 
 
 @click.command("train")
@@ -28,7 +28,7 @@ def command(
     from scenelang.lab.designs.export import export
     from scenelang.lab.designs.studies import Study, read_student
 
-    with mistakes_told(config, out):
+    with reporting_mistakes(config, out):
         file = read_student(config)
         place = prepare_torch(device, threads)
         study = Study(file.study, out, place)
