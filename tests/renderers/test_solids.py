@@ -80,7 +80,7 @@ def test_the_cell_is_the_fold(token: str) -> None:
         depth, paint = combine(past, np.zeros((n, 1)), own, np.ones((n, 1)), TOKENS[token])
         assert joined.state == pytest.approx(depth * width / 0.15, abs=2e-4, rel=3e-4)
         register = net.register(joined, np.zeros((4, n), np.float32), np.ones((4, 1), np.float32))
-        clear = (abs(own - past) > 1e-3) & (abs(own) > 1e-3) & (abs(past) < 2)
+        clear = (abs(own - past) > 3e-3) & (abs(own) > 1e-3) & (abs(past) < 2)
         assert register[0, clear] == pytest.approx(paint[clear, 0], abs=2e-3)
         assert register[3, clear] == pytest.approx(paint[clear, 0].round(), abs=2e-3)
 
