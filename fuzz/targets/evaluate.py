@@ -24,7 +24,7 @@ from fuzz.target import Target, hold, sampled
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.render import render_json
+from scenelang.diagnostics.render_machine import render_json
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate import evaluation as evaluating
 from scenelang.program.compile import compile_scene

@@ -16,6 +16,6 @@ class SceneError(Exception):
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
-        from scenelang.diagnostics.render import render_text
+        from scenelang.diagnostics.render_text import render_text
 
         super().__init__(render_text(self.diagnostics, fixable=0))

@@ -203,7 +203,11 @@ class Layout(ExpressionLayout):
         return self._use([name, *rest[:-1]], rest[-1])
 
     def _use(self, head: list[Part], last: int | Block) -> Part:
-        return self._object(head, last) if isinstance(last, Block) else self._ended(head, last, simple=True)
+        return (
+            self._blocked(head, last, structure=False)
+            if isinstance(last, Block)
+            else self._ended(head, last, simple=True)
+        )
 
     def parameter(self, name: Part, *default: Any) -> Part:
         return sequence([name, " ", self.word(default[0]), " ", default[1]]) if default else name
@@ -213,35 +217,30 @@ class Layout(ExpressionLayout):
     def block(self, opening: int, *rest: Any) -> Block:
         return Block(self.word(opening), rest[0] if rest[1:] else [], self.word(rest[-1]))
 
-    def _blocked(self, head: Sequence[Part], body: Block, one_line: str | None, simple: bool) -> Statement:
-        """A statement that ends with a block."""
+    def _blocked(self, head: Sequence[Part], body: Block, structure: bool = True) -> Statement:
+        """A statement that ends with a block; that of an object stands on one line with what holds it."""
+        one_line = body.structural() if structure else body.flat
         begun = [*head[:-1], plain(head[-1], before=len(head) > 1)]
         flat = None if one_line is None or after_of(head[-1]) else joined([*begun, " ", one_line])
         stmt = Statement(
             flat,
             lambda: sequence([*begun, " ", *body.open(after_of(head[-1]))]),
             body.depth,
-            simple and one_line is not None,
+            simple=not structure and one_line is not None,
         )
         return ends_of(stmt, head[0], body.closing)
 
-    def _object(self, head: Sequence[Part], body: Block) -> Statement:
-        return self._blocked(head, body, body.flat, simple=True)
-
-    def _structure(self, head: Sequence[Part], body: Block) -> Statement:
-        return self._blocked(head, body, body.structural(), simple=False)
-
     def module(self, word: int, name: Part, params: Part, body: Block) -> Part:
-        return self._structure([self.word(word), " ", name, params], body)
+        return self._blocked([self.word(word), " ", name, params], body)
 
     def for_(
         self, word: int, opening: int, variable: Part, within: int, iterable: Part, closing: int, body: Block
     ) -> Part:
         inside = sequence([variable, " ", self.word(within), " ", iterable])
-        return self._structure([self.word(word), " ", self.parenthesised(opening, inside, closing)], body)
+        return self._blocked([self.word(word), " ", self.parenthesised(opening, inside, closing)], body)
 
     def if_(self, word: int, opening: int, condition: Part, closing: int, then: Block, *rest: Any) -> Part:
-        begun = self._structure([self.word(word), " ", self.parenthesised(opening, condition, closing)], then)
+        begun = self._blocked([self.word(word), " ", self.parenthesised(opening, condition, closing)], then)
         if not rest:
             return begun
         otherwise: Block | Statement = rest[1]
@@ -264,7 +263,7 @@ class Layout(ExpressionLayout):
         return ends_of(Statement(flat, broken, depth, simple=False), begun, last)
 
     def node(self, kind: Part, body: Block) -> Part:
-        return self._structure([kind], body)
+        return self._blocked([kind], body)
 
     def combined(self, op: Part, child: Statement) -> Part:
         parts = [op, " ", child]
@@ -275,5 +274,5 @@ class Layout(ExpressionLayout):
         head = [self.word(word), " ", name]
         if not body:
             return sequence(head)
-        stmt = self._object(head, body[0])
+        stmt = self._blocked(head, body[0], structure=False)
         return ends_of(Bracketed(stmt.flat, stmt.maker), stmt, stmt)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.pages import CODES
-from scenelang.diagnostics.render import render_text
+from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import load_source
 

@@ -9,13 +9,8 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Edit, Fix, Label
 from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.render import (
-    render_concise,
-    render_github,
-    render_json,
-    render_sarif,
-    render_text,
-)
+from scenelang.diagnostics.render_machine import render_concise, render_github, render_json, render_sarif
+from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile, Span
 
 SOURCE = SourceFile("dir/a b.nsg", "nsg 1;\nlet x = 3;\nlet x = 4;\n\tsquare { scale(2) }\n")

@@ -12,7 +12,7 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
 from scenelang.diagnostics.pages import CODES, read_page
-from scenelang.diagnostics.render import render_github, render_sarif
+from scenelang.diagnostics.render_machine import render_github, render_sarif
 from scenelang.diagnostics.span import SourceFile, Span
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
-from scenelang.diagnostics.render import render_text
+from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile, Span
 
 TEXT = """\

@@ -15,7 +15,8 @@ from scenelang.backend.render import render
 from scenelang.diagnostics.cells import in_cells
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.render import render_sarif, render_text
+from scenelang.diagnostics.render_machine import render_sarif
+from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.api import loads
 from scenelang.formatting import format_text

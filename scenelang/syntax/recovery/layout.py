@@ -129,8 +129,7 @@ def _cheapest(lines: list[_Line], wanted: int) -> list[list[int]]:
     came_from = [list(range(len(offsets)))]
     for number, line in enumerate(lines):
         if number:
-            sources, costs = _step(costs)
-            came_from.append(sources)
+            came_from.append(_step(costs))
         last = number == len(lines) - 1
         for state, offset in enumerate(offsets):
             depth = line.depth + offset
@@ -141,14 +140,13 @@ def _cheapest(lines: list[_Line], wanted: int) -> list[list[int]]:
     return came_from
 
 
-def _step(costs: list[float]) -> tuple[list[int], list[float]]:
-    """For each state the cheapest one before it, and the cost; moving wins a tie, so slips come late."""
+def _step(costs: list[float]) -> list[int]:
+    """For each state the cheapest one before it; adds its cost. Moving wins a tie, so slips come late."""
     count = len(costs)
     source = list(range(count))
-    best = costs.copy()
     for states, step in ((range(1, count), -1), (range(count - 2, -1, -1), 1)):
         for state in states:
-            if best[state + step] + _SLIP <= best[state]:
-                best[state] = best[state + step] + _SLIP
+            if costs[state + step] + _SLIP <= costs[state]:
+                costs[state] = costs[state + step] + _SLIP
                 source[state] = source[state + step]
-    return source, best
+    return source
