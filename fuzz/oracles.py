@@ -9,7 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 from fuzz.target import Failure, hold
-from scenelang.diagnostics import render_machine, render_text
+from scenelang.diagnostics import render_machine as machine
+from scenelang.diagnostics import render_text
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.pages import CODES
@@ -89,8 +90,8 @@ def check_rendering(found: Sequence[Diagnostic]) -> None:
     coloured = render_text.render_text(found, color=True)
     hold("\x1b" not in plain and len(coloured) >= len(plain), "colours only where asked for")
     for name, text in (
-        ("json", render_machine.render_json(found)),
-        ("sarif", render_machine.render_sarif(found)),
+        ("json", machine.render_json(found)),
+        ("sarif", machine.render_sarif(found)),
     ):
         try:
             data = json.loads(text)
@@ -98,9 +99,9 @@ def check_rendering(found: Sequence[Diagnostic]) -> None:
             raise Failure(f"{name} output is JSON", error) from None
         listed = data["diagnostics"] if name == "json" else data["runs"][0]["results"]
         hold(len(listed) == len(found), f"{name} output has every diagnostic", len(listed))
-    concise = render_machine.render_concise(found)
+    concise = machine.render_concise(found)
     hold(concise.count("\n") == len(concise.splitlines()) == len(found), "a line each", concise)
-    github = render_machine.render_github(found)
+    github = machine.render_github(found)
     hold(github.count("\n") == len(found) and github.count("\r") == 0, "a command each", github)
     starts = all(line.startswith(("::error ", "::warning ")) for line in github.split("\n")[:-1])
     hold(starts, "only commands of our own", github)
