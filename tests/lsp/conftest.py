@@ -52,3 +52,12 @@ def uri(client: Client, folder: Path) -> Iterator[str]:
     client.close(uri)
     client.next_diagnostics(uri)
     client.published.pop(uri)
+
+
+@pytest.fixture(scope="module")
+def lasting() -> Iterator[Client]:
+    client = Client()
+    yield client
+    assert client.logged == [], client.logged
+    assert client.stop() == 0
+    client.kill()
