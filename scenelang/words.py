@@ -40,6 +40,11 @@ class Word(Record):
     snippet: str = ""
     variadic: bool = False
 
+    @property
+    def notes(self) -> dict[str, str]:
+        """A line for each argument that has one."""
+        return dict(zip(self.params, self.about, strict=False))
+
 
 def _table(*words: Word) -> dict[str, Word]:
     return {word.name: word for word in words}

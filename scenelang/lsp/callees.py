@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from typing import Final
 
 from lsprotocol import types
 
-from scenelang import words
 from scenelang.lsp.context import Cursor, cursor_at
 from scenelang.lsp.text import width
 from scenelang.lsp.tree import sight_at
@@ -16,44 +14,21 @@ from scenelang.lsp.workspace import Document, Workspace
 from scenelang.resolve.names import Names
 from scenelang.resolve.symbols import Symbol
 from scenelang.syntax import nodes
+from scenelang.words import Word, word_for_call
 
 _LINE: Final = re.compile(r"^[ \t]*//(.*)$")
 _MAX_SHOWN: Final = 200
 
 
-@dataclass(frozen=True, slots=True)
-class Callee:
-    """What is called.
-
-    Args:
-        name: its name.
-        head: how it is called, for people.
-        params: names of its parameters.
-        about: a line on each parameter.
-        text: what it does.
-        positional: whether arguments may go without names.
-        variadic: whether the last parameter may be repeated.
-        required: the parameters without a default, where they are known.
-    """
-
-    name: str
-    head: str
-    params: tuple[str, ...]
-    about: dict[str, str] = field(default_factory=dict)
-    text: str = ""
-    positional: bool = True
-    variadic: bool = False
-
-
-def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Callee | None:
+def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Word | None:
     """What the call around the cursor calls; None where there is none or it is unknown."""
     call = cursor.call
     if call is None:
         return None
     found = find_symbol(docs, document, sight_at(document.parsed, call.start), call.name, call.start)
     if found is not None:
-        return callee_of(found[1])
-    return callee_of_word(call.name, cursor.block.kind == "material")
+        return word_of(found[1])
+    return word_for_call(call.name, cursor.block.kind == "material")
 
 
 def find_symbol(
@@ -73,21 +48,6 @@ def find_symbol(
     return (document, symbol) if symbol.kind in ("fn", "module") else None
 
 
-def callee_of(symbol: Symbol) -> Callee:
-    """A fn or module as a callee."""
-    head, text = describe_symbol(symbol)
-    return Callee(symbol.name, head, tuple(p.name for p in symbol.params), {}, text)
-
-
-def callee_of_word(name: str, in_material: bool) -> Callee | None:
-    """A word of the language as a callee."""
-    word = words.word_for_call(name, in_material)
-    if word is None:
-        return None
-    about = dict(zip(word.params, word.about, strict=False))
-    return Callee(name, word.head, word.params, about, word.text, name != "shear", word.variadic)
-
-
 def signature_help(docs: Workspace, document: Document, offset: int) -> types.SignatureHelp | None:
     """How what is being called is called, and which argument the cursor is in."""
     cursor = cursor_at(document.parsed, offset)
@@ -104,7 +64,7 @@ def signature_help(docs: Workspace, document: Document, offset: int) -> types.Si
     at = callee.head.find("(") + 1
     for param in callee.params:
         match = re.compile(rf"\b{re.escape(param)}\b").search(callee.head, at)
-        about = types.MarkupContent(types.MarkupKind.Markdown, callee.about.get(param, ""))
+        about = types.MarkupContent(types.MarkupKind.Markdown, callee.notes.get(param, ""))
         label: str | tuple[int, int] = param
         if match is not None:
             # Offsets into a label count UTF-16, whatever positions count.
@@ -121,8 +81,8 @@ def signature_help(docs: Workspace, document: Document, offset: int) -> types.Si
     return types.SignatureHelp([signature], 0, active)
 
 
-def describe_symbol(symbol: Symbol) -> tuple[str, str]:
-    """A definition's first line, and the comment above it."""
+def word_of(symbol: Symbol) -> Word:
+    """A definition as a word: its first line, the comment above it, its parameters."""
     node = symbol.node
     if isinstance(node, nodes.Module):
         head = f"module {_call(symbol)}"
@@ -134,7 +94,7 @@ def describe_symbol(symbol: Symbol) -> tuple[str, str]:
         head = f"(parameter) {_short(node.span.text)}"
     else:
         head = _short(node.span.text)
-    return head, comment_above(symbol)
+    return Word(symbol.name, head, comment_above(symbol), tuple(p.name for p in symbol.params))
 
 
 def _call(symbol: Symbol) -> str:

@@ -10,7 +10,7 @@ from lsprotocol import types
 
 from scenelang import words
 from scenelang.evaluate.vocabulary import Vocabulary
-from scenelang.lsp.callees import Callee, describe_symbol, find_callee
+from scenelang.lsp.callees import find_callee, word_of
 from scenelang.lsp.completion_items import Item, strings, units
 from scenelang.lsp.context import Cursor, cursor_at
 from scenelang.lsp.tree import sight_at
@@ -168,9 +168,8 @@ class _Maker:
 
     def _calls(self, known: dict[str, words.Word], offered: Iterable[str], rank: str) -> Iterator[Item]:
         for name in sorted(offered):
-            word = known.get(name)
-            if word is not None:
-                yield Item(name, Kind.Method, word.snippet, rank, word.head, word.text, True)
+            if name in known:
+                yield _item(known[name], Kind.Method, rank)
 
     def _children(self, rank: str) -> Iterator[Item]:
         for name in sorted(self.words.geometries):
@@ -207,8 +206,8 @@ class _Maker:
         elif symbol.kind == "import":
             text = symbol.name
         rank = "b" if symbol.scope.parent is not None else "d"
-        head, about = describe_symbol(symbol)
-        return Item(symbol.name, _SYMBOLS[symbol.kind], text, rank, head, about, snippet)
+        word = word_of(symbol)
+        return Item(symbol.name, _SYMBOLS[symbol.kind], text, rank, word.head, word.text, snippet)
 
     def _expressions(self) -> Iterator[Item]:
         callee = find_callee(self.docs, self.document, self.cursor)
@@ -217,28 +216,27 @@ class _Maker:
         for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind != "module":
                 yield self._symbol(symbol)
-        for name, word in words.FUNCTIONS.items():
-            yield Item(name, Kind.Function, word.snippet, "k", word.head, word.text, True)
-        for known in (words.CONSTANTS, words.ANIMATED):
-            for name, word in known.items():
-                yield Item(name, Kind.Constant, "", "l", about=word.text)
+        yield from (_item(word, Kind.Function, "k") for word in words.FUNCTIONS.values())
+        for word in (words.CONSTANTS | words.ANIMATED).values():
+            yield Item(word.name, Kind.Constant, "", "l", about=word.text)
         for name in ("true", "false"):
             yield Item(name, Kind.Keyword, "", "n")
         yield Item("material", Kind.Keyword, "material ", "n", about=words.KEYWORDS["material"].text)
 
-    def _arguments(self, callee: Callee) -> Iterator[Item]:
+    def _arguments(self, callee: words.Word) -> Iterator[Item]:
         """Names of arguments that are left, and values that the one at hand takes."""
         call = self.cursor.call
         assert call is not None
+        positional = callee is not words.TRANSFORMS["shear"]
         name = call.named
         if name is None:
             start = self.cursor.before[-1] in ("(", ",")
-            left = callee.params[call.index :] if callee.positional else callee.params
+            left = callee.params[call.index :] if positional else callee.params
             for param in left if start else ():
                 if param not in call.given:
-                    about = callee.about.get(param, "")
+                    about = callee.notes.get(param, "")
                     yield Item(f"{param} =", Kind.Field, f"{param} = ", "a", "argument", about)
-            if call.index < len(callee.params) and callee.positional:
+            if call.index < len(callee.params) and positional:
                 name = callee.params[call.index]
         yield from self._values(callee.name, name)
 
@@ -250,10 +248,9 @@ class _Maker:
             for value in ("true", "false"):
                 yield Item(value, Kind.EnumMember, "", "0")
         elif param == "angle":
-            for unit in ("deg", "turn", "rad"):
-                label = {"deg": "30deg", "turn": "0.25turn", "rad": "0.5rad"}[unit]
-                text = f"${{1:{label.removesuffix(unit)}}}{unit}"
-                yield Item(label, Kind.Unit, text, "0", "an angle", "", True)
+            for value, unit in (("30", "deg"), ("0.25", "turn"), ("0.5", "rad")):
+                text = f"${{1:{value}}}{unit}"
+                yield Item(f"{value}{unit}", Kind.Unit, text, "0", "an angle", "", True)
         elif callee in ("color", "background") and param == "c":
             yield Item("#d33", Kind.Color, "#${1:d33}", "0", "a colour", "", True)
             for name in ("rgb", "hsv"):
@@ -276,6 +273,10 @@ class _Maker:
         for found in library.names.exported():
             if not statement or found.kind in ("module", "let"):
                 yield self._symbol(found, statement=statement)
+
+
+def _item(word: words.Word, kind: Kind, rank: str) -> Item:
+    return Item(word.name, kind, word.snippet, rank, word.head, word.text, True)
 
 
 def _ends_operand(text: str) -> bool:

@@ -7,12 +7,13 @@ from typing import Final
 from lsprotocol import types
 
 from scenelang.lsp import values
-from scenelang.lsp.callees import callee_of, callee_of_word, find_symbol
+from scenelang.lsp.callees import find_symbol, word_of
 from scenelang.lsp.hover import seen_at
 from scenelang.lsp.server import Settings
 from scenelang.lsp.tree import walk
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax import nodes
+from scenelang.words import word_for_call
 
 _LONGEST: Final = 28
 _PLAIN: Final = (nodes.Number, nodes.String, nodes.Bool, nodes.Color)
@@ -79,7 +80,7 @@ def _arguments(
     if name in _CLEAR or not args:
         return []
     found = find_symbol(docs, document, document.names, name, call.name.span.start)
-    callee = callee_of(found[1]) if found is not None else callee_of_word(name, False)
+    callee = word_of(found[1]) if found is not None else word_for_call(name, False)
     if callee is None or callee.variadic or len(callee.params) < 2:
         return []
     hints = []

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Final
 
 from lsprotocol import types
 
 from scenelang import words
 from scenelang.lsp import values
-from scenelang.lsp.callees import describe_symbol
+from scenelang.lsp.callees import word_of
 from scenelang.lsp.check import Seen
 from scenelang.lsp.tree import path_to
 from scenelang.lsp.values import space_of, vocabulary_of
@@ -18,6 +19,13 @@ from scenelang.models.manifest import Manifest
 from scenelang.resolve.symbols import Symbol, Use
 from scenelang.scene import text as to_nsg
 from scenelang.syntax import nodes
+
+_TABLES: Final = {
+    "function": words.FUNCTIONS,
+    "constant": words.CONSTANTS,
+    "animated": words.ANIMATED,
+    "setting": words.SETTINGS,
+}
 
 
 def hover(docs: Workspace, document: Document, offset: int) -> types.Hover | None:
@@ -45,32 +53,17 @@ def _code(text: str) -> str:
 
 
 def _word(word: words.Word) -> str:
-    about = [f"- `{name}`: {line}" for name, line in zip(word.params, word.about, strict=False) if word.about]
+    about = [f"- `{name}`: {line}" for name, line in word.notes.items()]
     return "\n\n".join([_code(word.head), word.text, *(["\n".join(about)] if about else [])])
 
 
 def _keyword(node: Any, offset: int) -> tuple[int, int, str] | None:
     """The keyword that heads a node, if the cursor is on it."""
-    kinds: dict[type, str] = {
-        nodes.Version: "nsg",
-        nodes.Model: "model",
-        nodes.Param: "param",
-        nodes.Let: "let",
-        nodes.Fn: "fn",
-        nodes.Module: "module",
-        nodes.Import: "import",
-        nodes.For: "for",
-        nodes.If: "if",
-        nodes.MaterialUse: "material",
-        nodes.MaterialExpr: "material",
-    }
-    word = node.kind if isinstance(node, nodes.Node) else kinds.get(type(node))
-    if isinstance(node, nodes.Combined):
-        word = node.op
-    if word is None:
-        return None
     start = node.span.start
-    return (start, start + len(word), word) if start <= offset <= start + len(word) else None
+    head = re.match(r"[a-z]+", node.span.text)
+    word = head[0] if head is not None else ""
+    heads = word in words.RESERVED
+    return (start, start + len(word), word) if heads and offset <= start + len(word) else None
 
 
 # ---------------------------------------------------------------- names
@@ -81,16 +74,9 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
     if found is not None:
         return _definition(document, *found)
     text = use.text
-    word: words.Word | None = None
     match use.role:
-        case "function":
-            word = words.FUNCTIONS.get(text)
-        case "constant":
-            word = words.CONSTANTS.get(text)
-        case "animated":
-            word = words.ANIMATED.get(text)
-        case "setting":
-            word = words.SETTINGS.get(text)
+        case "function" | "constant" | "animated" | "setting":
+            return _word(_TABLES[use.role][text]) if text in _TABLES[use.role] else None
         case "transform" | "operation":
             table = words.OPERATIONS if use.role == "operation" else words.TRANSFORMS
             return (_word(table[text]) + _transform_facts(document, use)) if text in table else None
@@ -107,22 +93,19 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             return f"`{library.path}`" if library is not None else "no such file"
         case _:
             return None
-    return _word(word) if word is not None else None
 
 
 def _argument(use: Use) -> str | None:
     word = words.word_for_call(use.callee.text, use.callee.role == "operation") if use.callee else None
     if word is None or use.text not in word.params:
         return None
-    about = dict(zip(word.params, word.about, strict=False)).get(use.text, "")
+    about = word.notes.get(use.text)
     return f"{_code(word.head)}\n\n`{use.text}`: {about}" if about else _code(word.head)
 
 
 def _definition(document: Document, where: Document, symbol: Symbol) -> str:
-    head, about = describe_symbol(symbol)
-    parts = [_code(head)]
-    if about:
-        parts.append(about)
+    word = word_of(symbol)
+    parts = [_code(word.head), *([word.text] if word.text else [])]
     seen = seen_at(document, where, symbol.span.start, symbol.span.end)
     line = describe_values(seen)
     if line and not (isinstance(symbol.node, nodes.Let | nodes.Param) and _says_it(symbol.node, line)):
