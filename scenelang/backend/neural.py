@@ -69,7 +69,7 @@ def open_model(name: str, device: str = "cpu") -> Model:
     """A shipped model, loaded once for each process and device.
 
     Raises:
-        RenderError: there is none of that name, or its weights are missing or damaged.
+        RenderError: there is no such model, or its weights are missing or damaged.
     """
     try:
         with _loading:
@@ -121,8 +121,8 @@ def draw_program(
         progress: called with the share done, in [0, 1], from any thread.
 
     Raises:
-        RenderError: the Program was compiled for another model or other weights, its vectors are none that
-            a compiler makes, or the model does not draw in this way.
+        RenderError: the Program was compiled for another model or other weights, its vectors are not
+            those of a compiled scene, or the model does not draw in this way.
     """
     name, network = model.manifest.name, model.network
     if program.model != name:

@@ -1,4 +1,4 @@
-"""Small pictures, drawn by numpy: nobody waits for torch to be imported.
+"""Small pictures are drawn by numpy, without waiting for torch to be imported.
 
 Numpy on one core draws as fast as torch on one core. Torch has more cores and devices, and takes one to two
 seconds to import; so a single picture is worth it from some amount of work on. That amount is counted from

@@ -82,12 +82,12 @@ def _check_canvas(
         diagnostics.add("E0507", fact, place, help="render smaller with `canvas(w, h)` or `--size`")
     elif manifest.sizes and scene.canvas not in manifest.sizes:
         sizes = " or ".join(f"{w} x {h}" for w, h in manifest.sizes)
-        fact = f"a canvas of {width} x {height} pixels; {model} draws {sizes} alone"
+        fact = f"a canvas of {width} x {height} pixels; {model} draws only {sizes}"
         help = "give that size with `canvas(w, h)` or `--size`, or draw with another model"
         diagnostics.add("E0509", fact, place, help=help)
     if manifest.white and scene.background != WHITE:
         help = "leave `background` out, or draw with another model"
-        diagnostics.add("E0510", f"{model} draws over white alone", place, help=help)
+        diagnostics.add("E0510", f"{model} draws only over white", place, help=help)
 
 
 Composite = schema.Scene | schema.Group | schema.Boolean | schema.Chain

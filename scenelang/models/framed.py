@@ -25,7 +25,7 @@ def framed_config(config: dict[str, Any], size: int) -> FramedConfig:
     """Sizes of the network in a weights file of ``size`` bytes.
 
     Raises:
-        ModelError: there are none or others, or they are out of range, or larger than the file.
+        ModelError: they are missing, unknown, out of range, or larger than the file.
     """
     sizes = config.get("network") if isinstance(config, dict) else None
     if not isinstance(sizes, dict):

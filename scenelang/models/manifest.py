@@ -53,7 +53,7 @@ class Manifest:
         measured: figures of its evaluation and stability suite.
         set: name of the scenes it was trained on, which models of different speed and error share.
         sizes: canvases (width, height) that it draws; any within its limits where there are none.
-        white: whether it draws over white alone, knowing colours but no coverage.
+        white: whether it draws only over white, knowing colours but no coverage.
         outlines: of its geometries, for bounds; see `Outline`.
     """
 
@@ -103,7 +103,7 @@ class Manifest:
             if not fits(data[key]):
                 raise ValueError(f"field `{key}` does not hold what it should")
         if data["default_material"] not in data["materials"]:
-            raise ValueError("the default material is none of the materials")
+            raise ValueError("the default material is not one of the materials")
         lists = {key: tuple(data[key]) for key in ("geometries", "materials", "transforms", "material_ops")}
         trained = {key: (float(low), float(high)) for key, (low, high) in data["trained"].items()}
         sizes = tuple((width, height) for width, height in data["sizes"])

@@ -179,7 +179,7 @@ def check_text(
     all_frames: bool = False,
     name: str = "<text>",
 ) -> Diagnostics:
-    """Everything there is to say of scene text; as `check`. Imports are found in ``root`` alone.
+    """Everything there is to say of scene text; as `check`. Imports are found only in ``root``.
 
     Args:
         text: the scene.

@@ -99,7 +99,7 @@ def read_frame(g: np.ndarray, layout: Layout = PLANE_LAYOUT) -> ObjectFrame:
     """The frame of one geometry vector of the plane, in plain floats, as a stream has one for each object.
 
     Raises:
-        ProgramError: it leads from the world to no leaf, which no compiled scene has.
+        ProgramError: it does not lead from the world to a leaf, as those of compiled scenes do.
     """
     numbers = g.tolist()
     last, outer, middle, inner = [numbers[part] for part in _parts(layout)]
