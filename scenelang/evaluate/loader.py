@@ -8,7 +8,7 @@ from dataclasses import field
 from pathlib import Path, PureWindowsPath
 from typing import Final
 
-from scenelang.diagnostics.diagnostic import Label
+from scenelang.diagnostics.diagnostic import Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.limits import MAX_BYTES
@@ -20,14 +20,18 @@ from scenelang.syntax import nodes, parse
 
 MAX_IMPORTS: Final = 1000
 MAX_IMPORT_DEPTH: Final = 100
+_RELATIVE: Final = "paths are relative to the importing file"
+Labels = tuple[Label, ...]
 
 
 class Unreadable(Exception):
-    """A file that is not scene text; the message says why."""
+    """A file that is not scene text, or not one to read; the message says why."""
 
-    def __init__(self, code: str, message: str) -> None:
+    def __init__(
+        self, code: str, message: str, help: str | None = None, fix: Fix | None = None, labels: Labels = ()
+    ) -> None:
         super().__init__(message)
-        self.code = code
+        self.code, self.help, self.fix, self.labels = code, help, fix, labels
 
 
 def read_source(path: Path, name: str) -> SourceFile:
@@ -73,81 +77,74 @@ class Loader(Record, frozen=False):
     count: int = 0
     texts: Mapping[Path, str] = field(default_factory=dict)
 
-    def find(self, stmt: nodes.Import, importer: Path | None, session: Session) -> Path | None:
-        """The file that an import in the file ``importer`` means; None after a report."""
+    def load(
+        self, stmt: nodes.Import, importer: Path | None, session: Session
+    ) -> tuple[Path, nodes.File] | None:
+        """The file that an import in the file ``importer`` means, parsed; None after a report."""
         span = stmt.path.span
-        path = self._locate(stmt.path, importer, session)
-        if path is None:
+        try:
+            path = self._locate(stmt.path.value, importer)
+            if path in self.chain:
+                self._refuse_cycle(path)
+            self.count += 1
+            if self.count > MAX_IMPORTS:
+                raise session.halt("E0324", f"more than {MAX_IMPORTS:,} imports", span)
+            if len(self.chain) > MAX_IMPORT_DEPTH:
+                raise session.halt("E0324", f"imports nested deeper than {MAX_IMPORT_DEPTH}", span)
+            if path not in self.parsed:
+                self.parsed[path] = parse(self._read(path, stmt.path), session.report.diagnostics)
+        except Unreadable as error:
+            fix, labels = error.fix, error.labels
+            session.report.error(error.code, str(error), span, help=error.help, fix=fix, labels=labels)
             return None
-        if path in self.chain:
-            names = " → ".join(p.name for p in [*self.chain[self.chain.index(path) :], path])
-            # The first file of the chain, unless it is standard input, was not imported.
-            around = self.sites[max(0, self.chain.index(path) + 1 - len(self.chain) + len(self.sites)) :]
-            labels = tuple([Label(site, "which imports this") for site in around])
-            session.report.error("E0216", f"import cycle: {names}", span, labels=labels)
-            return None
-        self.count += 1
-        if self.count > MAX_IMPORTS:
-            raise session.halt("E0324", f"more than {MAX_IMPORTS:,} imports", span)
-        if len(self.chain) > MAX_IMPORT_DEPTH:
-            raise session.halt("E0324", f"imports nested deeper than {MAX_IMPORT_DEPTH}", span)
-        return path
+        return path, self.parsed[path]
 
-    def _locate(self, written: nodes.String, importer: Path | None, session: Session) -> Path | None:
-        """The place of a file of the library, or inside the root; None after a report."""
-        span, text = written.span, written.value
+    def _refuse_cycle(self, path: Path) -> None:
+        first = self.chain.index(path)
+        names = " → ".join(p.name for p in [*self.chain[first:], path])
+        # The first file of the chain, unless it is standard input, was not imported.
+        around = self.sites[max(0, first + 1 - len(self.chain) + len(self.sites)) :]
+        labels = tuple([Label(site, "which imports this") for site in around])
+        raise Unreadable("E0216", f"import cycle: {names}", labels=labels)
+
+    def _locate(self, text: str, importer: Path | None) -> Path:
+        """The place of a file of the library, or inside the root."""
         if library.is_reserved(text):
             shipped = library.find(text)
             if shipped is None:
                 help = f"it has {listing(library.names())}; a file of your own is `./{text}`"
-                session.report.error("E0214", f"the library has no `{text}`", span, help=help)
+                raise Unreadable("E0214", f"the library has no `{text}`", help)
             return shipped
         folder = importer.parent if importer is not None else self.root
         if folder is None or self.root is None:
             help = "load the scene from a file, or give a root"
-            session.report.error("E0214", "text without a folder cannot import", span, help=help)
-            return None
+            raise Unreadable("E0214", "text without a folder cannot import", help)
         if not text or "\0" in text:
-            session.report.error("E0214", "an import path without a file name", span)
-            return None
+            raise Unreadable("E0214", "an import path without a file name")
         if os.path.isabs(text) or PureWindowsPath(text).drive or text[0] in "/\\":
-            help = "paths are relative to the importing file"
-            session.report.error("E0215", f"`{text}` is an absolute path", span, help=help)
-            return None
+            raise Unreadable("E0215", f"`{text}` is an absolute path", _RELATIVE)
         try:
             path = (folder / text).resolve()
         except (OSError, RuntimeError, ValueError) as error:
-            session.report.error("E0214", f"cannot read `{text}`: {_reason(error)}", span)
-            return None
+            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}") from None
         if not path.is_relative_to(self.root):
             help = f"imports stay inside {self.root}; --root sets another folder"
-            session.report.error("E0215", f"`{text}` lies outside the import root", span, help=help)
-            return None
+            raise Unreadable("E0215", f"`{text}` lies outside the import root", help)
         self.wanted.update({Path(os.path.abspath(folder / text)): None, path: None})
         return path
 
-    def read(self, path: Path, stmt: nodes.Import, session: Session) -> nodes.File | None:
-        """The parsed file; None after a report."""
-        if path in self.parsed:
-            return self.parsed[path]
-        text, span = stmt.path.value, stmt.path.span
+    def _read(self, path: Path, written: nodes.String) -> SourceFile:
+        text, span = written.value, written.span
+        name = os.path.normpath(os.path.join(os.path.dirname(span.source.name), text))
         if library.is_reserved(text):
             name = library.called(text)
-        else:
-            name = os.path.normpath(os.path.join(os.path.dirname(span.source.name), text))
         try:
-            given = self.texts.get(path)
-            source = read_source(path, name) if given is None else SourceFile(name, given)
+            return SourceFile(name, self.texts[path]) if path in self.texts else read_source(path, name)
         except Unreadable as error:
-            session.report.error(error.code, f"cannot read `{text}`: {error}", span)
-            return None
+            raise Unreadable(error.code, f"cannot read `{text}`: {error}") from None
         except OSError as error:
             help, fix = library.meant(text, span)
-            session.report.error("E0214", f"cannot read `{text}`: {_reason(error)}", span, help=help, fix=fix)
-            return None
-        file = parse(source, session.report.diagnostics)
-        self.parsed[path] = file
-        return file
+            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}", help, fix) from None
 
 
 def _reason(error: BaseException) -> str:

@@ -9,18 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from scenelang.scene.fields import (
-    Affine,
-    Axis,
-    Factor,
-    Finite,
-    Frozen,
-    Length,
-    Radians,
-    Rate,
-    Rgb,
-    Row,
-)
+from scenelang.scene.fields import Affine, Axis, Factor, Finite, Frozen, Length, Radians, Rate, Rgb, Row
 
 
 def singular(rows: Sequence[Sequence[float]]) -> bool:
@@ -37,15 +26,21 @@ def singular(rows: Sequence[Sequence[float]]) -> bool:
     return abs(determinant) < 1e-14
 
 
-def _with_unit(cls: type[Frozen], args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
-    """The arguments of a turn, whose angle does not go without a word on its unit."""
-    if args:
-        name = cls.__name__
-        raise TypeError(
-            f"{name}: an angle without its unit: write {name}.degrees({args[0]!r}), "
-            f"or {name}(angle={args[0]!r}) for radians"
-        )
-    return data
+class _Turn(Frozen):
+    """A turn, whose angle does not go without a word on its unit."""
+
+    kind: str
+    angle: Radians
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        if args:
+            name = cls.__name__
+            raise TypeError(
+                f"{name}: an angle without its unit: write {name}.degrees({args[0]!r}), "
+                f"or {name}(angle={args[0]!r}) for radians"
+            )
+        return data
 
 
 def _decoded(text: str) -> tuple[float, float, float]:
@@ -70,20 +65,15 @@ class Translate(Frozen):
         def __init__(self, x: float, y: float, z: float = 0.0) -> None: ...
 
 
-class Rotate(Frozen):
+class Rotate(_Turn):
     """A turn by ``angle`` radians, counter-clockwise, about ``axis`` (any length but 0)."""
 
     kind: Literal["rotate"] = "rotate"
-    angle: Radians
     axis: Axis = (0.0, 0.0, 1.0)
 
     if TYPE_CHECKING:
 
         def __init__(self, *, angle: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> None: ...
-
-    @classmethod
-    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
-        return _with_unit(cls, args, data)
 
     @classmethod
     def degrees(cls, angle_deg: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Rotate:
@@ -163,37 +153,33 @@ class Matrix(Frozen):
         return rows
 
 
-class Twirl(Frozen):
+class _Warp(Frozen):
+    """A turn whose angle grows along something."""
+
+    kind: str
+    k: Rate
+
+    if TYPE_CHECKING:
+
+        def __init__(self, k: float) -> None: ...
+
+
+class Twirl(_Warp):
     """A turn that grows with the distance from the origin."""
 
     kind: Literal["twirl"] = "twirl"
-    k: Rate
-
-    if TYPE_CHECKING:
-
-        def __init__(self, k: float) -> None: ...
 
 
-class Bend(Frozen):
+class Bend(_Warp):
     """A turn that grows along x."""
 
     kind: Literal["bend"] = "bend"
-    k: Rate
-
-    if TYPE_CHECKING:
-
-        def __init__(self, k: float) -> None: ...
 
 
-class Twist(Frozen):
+class Twist(_Warp):
     """A turn of (x, z) that grows along y; for 3D models."""
 
     kind: Literal["twist"] = "twist"
-    k: Rate
-
-    if TYPE_CHECKING:
-
-        def __init__(self, k: float) -> None: ...
 
 
 class Displace(Frozen):
@@ -253,19 +239,14 @@ class Grayscale(Frozen):
         def __init__(self, amount: float) -> None: ...
 
 
-class Hue(Frozen):
+class Hue(_Turn):
     """An HSV hue shift by ``angle`` radians."""
 
     kind: Literal["hue"] = "hue"
-    angle: Radians
 
     if TYPE_CHECKING:
 
         def __init__(self, *, angle: float) -> None: ...
-
-    @classmethod
-    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
-        return _with_unit(cls, args, data)
 
     @classmethod
     def degrees(cls, angle_deg: float) -> Hue:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from scenelang import words
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate import costs
 from scenelang.evaluate.file_context import Place
@@ -14,7 +15,7 @@ from scenelang.evaluate.prepare.arguments import bind
 from scenelang.evaluate.prepare.expressions import POISONED, Code, Given, Run, computed, prepare_arguments
 from scenelang.evaluate.prepare.references import lookup, wrong_kind
 from scenelang.evaluate.report.undefined import unknown, unknown_member
-from scenelang.evaluate.values.functions import FUNCTIONS, Builtin
+from scenelang.evaluate.values.functions import FUNCTIONS, doubt_hue
 from scenelang.scene.spans import Calls
 from scenelang.syntax import nodes
 
@@ -52,8 +53,8 @@ def prepare_call(expr: nodes.CallExpr, place: Place) -> Code:
 def _call_builtin(expr: nodes.CallExpr, given: list[Given], place: Place) -> Code:
     """A call of a function of the language; reports a name that stands for nothing."""
     name = expr.name
-    builtin = FUNCTIONS.get(name.text)
-    if builtin is None:
+    word = words.FUNCTIONS.get(name.text)
+    if word is None:
         alias, dot, _ = name.text.partition(".")
         outer = place.scope.find(alias) if dot else None
         if outer is None:
@@ -63,19 +64,19 @@ def _call_builtin(expr: nodes.CallExpr, given: list[Given], place: Place) -> Cod
         else:
             _method(expr, place)
         return POISONED
-    if builtin.variadic:
+    if word.variadic:
         if not given or any(arg.name for arg, _ in given):
             message = f"`{name.text}` takes one or more arguments without names"
             place.report.error("E0308", message, name.span)
             return POISONED
     else:
-        bound = bind(place.report, name, builtin.params, len(builtin.params), given)
+        bound = bind(place.report, name, word.params, word.required, given)
         if bound is None:
             return POISONED
         given = [one for one in bound if one is not None]
     exprs = [arg.value for arg, _ in given]
-    meaning = builtin.run if builtin.doubt is None else _doubted(builtin, exprs, place)
-    place.file.weight += costs.FUNCTIONS.get(name.text, 4 * len(given) if builtin.variadic else 0)
+    meaning = _doubted_hsv(exprs, place) if name.text == "hsv" else FUNCTIONS[name.text]
+    place.file.weight += costs.FUNCTIONS.get(name.text, 4 * len(given) if word.variadic else 0)
     per_item = 0 if name.text == "len" else costs.FUNCTION_ITEM_STEPS
     return computed(place, meaning, expr.span, exprs, [code for _, code in given], per_item)
 
@@ -93,14 +94,13 @@ def _method(expr: nodes.CallExpr, place: Place) -> None:
     place.report.error("E0128", "only a name can be called", expr.name.span, help=help, fix=fix)
 
 
-def _doubted(builtin: Builtin, exprs: Sequence[nodes.Expr], place: Place) -> Callable[..., Any]:
-    """A function that warns of doubtful values."""
+def _doubted_hsv(exprs: Sequence[nodes.Expr], place: Place) -> Callable[..., Any]:
+    """``hsv``, which warns of doubtful values."""
 
     def run(*values: Any) -> Any:
-        result = builtin.run(*values)
-        doubt = builtin.doubt(*values) if builtin.doubt else None
-        if doubt is not None and doubt.operand is not None:
-            place.report.warn(doubt.code, doubt.message, exprs[doubt.operand].span, doubt.help)
+        result, doubt = FUNCTIONS["hsv"](*values), doubt_hue(*values)
+        if doubt is not None:
+            place.report.warn(doubt.code, doubt.message, exprs[0].span, doubt.help)
         return result
 
     return run

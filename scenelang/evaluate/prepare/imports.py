@@ -21,10 +21,10 @@ def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
     loader = context.loader
     binding = Binding("import", alias.span)
     good = define(alias, binding, place)
-    path = loader.find(stmt, context.path, context.session)
-    file = loader.read(path, stmt, context.session) if path is not None else None
-    if path is None or file is None or not good:
+    found = loader.load(stmt, context.path, context.session)
+    if found is None or not good:
         return None
+    path, file = found
     prefix = f"{context.prefix}{alias.text}."
     brought = FileContext(file.span.source, context.session, loader, context.defines, path, prefix)
     loader.chain.append(path)

@@ -28,31 +28,20 @@ class Shape(Record):
     most: int = 0
     bare: str = ""
 
-    @property
-    def module(self) -> str:
-        return self.call.partition("(")[0]
-
-
-_DISC: Final = Shape("disc(r)", 1, 1, "disc()")
-_ELLIPSE: Final = Shape("ellipse(rx, ry)", 2, 2)
-_RING: Final = Shape("ring(r, width)", 2, 2, "ring()")
-_RECT: Final = Shape("rect(w, h)", 1, 2, "rect()")
-_ROUNDED: Final = Shape("rounded(w, h, r)")
-_LINE: Final = Shape("line(a, b, width)", 2, 3)
-_POLYGON: Final = Shape("polygon(n, r)")
-_PIE: Final = Shape("pie(r, from, to)")
 
 SHAPES: Final = {
-    **dict.fromkeys(("circle", "disc", "disk", "dot"), _DISC),
-    **dict.fromkeys(("ellipse", "oval"), _ELLIPSE),
-    **dict.fromkeys(("ring", "annulus"), _RING),
-    **dict.fromkeys(("rect", "rectangle", "box", "cube", "quad"), _RECT),
-    **dict.fromkeys(("rounded", "rounded_rect", "rounded_rectangle", "roundrect", "rrect"), _ROUNDED),
-    **dict.fromkeys(("line", "segment"), _LINE),
+    **dict.fromkeys(("circle", "disc", "disk", "dot"), Shape("disc(r)", 1, 1, "disc()")),
+    **dict.fromkeys(("ellipse", "oval"), Shape("ellipse(rx, ry)", 2, 2)),
+    **dict.fromkeys(("ring", "annulus"), Shape("ring(r, width)", 2, 2, "ring()")),
+    **dict.fromkeys(("rect", "rectangle", "box", "cube", "quad"), Shape("rect(w, h)", 1, 2, "rect()")),
+    **dict.fromkeys(
+        ("rounded", "rounded_rect", "rounded_rectangle", "roundrect", "rrect"), Shape("rounded(w, h, r)")
+    ),
+    **dict.fromkeys(("line", "segment"), Shape("line(a, b, width)", 2, 3)),
     **dict.fromkeys(("capsule", "stadium"), Shape("capsule(a, b, width)", 2, 3)),
     **dict.fromkeys(("path", "polyline"), Shape("path(points, width)", 1, 2)),
-    **dict.fromkeys(("polygon", "ngon"), _POLYGON),
-    **dict.fromkeys(("pie", "sector", "wedge"), _PIE),
+    **dict.fromkeys(("polygon", "ngon"), Shape("polygon(n, r)")),
+    **dict.fromkeys(("pie", "sector", "wedge"), Shape("pie(r, from, to)")),
     "arrow": Shape("arrow(a, b, width)", 2, 3),
     "arc": Shape("arc(r, width, from, to)"),
     "parallelogram": Shape("parallelogram(p, a, b)", 3, 3),
@@ -96,7 +85,7 @@ def _edit(stmt: nodes.Call, shape: Shape, alias: str) -> Edit | None:
         end = name.end if stmt.args is None else name.source.text.find(")", name.end) + 1
         return Edit(Span(name.source, name.start, end), f"{alias}.{shape.bare}") if shape.bare else None
     fits = shape.least <= len(stmt.args) <= shape.most and not any(arg.name for arg in stmt.args)
-    return Edit(name, f"{alias}.{shape.module}") if fits else None
+    return Edit(name, f"{alias}.{shape.call.partition('(')[0]}") if fits else None
 
 
 def _with_import(edit: Edit, file: FileContext, text: str) -> tuple[Edit, ...]:

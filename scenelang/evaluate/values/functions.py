@@ -9,7 +9,6 @@ import struct
 from collections.abc import Callable
 from typing import Any, Final, Literal
 
-from scenelang import words
 from scenelang.evaluate.values.operators import binary, finite, same_unit
 from scenelang.evaluate.values.value import (
     UNITS,
@@ -23,25 +22,8 @@ from scenelang.evaluate.values.value import (
     unexpected,
     unpack,
 )
-from scenelang.records import Record
 
 _MASK = (1 << 64) - 1
-
-
-class Builtin(Record):
-    """A function of the language.
-
-    Args:
-        params: names of its parameters; the last may be repeated if ``variadic``.
-        run: its meaning; raises Problem.
-        variadic: takes one or more arguments.
-        doubt: a warning about values that it takes; its operand is to blame.
-    """
-
-    params: tuple[str, ...]
-    run: Callable[..., Any]
-    variadic: bool = False
-    doubt: Callable[..., Problem | None] | None = None
 
 
 def number(value: Any, operand: int = 0) -> float:
@@ -224,14 +206,15 @@ def _hsv(h: Any, s: Any, v: Any) -> Vec:
     return Vec(colorsys.hsv_to_rgb(turns % 1.0, number(s, 1), number(v, 2)))
 
 
-def _doubt_hue(h: Any, s: Any, v: Any) -> Problem | None:
+def doubt_hue(h: Any, s: Any, v: Any) -> Problem | None:
+    """A warning about the arguments of ``hsv``; its operand is to blame."""
     if h.__class__ is not float or abs(h) <= 2.0:
         return None
     help = f"a bare hue is in turns: write {show(h)}deg for degrees, or take % 1 where turns are meant"
     return Problem("W0302", f"a hue of {show(h)} turns", help, operand=0)
 
 
-_MEANINGS: Final[dict[str, Callable[..., Any]]] = {
+FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "sin": _of_angle(math.sin),
     "cos": _of_angle(math.cos),
     "tan": _of_angle(math.tan),
@@ -255,10 +238,7 @@ _MEANINGS: Final[dict[str, Callable[..., Any]]] = {
     "rgb": _rgb,
     "hsv": _hsv,
 }
-FUNCTIONS: Final = {
-    name: Builtin(word.params, _MEANINGS[name], word.variadic, _doubt_hue if name == "hsv" else None)
-    for name, word in words.FUNCTIONS.items()
-}
+"""What each function means; raises Problem."""
 CONSTANTS: Final[dict[str, Any]] = {
     "PI": math.pi,
     "TAU": math.tau,
