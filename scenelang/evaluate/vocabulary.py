@@ -9,6 +9,11 @@ from functools import cached_property
 from scenelang.models.manifest import Manifest, available, load_manifest
 
 
+def _offered(kind: str) -> cached_property[set[str]]:
+    """All names of a kind that the models in use have."""
+    return cached_property(lambda words: {name for m in words.in_use for name in getattr(m, kind)})
+
+
 @dataclass(frozen=True)
 class Vocabulary:
     """What a scene may name: the chosen model's words, or those of all models.
@@ -35,21 +40,10 @@ class Vocabulary:
                 return Vocabulary(self.models, manifest)
         return None
 
-    @cached_property
-    def geometries(self) -> set[str]:
-        return {name for m in self.in_use for name in m.geometries}
-
-    @cached_property
-    def materials(self) -> set[str]:
-        return {name for m in self.in_use for name in m.materials}
-
-    @cached_property
-    def transforms(self) -> set[str]:
-        return {name for m in self.in_use for name in m.transforms}
-
-    @cached_property
-    def material_ops(self) -> set[str]:
-        return {name for m in self.in_use for name in m.material_ops}
+    geometries = _offered("geometries")
+    materials = _offered("materials")
+    transforms = _offered("transforms")
+    material_ops = _offered("material_ops")
 
     def owner(self, name: str) -> str | None:
         """The first model at hand but the chosen one that has a geometry, material or operation ``name``."""

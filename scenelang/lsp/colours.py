@@ -6,9 +6,9 @@ import colorsys
 
 from lsprotocol import types
 
-from scenelang.lsp.tree import walk
 from scenelang.lsp.workspace import Document
 from scenelang.syntax import nodes
+from scenelang.syntax.nodes import walk
 
 
 def colours(document: Document) -> list[types.ColorInformation]:

@@ -10,9 +10,9 @@ from scenelang.lsp import values
 from scenelang.lsp.callees import find_symbol, word_of
 from scenelang.lsp.hover import seen_at
 from scenelang.lsp.server import Settings
-from scenelang.lsp.tree import walk
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax import nodes
+from scenelang.syntax.nodes import walk
 from scenelang.words import word_for_call
 
 _LONGEST: Final = 28

@@ -9,9 +9,10 @@ from typing import Any, Final
 
 from lsprotocol import types
 
-from scenelang.lsp.tree import path_to, walk
+from scenelang.lsp.tree import path_to
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax import nodes
+from scenelang.syntax.nodes import walk
 
 Kind = types.SymbolKind
 _DEFINES: Final = {

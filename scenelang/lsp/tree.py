@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, Final
 
 from scenelang.diagnostics.span import Span
@@ -11,15 +10,6 @@ from scenelang.resolve.symbols import Kind, Symbol
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Parsed
 from scenelang.syntax.nodes import children
-
-
-def walk(node: Any) -> Iterator[Any]:
-    """A node and everything below it."""
-    stack = [node]
-    while stack:
-        at = stack.pop()
-        yield at
-        stack.extend(children(at))
 
 
 def path_to(parsed: Parsed, offset: int) -> list[Any]:

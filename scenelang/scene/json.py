@@ -94,8 +94,7 @@ def from_json(text: str | bytes, kind: type[S]) -> S:
         try:
             text = text.decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            found = [Diagnostic("E0313", f"not UTF-8 text: byte {error.start}", None)]
-            raise SceneError(found) from None
+            raise _failure(f"not UTF-8 text: byte {error.start}") from None
     return _read(SourceFile("<json>", text), kind)
 
 
@@ -140,9 +139,8 @@ def _read(source: SourceFile, kind: type[S]) -> S:
     except ValidationError as error:
         raise SceneError(_problems(error, source)) from None
     except UnicodeEncodeError as error:
-        raise _failure(
-            f"half of a character at {error.start}", Span(source, error.start, error.end)
-        ) from None
+        half = Span(source, error.start, error.end)
+        raise _failure(f"half of a character at {error.start}", half) from None
     _refuse_repeated(source)
     return scene
 

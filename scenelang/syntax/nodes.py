@@ -314,3 +314,12 @@ def children(node: Any) -> Iterator[Any]:
         for item in value if value.__class__ is tuple else (value,):
             if isinstance(item, Record) and item.__class__ is not Span:
                 yield item
+
+
+def walk(node: Any) -> Iterator[Any]:
+    """A node and everything below it."""
+    stack = [node]
+    while stack:
+        at = stack.pop()
+        yield at
+        stack.extend(children(at))

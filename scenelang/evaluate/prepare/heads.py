@@ -46,25 +46,11 @@ def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
     if binding.kind == "module":
         return prepare_module_call(stmt, binding.value, place)
     if binding.kind in VALUES:
-        if not _is_hidden_geometry(stmt, place):
-            return prepare_value_use(stmt, binding, place)
-        wrong_kind(stmt.name, binding, place, "a geometry here", "give one of them another name")
-        return None
+        return prepare_value_use(stmt, binding, place)
     _skim(stmt, place)
     if binding.kind != "poison":
         wrong_kind(stmt.name, binding, place, "an object or a module")
     return None
-
-
-def _is_hidden_geometry(stmt: nodes.Call, place: Place) -> bool:
-    """Whether a statement can only be an object of a geometry, whose name stands for a value here."""
-    if stmt.name.text not in place.session.vocabulary.geometries or place.kind not in HOLDERS:
-        return False
-    inside = stmt.body.statements if stmt.body is not None else ()
-    return place.kind == "file" or any(
-        isinstance(one, nodes.MaterialUse) or (isinstance(one, nodes.Call) and one.args is None)
-        for one in inside
-    )
 
 
 def _skim(stmt: nodes.Call, place: Place) -> None:

@@ -28,6 +28,10 @@ class Shape(Record):
     most: int = 0
     bare: str = ""
 
+    @property
+    def module(self) -> str:
+        return self.call.partition("(")[0]
+
 
 SHAPES: Final = {
     **dict.fromkeys(("circle", "disc", "disk", "dot"), Shape("disc(r)", 1, 1, "disc()")),
@@ -85,7 +89,7 @@ def _edit(stmt: nodes.Call, shape: Shape, alias: str) -> Edit | None:
         end = name.end if stmt.args is None else name.source.text.find(")", name.end) + 1
         return Edit(Span(name.source, name.start, end), f"{alias}.{shape.bare}") if shape.bare else None
     fits = shape.least <= len(stmt.args) <= shape.most and not any(arg.name for arg in stmt.args)
-    return Edit(name, f"{alias}.{shape.call.partition('(')[0]}") if fits else None
+    return Edit(name, f"{alias}.{shape.module}") if fits else None
 
 
 def _with_import(edit: Edit, file: FileContext, text: str) -> tuple[Edit, ...]:

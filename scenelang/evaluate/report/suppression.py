@@ -87,7 +87,7 @@ def find_damage(file: nodes.File, found: Iterable[Diagnostic]) -> Damage:
     ]
     if not marks:
         return NONE
-    found_parts = [stmt.span for stmt in _bad(file.statements)]
+    found_parts = [node.span for node in nodes.walk(file) if isinstance(node, nodes.BadStmt)]
     blocks: list[Span] = []
     for _, span in marks:
         found_parts.append(_lines(span))
@@ -149,17 +149,6 @@ def _inside(stmt: nodes.Stmt) -> Iterator[nodes.Block]:
                 yield child
             elif isinstance(child, nodes.Stmt):
                 stack.append(child)
-
-
-def _bad(statements: tuple[nodes.Stmt, ...]) -> Iterator[nodes.BadStmt]:
-    """Unreadable statements, in all blocks."""
-    stack: list[nodes.Stmt] = list(statements)
-    while stack:
-        stmt = stack.pop()
-        if isinstance(stmt, nodes.BadStmt):
-            yield stmt
-        for block in _inside(stmt):
-            stack.extend(block.statements)
 
 
 def _touched(statements: tuple[nodes.Stmt, ...], mark: Span) -> Iterator[tuple[Span, Span | None]]:
