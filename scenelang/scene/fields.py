@@ -6,7 +6,8 @@ the validators check.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -16,14 +17,27 @@ from scenelang.words import RESERVED
 _NOT_0: dict[str, Any] = {"not": {"const": 0}}
 _NOT_000: dict[str, Any] = {"not": {"const": [0, 0, 0]}}
 
+
+def _checked(value: Any, wrong: bool, why: str) -> Any:
+    if wrong:
+        raise ValueError(why)
+    return value
+
+
 # Strict: text such as "0.5" is not a number. Integers are.
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Length = Annotated[Finite, Field(description="world units; the shorter side of the canvas spans 2")]
 Radians = Annotated[Finite, Field(description="radians, counter-clockwise")]
 Rate = Annotated[Finite, Field(description="radians per world unit")]
-Factor = Annotated[Finite, Field(description="not 0", json_schema_extra=_NOT_0)]
+Factor = Annotated[
+    Finite,
+    Field(description="not 0", json_schema_extra=_NOT_0),
+    AfterValidator(lambda factor: _checked(factor, factor == 0.0, "a scale by 0")),
+]
 Axis = Annotated[
-    tuple[Finite, Finite, Finite], Field(description="of any length but 0", json_schema_extra=_NOT_000)
+    tuple[Finite, Finite, Finite],
+    Field(description="of any length but 0", json_schema_extra=_NOT_000),
+    AfterValidator(lambda axis: _checked(axis, not any(axis), "an axis of length 0")),
 ]
 Rgb = Annotated[
     tuple[Finite, Finite, Finite],
@@ -36,16 +50,10 @@ Opaque = Annotated[
 ]
 
 
-def _is_free(word: str) -> str:
-    if word in RESERVED:
-        raise ValueError(f"`{word}` is a word of the language")
-    return word
-
-
 Word = Annotated[
     str,
     Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", json_schema_extra={"not": {"enum": list(RESERVED)}}),
-    AfterValidator(_is_free),
+    AfterValidator(lambda word: _checked(word, word in RESERVED, f"`{word}` is a word of the language")),
 ]
 """A name that text can spell."""
 
@@ -61,6 +69,25 @@ Version = Annotated[Literal[1], Field(description="of the language"), BeforeVali
 Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), BeforeValidator(_whole)]
 
 
+def singular(rows: Sequence[Sequence[float]]) -> bool:
+    """Whether the 3 x 3 linear block of an affine has no inverse.
+
+    A determinant below 1e-14 of the product of the rows' lengths counts as 0: float64 cannot tell.
+    """
+    lengths = [math.hypot(*row[:3]) for row in rows[:3]]
+    if not all(lengths) or not all(map(math.isfinite, lengths)):
+        return True
+    unit = [[x / n for x in row[:3]] for row, n in zip(rows, lengths, strict=False)]
+    (a, b, c), (d, e, f), (g, h, i) = unit
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    return abs(determinant) < 1e-14
+
+
+def _is_affine(rows: Any) -> Any:
+    _checked(rows, rows[3] != (0.0, 0.0, 0.0, 1.0), "the last row of a matrix is not 0, 0, 0, 1")
+    return _checked(rows, singular(rows), "a singular matrix")
+
+
 def _last_row(schema: dict[str, Any]) -> None:
     schema["prefixItems"][3] = {"const": [0, 0, 0, 1]}
 
@@ -74,6 +101,7 @@ def first_joins_by_union(schema: dict[str, Any]) -> None:
 Affine = Annotated[
     tuple[Row, Row, Row, Row],
     Field(description="four rows; the last is 0, 0, 0, 1", json_schema_extra=_last_row),
+    AfterValidator(_is_affine),
 ]
 
 

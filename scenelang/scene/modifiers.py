@@ -7,23 +7,9 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from scenelang.scene.fields import Affine, Axis, Factor, Finite, Frozen, Length, Radians, Rate, Rgb, Row
-
-
-def singular(rows: Sequence[Sequence[float]]) -> bool:
-    """Whether the 3 x 3 linear block of an affine has no inverse.
-
-    A determinant below 1e-14 of the product of the rows' lengths counts as 0: float64 cannot tell.
-    """
-    lengths = [math.hypot(*row[:3]) for row in rows[:3]]
-    if not all(lengths) or not all(map(math.isfinite, lengths)):
-        return True
-    unit = [[x / n for x in row[:3]] for row, n in zip(rows, lengths, strict=False)]
-    (a, b, c), (d, e, f), (g, h, i) = unit
-    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-    return abs(determinant) < 1e-14
+from scenelang.scene.fields import Affine, Axis, Factor, Finite, Frozen, Length, Radians, Rate, Rgb
 
 
 class _Turn(Frozen):
@@ -80,13 +66,6 @@ class Rotate(_Turn):
         """A turn by ``angle_deg`` degrees."""
         return cls(angle=math.radians(angle_deg), axis=axis)
 
-    @field_validator("axis")
-    @classmethod
-    def _has_direction(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
-        if not any(axis):
-            raise ValueError("an axis of length 0")
-        return axis
-
 
 class Scale(Frozen):
     """Factors along the axes, as in text: one alone is for all three, and z is 1 where two are given."""
@@ -107,13 +86,6 @@ class Scale(Frozen):
             given["z"] = 1.0 if "y" in given else given["x"]
             given.setdefault("y", given["x"])
         return given
-
-    @field_validator("x", "y", "z")
-    @classmethod
-    def _is_regular(cls, factor: float) -> float:
-        if factor == 0.0:
-            raise ValueError("a scale by 0")
-        return factor
 
     @classmethod
     def uniform(cls, s: float) -> Scale:
@@ -142,15 +114,6 @@ class Matrix(Frozen):
     if TYPE_CHECKING:
 
         def __init__(self, rows: Sequence[Sequence[float]]) -> None: ...
-
-    @field_validator("rows")
-    @classmethod
-    def _is_affine(cls, rows: tuple[Row, Row, Row, Row]) -> tuple[Row, Row, Row, Row]:
-        if rows[3] != (0.0, 0.0, 0.0, 1.0):
-            raise ValueError("the last row of a matrix is not 0, 0, 0, 1")
-        if singular(rows):
-            raise ValueError("a singular matrix")
-        return rows
 
 
 class _Warp(Frozen):

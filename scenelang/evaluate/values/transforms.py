@@ -9,7 +9,7 @@ from scenelang.evaluate.builder import make
 from scenelang.evaluate.values.functions import angle, number
 from scenelang.evaluate.values.value import Problem, Vec, describe, unexpected
 from scenelang.records import Record
-from scenelang.scene.fields import Frozen
+from scenelang.scene.fields import Frozen, singular
 from scenelang.scene.modifiers import (
     Bend,
     Color,
@@ -24,7 +24,6 @@ from scenelang.scene.modifiers import (
     Translate,
     Twirl,
     Twist,
-    singular,
 )
 from scenelang.words import OPERATIONS, TRANSFORMS, Word
 
