@@ -10,8 +10,10 @@ import pytest
 from scenelang.graph.nodes import Fold
 from scenelang.graph.stage import Camera, Ground, Light, Stage
 from scenelang.graph.steps import Displace, Twist, Warp
+from scenelang.reference.solid import image, rays
 from scenelang.reference.solid.body import Body
 from scenelang.reference.solid.image import solid_image
+from tests.pictures import psnr_db
 from tests.reference import solid_oracle
 from tests.reference.solid_scenes import fold, leaf, moved, scaled, sheared, turned
 
@@ -171,14 +173,15 @@ def test_gradients_are_differences_and_no_distance_changes_faster_than_its_bound
         kinds = [
             Warp(float(rng.uniform(-2, 2)), tuple(rng.uniform(-1, 1, 2).tolist())),
             Twist(float(rng.uniform(-2, 2))),
-            scaled(*rng.uniform(0.3, 1.5, 3).tolist()),
+            scaled(*rng.uniform(0.3, 3.0, 3).tolist()),
             sheared("yz", float(rng.uniform(-1, 1))),
             moved(*rng.uniform(-1, 1, 3).tolist()),
         ]
-        steps = [Displace(0.1, 6.0), *(kinds[i] for i in rng.integers(0, 5, 5))]
+        steps = [Displace(0.1, 6.0), *(kinds[i] for i in rng.integers(0, 5, 5)), scaled(0.3)]
         body = Body(leaf(geometry, "diffuse", GOLD), steps, 0.0)
         p = rng.uniform(-2, 2, (3, 200))
-        d, bound = body.distance(p)
+        d, rate = body.distance(p)
+        bound = rate * body.first.grows
         h = 1e-6
         differences = [(body.distance(p + h * e)[0] - body.distance(p - h * e)[0]) / (2 * h) for e in AXES]
         np.testing.assert_allclose(body.gradient(p), differences, rtol=1e-4, atol=1e-5)
@@ -202,3 +205,13 @@ def test_no_ray_passes_through_what_is_warped() -> None:
     least = np.min([body.distance(eye + t * d)[0] for t in np.arange(4.5, 7.8, 0.004)], axis=0)
     sure = abs(least) > 1e-3
     np.testing.assert_array_equal(alpha.ravel()[sure], (least < 0)[sure])
+
+
+def test_finer_steps_change_nothing_to_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By more than 60 dB: what the language asks of light in media."""
+    root, stage = SCENES["media"]
+    usual = np.asarray(solid_image(root, stage, (32, 24)))
+    monkeypatch.setattr(image, "TOLERANCE", image.TOLERANCE / 20)
+    monkeypatch.setattr(image, "HALVINGS", image.HALVINGS + 3)
+    monkeypatch.setattr(rays, "STEP", rays.STEP / 2)
+    assert psnr_db(usual, np.asarray(solid_image(root, stage, (32, 24)))) > 60

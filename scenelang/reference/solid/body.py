@@ -7,7 +7,7 @@ and another axis, with ``a = twirl |p| + slope . p``.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,23 +27,24 @@ def length(p: Array) -> Array:
 
 
 class Map(NamedTuple):
-    """``p -> inverse p + shift``, (3, 3) and (3, 1)."""
+    """``p -> inverse p + shift``, (3, 3) and (3, 1), and the largest stretch of the inverse."""
 
     inverse: Array
     shift: Array
+    grows: float
 
     @staticmethod
     def back(matrix: Array) -> Map:
         """The way back through a 4 x 4 matrix."""
         inverse: Array = np.linalg.inv(matrix[:3, :3])
-        return Map(inverse, -inverse @ matrix[:3, 3:])
+        return Map(inverse, -inverse @ matrix[:3, 3:], float(np.linalg.norm(inverse, 2)))
 
     def __call__(self, p: Array) -> Array:
         return self.inverse @ p + self.shift
 
     def stretch(self, most: Array | float) -> float:
         """The largest stretch; it is the same everywhere."""
-        return float(np.linalg.norm(self.inverse, 2))
+        return self.grows
 
     def pull(self, p: Array, g: Array) -> Array:
         """A gradient after the map as the one before it, at p."""
@@ -95,7 +96,7 @@ class Turn(NamedTuple):
         return out
 
 
-def way_back(steps: Sequence[Step]) -> list[Map | Turn]:
+def way_back(steps: Sequence[Step]) -> Any:
     """Maps and turns, the world's first, which is a map; neighbouring affine maps are one."""
     back: list[Map | Turn] = []
     pending = np.eye(4)
@@ -126,20 +127,18 @@ class Body:
         self.medium = leaf.look.material == "volumetric"
         first = steps[0] if steps else None
         self.displace = first if isinstance(first, Displace) and not first.idle else None
-        self.back = way_back(steps)
+        self.first, *self.back = way_back(steps)
         self.scale = distance_scale(steps, 3)
-        self.lipschitz, self.thickness = self.scale, self.scale  # thickness: how deep its inside can be
+        self.rate, self.deep = self.scale, self.scale  # deep: no point is further inside
         radius = 1.0 + margin / self.scale
         if self.displace:
-            self.lipschitz *= 1.0 + abs(self.displace.amount * self.displace.frequency)
-            self.thickness *= 1.0 + abs(self.displace.amount)
+            self.rate *= 1.0 + abs(self.displace.amount * self.displace.frequency)
+            self.deep *= 1.0 + abs(self.displace.amount)
             radius += abs(self.displace.amount)
-        self.turns = any(isinstance(step, Turn) for step in self.back)
-        self.maps = float(np.prod([step.stretch(0.0) for step in self.back if isinstance(step, Map)]))
-        # How far around a point the stretch that `distance` tells holds.
-        self.reach = _REACH * self.scale if self.turns else np.inf
+        # How far around a point the rate that `distance` tells holds: without turns anywhere.
+        self.reach = _REACH * self.scale if self.back else np.inf
         centre = np.zeros((3, 1))
-        for step in reversed(self.back[1:]):
+        for step in reversed(self.back):
             if isinstance(step, Map):
                 matrix = np.linalg.inv(step.inverse)
                 centre, radius = matrix @ (centre - step.shift), radius * float(np.linalg.norm(matrix, 2))
@@ -147,36 +146,35 @@ class Body:
                 centre, radius = np.zeros((3, 1)), radius + float(np.linalg.norm(centre))
         self.centre, self.radius = centre, radius
 
-    def span(self, o: Array, d: Array) -> tuple[Array, Array]:
-        """Where rays o + t d enter and leave the ball, an ellipsoid of the world; (inf, -inf) if never."""
-        first = self.back[0]
-        assert isinstance(first, Map)
-        o, d = first(o) - self.centre, first.inverse @ d
+    def span(self, o: Array, d: Array) -> tuple[Array, Array, Array]:
+        """Where rays o + t d enter and leave the ball, an ellipsoid of the world, and how fast they go there.
+
+        Rays that miss it enter at inf and leave at -inf. The speed is that behind the first map.
+        """
+        o, d = self.first(o) - self.centre, self.first.inverse @ d
         a, b, c = (d * d).sum(0), (o * d).sum(0), (o * o).sum(0) - self.radius**2
         root = b * b - a * c
         hit = root > 0.0
         root = np.sqrt(np.where(hit, root, 0.0))
-        return np.where(hit, (-b - root) / a, np.inf), np.where(hit, (root - b) / a, -np.inf)
+        return np.where(hit, (-b - root) / a, np.inf), np.where(hit, (root - b) / a, -np.inf), np.sqrt(a)
 
-    def distance(self, p: Array) -> tuple[Array, Array | float]:
-        """World distances, and how fast they may change within `reach` of the points."""
-        grown: Array | float = self.maps
-        far: Array | float = self.reach * self.maps  # not less than how far the reach may be on the way
+    def distance(self, p: Array) -> tuple[Array, Any]:
+        """World distances, and how fast they may change within `reach` of the points, by a ray's speed."""
+        p, far, rate = self.first(p), self.reach * self.first.grows, self.rate
         for step in self.back:
-            if isinstance(step, Turn):
-                stretch = step.stretch(length(p) + far)
-                grown, far = grown * stretch, far * stretch
-            p = step(p)
+            stretch = step.stretch(length(p) + far)
+            rate, far, p = rate * stretch, far * stretch, step(p)
         d = leaf_distance(self.geometry, p)
         if self.displace:
             x, y, z = np.sin(self.displace.frequency * p)
             d = d + self.displace.amount * x * y * z
-        return d * self.scale, self.lipschitz * grown
+        return d * self.scale, rate
 
     def gradient(self, p: Array) -> Array:
         """Gradients (3, M) of the world distance."""
+        back = [self.first, *self.back]
         points = [p]
-        for step in self.back:
+        for step in back:
             points.append(step(points[-1]))
         x, y, z = q = points[-1]
         if self.geometry == "sphere":
@@ -190,6 +188,6 @@ class Body:
             f = self.displace.frequency
             (sx, sy, sz), (cx, cy, cz) = np.sin(f * q), np.cos(f * q)
             g += self.displace.amount * f * np.stack([cx * sy * sz, sx * cy * sz, sx * sy * cz])
-        for step, at in zip(reversed(self.back), reversed(points[:-1]), strict=True):
+        for step, at in zip(reversed(back), reversed(points[:-1]), strict=True):
             g = step.pull(at, g)
         return g * self.scale

@@ -82,7 +82,7 @@ class Field:
         # A leaf far from a point changes no sign there if it is further than all blends together can reach,
         # and one that is taken away further than anything is deep.
         blends = 1.25 * sum(_blends(root))
-        deep = max((Body(leaf, steps, 0.0).thickness for leaf, steps, _ in found), default=0.0)
+        deep = max((Body(leaf, steps, 0.0).deep for leaf, steps, _ in found), default=0.0)
         self.bodies = [
             Body(leaf, steps, _MARGIN + blends + (deep if blends and taken else 0.0))
             for leaf, steps, taken in found
@@ -91,28 +91,30 @@ class Field:
         self.mixed = len(kinds) > 1
         self.media = True in kinds
 
-    def spans(self, o: Array, d: Array) -> tuple[Array, Array]:
-        """Where rays o + t d (3, M) enter and leave the ball of each object: (N, M) each."""
-        spans = [body.span(o, d) for body in self.bodies]
-        shape = (len(spans), o.shape[1])
-        return np.reshape([a for a, _ in spans], shape), np.reshape([b for _, b in spans], shape)
+    def spans(self, o: Array, d: Array) -> Array:
+        """`Body.span` of all objects, (3, N, M)."""
+        spans = np.empty((3, len(self.bodies), o.shape[1]))
+        for index, body in enumerate(self.bodies):
+            spans[:, index] = body.span(o, d)
+        return spans
 
-    def probe(self, p: Array, met: npt.NDArray[np.bool_]) -> tuple[Array, npt.NDArray[np.int8], Array]:
+    def probe(self, p: Array, met: Array, speed: Array) -> tuple[Array, npt.NDArray[np.int8], Array]:
         """Distance, kind (`OUT`, `MEDIUM`, `OPAQUE`) and how far the kind stays the same, (M,) each.
 
         Args:
             p: world points (3, M).
             met: (N, M), in which objects' balls they lie; the others count as far away.
+            speed: (N, M), as `spans` tells, of the rays on which they lie.
         """
         count = p.shape[1]
-        stretch, most = np.ones(count), np.full(count, FAR)
+        fastest, most = np.full(count, 1e-9), np.full(count, FAR)
         d = np.full(met.shape, FAR)
-        for body, row, here in zip(self.bodies, d, met, strict=True):
+        for body, row, here, fast in zip(self.bodies, d, met, speed, strict=True):
             at = np.nonzero(here)[0]
             if len(at):
-                row[at], grown = body.distance(p if len(at) == count else p.take(at, 1))
-                stretch[at] = np.maximum(stretch[at], grown)
-                if body.turns:
+                row[at], rate = body.distance(p if len(at) == count else p.take(at, 1))
+                fastest[at] = np.maximum(fastest[at], rate * fast[at])
+                if body.back:
                     most[at] = np.minimum(most[at], body.reach)
         rows = zip(self.bodies, d, strict=True)
 
@@ -124,7 +126,7 @@ class Field:
         way = abs(state.d)
         if self.mixed:
             way = np.where(state.d < 0.0, np.minimum(way, state.near), way)
-        return state.d, state.kind(), np.minimum(way / stretch, most)
+        return state.d, state.kind(), np.minimum(way / fastest, most)
 
     def at(self, p: Array, *, gradient: bool = False) -> State:
         """All that the fold carries at world points (3, M), near left out, the gradient only if asked for."""

@@ -62,18 +62,18 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
         end: (M,), may be infinite.
         exact: places to 1e-9 or so; otherwise to about 1e-6.
     """
-    enter, leave = field.spans(o, d)
+    enter, leave, speed = field.spans(o, d)
     leave = np.minimum(leave, end)
     enter = np.where(leave > np.maximum(enter, 0.0), enter, np.inf)
     first, last = np.full(o.shape[1], OUT, np.int8), np.full(o.shape[1], OUT, np.int8)
     ray = np.nonzero((enter < np.inf).any(0))[0]
     enter, leave = enter[:, ray], np.where(enter < np.inf, leave, -np.inf)[:, ray]
     stop, t = leave.max(0, initial=-np.inf), np.maximum(enter.min(0, initial=np.inf), 0.0)
-    origin, along = o.take(ray, 1), d.take(ray, 1)
+    origin, along, speed = o.take(ray, 1), d.take(ray, 1), speed.take(ray, 1)
     lower: Any = None
     found: list[tuple[Any, ...]] = []
     while len(ray):
-        value, kind, way = field.probe(origin + t * along, (enter <= t) & (t <= leave))
+        value, kind, way = field.probe(origin + t * along, (enter <= t) & (t <= leave), speed)
         if lower is None:
             first[ray] = np.where(t == 0.0, kind, OUT)
             lower = t, np.full_like(t, FAR), first[ray]
@@ -86,7 +86,9 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
         going = np.nonzero((kind != OPAQUE) & (lower[0] < stop))[0]
         if len(going) < len(ray):
             ray, t, stop, lower = ray[going], t[going], stop[going], tuple(v[going] for v in lower)
-            origin, along, enter, leave = (v.take(going, 1) for v in (origin, along, enter, leave))
+            origin, along, enter, leave, speed = (
+                v.take(going, 1) for v in (origin, along, enter, leave, speed)
+            )
     if not found:
         return Changes(first, last, np.zeros(0, int), np.zeros(0), first[:0], first[:0])
     ray, low, low_d, before, high, high_d, after = (np.concatenate(v) for v in zip(*found, strict=True))
