@@ -14,7 +14,7 @@ from scenelang.syntax.tables import tables
 from scenelang.words import ANIMATED, LANGUAGE
 
 ROOT: Final = Path(__file__).resolve().parent.parent
-FOLDERS: Final = ("examples", "examples/lib", "tests/syntax", "tests/scene", "tests/conformance/cases")
+FOLDERS: Final = ("examples", "examples/lib", "tests/syntax", "tests/evaluate", "tests/conformance/cases")
 
 NUMBERS: Final = [
     "0",

@@ -29,7 +29,7 @@ SINGLE = [
     ),
     *(
         case.partition("\n")[::2]
-        for case in (TESTS / "scene/errors.nsgs").read_text("utf-8").split("=== ")[1:]
+        for case in (TESTS / "evaluate/errors.nsgs").read_text("utf-8").split("=== ")[1:]
         if len(re.findall(r"//!.*", case)) == 1
     ),
 ]
@@ -40,7 +40,7 @@ SINGLE += [
     ("an invisible space", "square { sc\u200bale(0.5); }"),
     ("a control character", "square { scale(0.5); }\x07"),
 ]
-MANY = sorted([*(TESTS / "scene/malformed").glob("*.nsg"), *(TESTS / "syntax/malformed").glob("*.nsg")])
+MANY = sorted([*(TESTS / "evaluate/malformed").glob("*.nsg"), *(TESTS / "syntax/malformed").glob("*.nsg")])
 
 EXAMPLES = sorted((TESTS.parent / "examples").glob("*.nsg"))
 

@@ -6,7 +6,8 @@ import math
 from pathlib import Path
 
 import pytest
-from scene_cases import run_text, transform, value
+
+from tests.evaluate.cases import run_text, transform, value
 
 TABLE = [
     line.rpartition(" = ")

@@ -6,10 +6,10 @@ import math
 
 import pytest
 from hypothesis import given, settings
-from scene_cases import run_text
 
 import scenelang as nsg
 from scenelang.scene.schema import MAX_NODE_DEPTH
+from tests.evaluate.cases import run_text
 from tests.strategies import scenes
 
 

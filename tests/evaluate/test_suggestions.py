@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from scene_cases import Outcome, run_text
 
 from scenelang.diagnostics.fixes import apply_fixes
 from scenelang.diagnostics.span import SourceFile, Span
@@ -11,6 +10,7 @@ from scenelang.diagnostics.suggest import did_you_mean, ranked
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.values.functions import FUNCTIONS
 from scenelang.words import LANGUAGE
+from tests.evaluate.cases import Outcome, run_text
 from tests.syntax.reading import apply
 
 SPAN = Span(SourceFile("x", "x"), 0, 1)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import pytest
-from scene_cases import run_text, transform
 
 import scenelang as nsg
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.scene.schema import SceneNode
 from scenelang.scene.spans import Calls, SpanMap, Written
+from tests.evaluate.cases import run_text, transform
 
 
 def nodes(text: str, **options: object) -> tuple[SceneNode, ...]:

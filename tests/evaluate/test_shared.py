@@ -9,7 +9,7 @@ import pytest
 from scenelang.evaluate.values.functions import angle, number
 from scenelang.evaluate.values.operators import binary, compare
 from scenelang.evaluate.values.value import Angle, Problem, Time, Vec
-from tests.scene.scene_cases import run_text
+from tests.evaluate.cases import run_text
 
 SPREAD = {
     "surplus": ("fn f(a) = 2 * a;\nsquare { scale(f(1, 2)); rotate(1deg * f(1, 3)); }", "E0308", 2, 2),

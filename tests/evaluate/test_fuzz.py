@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scene_cases import HERE, run_text
 
 from scenelang.evaluate.values.functions import FUNCTIONS
 from scenelang.words import LANGUAGE
 from scenelang.words import NODES as NODE_WORDS
+from tests.evaluate.cases import HERE, run_text
 
 ATOMS = st.sampled_from(
     """1 0 2.5 -3 45deg 0.25turn 2s true false none X PI t u i a v m f(1) f(a) lib.x #d33 [1,2] [1,2,3] []

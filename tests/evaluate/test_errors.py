@@ -6,10 +6,10 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from scene_cases import HERE, Outcome, mismatch, run_text
 
 from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.suggest import nearest
+from tests.evaluate.cases import HERE, Outcome, mismatch, run_text
 from tests.syntax.reading import apply
 
 CASES = [case.partition("\n")[::2] for case in (HERE / "errors.nsgs").read_text("utf-8").split("=== ")[1:]]

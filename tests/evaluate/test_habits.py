@@ -11,7 +11,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.fixes import apply_fixes, settle
 from scenelang.syntax.recovery.foreign import HABITS
 from scenelang.syntax.recovery.patterns import WORDS, pieces
-from tests.scene.scene_cases import HERE, mismatch, run_text
+from tests.evaluate.cases import HERE, mismatch, run_text
 
 CASES = [
     (title, *body.partition("---\n")[::2])

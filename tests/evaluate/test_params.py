@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from scene_cases import Outcome, run_text, transform
+
+from tests.evaluate.cases import Outcome, run_text, transform
 
 
 def given(declaration: str, use: str, **defines: Any) -> Outcome:

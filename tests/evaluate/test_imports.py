@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scene_cases import MODELS, Outcome, transform
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import evaluate, load_scene
 from scenelang.syntax import parse
+from tests.evaluate.cases import MODELS, Outcome, transform
 
 
 def write(folder: Path, **files: str) -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from scene_cases import run_text
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import apply_fixes
 from scenelang.diagnostics.span import SourceFile
 from scenelang.resolve.unused import find_unused
 from scenelang.syntax import parse
+from tests.evaluate.cases import run_text
 
 ROOT = Path(__file__).parents[2]
 

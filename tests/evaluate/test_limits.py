@@ -7,7 +7,6 @@ import threading
 from functools import partial
 
 import pytest
-from scene_cases import Outcome, run_text
 
 from scenelang.diagnostics.diagnostic import MOST, Diagnostics
 from scenelang.diagnostics.render_text import render_text
@@ -18,6 +17,7 @@ from scenelang.evaluate.limits import MAX_DEPTH, MAX_OBJECTS
 from scenelang.evaluate.report import reporter
 from scenelang.resolve.unused import find_unused
 from scenelang.syntax import nodes, parse
+from tests.evaluate.cases import Outcome, run_text
 from tests.work import lines_run
 
 
