@@ -12,7 +12,6 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import Any
 
 from scenelang.backend.errors import RenderError
 
@@ -134,8 +133,16 @@ def draw_program(
         try:
             program.check_weights(model.digest)
             if isinstance(network, Framed):
-                options: dict[str, Any] = {"skip": skip, "samples": samples, "progress": progress}
-                return draw(network, program, threads=threads, split=split, kept=kept, **options)
+                return draw(
+                    network,
+                    program,
+                    threads=threads,
+                    split=split,
+                    kept=kept,
+                    skip=skip,
+                    samples=samples,
+                    progress=progress,
+                )
             if samples != "adaptive":
                 raise RenderError(f"model `{name}` samples pixels in one way only, not `{samples}`")
             torch.set_num_threads(threads)

@@ -8,12 +8,9 @@ far, for a thin object.
 
 from __future__ import annotations
 
-from scenelang.graph.nodes import Leaf
+from scenelang.graph.nodes import BLEND, Leaf
 from scenelang.graph.space import Box, Space
 from scenelang.words import Combine
-
-BLEND = 0.15
-"""The k of `smooth`: it blends where two distances differ by less, and lowers them by at most k/4."""
 
 
 def leaf_box(leaf: Leaf, level: float, space: Space) -> Box:

@@ -19,6 +19,7 @@ from scenelang.records import Record
 from scenelang.words import Combine
 
 BLEND = 0.15
+"""The k of `smooth`: it blends where two distances differ by less, and lowers them by at most k/4."""
 T = TypeVar("T")
 
 

@@ -68,20 +68,10 @@ def warp_matrix(warp: Warp, group: slice, layout: Layout = PLANE_LAYOUT) -> np.n
     return matrix
 
 
-def matrices(levels: Levels, layout: Layout = PLANE_LAYOUT) -> list[np.ndarray]:
-    """The matrices of a chain, nearest the leaf first: g = M_n … M_1 leaf_vector(code)."""
-    return [
-        *(warp_matrix(w, layout.inner_warps, layout) for w in levels.inner),
-        affine_matrix(levels.middle, layout.middle, layout),
-        *(warp_matrix(w, layout.outer_warps, layout) for w in levels.outer),
-        affine_matrix(levels.affine, layout.frame, layout),
-    ]
-
-
 def lift_many(
     levels: Sequence[Levels], codes: Sequence[Sequence[float]], layout: Layout = PLANE_LAYOUT
 ) -> np.ndarray:
-    """Geometry vectors (N, layout.geometry) in float64: what the products of `matrices` are, at once.
+    """Geometry vectors (N, layout.geometry) in float64: the products of their matrices and the leaf, at once.
 
     Args:
         levels: one chain an object.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from scenelang.graph.nodes import BLEND
 from scenelang.reference.leaves import Array, namespace
-
-BLEND = 0.15  # k of the smooth union, world units
 
 
 def fold(

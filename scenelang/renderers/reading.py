@@ -21,7 +21,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import one_hot
 
-TOKENS = 4
+from scenelang.words import TOKENS
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class Reading(nn.Module):
         # The first GRU's input is linear in position and object, so the two are multiplied apart: a
         # pixel's part once, an object's part once, instead of both for every pair.
         self.look_place = nn.Linear(place, 3 * config.hidden)
-        self.look_object = nn.Linear(config.vector + TOKENS + 1, 3 * config.hidden, bias=False)
+        self.look_object = nn.Linear(config.vector + len(TOKENS) + 1, 3 * config.hidden, bias=False)
         self.look_state = nn.Linear(config.hidden, 3 * config.hidden)
         self.next = nn.GRUCell(config.hidden, config.hidden)
         self.head = nn.Linear(config.hidden, 3)
@@ -75,7 +75,7 @@ class Reading(nn.Module):
         """
         b, n, _ = vectors.shape
         order = torch.arange(n, device=vectors.device, dtype=vectors.dtype) / 4
-        marks = one_hot(tokens, TOKENS).to(vectors.dtype)
+        marks = one_hot(tokens, len(TOKENS)).to(vectors.dtype)
         objects = torch.cat([vectors, marks, order.expand(b, n)[..., None]], -1)  # (B, N, D + 5)
         seen = self.look_object(objects)  # (B, N, 3 H)
         where = self.look_place(fourier_features(points, self.config.octaves))  # (B, P, 3 H)

@@ -20,7 +20,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import interpolate, one_hot
 
-TOKENS = 4
+from scenelang.words import TOKENS
+
 SMALLEST = 4  # pixels along a side at which growing starts
 # Table 3: filters at each resolution, 1 x 1 up to 512 x 512
 FILTERS = {2: 256, 4: 256, 8: 256, 16: 256, 32: 256, 64: 128, 128: 64, 256: 32, 512: 32}
@@ -85,7 +86,7 @@ class Level(nn.Module):
 
     def __init__(self, filters: int) -> None:
         super().__init__()
-        self.cell = ConvLSTM(filters + TOKENS, filters)
+        self.cell = ConvLSTM(filters + len(TOKENS), filters)
         self.pixels = nn.Sequential(
             nn.Conv2d(filters, filters, 1),
             nn.ReLU(),
@@ -164,7 +165,7 @@ class Streaming(nn.Module):
         r = resolution or self.config.resolution
         steps = int(math.log2(r))
         b, n, _ = vectors.shape
-        marks = one_hot(tokens, TOKENS).to(vectors.dtype)  # (B, N, 4)
+        marks = one_hot(tokens, len(TOKENS)).to(vectors.dtype)  # (B, N, 4)
         x = vectors.reshape(b * n, -1, 1, 1)
         below = None
         for deconvolution in self.deconvolutions[:steps]:

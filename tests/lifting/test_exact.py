@@ -8,7 +8,7 @@ import torch
 
 from scenelang.graph.levels import Levels
 from scenelang.graph.steps import Affine, Rows, Step, Warp
-from scenelang.lifting.exact import leaf_vector, lift_colours, lift_many, matrices
+from scenelang.lifting.exact import affine_matrix, leaf_vector, lift_colours, lift_many, warp_matrix
 from scenelang.lifting.layout import PLANE_LAYOUT, Layout
 from scenelang.reference.field import carry_back, distance_scale
 from scenelang.renderers.arrays import NUMPY
@@ -39,6 +39,16 @@ def random_levels(rng: np.random.Generator, inner: int, outer: int, strength: fl
 
 def steps_of(levels: Levels) -> tuple[Step, ...]:
     return (*levels.inner, Affine(levels.middle), *levels.outer, Affine(levels.affine))
+
+
+def matrices(levels: Levels, layout: Layout = PLANE_LAYOUT) -> list[np.ndarray]:
+    """The matrices of a chain, nearest the leaf first: g = M_n … M_1 leaf_vector(code)."""
+    return [
+        *(warp_matrix(w, layout.inner_warps, layout) for w in levels.inner),
+        affine_matrix(levels.middle, layout.middle, layout),
+        *(warp_matrix(w, layout.outer_warps, layout) for w in levels.outer),
+        affine_matrix(levels.affine, layout.frame, layout),
+    ]
 
 
 SIZES = [(i, o) for i in range(PLANE_LAYOUT.inner + 1) for o in range(PLANE_LAYOUT.outer + 1)]

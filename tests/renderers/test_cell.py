@@ -5,7 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from scenelang.reference.fold import BLEND, fold
+from scenelang.graph.nodes import BLEND
+from scenelang.reference.fold import fold
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.network import TOKENS, FramedConfig
 
