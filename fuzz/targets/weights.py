@@ -136,7 +136,7 @@ def _small() -> bytes:
         torch.manual_seed(1)
         network = Framed(config, 4, 1)
     plain = {name: value.detach().contiguous() for name, value in network.state_dict().items()}
-    header = {"format": 1, "config": {"network": config.to_json()}, "seed": 1}
+    header = {"format": 1, "config": {"network": asdict(config)}, "seed": 1}
     return bytes(save(plain, {"scenelang": json.dumps(header, sort_keys=True)}))
 
 
