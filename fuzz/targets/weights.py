@@ -56,7 +56,8 @@ def _check_manifest(data: bytes) -> None:
         manifest = Manifest.from_json(data.decode("utf-8", "surrogateescape"))
     except ValueError:
         return
-    told = {**asdict(manifest), "format": 1}
+    outlines = {name: outline._asdict() for name, outline in manifest.outlines.items()}
+    told = {**asdict(manifest), "outlines": outlines, "format": 1}
     hold(Manifest.from_json(json.dumps(told)) == manifest, "manifest to JSON and back")
     for text in (SCENE, WORDS, f'model "{MODEL}"; star {{ }}'):
         found = Diagnostics()
