@@ -15,6 +15,7 @@ from scenelang.syntax.automaton import advance, reach, statement_depth
 from scenelang.syntax.recovery import mistakes
 from scenelang.syntax.recovery.foreign import HEADS, keywords_near
 from scenelang.syntax.recovery.habits import Habits
+from scenelang.syntax.recovery.patterns import closing
 from scenelang.syntax.recovery.repairs import FOLLOWED, MAX_REPLAY, Repair, Search
 from scenelang.syntax.tables import tables
 from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
@@ -171,32 +172,18 @@ class Recovery(Habits):
 
     def _misspelt_if(self, states: list[int], values: list[Any], at: int) -> int | None:
         """`fi (a) { … } else { … }`: where `if` was meant, for parsing to go on from there."""
-        kinds, tokens = self.tokens.kinds, self.tokens
-        block = self._opening_of(at - 1, "{", "}")
-        first = self._opening_of(block - 1, "(", ")") - 1 if block else -1
-        if (
-            first < 0
-            or kinds[first] != tables().kind("NAME")
-            or "if" not in keywords_near(tokens.text(first))
-        ):
-            return None
-        names = [i for i, value in enumerate(values) if isinstance(value, nodes.Name | nodes.NameRef)]
-        depth = next((i for i in reversed(names) if values[i].span.start == tokens.starts[first]), None)
-        if depth is None:
-            return None
-        mistakes.report_misspelt(tokens, self.report, first, "if")
-        kinds[first] = self.literals["if"]
-        del states[depth + 1 :], values[depth:]
-        return first
-
-    def _opening_of(self, at: int, opening: str, closing: str) -> int:
-        """Index of the bracket that the one at an index closes; 0 where there is none."""
-        depth = 0
-        for index in range(at, max(0, at - 4 * MAX_REPLAY), -1):
-            depth += self._is(index, closing) - self._is(index, opening)
-            if depth == 0:
-                return index if self._is(index, opening) else 0
-        return 0
+        tokens = self.tokens
+        for depth in reversed(range(len(values))):
+            if isinstance(values[depth], nodes.Name | nodes.NameRef):
+                first = self._index(values[depth])
+                block = closing(tokens, first + 1)
+                headed = closing(tokens, block, "{}") == at > block > first + 1
+                if headed and "if" in keywords_near(tokens.text(first)):
+                    mistakes.report_misspelt(tokens, self.report, first, "if")
+                    tokens.kinds[first] = self.literals["if"]
+                    del states[depth + 1 :], values[depth:]
+                    return first
+        return None
 
     # ------------------------------------------------------------ skipping
 
