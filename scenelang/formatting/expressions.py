@@ -125,9 +125,9 @@ class ExpressionLayout:
     def word(self, token: int) -> Part:
         """A token with what stands around it."""
         text = self.text[self.starts[token] : self.ends[token]]
-        if token not in self.notes:
+        note = self.notes.get(token)
+        if note is None:
             return text
-        note = self.notes[token]
         if note.leading or note.trailing:
             gap = "" if text in ("(", "[") else " "
             text += "".join(gap + comment for comment in texts_of(note.trailing))
@@ -169,13 +169,11 @@ class ExpressionLayout:
         flat: str | None = None
         if not (after_of(left) or before_of(right)):
             flat = joined([left, *inline(items), right])
-        doc = form(flat, lambda: broken(left, items, right))
-        return ends_of(doc, left, right)
+        return ends_of(form(flat, lambda: broken(left, items, right)), left, right)
 
     # ------------------------------------------------------------ names
 
-    def name(self, token: int) -> Part:
-        return self.word(token)
+    name = word
 
     def path(self, left: Part, dot: int, right: Part) -> Part:
         return self._glued(left, self.word(dot), right)
@@ -204,9 +202,7 @@ class ExpressionLayout:
         named = sequence([name, " ", self.word(equal), " ", value])
         if isinstance(value, Bracketed) and isinstance(named, Concat):
             # Keeps being told apart as something that opens on the line of a call it is alone in.
-            hugging = Bracketed(named.flat, lambda: Concat(None, named.parts))
-            hugging.before, hugging.after, hugging.blank = named.before, named.after, named.blank
-            return hugging
+            return ends_of(Bracketed(named.flat, lambda: Concat(None, named.parts)), named, named)
         return named
 
     def range(self, start: Part, dots: int, stop: Part, *rest: Any) -> Part:
@@ -270,9 +266,6 @@ class ExpressionLayout:
     def name_ref(self, name: Part) -> Part:
         return name
 
-    def _literal(self, token: int) -> Part:
-        return self.word(token)
-
     def number(self, token: int) -> Part:
         text = self.text[self.starts[token] : self.ends[token]]
         if len(text) > _SURE_DIGITS or "E" in text or "e" in text.rstrip(_UNIT_LETTERS):
@@ -284,4 +277,4 @@ class ExpressionLayout:
             self.doubtful = True
         return self.word(token)
 
-    color = true = false = _literal
+    color = true = false = word

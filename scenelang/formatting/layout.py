@@ -77,17 +77,11 @@ class Block:
             assert isinstance(stmt, Statement)
             self.depth = max(self.depth, stmt.depth + 1)
             simple = simple and stmt.simple and not (stmt.before or stmt.after or (index and stmt.blank))
-        if simple:
-            self.flat = self._one_line()
-
-    def _one_line(self) -> str | None:
-        opening, closing = flat_of(self.opening), flat_of(self.closing)
-        if not self.statements and opening == "{":
-            return f"{{{closing}"
-        parts: list[Part] = [self.opening]
-        for item in self.statements:
-            parts += [" ", item.part]
-        return joined([*parts, " ", self.closing])
+        if simple and not statements and flat_of(opening) == "{":
+            self.flat = f"{{{flat_of(closing)}"
+        elif simple:
+            spaced = [part for item in statements for part in (" ", item.part)]
+            self.flat = joined([opening, *spaced, " ", closing])
 
     def structural(self) -> str | None:
         """Its one line where it is the block of something that is not an object."""

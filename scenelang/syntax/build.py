@@ -23,6 +23,9 @@ PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
     "conditional": (nodes.Conditional, (0, 2, 4)),
     "index": (nodes.Index, (0, 2)),
     "member": (nodes.Member, (0, 2)),
+    "bad_expression": (nodes.BadExpr, ()),
+    "bad_statement": (nodes.BadStmt, ()),
+    "bad_block": (nodes.BadStmt, ()),
 }
 """Rules whose node has some of their parts as they are: its class, and which parts."""
 Keyword = tuple[Any, Span]
@@ -95,12 +98,6 @@ class Builder(ExpressionBuilder):
         if not name.text:
             return nodes.BadStmt(span)
         return nodes.Call(name, rest[0][0] if rest[1:] else None, _block(rest[-1]), span)
-
-    def bad_statement(self, token: int) -> nodes.Stmt:
-        return nodes.BadStmt(self._span(token, token))
-
-    def bad_block(self, head: int, body: nodes.Block) -> nodes.Stmt:
-        return nodes.BadStmt(self._span(head, body))
 
     def block(self, opening: int, *rest: Any) -> nodes.Block:
         return nodes.Block(tuple(rest[0]) if rest[1:] else (), self._span(opening, rest[-1]))

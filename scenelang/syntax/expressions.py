@@ -79,18 +79,18 @@ class ExpressionBuilder:
 
     def argument(self, *parts: Any) -> nodes.Argument:
         name, value = (parts[0] if parts[1:] else None), parts[-1]
-        return nodes.Argument(name, value, (name or value).span.to(value.span))
+        return nodes.Argument(name, value, name.span.to(value.span) if name else value.span)
 
     def range(self, start: nodes.Expr, dots: int, stop: nodes.Expr, *rest: Any) -> nodes.Expr:
         step = rest[1] if rest else None
         return nodes.Range(start, stop, self.sign(dots) == "..<", step, self._span(start, step or stop))
 
     def binary(self, left: nodes.Expr, op: int, right: nodes.Expr) -> nodes.Expr:
-        start, end = self.starts[op], self.ends[op]
         span = Span(self.source, left.span.start, right.span.end)
-        if start == end:  # an operator that recovery put in
+        place = Span(self.source, self.starts[op], self.ends[op])
+        if place.start == place.end:  # an operator that recovery put in
             return nodes.BadExpr(span)
-        return nodes.Binary(self.sign(op), left, right, Span(self.source, start, end), span)
+        return nodes.Binary(self.sign(op), left, right, place, span)
 
     def unary(self, op: int, operand: nodes.Expr) -> nodes.Expr:
         return nodes.Unary(self.sign(op), operand, Span(self.source, self.starts[op], operand.span.end))
@@ -136,9 +136,6 @@ class ExpressionBuilder:
 
     def false(self, token: int) -> nodes.Expr:
         return nodes.Bool(False, self._span(token, token))
-
-    def bad_expression(self, token: int) -> nodes.Expr:
-        return nodes.BadExpr(self._span(token, token))
 
     # ------------------------------------------------------------ literals
 
