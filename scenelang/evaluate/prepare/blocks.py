@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -110,17 +109,18 @@ def _unbind(scope: Scope) -> list[Action]:
 
 
 def misplaced(
-    place: Place, span: Span, message: str, help: str | None = None, fix: Fix | None = None
+    place: Place, span: Span, fact: str, name: str = "", help: str | None = None, fix: Fix | None = None
 ) -> None:
     """Report a statement in the wrong place, unless nothing is known about the place.
 
-    Several of a sort in one block are one report: it is the block that is of the wrong kind. Messages that
-    differ only in what they quote are of a sort.
+    Several of a sort in one block are one report: it is the block that is of the wrong kind.
+
+    Args:
+        fact: the message, with ``{}`` for the name: those with the same fact are of a sort.
     """
     if place.kind != "unknown":
-        sort = re.sub(r"`[^`]*`", "", message)
-        key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, sort)
-        place.report.error_once(key, "E0330", message, span, help=help, fix=fix)
+        key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, fact)
+        place.report.error_once(key, "E0330", fact.format(name), span, help=help, fix=fix)
 
 
 # ---------------------------------------------------------------- definitions

@@ -21,13 +21,15 @@ from scenelang.scene.spans import Written
 from scenelang.syntax import nodes
 
 
-def _stands(place: Place, span: Span, what: str, help: str, inside: str | None = None) -> bool:
+def _stands(
+    place: Place, span: Span, what: str, help: str, inside: str | None = None, name: str = ""
+) -> bool:
     """Whether a material may stand here; reports it if not."""
     if place.kind not in ("file", "material"):
         return True
     at_top = place.kind == "file"
     where = "at top level" if at_top else "inside a material"
-    misplaced(place, span, f"{what} {where}", help if at_top else inside)
+    misplaced(place, span, f"{what} {where}", name, help if at_top else inside)
     return False
 
 
@@ -128,7 +130,7 @@ def prepare_value_use(stmt: nodes.Call, binding: Binding, place: Place) -> Actio
         session.report.error("E0308", f"`{name}` is a value and takes no arguments", stmt.args[0].span)
         return None
     help = "materials stand in the block of an object or a group"
-    if not _stands(place, span, f"value `{name}`", help, help):
+    if not _stands(place, span, "value `{}`", help, help, name):
         return None
     place.file.weight += MATERIAL_VALUE
     where = Written(span, stmt.span)

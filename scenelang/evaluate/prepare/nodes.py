@@ -25,15 +25,16 @@ from scenelang.words import LANGUAGE
 HOLDERS = ("file", "group", "chain", "unknown")
 
 
-def _holds_children(place: Place, span: Span, what: str) -> bool:
+def _holds_children(place: Place, span: Span, what: str, name: str) -> bool:
     """Whether children may stand here; reports it if not."""
     if place.kind in HOLDERS:
         return True
     if place.kind == "material":
-        misplaced(place, span, f"{what} inside a material", "a material's block holds texture operations")
+        help = "a material's block holds texture operations"
+        misplaced(place, span, f"{what} inside a material", name, help)
     else:
         help = "a block of an object or a call holds transforms and a material; use group { … } for children"
-        misplaced(place, span, f"{what} inside an object", help)
+        misplaced(place, span, f"{what} inside an object", name, help)
     return False
 
 
@@ -61,7 +62,7 @@ def _join_child(node: Any, where: Written, out: Builder, session: Session) -> No
 def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
     """``GEOMETRY { … }`` with a geometry that the model has."""
     name, session, where = stmt.name.text, place.session, Written(stmt.name.span, stmt.span)
-    fits = _holds_children(place, where.name, f"object `{name}`")
+    fits = _holds_children(place, where.name, "object `{}`", name)
     body = prepare_inner(stmt.body, place.inner("object"))
     if stmt.args:
         prepare_arguments(stmt.args, place)
@@ -94,7 +95,7 @@ def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
 
 
 def prepare_node(stmt: nodes.Node, place: Place) -> Action | None:
-    fits = _holds_children(place, stmt.keyword, f"`{stmt.kind}`")
+    fits = _holds_children(place, stmt.keyword, "`{}`", stmt.kind)
     chain = stmt.kind == "chain"
     if chain:
         _check_first(stmt, place)
@@ -152,12 +153,12 @@ def prepare_combined(stmt: nodes.Combined, place: Place) -> Action | None:
     report, op = place.report, stmt.op
     if place.kind not in ("chain", "unknown"):
         help = f"put the children into chain {{ … }}, or write a boolean node: {op} {{ … }}"
-        misplaced(place, stmt.keyword, f"`{op}` before a child outside a chain", help)
+        misplaced(place, stmt.keyword, "`{}` before a child outside a chain", op, help)
         prepare_statement(stmt.child, Place(place.file, place.scope, "unknown", place.nested))
         return None
     if not _makes_child(stmt.child, place):
-        message = f"`{op}` before a statement that makes no object"
-        misplaced(place, stmt.keyword, message, "the word joins one object or node to those before it")
+        help = "the word joins one object or node to those before it"
+        misplaced(place, stmt.keyword, "`{}` before a statement that makes no object", op, help)
         return None
     act = prepare_statement(stmt.child, place)
     if act is None:
@@ -189,7 +190,7 @@ def _makes_child(stmt: nodes.Stmt, place: Place) -> bool:
 def prepare_module_call(stmt: nodes.Call, definition: Definition, place: Place) -> Action | None:
     """``NAME(1);`` or ``NAME(1) { transforms }``: one child, whatever the module holds."""
     session, where = place.session, Written(stmt.name.span, stmt.span)
-    fits = _holds_children(place, where.name, f"a call of module `{stmt.name.text}`")
+    fits = _holds_children(place, where.name, "a call of module `{}`", stmt.name.text)
     given = prepare_arguments(stmt.args, place)
     block = prepare_inner(stmt.body, place.inner("object")) if stmt.body is not None else None
     enter = entering(stmt.name, given, definition, place)

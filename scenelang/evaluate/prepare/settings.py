@@ -28,11 +28,11 @@ MAX_SIDE_PX: Final = 8192
 LEFT_OUT: Final = object()  # an argument that was not given; None is the value ``none``
 
 
-def at_top_level(place: Place, span: Span, what: str) -> bool:
+def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
     """Whether a statement stands at top level; reports it if not."""
     if place.kind == "file" and not place.nested:
         return True
-    misplaced(place, span, f"{what} inside a block", "it stands at top level")
+    misplaced(place, span, f"{what} inside a block", name, "it stands at top level")
     return False
 
 
@@ -84,7 +84,7 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
     """``canvas``, ``background`` or ``animate``."""
     session, name, span = place.session, stmt.name.text, stmt.name.span
     given = prepare_arguments(stmt.args, place)
-    if not at_top_level(place, span, f"`{name}`") or not _once(session, name, span):
+    if not at_top_level(place, span, "`{}`", name) or not _once(session, name, span):
         return None
     if stmt.body is not None:
         session.report.error("E0330", f"`{name}` takes no block", span, help=f"write {name}(…);")

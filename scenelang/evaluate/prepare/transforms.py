@@ -51,18 +51,18 @@ def _spec(stmt: nodes.Call, place: Place) -> Spec | None:
     name, span = stmt.name.text, stmt.name.span
     if place.kind == "material":
         if name not in TEXTURE:
-            misplaced(place, span, f"`{name}` does not move textures", "put it into the object's block")
+            misplaced(place, span, "`{}` does not move textures", name, "put it into the object's block")
         return TEXTURE.get(name)
     if name not in GEOMETRY and place.kind != "unknown":
         help = f"put it into a material's block, as in material flat {{ {name}(…); }}"
         from scenelang.evaluate.report.habits import in_material  # only mistakes need it
 
         fix = _grouped(stmt, place) or in_material(stmt, place.session, name)
-        misplaced(place, span, f"`{name}` stands outside a material", help, fix)
+        misplaced(place, span, "`{}` stands outside a material", name, help, fix)
         return None
     if place.kind == "file":
         help = "put what it moves and the transform into group { … }"
-        misplaced(place, span, f"transform `{name}` at top level", help, _grouped(stmt, place))
+        misplaced(place, span, "transform `{}` at top level", name, help, _grouped(stmt, place))
         return None
     return GEOMETRY.get(name) or TEXTURE[name]
 
