@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scenelang.graph.looks import Look
+from scenelang.graph.nodes import Fold, Leaf, Link, Move
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
 from scenelang.lifting.exact import inverse_frame
 from scenelang.lifting.layout import SOLID_LAYOUT as LAYOUT
@@ -107,3 +109,14 @@ MIXED = (
     Object("sphere", (scaled(1.1, 1.0, 1.2),), token="intersect"),
 )
 """Objects of every kind about the origin."""
+
+
+def graph(objects: Sequence[Object]) -> Fold:
+    """The same stream as a graph, for the reference."""
+    return Fold(
+        "scene",
+        tuple(
+            Link(o.token, Leaf(o.leaf, Look(o.material, rgb=o.rgb), tuple(map(Move, o.steps))), o.k)
+            for o in objects
+        ),
+    )

@@ -10,6 +10,7 @@ from scenelang.graph.stage import Light, Stage
 from scenelang.graph.steps import Displace, Twist, Warp
 from scenelang.reference.fold import combine
 from scenelang.reference.leaves import leaf_distance
+from scenelang.reference.solid.image import solid_image
 from scenelang.renderers.solid import draw
 from scenelang.renderers.solid.draw import draw_solids
 from scenelang.renderers.solid.field import Meeting, SolidField
@@ -17,7 +18,7 @@ from scenelang.renderers.solid.frames import read_solid_frame
 from scenelang.renderers.solid.network import SolidArrays
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.words import TOKENS
-from tests.renderers.solids import LEAVES, MIXED, Object, field, moved, network, scaled, turned, vector
+from tests.renderers.solids import LEAVES, MIXED, Object, field, graph, moved, network, scaled, turned, vector
 
 rng = np.random.default_rng(7)
 
@@ -170,6 +171,19 @@ def test_a_sphere_is_drawn_as_in_closed_form(canvas: tuple[int, int]) -> None:
     exact = sphere_picture(canvas, 0.8, stage)
     assert psnr(draw_solids(solids, stage, canvas, adaptive=False)[0], exact) > 50
     assert psnr(draw_solids(solids, stage, canvas)[0], exact) > 48
+
+
+@pytest.mark.parametrize("first", ["diffuse", "volumetric"])
+@pytest.mark.parametrize("last", [*TOKENS])
+def test_pictures_are_those_of_the_reference(first: str, last: str) -> None:
+    """Warps, blends, holes, media and solids in one another, from a light close by."""
+    small = Object(
+        "torus", (scaled(0.5, 0.4, 0.5), turned(0.7), moved(0.4, 0.2, 0.4)), "volumetric", token=last
+    )
+    objects = [MIXED[0]._replace(material=first), MIXED[1], small, Object("sphere", (scaled(0.3, 0.3, 0.3),))]
+    stage = Stage(light=Light((1.0, 2.5, 2.0), 12.0, (1.0, 0.9, 0.8)))
+    exact = solid_image(graph(objects), stage, (48, 40))
+    assert psnr(draw_solids(field(objects), stage, (48, 40))[0], exact) > 38
 
 
 def test_a_medium_lets_through_what_its_length_says() -> None:
