@@ -22,7 +22,7 @@ from torch.func import grad_and_value, jacrev, vmap
 from scenelang.files import write_whole
 from scenelang.reference.fold import combine
 from scenelang.reference.leaves import TORUS, leaf_distance
-from scenelang.renderers.solid.network import RADIUS
+from scenelang.renderers.solid.network import BLEND, RADIUS, Wanted
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.training.checkpoint import load_tensors, save_tensors
 from scenelang.training.config import SolidsConfig
@@ -189,16 +189,17 @@ def fit_cell(network: Solids, steps: int, g: torch.Generator, rate: float = 0.01
         own = torch.where(which == 0, past + close, torch.where(which == 1, close, own))
         own = torch.where(which == 2, close - past, own)
         loss = (network.look(network.material_codes) - known).square().sum()
-        for cell, token in zip(network.cells(), TOKENS.values(), strict=True):
-            joined = network.join(own, past, 1.0, cell, None)
-            register = network.register(joined, torch.zeros(4, points), torch.ones(4, 1))
+        memory = torch.cat([past[None], torch.zeros(4, points)])
+        for token in TOKENS.values():
+            cell = network.cell(token, BLEND)[Wanted.ALL]
+            found, _ = network.join(own, memory, torch.ones(4, 1), cell, Wanted.ALL)
             blank = torch.zeros(points, 1)
             depth, paint = combine(past, blank, own, blank + 1, token)
             kind = paint.round()  # of a blend the nearer one's
             loss = loss + (
-                ((joined.state - depth).abs() / (depth.abs() + 0.02)).mean()
-                + (register[0] - paint[:, 0]).abs().mean()
-                + (register[3] - kind[:, 0]).abs().mean()
+                ((found[0] - depth).abs() / (depth.abs() + 0.02)).mean()
+                + (found[1] - paint[:, 0]).abs().mean()
+                + (found[4] - kind[:, 0]).abs().mean()
             )
         optimiser.zero_grad()
         loss.backward()

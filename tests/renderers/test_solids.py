@@ -15,7 +15,7 @@ from scenelang.renderers.solid import draw
 from scenelang.renderers.solid.draw import draw_solids
 from scenelang.renderers.solid.field import Meeting, SolidField
 from scenelang.renderers.solid.frames import read_solid_frame
-from scenelang.renderers.solid.network import SolidArrays
+from scenelang.renderers.solid.network import SolidArrays, Wanted
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.words import TOKENS
 from tests.renderers.solids import LEAVES, MIXED, Object, field, graph, moved, network, scaled, turned, vector
@@ -23,10 +23,10 @@ from tests.renderers.solids import LEAVES, MIXED, Object, field, graph, moved, n
 rng = np.random.default_rng(7)
 
 
-def everywhere(solids: SolidField, p: np.ndarray, **asked: bool) -> Meeting:
+def everywhere(solids: SolidField, p: np.ndarray, gradient: bool = False) -> Meeting:
     """What a field answers where every object is met."""
     with solids.xp.inference():
-        return solids.meet(p, [np.ones(p.shape[1], bool)] * len(solids.solids), **asked)
+        return solids.meet(p, [np.ones(p.shape[1], bool)] * len(solids.solids), Wanted.ALL, gradient)
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:
@@ -75,15 +75,19 @@ def test_the_cell_is_the_fold(token: str) -> None:
     net, n = network(), 4000
     past, own = rng.normal(size=(2, n)).astype(np.float32) * 10 ** rng.uniform(-2, 0, n).astype(np.float32)
     own[::2] = past[::2] + own[::2] / 10
-    cell = net.cells()[TOKENS[token]]
+    depth, paint = combine(past, np.zeros((n, 1)), own, np.ones((n, 1)), TOKENS[token])
+    clear = (abs(own - past) > 3e-3) & (abs(own) > 1e-3) & (abs(past) < 2)
     for width in (0.15, 0.05, 0.6):
-        joined = net.join(own * width / 0.15, past * width / 0.15, 0.15 / width, cell, None)
-        depth, paint = combine(past, np.zeros((n, 1)), own, np.ones((n, 1)), TOKENS[token])
-        assert joined.state == pytest.approx(depth * width / 0.15, abs=2e-4, rel=3e-4)
-        register = net.register(joined, np.zeros((4, n), np.float32), np.ones((4, 1), np.float32))
-        clear = (abs(own - past) > 3e-3) & (abs(own) > 1e-3) & (abs(past) < 2)
-        assert register[0, clear] == pytest.approx(paint[clear, 0], abs=2e-3)
-        assert register[3, clear] == pytest.approx(paint[clear, 0].round(), abs=2e-3)
+        scale = np.float32(width / 0.15)
+        memory = np.concatenate([past[None] * scale, np.zeros((4, n), np.float32)])
+        look = np.ones((4, 1), np.float32)
+        for wanted, rows in ((Wanted.DISTANCE, [0]), (Wanted.KIND, [0, 4]), (Wanted.ALL, [0, 1, 2, 3, 4])):
+            cell = net.cell(TOKENS[token], width)[wanted]
+            found, _ = net.join(own * scale, memory[rows], look, cell, wanted)
+            assert found[0] == pytest.approx(depth * scale, abs=2e-4, rel=3e-4)
+            if wanted != Wanted.DISTANCE:
+                assert found[-1, clear] == pytest.approx(paint[clear, 0].round(), abs=2e-3)
+        assert found[1, clear] == pytest.approx(paint[clear, 0], abs=2e-3)
 
 
 def test_gradients_are_those_of_the_distance() -> None:
@@ -107,8 +111,8 @@ def test_objects_change_nothing_out_of_their_reach() -> None:
     p = rng.uniform(-1.5, 1.5, (3, 20000)).astype(np.float32)
     t = np.linalg.norm(p - origin[:, None], axis=0)
     begin, end, _ = solids.spans(origin, (p - origin[:, None]) / t, t + 10)
-    near = solids.meet(p, list((begin <= t) & (t <= end)), register=True)
-    whole = everywhere(solids, p, register=True)
+    near = solids.meet(p, list((begin <= t) & (t <= end)), Wanted.ALL)
+    whole = everywhere(solids, p)
     inside = whole.distance < -1e-4
     assert ((near.distance < 0) == inside)[abs(whole.distance) > 1e-4].all()
     assert near.register[:, inside] == pytest.approx(whole.register[:, inside], abs=1e-3)

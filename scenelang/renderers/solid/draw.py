@@ -14,8 +14,9 @@ from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stag
 from scenelang.image import Image, from_samples
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
-from scenelang.renderers.solid.field import Meeting, SolidField
-from scenelang.renderers.solid.march import GAP, INF, Trail, march
+from scenelang.renderers.solid.field import INF, Meeting, SolidField
+from scenelang.renderers.solid.march import GAP, Trail, march
+from scenelang.renderers.solid.network import Wanted
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
 CLEAR = 2e-4  # world units before a surface where rays from the light end
@@ -72,15 +73,17 @@ class Lighting:
             limit = xp.select(down, drop, limit)
         trail = march(field, self.eye, way, limit)
         met = trail.met
-        for index, shaded in (
-            (xp.where(trail.hit < INF), self._surface),
-            (xp.where((trail.hit == INF) & (limit < INF)), self._ground),
-        ):
-            if len(index):
-                found, more = shaded(xp.take(way, index), index, trail, limit)
-                xp.put(seen, index, found)
-                xp.put(alpha, index, xp.take(alpha, index) * 0 + 1)
-                met += more
+        surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
+        both = xp.concat([surface, floor], 0)
+        if len(both):
+            parts = [self._surface(xp.take(way, surface), surface, trail)] if len(surface) else []
+            if len(floor):
+                parts.append(self._ground(xp.take(way, floor), xp.take(limit, floor)))
+            p, n, colour, haze = (xp.concat(list(part), 1) for part in zip(*parts, strict=True))
+            light, more = self._received(p, n)
+            xp.put(seen, both, colour * light + haze)
+            xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
+            met += len(surface) + more
         if trail.pieces:
             clear = xp.exp(-EXTINCTION * trail.length)
             glow, more = self._scattered(way, trail)
@@ -112,31 +115,30 @@ class Lighting:
         trail = march(self.field, self.lamp, way / r.clip(1e-9), r - before)
         return (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length), trail.met
 
-    def _surface(self, way: Array, index: Array, trail: Trail, limit: Array) -> tuple[Array, int]:
+    def _surface(self, way: Array, index: Array, trail: Trail) -> tuple[Array, ...]:
+        """Points where rays meet solids, normals, colours, and light that joins in before (3, K) each."""
         xp = self.xp
         t = xp.take(trail.hit, index)
-        begin, end = xp.take(trail.begin, index), xp.take(trail.end, index)
-        found = self._look(way, t + INTO, begin, end)
+        found = self._look(way, t + INTO, gradient=True)
         sharp = xp.take(trail.soft, index) == 0
         off = xp.where(sharp & (abs(found.distance) > 3 * INTO))
-        met = len(index)
         if len(off):  # where the distances on both sides of the surface said little about it
             t_off = xp.take(t, off) + INTO + self._ahead(found, way, off)
-            again = self._look(xp.take(way, off), t_off, xp.take(begin, off), xp.take(end, off))
+            again = self._look(xp.take(way, off), t_off, gradient=True)
             xp.put(t, off, t_off - INTO)
             for old, new in zip(found[:3], again[:3], strict=True):
                 xp.put(old, off, new)
-            met += len(off)
         g = found.gradient
         towards = _dot(g, way)
         p = self.eye[:, None] + way * (t + sharp * (INTO + self._ahead(found, way, None)))
         n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
-        light, more = self._received(p, n)
-        return found.register[:3] * light, met + more
+        return p, n, found.register[:3], 0 * p
 
-    def _look(self, way: Array, t: Array, begin: Array, end: Array) -> Meeting:
+    def _look(self, way: Array, t: Array, gradient: bool = False) -> Meeting:
+        """All about points at t (K,) of rays (3, K) from the eye."""
+        begin, end, _ = self.field.spans(self.eye, way, t)
         inside = [(begin[i] <= t) & (t <= end[i]) for i in range(len(begin))]
-        return self.field.meet(self.eye[:, None] + way * t, inside, register=True, gradient=True)
+        return self.field.meet(self.eye[:, None] + way * t, inside, Wanted.ALL, gradient)
 
     def _ahead(self, found: Meeting, way: Array, index: Array | None) -> Array:
         """How much farther rays meet the surface than where the field was asked."""
@@ -146,16 +148,16 @@ class Lighting:
         towards = _dot(g, way)
         return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-GAP, GAP)
 
-    def _ground(self, way: Array, index: Array, trail: Trail, limit: Array) -> tuple[Array, int]:
+    def _ground(self, way: Array, t: Array) -> tuple[Array, ...]:
+        """As `_surface`, of the ground at t (K,)."""
         xp, ground = self.xp, self.stage.ground
         assert ground is not None
-        p = self.eye[:, None] + way * xp.take(limit, index)
+        p = self.eye[:, None] + way * t
         n = p * 0
         n[1] = 1.0
-        light, met = self._received(p, n)
         kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
-        colour = xp.array(np.asarray(ground.rgb, np.float32), p)[:, None] * light
-        return kept * colour + (1 - kept) * self.horizon[:, None], met
+        colour = xp.array(np.asarray(ground.rgb, np.float32), p)[:, None]
+        return p, n, kept * colour, (1 - kept) * self.horizon[:, None]
 
     def _scattered(self, way: Array, trail: Trail) -> tuple[Array, int]:
         """Light (3, M) that media send towards the eye.
@@ -171,10 +173,9 @@ class Lighting:
         weight = weights * (taken * xp.exp(-EXTINCTION * before))
         count = len(NODES)
         t, weight, rays = t.reshape(-1), weight.reshape(-1), xp.concat([ray] * count, 0)
-        p = self.eye[:, None] + xp.take(way, rays) * t
-        first, last = xp.take(trail.begin, rays), xp.take(trail.end, rays)
-        inside = [(first[i] <= t) & (t <= last[i]) for i in range(len(first))]
-        colour = self.field.meet(p, inside, register=True).register[:3]
+        ways = xp.take(way, rays)
+        p = self.eye[:, None] + ways * t
+        colour = self._look(ways, t).register[:3]
         r = _length(xp, self.lamp[:, None] - p).clip(NEAREST)
         clear, met = self._clear(p, 0.0)
         light = (clear / (4 * r * r)) * self.power[:, None] + AMBIENT[0]

@@ -15,8 +15,10 @@ import numpy as np
 from scenelang.renderers.arrays import Array, Arrays, Layers
 from scenelang.renderers.field import INTERSECT, SMOOTH, UNION
 from scenelang.renderers.solid.frames import SolidFrame, read_solid_frame
-from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, SolidNetwork
+from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted
 
+_ROWS = (1, 2, 5)  # of a point's memory, by `Wanted`
+INF = float("inf")
 SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball
 
 
@@ -31,7 +33,8 @@ class Solid:
         layers: its decoder.
         direct: the same from world points, where its way back is a single map.
         radius: leaf units from its origin beyond which it changes nothing.
-        blend: the cell's blend width over its own.
+        centre, extent: a ball (3,) of the world around that.
+        cells: of its token, by what is wanted.
     """
 
     frame: SolidFrame
@@ -40,7 +43,9 @@ class Solid:
     layers: Layers
     direct: Layers | None
     radius: float
-    blend: float
+    centre: Array
+    extent: float
+    cells: tuple[Cell, ...]
 
     @property
     def draws(self) -> bool:
@@ -53,14 +58,14 @@ class Meeting(NamedTuple):
 
     Args:
         distance: D.
-        register: colour and medium (4, M), if asked for.
+        register: colour and medium (4, M), the medium alone (1, M), or nothing (0, M).
         gradient: of D (3, M), if asked for.
         change: a bound on D and on how far another object's material may begin, if asked for.
         met: pairs of points and objects that met.
     """
 
     distance: Array
-    register: Array = None
+    register: Array
     gradient: Array = None
     change: Array = None
     met: int = 0
@@ -81,7 +86,6 @@ class SolidField:
     def __init__(self, network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) -> None:
         self.network, self.xp = network, network.xp
         with self.xp.inference():
-            self.cells = network.cells()
             self.solids = self._solids(vectors, tokens)
         self.plain = all(solid.token == UNION for solid in self.solids)
         """Whether every object draws."""
@@ -112,6 +116,8 @@ class SolidField:
             if not steps and not frame.amount and radius <= RADIUS:
                 (w, b), *rest = layers
                 direct = [(w @ outer.linear, w @ outer.shift + b), *rest]
+            back = np.linalg.inv(frame.outer.linear.astype(np.float64))
+            centre = (-back @ frame.outer.shift).astype(np.float32)
             solids.append(
                 Solid(
                     frame=replace(frame, outer=outer, steps=tuple(steps)),
@@ -120,10 +126,26 @@ class SolidField:
                     layers=layers,
                     direct=direct,
                     radius=radius,
-                    blend=BLEND / frame.blend if smooth and frame.blend > 0 else 1.0,
+                    centre=xp.array(centre, like),
+                    extent=float(np.linalg.norm(back, 2)) * frame.ball(radius),
+                    cells=self.network.cell(token, frame.blend if smooth and frame.blend > 0 else BLEND),
                 )
             )
         return solids[::-1]
+
+    def near(self, origin: Array, way: Array) -> Array:
+        """Which rays (k,) may meet any object: those within a cone around its ball."""
+        xp = self.xp
+        found = way[0] > INF
+        for solid in self.solids:
+            if not solid.draws:
+                continue
+            to = solid.centre - origin
+            far = float(xp.sqrt(to @ to))
+            if far <= solid.extent:
+                return xp.where(way[0] < INF)
+            found = found | (to @ way >= far * (1 - (solid.extent / far) ** 2) ** 0.5 - 1e-5 * far)
+        return xp.where(found)
 
     def spans(self, origin: Array, way: Array, limit: Array) -> tuple[Array, Array, Array]:
         """Where rays may meet each object: begin and end (N, M), inf and -inf for never, and a bound (N, M)
@@ -136,7 +158,7 @@ class SolidField:
         """
         xp, count = self.xp, way.shape[1]
         shape = len(self.solids), count
-        begin, end, rate = (xp.full(shape, v, way) for v in (float("inf"), -float("inf"), 1.0))
+        begin, end, rate = (xp.full(shape, v, way) for v in (INF, -INF, 1.0))
         for i, solid in enumerate(self.solids):
             frame = solid.frame
             a = frame.outer.linear @ way
@@ -154,30 +176,25 @@ class SolidField:
             if solid.token == INTERSECT:  # outside its ball nothing is left of what came before
                 begin[:i] = xp.maximum(begin[:i], begin[i])
                 end[:i] = xp.minimum(end[:i], end[i])
-                begin[:i] = xp.select(begin[:i] <= end[:i], begin[:i], xp.full((), float("inf"), way))
+                begin[:i] = xp.select(begin[:i] <= end[:i], begin[:i], xp.full((), INF, way))
         return begin, end, rate
 
     def meet(
-        self,
-        p: Array,
-        inside: Sequence[Array],
-        register: bool = False,
-        gradient: bool = False,
-        change: bool = False,
+        self, p: Array, inside: Sequence[Array], wanted: Wanted, gradient: bool = False, change: bool = False
     ) -> Meeting:
         """Let points meet the objects.
 
         Args:
             p: world points (3, M).
             inside: of each object, which points (M,) may be in its reach.
-            register, gradient, change: what to answer beside the distance.
+            wanted: what of the register to answer beside the distance.
+            gradient, change: what else.
         """
-        xp, count = self.xp, p.shape[1]
-        state = xp.full((count,), EMPTY, p)
-        memory = xp.full((4, count), 0.0, p) if register else None
+        xp, count, pairs = self.xp, p.shape[1], 0
+        memory = xp.full((_ROWS[wanted], count), 0.0, p)
+        memory[0] = EMPTY
         slope = xp.full((3, count), 0.0, p) if gradient else None
         bound = xp.full((count,), EMPTY, p) if change else None
-        pairs = 0
         touched = None if self.plain else inside[0] & ~inside[0]
         for solid, mask in zip(self.solids, inside, strict=True):
             if touched is not None:
@@ -190,29 +207,24 @@ class SolidField:
             if not met:
                 continue
             pairs += met
-            every = met == count
-            q = p if every else xp.take(p, index)
-            before = state if every else xp.take(state, index)
-            d, own = self._distance(solid, q, gradient)
-            cell = self.cells[solid.token]
-            joined = self.network.join(d, before, solid.blend, cell, None if register else 1)
+            place = None if met == count else index
+            before = _part(xp, memory, place)
+            d, own = self._distance(solid, _part(xp, p, place), gradient)
+            cell = solid.cells[wanted]
+            found, take = self.network.join(d, before, solid.look, cell, wanted)
             if bound is not None:
                 gap = abs(d)
                 if solid.token == SMOOTH:
-                    gap = xp.minimum(gap, abs(before - d) / 2)
-                bound = _update(
-                    xp, bound, index, every, xp.minimum(bound if every else xp.take(bound, index), gap)
-                )
+                    gap = xp.minimum(gap, abs(before[0] - d) / 2)
+                bound = _update(xp, bound, place, xp.minimum(_part(xp, bound, place), gap))
             if slope is not None:
-                by_own, by_past = self.network.partials(d, before, joined, solid.blend, cell)
-                past = slope if every else xp.take(slope, index)
-                slope = _update(xp, slope, index, every, by_own * own + by_past * past)
-            if memory is not None:
-                held = memory if every else xp.take(memory, index)
-                memory = _update(xp, memory, index, every, self.network.register(joined, held, solid.look))
-            state = _update(xp, state, index, every, joined.state)
-        bound = None if bound is None else xp.minimum(bound, abs(state))
-        return Meeting(state, memory, slope, bound, pairs)
+                by_own, by_past = self.network.partials(d, before[0], take, cell)
+                past = _part(xp, slope, place)
+                slope = _update(xp, slope, place, by_own * own + by_past * past)
+            memory = _update(xp, memory, place, found)
+        if bound is not None:
+            bound = xp.minimum(bound, abs(memory[0]))
+        return Meeting(memory[0], memory[1:], slope, bound, pairs)
 
     def _distance(self, solid: Solid, p: Array, gradient: bool) -> tuple[Array, Array | None]:
         """An object's world distance (M,) at world points (3, M), and its gradient (3, M) if asked for."""
@@ -250,9 +262,14 @@ class SolidField:
         return d * scale, None if g is None else frame.pulled(xp, p, g) * scale
 
 
-def _update(xp: Arrays, whole: Array, index: Array, every: bool, values: Array) -> Array:
+def _part(xp: Arrays, whole: Array, index: Array | None) -> Array:
+    """Entries (…, k) of an array (…, M), or all."""
+    return whole if index is None else xp.take(whole, index)
+
+
+def _update(xp: Arrays, whole: Array, index: Array | None, values: Array) -> Array:
     """An array (…, M) with new values (…, k) at some places, or at every one."""
-    if every:
+    if index is None:
         return values
     xp.put(whole, index, values)
     return whole

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from scenelang.renderers.arrays import Array
-from scenelang.renderers.solid.field import Meeting, SolidField
+import numpy as np
 
-GAP = 0.006  # world units
+from scenelang.renderers.arrays import Array
+from scenelang.renderers.solid.field import INF, Meeting, SolidField
+from scenelang.renderers.solid.network import Wanted
+
+GAP = 0.009  # world units
 TOUCH = 1e-5  # world units: so near counts as met
 STEPS = 400  # of a ray at most
 HALVINGS = 6  # of the interval in which a medium gives way to a solid
-INF = float("inf")
+NUDGE = np.float32(1 - 1e-6)  # of a point, to one just before it
 T, PAST, FREE, WAY, WITHIN, SINCE, LENGTH = 0, 1, 2, 3, 6, 7, 8  # rows of what a ray carries along
 
 
@@ -28,7 +31,6 @@ class Trail:
         hit: (M,) how far the first opaque surface is, inf where there is none.
         length: (M,) world units in media before that or before the ray's end.
         soft: (M,) 1 where it was a medium that the surface ends, 0 elsewhere: the distance is not 0 there.
-        begin, end: (N, M) where the rays may meet each object.
         pieces: of the ways in media, as (index of the ray, begin, end, length before it), each (P,).
         met: (object, point) pairs that went through the network.
     """
@@ -36,8 +38,6 @@ class Trail:
     hit: Array
     length: Array
     soft: Array
-    begin: Array
-    end: Array
     pieces: list[tuple[Array, Array, Array, Array]] = field(default_factory=list)
     met: int = 0
 
@@ -52,41 +52,43 @@ def march(solids: SolidField, origin: Array, way: Array, limit: Array) -> Trail:
         limit: how far to go (M,).
     """
     xp, n, media = solids.xp, len(solids.solids), solids.media
-    never = xp.full((), INF, way)
-    begin, end, rate = solids.spans(origin, way, limit)
+    wanted = Wanted.KIND if solids.mixed else Wanted.DISTANCE
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
-    trail = Trail(hit, length, soft, begin, end)
+    trail = Trail(hit, length, soft)
     draws = [i for i, solid in enumerate(solids.solids) if solid.draws]
-    if not draws:
+    ids = solids.near(origin, way)
+    if not len(ids):
         return trail
+    never, way = xp.full((), INF, way), xp.take(way, ids)
+    begin, end, rate = solids.spans(origin, way, xp.take(limit, ids))
     start = begin[draws[0]]
     for i in draws[1:]:
         start = xp.minimum(start, begin[i])
-    ids = xp.where(start < INF)
-    blank = xp.full((3 if media else 0, way.shape[1]), 0.0, way)
-    first = (start[None], start[None], start[None])
-    rays = xp.take(xp.concat([*first, way, blank, begin, end, rate], 0), ids)
-    b = WAY + 3 + len(blank)
+    blank = xp.full((4 if media else 1, len(ids)), 0.0, way)
+    some = xp.where(start < INF)
+    rays = xp.concat([start[None], start[None] * NUDGE, blank[:1], way, blank[1:], begin, end, rate], 0)
+    ids, rays = xp.take(ids, some), xp.take(rays, some)
+    b = WAY + 2 + len(blank)
     e, r = b + n, b + 2 * n
 
-    def ask(rays: Array, t: Array, register: bool) -> tuple[Meeting, list[Array]]:
+    def ask(rays: Array, t: Array) -> tuple[Meeting, list[Array]]:
         inside = [(rays[b + i] <= t) & (t <= rays[e + i]) for i in range(n)]
         p = origin[:, None] + rays[WAY : WAY + 3] * t
-        return solids.meet(p, inside, register=register, change=register and solids.mixed), inside
+        return solids.meet(p, inside, wanted, change=solids.mixed), inside
 
     for _ in range(STEPS):
         if not len(ids):
             break
         t, past, before = rays[T], rays[PAST], rays[FREE]
-        met, inside = ask(rays, t, media)
+        met, inside = ask(rays, t)
         trail.met += met.met
         d = met.distance
         free = abs(d)
         within = None
         if media:
-            dense = (d < 0) & (met.register[3] > 0.5)
-            within = rays[WITHIN] > 0
-            if met.change is not None:
+            dense, within = d < 0, rays[WITHIN] > 0
+            if solids.mixed:
+                dense = dense & (met.register[0] > 0.5)
                 free = xp.select(dense, met.change, free)
         step = t - past
         done = d < TOUCH if within is None else (d < 0) & ~dense
@@ -105,8 +107,8 @@ def march(solids: SolidField, origin: Array, way: Array, limit: Array) -> Trail:
                     low, high = part[PAST], part[T]
                     for _ in range(HALVINGS):
                         half = (low + high) / 2
-                        found, _ = ask(part, half, True)
-                        still = (found.distance < 0) & (found.register[3] > 0.5)
+                        found, _ = ask(part, half)
+                        still = (found.distance < 0) & (found.register[0] > 0.5)
                         low, high = xp.select(still, half, low), xp.select(still, high, half)
                     xp.put(back, into, high)
                     ended = xp.take(ids, xp.take(leave, into))
@@ -120,8 +122,7 @@ def march(solids: SolidField, origin: Array, way: Array, limit: Array) -> Trail:
         for i in range(1, n):
             rate = xp.maximum(rate, inside[i] * rays[r + i])
         safe = free / rate.clip(1e-3)
-        slope = (before - free) / step.clip(1e-9)
-        hope = xp.select((slope > 1e-3) & (step > 0), 1.05 * free / slope.clip(1e-3) + TOUCH, never)
+        hope = (1.05 * free) * step / (before - free).clip(1e-12) + TOUCH
         following = t + xp.minimum(xp.maximum(hope, safe), safe + GAP)
         following_t = d * 0 + never
         for i in draws:
@@ -137,8 +138,9 @@ def march(solids: SolidField, origin: Array, way: Array, limit: Array) -> Trail:
             if len(ended):
                 _close(solids, trail, rays, ids, ended, xp.take(t, ended))
             rays[WITHIN] = within & ~lost
-        rays[PAST] = xp.select(following_t > following, following_t, t)
-        rays[FREE] = free
+        jumps = following_t > following
+        rays[PAST] = xp.select(jumps, following_t * NUDGE, t)
+        rays[FREE] = free * ~jumps
         rays[T] = following_t
         left = xp.where(~lost)
         if len(left) < 0.85 * len(ids) or not len(left):

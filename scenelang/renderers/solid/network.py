@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -49,12 +50,20 @@ class SolidConfig:
 
 
 class Cell(NamedTuple):
-    """Weights of the cell of one token."""
+    """Weights of the cell of one token, for blends of one width."""
 
     lines: Array  # (1 + L + K, 2): levels of the gates from (distance, distance so far)
     bias: Array  # (1 + L + K)
     candidate: Array  # (): what an open gate makes of the object's distance
     bump: Array  # (): by how much a half-open gate lowers the distance, times four
+
+
+class Wanted(IntEnum):
+    """What is asked of the cell."""
+
+    DISTANCE = 0
+    KIND = 1  # and whether it is a medium
+    ALL = 2  # and the colour
 
 
 class SolidNetwork:
@@ -82,15 +91,19 @@ class SolidNetwork:
             for w, b in zip(self.decoder_w, self.decoder_b, strict=True)
         ]
 
-    def cells(self) -> list[Cell]:
-        """The cell of each token."""
-        gain = self.xp.exp(self.cell_gain)
-        lines = (self.cell_lines * gain[:, None]).swapaxes(1, 2)
-        bump = self.bump / gain[:, 0]
-        return [
-            Cell(self.xp.packed(lines[i]), self.cell_bias[i], self.candidate[i], bump[i])
-            for i in range(TOKENS)
-        ]
+    def cell(self, token: int, width: float) -> tuple[Cell, ...]:
+        """The cell of a token for blends of a width, with the gates of each of `Wanted`.
+
+        The fold of s d and s D is s D', so that the cell's own width is that of any other.
+        """
+        xp, paint, scale = self.xp, self.config.paint_lines, BLEND / width
+        gain = xp.exp(self.cell_gain[token])
+        lines = (self.cell_lines[token] * (gain * scale)).swapaxes(0, 1)
+        bias, bump = self.cell_bias[token], self.bump[token] / (gain[0] * scale)
+        kept = [[0], [0, *range(1 + paint, len(bias))], [*range(len(bias))]]
+        return tuple(
+            Cell(xp.packed(lines[rows]), xp.packed(bias[rows]), self.candidate[token], bump) for rows in kept
+        )
 
     def look(self, material_code: Array) -> Array:
         """Colour and medium (…, 4) of material codes (…, material_code)."""
@@ -132,52 +145,42 @@ class SolidNetwork:
             g = w.T @ (slope * g)
         return xp.concat([value, g], 0)
 
-    def join(self, d: Array, state: Array, scale: float, cell: Cell, rows: int | None) -> Joined:
+    def join(self, d: Array, memory: Array, look: Array, cell: Cell, wanted: Wanted) -> tuple[Array, Array]:
         """One object: the cell.
 
         Args:
             d: the object's distance (M,).
-            state: the distance so far (M,).
-            scale: both are multiplied by it, and the answer divided: of a blend narrower or wider than the
-                cell's, the cell's width over its own.
+            memory: the distance so far and the register behind it (1, M), (2, M) with the medium alone, or
+                (5, M).
+            look: the object's own register (4, 1).
             cell: of the object's token.
-            rows: gates that are asked for: 1 for the distance alone, None for the register too.
+            wanted: what the memory holds.
+
+        Returns:
+            The memory behind the object, and how far the distance's gate is open (M,).
         """
-        xp = self.xp
-        levels = xp.dense(xp.stack([d, state], 0), cell.lines[:rows] * scale, cell.bias[:rows])
+        xp, state = self.xp, memory[0]
+        levels = xp.dense(xp.stack([d, state], 0), cell.lines, cell.bias)
         gates = levels.clip(0.0, 1.0)
         take = gates[0]
         keep = 1 - take
-        new = take * (d * cell.candidate - keep * (cell.bump / scale)) + keep * state
-        return Joined(new, gates, take, keep)
-
-    def partials(
-        self, d: Array, state: Array, joined: Joined, scale: float, cell: Cell
-    ) -> tuple[Array, Array]:
-        """How the distance behind an object changes with its own (M,) and with that before it (M,)."""
-        take, keep = joined.take, joined.keep
-        open_ = (take > 0) & (take < 1)
-        rate = self.xp.select(
-            open_, d * cell.candidate - state - (keep - take) * (cell.bump / scale), 0.0 * d
-        )
-        own, past = (cell.lines[0] * scale).tolist()
-        return take * cell.candidate + rate * own, keep + rate * past
-
-    def register(self, joined: Joined, before: Array, look: Array) -> Array:
-        """Colour and medium (4, M) behind an object of some look (4, 1)."""
-        xp, n = self.xp, 1 + self.config.paint_lines
-        paint, kind = xp.largest(joined.gates[1:n]), xp.largest(joined.gates[n:])
+        new = (take * (d * cell.candidate - keep * cell.bump) + keep * state)[None]
+        if wanted == Wanted.DISTANCE:
+            return new, take
+        if wanted == Wanted.KIND:
+            kind = xp.largest(gates[1:])
+            return xp.concat([new, memory[1:] + kind * (look[3:] - memory[1:])], 0), take
+        n = 1 + self.config.paint_lines
+        paint, kind = xp.largest(gates[1:n]), xp.largest(gates[n:])
         gate = xp.concat([paint, paint, paint, kind], 0)
-        return before + gate * (look - before)
+        return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
 
-
-class Joined(NamedTuple):
-    """What the cell answers."""
-
-    state: Array  # (M,)
-    gates: Array  # (rows, M)
-    take: Array  # (M,)
-    keep: Array  # (M,)
+    def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:
+        """How the distance behind an object changes with its own (M,) and with that before it (M,)."""
+        rate = d * cell.candidate - state - (1 - 2 * take) * cell.bump
+        rate = self.xp.select((take > 0) & (take < 1), rate, 0 * rate)
+        own, past = cell.lines[0].tolist()
+        return take * cell.candidate + rate * own, 1 - take + rate * past
 
 
 class SolidArrays(SolidNetwork):
