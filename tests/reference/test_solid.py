@@ -224,3 +224,29 @@ def test_finer_steps_change_nothing_to_be_seen(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(image, "HALVINGS", image.HALVINGS + 3)
     monkeypatch.setattr(rays, "STEP", rays.STEP / 2)
     assert psnr_db(usual, np.asarray(solid_image(root, stage, (32, 24)))) > 60
+
+
+def test_a_light_inside_a_solid_lights_nothing_outside() -> None:
+    root = fold(
+        leaf("sphere", "diffuse", GOLD, scaled(0.3), moved(0.5, 0.4, 0)),
+        leaf("torus", "volumetric", SKY, moved(-0.4, 0, 0)),
+    )
+    inside, dark = Stage(light=Light((0.5, 0.4, 0.1))), Stage(light=Light(power=0.0))
+    np.testing.assert_allclose(
+        solid_image(root, inside, (24, 24)), solid_image(root, dark, (24, 24)), atol=1e-7
+    )
+
+
+def test_the_ground_is_not_drawn_from_below_and_casts_no_shadow() -> None:
+    below = Camera(eye=(0.0, -3.0, 4.0))
+    root = fold(leaf("sphere", "diffuse", GOLD, scaled(0.6)))
+    with_ground, without = Stage(below, Light((0.0, -3.0, 3.0))), Stage(below, Light((0.0, -3.0, 3.0)), None)
+    np.testing.assert_array_equal(
+        solid_image(root, with_ground, (24, 24)), solid_image(root, without, (24, 24))
+    )
+
+
+def test_an_empty_scene_is_sky_and_ground() -> None:
+    image = np.asarray(solid_image(fold(), Stage(ground=None, transparent=True), (4, 4)))
+    assert not image.any()
+    assert np.asarray(solid_image(fold(), Stage(camera=Camera(eye=(0.0, 3.0, 0.0))), (4, 4))).min() > 0.3
