@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import islice
 from typing import Final
 
@@ -13,6 +12,7 @@ from lsprotocol import types
 
 from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.lsp.workspace import Document, Workspace, scenes_below
+from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.words import UNITS
 
@@ -21,8 +21,7 @@ _MOST_PATHS: Final = 200
 _MOST_FILES: Final = 2000
 
 
-@dataclass(frozen=True, slots=True)
-class Item:
+class Item(Record):
     """A proposal.
 
     Args:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from dataclasses import dataclass
 from typing import Final, Literal
 
+from scenelang.records import Record
 from scenelang.syntax.incremental import Parsed
 from scenelang.syntax.tables import tables
 from scenelang.words import COMBINE, NODES
@@ -19,8 +19,7 @@ _HOLDERS: Final = {*NODES, "module"}
 _COMMENTS: Final = re.compile(r"//[^\n]*+\n?|/\*(?:[\s\S]*?\*/|[\s\S]*)")
 
 
-@dataclass(frozen=True, slots=True)
-class Call:
+class Call(Record):
     """A call whose parentheses the cursor is in.
 
     Args:
@@ -38,8 +37,7 @@ class Call:
     given: frozenset[str]
 
 
-@dataclass(frozen=True, slots=True)
-class Block:
+class Block(Record):
     """A block around the cursor.
 
     Args:
@@ -53,8 +51,7 @@ class Block:
     nested: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Cursor:
+class Cursor(Record):
     """What is around an offset.
 
     Args:

@@ -13,7 +13,6 @@ import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, BinaryIO, Final
@@ -27,6 +26,7 @@ from pygls.protocol.language_server import lsp_method
 from scenelang.lsp.check import Checked, Superseded, Task, check
 from scenelang.lsp.convert import to_diagnostic
 from scenelang.lsp.workspace import Document, Workspace, path_of
+from scenelang.records import Record
 
 log = logging.getLogger("scenelang.lsp")
 _DEEP: Final = 10_000  # trees are up to 200 levels deep, walks take a few calls a level
@@ -39,8 +39,7 @@ _CHUNK: Final = 1 << 16
 _LONGEST: Final = 64  # bytes of a header that counts
 
 
-@dataclass(frozen=True, slots=True)
-class Settings:
+class Settings(Record):
     """What the client may set, as ``initializationOptions`` or ``workspace/didChangeConfiguration``.
 
     Args:
