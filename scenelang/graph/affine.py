@@ -31,6 +31,21 @@ def composed(steps: Iterable[Step]) -> Rows:
     return rows
 
 
+def inverted(rows: Rows) -> Rows:
+    """The inverse of a map; raises ZeroDivisionError where there is none."""
+    a, b, c, x, d, e, f, y, g, h, i, z = rows
+    p, q, r = e * i - f * h, f * g - d * i, d * h - e * g
+    det = a * p + b * q + c * r
+    p, q, r = p / det, q / det, r / det
+    s, t, u = (c * h - b * i) / det, (a * i - c * g) / det, (b * g - a * h) / det
+    v, w, o = (b * f - c * e) / det, (c * d - a * f) / det, (a * e - b * d) / det
+    return (
+        p, s, v, -(p * x + s * y + v * z),
+        q, t, w, -(q * x + t * y + w * z),
+        r, u, o, -(r * x + u * y + o * z),
+    )  # fmt: skip
+
+
 def translation(x: float, y: float, z: float = 0.0) -> Rows:
     """A shift by (x, y, z)."""
     return (1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z)

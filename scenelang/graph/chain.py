@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from scenelang.graph import affine
 from scenelang.graph.nodes import Move
 from scenelang.graph.space import Space
-from scenelang.graph.steps import IDENTITY, Affine, Rows, Warp
+from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Turn, Twist, Warp
 
 Moves = tuple[Move, ...]
 
@@ -28,21 +28,22 @@ def normal(moves: Iterable[Move], space: Space) -> Moves:
     """The chain with its deformations as near to the leaf, and as few steps, as the three rules allow.
 
     - A warp without a bend and the warp after it are one warp, because a warp keeps every point's length:
-      ``[Warp(t, 0), Warp(u, b)] = [Warp(t + u, b)]``.
-    - In the plane, a similarity about the origin trades places with the warp after it. Let
+      ``[Warp(t, 0), Warp(u, b)] = [Warp(t + u, b)]``. Two twists are one, because a twist keeps y.
+    - A map that only turns, mirrors and scales about a turn's axis trades places with it. In the plane, let
       M be s times an orthogonal matrix. A point q goes back through the warp (t, b) to R(t|q| + b.q) q;
       with q = M u, |q| = s|u| and b.q = (M^T b).u, while M^-1 R(a) M is R(a) for a rotation and R(-a)
-      for a reflection. So ``[M, Warp(t, b)] = [Warp(+-s t, +-M^T b), M]``.
+      for a reflection. So ``[M, Warp(t, b)] = [Warp(+-s t, +-M^T b), M]``. For space see
+      `scenelang.graph.solid`.
     - Steps that do nothing vanish, and neighbouring affine maps compose.
 
     Args:
         moves: nearest the leaf first.
-        space: the model's; the second rule is the plane's.
+        space: the model's.
     """
     out: list[Move] = []
     for move in moves:
-        if isinstance(move.step, Warp):
-            _append_warp(out, move.step, move, space)
+        if isinstance(move.step, Turn):
+            _append_turn(out, move.step, move, space)
         elif isinstance(move.step, Affine):
             _append_affine(out, move.step.rows, move)
         elif not move.step.idle:
@@ -58,17 +59,25 @@ def _append_affine(out: list[Move], rows: Rows, move: Move) -> None:
         out.append(Move(Affine(rows), move.span))
 
 
-def _append_warp(out: list[Move], warp: Warp, move: Move, space: Space) -> None:
+def _append_turn(out: list[Move], turn: Turn, move: Move, space: Space) -> None:
     held: Move | None = None
     if out and isinstance(last := out[-1].step, Affine):
-        before = space.before(last.rows, warp)
+        before = space.before(last.rows, turn)
         if before is not None:
-            warp = before
+            turn = before
             held = out.pop()
-    if out and isinstance(inner := out[-1].step, Warp) and inner.bend == (0.0, 0.0):
+    if out and (both := _joined(out[-1].step, turn)) is not None:
         move = out.pop()
-        warp = Warp(inner.twirl + warp.twirl, warp.bend)
-    if not warp.idle:
-        out.append(Move(warp, move.span))
+        turn = both
+    if not turn.idle:
+        out.append(Move(turn, move.span))
     if held is not None and isinstance(held.step, Affine):
         _append_affine(out, held.step.rows, held)
+
+
+def _joined(inner: Step, outer: Turn) -> Turn | None:
+    if isinstance(inner, Twist) and isinstance(outer, Twist):
+        return Twist(inner.twist + outer.twist)
+    if isinstance(inner, Warp) and isinstance(outer, Warp) and inner.bend == (0.0, 0.0):
+        return Warp(inner.twirl + outer.twirl, outer.bend)
+    return None

@@ -12,7 +12,7 @@ from scenelang.graph.space import Box
 Entry = tuple[Box, Leaf]
 Cell = tuple[int, int]
 
-_NOWHERE: Box = (inf, inf, -inf, -inf)
+_NOWHERE: Box = (inf, inf, -inf, -inf, inf, -inf)
 
 _TESTS = 4096
 """Boxes compared for one question before the answer is "perhaps", so that no scene takes for ever."""

@@ -13,6 +13,7 @@ from scenelang.graph.looks import WHITE, Look
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
 from scenelang.graph.space import Refusal, Space
 from scenelang.graph.spaces import PLANE, SPACES
+from scenelang.graph.stage import Stage, decoded
 from scenelang.graph.steps import Step
 from scenelang.graph.transforms import step_of
 from scenelang.models.manifest import Manifest
@@ -69,7 +70,16 @@ def lower(
     root = lowering.run(scene)
     if memory is not None and lowering.kept is not None:
         memory.leaves, memory.model = lowering.kept, manifest.name
-    return Graph(root, scene.canvas, scene.background, space)
+    stage = stage_of(scene) if space.dimension == 3 else None
+    return Graph(root, scene.canvas, scene.background, space, stage)
+
+
+def stage_of(scene: schema.Scene) -> Stage:
+    """The stage of a scene of solids."""
+    sky = scene.background
+    if sky is None:
+        return Stage(transparent=True)
+    return Stage() if sky == WHITE else Stage(horizon=decoded(sky), zenith=decoded(sky))
 
 
 def _check_canvas(
@@ -197,7 +207,7 @@ class _Lowering:
                 self.refuse("E0504", "material operation", op.kind, self.manifest.material_ops, op)
             elif isinstance(op, schema.Scale) and not PLANE.usable(affine.scaling(op.x, op.y)):
                 self.say("E0312", "`scale` of a texture is singular", op, "use factors other than 0")
-        look = self.looks[id(material)] = Look.of(material.name, material.ops)
+        look = self.looks[id(material)] = Look.of(material.name, map(self.space.inked, material.ops))
         return look
 
     def refuse(self, code: str, what: str, name: str, known: Sequence[str], node: object) -> None:

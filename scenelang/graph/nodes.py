@@ -8,18 +8,21 @@ new graph.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from operator import attrgetter
 from typing import Any, TypeVar, cast
 
 from scenelang.diagnostics.span import Span
 from scenelang.graph.looks import Look
-from scenelang.graph.space import Space
+from scenelang.graph.space import Box, Space
+from scenelang.graph.stage import Stage
 from scenelang.graph.steps import Step
 from scenelang.records import Record
 from scenelang.words import Combine
 
 BLEND = 0.15
 """The k of `smooth`: it blends where two distances differ by less, and lowers them by at most k/4."""
+BELOW = 1e-3  # world units below the ground that count as seen: more than a renderer's step behind a surface
 T = TypeVar("T")
 
 
@@ -106,23 +109,33 @@ class Graph(Record):
         canvas: width and height in pixels.
         background: colour in [0, 1] as written, or None for transparency.
         space: the model's.
+        stage: of a scene of solids, None in the plane.
     """
 
     root: Fold
     canvas: tuple[int, int]
     background: tuple[float, float, float] | None
     space: Space
+    stage: Stage | None = None
 
     def rooted(self, root: Fold) -> Graph:
         """The same scene with another root."""
-        return Graph(root, self.canvas, self.background, self.space)
+        return Graph(root, self.canvas, self.background, self.space, self.stage)
 
     def rows(self) -> list[tuple[Combine, Leaf]]:
         """Operators and leaves of a graph that is one stream."""
         return [(link.op, link.node) for link in self.root.links if isinstance(link.node, Leaf)]
 
-    def window(self) -> tuple[float, float, float, float]:
-        """The part of the 2D world that the canvas shows: (xmin, ymin, xmax, ymax)."""
+    def window(self) -> Box:
+        """The part of the world that decides the picture.
+
+        In the plane it is what the canvas shows. In space nothing below the ground is seen from above it,
+        nor stands before a light above it; all else may at least throw a shadow on what is seen.
+        """
+        if (stage := self.stage) is not None:
+            floor = -inf if stage.ground is None else stage.ground.y
+            seen = stage.camera.eye[1] > floor and stage.light.position[1] > floor
+            return (-inf, floor - BELOW if seen else -inf, inf, inf, -inf, inf)
         width, height = self.canvas
         side = min(width, height)
-        return -width / side, -height / side, width / side, height / side
+        return -width / side, -height / side, width / side, height / side, 0.0, 0.0

@@ -14,7 +14,7 @@ from math import asin, atan2, cos, hypot, pi, sqrt, tau
 
 from scenelang.graph import affine
 from scenelang.graph.space import EVERYWHERE, Box, Refusal, Space
-from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Warp
+from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Turn, Warp
 from scenelang.models.manifest import Outline
 from scenelang.scene import schema
 
@@ -60,15 +60,15 @@ class Plane(Space):
     def stretches(self, rows: Rows) -> tuple[float, float]:
         return stretches(rows[0], rows[1], rows[4], rows[5])
 
-    def before(self, rows: Rows, warp: Warp) -> Warp | None:
+    def before(self, rows: Rows, turn: Turn) -> Turn | None:
         """Similarities about the origin trade places with warps: `scenelang.graph.chain.normal` proves it."""
         alike = _similarity(rows)
-        if alike is None:
+        if alike is None or not isinstance(turn, Warp):
             return None
         scale, sign = alike
-        x, y = warp.bend
+        x, y = turn.bend
         bend = (sign * (rows[0] * x + rows[4] * y), sign * (rows[1] * x + rows[5] * y))
-        return Warp(sign * scale * warp.twirl, bend)
+        return Warp(sign * scale * turn.twirl, bend)
 
     def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
         rows, reach = affine.composed(steps), 0.0
@@ -129,15 +129,15 @@ def _inverted(rows: Rows) -> Rows:
     return (p, q, 0.0, -(p * x + q * y), r, s, 0.0, -(r * x + s * y), 0.0, 0.0, 1.0, 0.0)
 
 
-def _grown(box: Box) -> Box:
+def _grown(box: tuple[float, float, float, float]) -> Box:
     left, bottom, right, top = box
     more = _ROUNDING * (1.0 + max(abs(left), abs(bottom), abs(right), abs(top)))
-    grown = (left - more, bottom - more, right + more, top + more)
+    grown = (left - more, bottom - more, right + more, top + more, 0.0, 0.0)
     # NaN compares false: what overflowed may be anywhere.
     return grown if grown[0] < grown[2] and grown[1] < grown[3] else EVERYWHERE
 
 
-def _straight(outline: Outline | None, rows: Rows, reach: float) -> Box:
+def _straight(outline: Outline | None, rows: Rows, reach: float) -> tuple[float, float, float, float]:
     a, b, x = rows[0], rows[1], rows[3]
     c, d, y = rows[4], rows[5], rows[7]
     wide, high = reach * hypot(a, b), reach * hypot(c, d)
@@ -202,7 +202,7 @@ class _Sector:
         return _Sector(away - radius, away + radius, middle - half, middle + half)
 
 
-def _warped(steps: Sequence[Step], radius: float) -> Box:
+def _warped(steps: Sequence[Step], radius: float) -> tuple[float, float, float, float]:
     sector = _Sector(0.0, radius, -pi, pi)
     pending = IDENTITY
     for step in steps:
@@ -210,7 +210,7 @@ def _warped(steps: Sequence[Step], radius: float) -> Box:
             pending = affine.compose(step.rows, pending)
             continue
         if not isinstance(step, Warp):
-            return EVERYWHERE
+            return EVERYWHERE[:4]
         if pending is not IDENTITY:
             sector, pending = sector.mapped(pending), IDENTITY
         sector = sector.turned(step)

@@ -12,14 +12,15 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import ClassVar, Final, NamedTuple
 
-from scenelang.graph.steps import Rows, Step, Warp
+from scenelang.graph.affine import inverted
+from scenelang.graph.steps import Rows, Step, Turn
 from scenelang.models.manifest import Outline
 from scenelang.scene import schema
 
-Box = tuple[float, float, float, float]
-"""xmin, ymin, xmax, ymax in the world."""
+Box = tuple[float, float, float, float, float, float]
+"""xmin, ymin, xmax, ymax, zmin, zmax in the world; what lies in the plane has z = 0."""
 
-EVERYWHERE: Final[Box] = (-inf, -inf, inf, inf)
+EVERYWHERE: Final[Box] = (-inf, -inf, inf, inf, -inf, inf)
 
 SINGULAR: Final = 1e-12
 """Smallest to largest stretch at which a map counts as singular.
@@ -64,6 +65,10 @@ class Space(ABC):
         """The part of a transform that was asked for and has no effect here, if there is one."""
         return None
 
+    def inked(self, op: schema.MaterialOp) -> schema.MaterialOp:
+        """An operation of a material in the space that colours are averaged in."""
+        return op
+
     @abstractmethod
     def holds(self, rows: Rows) -> bool:
         """Whether a map is one that `fitted` gives."""
@@ -73,8 +78,12 @@ class Space(ABC):
         """The smallest and largest singular value of the linear block."""
 
     @abstractmethod
-    def before(self, rows: Rows, warp: Warp) -> Warp | None:
-        """The warp that does before the map ``rows`` what ``warp`` does after it; None where none does."""
+    def before(self, rows: Rows, turn: Turn) -> Turn | None:
+        """The turn that does before the map ``rows`` what ``turn`` does after it; None where none does."""
+
+    def after(self, rows: Rows, turn: Turn) -> Turn | None:
+        """The turn that does after the map ``rows`` what ``turn`` does before it; None where none does."""
+        return self.before(inverted(rows), turn)
 
     @abstractmethod
     def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
@@ -86,9 +95,13 @@ class Space(ABC):
             level: world distance, at least 0; 0 for the leaf itself.
         """
 
+    def bound(self, geometry: str, steps: Sequence[Step], level: float) -> tuple[float, float, float, float]:
+        """The same as Programs keep it: the flat box, in space a ball, as centre and radius."""
+        return self.box(geometry, steps, level)[:4]
+
     @abstractmethod
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
-        """A disc that a leaf certainly fills, where one is known.
+        """A disc, or ball, that a leaf certainly fills, where one is known.
 
         Returns:
             Its radius in the leaf's own space, about the origin, and the map from the world to there.

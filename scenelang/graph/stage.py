@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import atan, degrees, hypot, pi
+from typing import Any
 
 from scenelang.records import Record
 
@@ -17,6 +18,7 @@ AMBIENT = (0.12, 0.06)
 EXTINCTION = 3.0  # of media, per world unit
 FADE = 64.0  # the ground fades into the horizon by exp(-(x² + z²) / FADE)
 NEAREST = 1e-3  # the light counts as at least this far away
+MOST = 1e30  # numbers of a stage are below this
 LIFT = 1e-4  # how far off its surface a ray to the light starts
 
 
@@ -89,6 +91,51 @@ class Stage(Record):
     horizon: Triple = HORIZON
     zenith: Triple = ZENITH
     transparent: bool = False
+
+
+def stage_data(stage: Stage) -> dict[str, Any]:
+    """A stage as JSON data; camera, light and ground are objects of their fields."""
+    data: dict[str, Any] = {name: getattr(stage, name) for name in Stage.__match_args__}
+    for name in ("camera", "light", "ground"):
+        part = data[name]
+        data[name] = None if part is None else {n: getattr(part, n) for n in part.__match_args__}
+    return data
+
+
+def read_stage(data: object) -> Stage:
+    """The stage that JSON data holds; the inverse of `stage_data`.
+
+    Raises:
+        ValueError: it holds none, or one out of float32.
+    """
+    if not isinstance(data, dict) or data.keys() != set(Stage.__match_args__):
+        raise ValueError("fields missing or unknown")
+    parts: dict[str, Any] = {name: _read(name, data[name]) for name in data}
+    if parts["camera"] is None or parts["light"] is None or type(parts["transparent"]) is not bool:
+        raise ValueError("a part missing")
+    return Stage(**parts)
+
+
+_PARTS: dict[str, type[Record]] = {"camera": Camera, "light": Light, "ground": Ground}
+
+
+def _read(name: str, value: object) -> Any:
+    """A field of a stage or of one of its parts."""
+    if name in _PARTS:
+        if value is None:
+            return None
+        if not isinstance(value, dict) or value.keys() != set(_PARTS[name].__match_args__):
+            raise ValueError(f"`{name}` has fields missing or unknown")
+        return _PARTS[name](**{n: _read(n, v) for n, v in value.items()})
+    if name == "transparent":
+        return value
+    three = name not in ("fov_rad", "power", "y")
+    numbers = value if three else [value]
+    if not isinstance(numbers, list) or len(numbers) != (3 if three else 1):
+        raise ValueError(f"`{name}` does not hold what it should")
+    if not all(type(v) in (int, float) and abs(v) < MOST for v in numbers):
+        raise ValueError(f"`{name}` is not a number of float32")
+    return tuple(map(float, numbers)) if three else float(numbers[0])
 
 
 def _cross(a: Triple, b: Triple) -> Triple:

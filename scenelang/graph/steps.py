@@ -63,4 +63,5 @@ class Displace(Record):
         return self.amount == 0.0 or self.frequency == 0.0
 
 
-Step = Affine | Warp | Twist | Displace
+Turn = Warp | Twist
+Step = Affine | Turn | Displace

@@ -4,12 +4,12 @@ The *picture* of a stream is where its distance D is negative and its colour the
 here, both from boxes alone.
 
 **Following.** S followed by X = x0 op1 x1 …, with x0 joined by union, has the picture of S union X if X holds
-no `intersect`, no subtracted leaf of X reaches S, and, when X holds n > 0 `smooth`, no point is both closer
-than m = max(n, 1) k to S and closer than m to a leaf that X joins. Take a point at m or more from all such
+no `intersect`, no subtracted leaf of X reaches S, and, when X holds `smooth` whose k add up to m, no point is
+both closer than m to S and closer than m to a leaf that X joins. Take a point at m or more from all such
 leaves: each `smooth` of X then finds D at most m - k (h = 0, nothing changes) or leaves D at m - k or
 more, which is not negative. Take a point with D_S at least m: D of the stream equals that of X alone until
 both are at m or more, and each `smooth` from then on makes them equal (h = 1 in both) or leaves both above a
-threshold that sinks by k; after n it is still not negative. Without `smooth` only signs matter.
+threshold that sinks by k; after all of them it is still not negative. Without `smooth` only signs matter.
 
 **Swapping.** X then S instead of S then X: where neither holds `smooth` and they do not overlap, no point
 lies in both, so the order of drawing does not matter; it is then a following with the parts exchanged.
@@ -30,7 +30,8 @@ from scenelang.graph.space import Space
 from scenelang.records import Record
 from scenelang.words import Combine
 
-Row = tuple[Combine, Leaf]
+Row = tuple[Combine, Leaf, float]
+"""An operator, its leaf, and the width of its blend."""
 
 _MOST_CUTS = 64
 """A stream that subtracts more often than this is not moved behind another one."""
@@ -41,32 +42,29 @@ class Stream(Record, frozen=False):
 
     Args:
         space: the model's.
+        smooths: the sum of the k of all `smooth` rows, as a multiple of `BLEND`.
+        slack: how far D may be below the smallest distance of a joined leaf. Each `smooth` lowers D by at
+            most k/4, and none lowers a D that is k below the leaf it joins.
     """
 
     space: Space
     rows: deque[Row] = field(default_factory=deque)
     cuts: list[Leaf] = field(default_factory=list)
-    smooths: int = 0
+    smooths: float = 0.0
+    slack: float = 0.0
     clipped: bool = False
     _grids: dict[float, Grid] = field(default_factory=dict)
 
-    @property
-    def slack(self) -> float:
-        """How far D may be below the smallest distance of a joined leaf.
-
-        Each `smooth` lowers D by at most k/4, and none lowers a D that is k below the leaf it joins.
-        """
-        return BLEND if self.smooths else 0.0
-
-    def push(self, op: Combine, leaf: Leaf) -> None:
+    def push(self, op: Combine, leaf: Leaf, k: float) -> None:
         """Append one row."""
         if not self.rows:
             op = "union"
-        self.rows.append((op, leaf))
+        self.rows.append((op, leaf, k))
         if op == "subtract":
             self.cuts.append(leaf)
         elif op == "smooth":
-            self.smooths += 1
+            self.smooths += k / BLEND
+            self.slack = max(self.slack, k)
         elif op == "intersect":
             self.clipped = True
         for level, grid in self._grids.items():
@@ -77,7 +75,7 @@ class Stream(Record, frozen=False):
         grid = self._grids.get(level)
         if grid is None:
             grid = self._grids[level] = Grid()
-            for op, leaf in self.rows:
+            for op, leaf, _ in self.rows:
                 self._index(grid, level, op, leaf)
         return grid
 
@@ -115,7 +113,7 @@ class Stream(Record, frozen=False):
     def _followed(self, other: Stream) -> tuple[Leaf, Leaf] | None:
         """None where ``other`` provably may follow, else who is in the way."""
         if other.clipped:
-            return self.rows[0][1], next(leaf for op, leaf in other.rows if op == "intersect")
+            return self.rows[0][1], next(leaf for op, leaf, _ in other.rows if op == "intersect")
         near = self.grid(self.slack)
         for leaf in other.cuts:
             hit = near.touched(leaf_box(leaf, 0.0, self.space))
@@ -162,4 +160,5 @@ class Stream(Record, frozen=False):
     def _count(self, other: Stream) -> None:
         self.cuts.extend(other.cuts)
         self.smooths += other.smooths
+        self.slack = max(self.slack, other.slack)
         self.clipped = self.clipped or other.clipped

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from scenelang.graph import affine
 from scenelang.graph.space import REACH, SINGULAR, Refusal, Space
-from scenelang.graph.steps import Affine, Rows, Step, Warp
+from scenelang.graph.steps import Affine, Displace, Rows, Step, Twist, Warp
 from scenelang.scene import schema
 
 
@@ -20,11 +20,12 @@ def step_of(transform: schema.Transform, space: Space) -> Step | Refusal:
     if isinstance(transform, schema.Bend):
         return Warp(0.0, (transform.k, 0.0))
     if isinstance(transform, (schema.Twist, schema.Displace)):
-        return Refusal(
-            "E0503",
-            f"no renderer of this version draws `{transform.kind}`",
-            "bend the shape with `twirl` or `bend` instead",
-        )
+        if space.dimension == 2:
+            fact = f"`{transform.kind}` leaves the plane"
+            return Refusal("E0505", fact, "bend the shape with `twirl` or `bend` instead")
+        if isinstance(transform, schema.Twist):
+            return Twist(transform.k)
+        return Displace(transform.amount, transform.frequency)
     fitted = space.fitted(transform, _rows(transform))
     if isinstance(fitted, Refusal):
         return fitted

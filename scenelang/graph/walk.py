@@ -59,7 +59,7 @@ def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph
         return change(node) if node.notes is None else node.noted(name, change)
 
     def fold(node: Fold, children: list[Node]) -> Fold:
-        links = [Link(link.op, child) for link, child in zip(node.links, children, strict=True)]
+        links = [Link(link.op, child, link.k) for link, child in zip(node.links, children, strict=True)]
         return Fold(node.kind, tuple(links), node.moves, node.span)
 
     return graph.rooted(fold(graph.root, [bottom_up(link.node, leaf, fold) for link in graph.root.links]))

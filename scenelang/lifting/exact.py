@@ -15,8 +15,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenelang.graph.levels import Levels
-from scenelang.graph.steps import Rows, Warp
+from scenelang.graph.levels import Levels, slots
+from scenelang.graph.steps import Rows, Turn
 from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH, Layout
 
 
@@ -59,12 +59,12 @@ def affine_matrix(rows: Rows, slot: slice | None = None, layout: Layout = PLANE_
     return matrix
 
 
-def warp_matrix(warp: Warp, group: slice, layout: Layout = PLANE_LAYOUT) -> np.ndarray:
-    """The matrix of a warp that enters a group of warps of the layout from outside."""
+def warp_matrix(turn: Turn, group: slice, layout: Layout = PLANE_LAYOUT) -> np.ndarray:
+    """The matrix of a turn that enters a slot of its own in a group of the layout from outside."""
     n = layout.strengths
     matrix = np.eye(layout.geometry)
     matrix[group, group] = np.eye(group.stop - group.start, k=-n)
-    matrix[group.start : group.start + n, layout.one] = (warp.twirl, *warp.bend)
+    matrix[group.start : group.start + n, layout.one] = slots([turn], layout.dimension)[0]
     return matrix
 
 
@@ -87,13 +87,15 @@ def lift_many(
         numbers += _slots(level.outer, layout.outer, layout)
         numbers += inverse_frame(level.middle, d)
         numbers += _slots(level.inner, layout.inner, layout)
+        if layout.extras:
+            numbers += [level.bulge.amount, level.bulge.frequency, 0.0]
         row[:] = numbers
     return out
 
 
-def _slots(warps: tuple[Warp, ...], count: int, layout: Layout) -> list[float]:
-    numbers = [x for w in reversed(warps) for x in (w.twirl, *w.bend)]
-    return numbers + [0.0] * (layout.strengths * (count - len(warps)))
+def _slots(turns: tuple[Turn, ...], count: int, layout: Layout) -> list[float]:
+    numbers = [x for slot in reversed(slots(turns, layout.dimension)) for x in slot]
+    return numbers + [0.0] * (layout.strengths * count - len(numbers))
 
 
 def lift_colours(

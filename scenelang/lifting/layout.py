@@ -6,13 +6,14 @@ A geometry vector g holds the way from the world back to the leaf:
 
 and a material vector m what it looks like:
 
-    texture frame | colour matrix, 3 x 4, row by row | the material's code
+    texture frame | width of a blend, in the plane | colour matrix, 3 x 4, row by row | the material's code
 
 A frame is the rows of the inverse of an affine map, d of d + 1 numbers. A warp is its strengths; the
 outermost of a group comes first. The extras of solids are the amount and frequency of their displacement and
-the width k of the blend that takes them in. Every slot is a function of the scene alone, and each
-transformation acts on them linearly (`scenelang.lifting.exact`). Both vectors together are 64 numbers; how
-they are shared out is the layout's, which a model's manifest names.
+the width of a blend. That is k where a `smooth` of another k than usual takes the object in, else 0. Every
+slot is a function of the scene alone, and each transformation acts on them linearly
+(`scenelang.lifting.exact`). Both vectors together are 64 numbers; how they are shared out is the layout's,
+which a model's manifest names.
 """
 
 from __future__ import annotations
@@ -88,6 +89,11 @@ class Layout:
     def geometry(self) -> int:
         """Length of g, which m follows."""
         return int(self.inner_warps.stop) + self.extras
+
+    @property
+    def blend(self) -> int:
+        """Place of a blend's width, in both vectors together."""
+        return self.geometry - 1 if self.extras else self.geometry + self.texture - 2
 
     @property
     def colour(self) -> slice:

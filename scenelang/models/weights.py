@@ -143,7 +143,7 @@ def codes_of(manifest: Manifest, data: bytes) -> Codes:
     from scenelang.lifting.layout import LAYOUTS, WIDTH
 
     tensors = open_weights(data).arrays
-    prefix = "" if manifest.renderer == "framed" else LIFTING
+    prefix = "" if manifest.renderer in ("framed", "solid") else LIFTING
     learned = manifest.lifting == "learned"
     layout = LAYOUTS.get(manifest.layout)
     if layout is None:

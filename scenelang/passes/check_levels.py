@@ -11,7 +11,7 @@ from scenelang.graph import affine
 from scenelang.graph.levels import LevelsError, split_levels
 from scenelang.graph.nodes import Graph, Leaf
 from scenelang.graph.space import REACH, Space
-from scenelang.graph.steps import Affine, Warp
+from scenelang.graph.steps import Affine, Step, Twist, Warp
 from scenelang.graph.walk import leaves
 from scenelang.passes.context import Context
 
@@ -29,9 +29,9 @@ def check_levels(graph: Graph, context: Context) -> Graph:
 
 def _check(leaf: Leaf, space: Space, context: Context) -> None:
     manifest = context.manifest
-    if manifest.lifting == "exact" and any(isinstance(move.step, Warp) for move in leaf.moves):
+    if manifest.lifting == "exact" and any(not isinstance(move.step, Affine) for move in leaf.moves):
         try:  # other liftings take any chain
-            split_levels(leaf.steps, manifest.limits)
+            split_levels(leaf.steps, manifest.limits, space)
         except LevelsError as error:
             inner, outer = manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)
             fact = f"the deformations of `{leaf.geometry}` do not fit model `{manifest.name}`: {error}"
@@ -50,15 +50,19 @@ def _check(leaf: Leaf, space: Space, context: Context) -> None:
         smallest, largest = space.stretches(bad)
         fact = f"the transforms of `{leaf.geometry}` compose to a singular one, which stretches by "
         fact, help = f"{fact}{smallest:.3g} to {largest:.3g}", "scale less along one direction, or less often"
-    elif not all(_mild(move.step) for move in leaf.moves if isinstance(move.step, Warp)):
+    elif not all(_mild(move.step) for move in leaf.moves):
         fact, help = f"the deformations of `{leaf.geometry}` compose to one beyond float32", "deform less"
     else:
         return
     context.diagnostics.add("E0406", fact, leaf.span, labels=_places(leaf), help=help)
 
 
-def _mild(warp: Warp) -> bool:
-    return abs(warp.twirl) < REACH and hypot(*warp.bend) < REACH
+def _mild(step: Step) -> bool:
+    if isinstance(step, Warp):
+        return abs(step.twirl) < REACH and hypot(*step.bend) < REACH
+    if isinstance(step, Twist):
+        return abs(step.twist) < REACH
+    return isinstance(step, Affine) or max(abs(step.amount), abs(step.frequency)) < REACH
 
 
 def _places(leaf: Leaf) -> list[Label]:

@@ -55,7 +55,7 @@ def _linked(fold: Fold, children: list[Node | None], context: Context) -> list[L
                 )
                 links.clear()
         elif links:
-            links.append(Link(link.op, child))
+            links.append(Link(link.op, child, link.k))
         elif index == 0 or link.op in ("union", "smooth"):
             links.append(Link("union", child))
     return links

@@ -19,7 +19,7 @@ _INSIDE = 1.0 - 1e-9
 """Share of a cover's inner disc that counts, to cover the rounding of float64."""
 
 Cover = tuple[float, Rows, float]
-"""World radius, map from the world to the leaf, radius of the disc inside it."""
+"""World radius, map from the world to the leaf, radius of the disc or ball inside it."""
 
 
 def drop_hidden(graph: Graph, context: Context) -> Graph:
@@ -61,16 +61,16 @@ def _cover(leaf: Leaf, space: Space) -> Cover | None:
 
 
 def _covered(box: Box, covers: list[Cover]) -> bool:
-    left, bottom, right, top = box
-    corners = ((left, bottom), (left, top), (right, bottom), (right, top))
+    left, bottom, right, top, near, far = box
+    depths = (near,) if near == far else (near, far)
+    corners = [(x, y, z) for x in (left, right) for y in (bottom, top) for z in depths]
     for _, rows, radius in covers:
-        a, b, x = rows[0], rows[1], rows[3]
-        c, d, y = rows[4], rows[5], rows[7]
+        a, b, c, x, d, e, f, y, g, h, i, z = rows
         limit = radius * radius
-        # A disc is convex: a box is inside when its corners are.
-        for p, q in corners:
-            u, v = a * p + b * q + x, c * p + d * q + y
-            if not u * u + v * v < limit:
+        # A ball is convex: a box is inside when its corners are.
+        for p, q, r in corners:
+            u, v, w = a * p + b * q + c * r + x, d * p + e * q + f * r + y, g * p + h * q + i * r + z
+            if not u * u + v * v + w * w < limit:
                 break
         else:
             return True

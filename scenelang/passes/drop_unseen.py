@@ -1,28 +1,28 @@
-"""Rows of the stream that no pixel of the canvas can feel vanish."""
+"""Rows of the stream that nothing in the picture can feel vanish."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from scenelang.graph.bounds import felt_level, leaf_box, overlap
-from scenelang.graph.nodes import Fold, Graph, Link
+from scenelang.graph.nodes import BLEND, Fold, Graph, Link
 from scenelang.passes.context import Context
 
 
 def drop_unseen(graph: Graph, context: Context) -> Graph:
-    """Drop rows that provably stay off the canvas, and whatever they leave without an effect.
+    """Drop rows that provably stay out of what decides the picture, and whatever they leave without effect.
 
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
     """
     window = graph.window()
     links = graph.root.links
     keep = [False] * len(links)
-    smooths = 0
+    smooths = 0.0
     for index, (op, leaf) in reversed(list(enumerate(graph.rows()))):
-        level = felt_level(op, smooths)
+        level = felt_level(op, links[index].k, smooths)
         if level is None or overlap(leaf_box(leaf, level, graph.space), window):
             keep[index] = True
-            smooths += op == "smooth"
+            smooths += links[index].k / BLEND if op == "smooth" else 0.0
         elif op == "intersect":
             break  # what comes before is cut down to nothing on the canvas
     return graph.rooted(begun(links, keep))

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import field
 
 from scenelang.diagnostics.diagnostic import Label
-from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node
+from scenelang.graph.nodes import BLEND, Fold, Graph, Leaf, Link, Node
 from scenelang.graph.space import Space
 from scenelang.graph.stream import Stream
 from scenelang.passes.context import Context
@@ -65,7 +65,7 @@ def linearise(graph: Graph, context: Context) -> Graph:
             continue
         stack.pop()
         if not stack:
-            links = tuple(Link(op, leaf) for op, leaf in here.stream.rows)
+            links = tuple(Link(op, leaf, k) for op, leaf, k in here.stream.rows)
             return graph.rooted(Fold("scene", links))
         if not here.refused:
             _attach(stack[-1], here, context)
@@ -84,7 +84,7 @@ def _advance(here: _Frame, context: Context) -> _Frame | None:
     op, node = link.op, link.node
     here.smooths -= op == "smooth"
     if isinstance(node, Leaf):
-        here.stream.push(op, node)
+        here.stream.push(op, node, link.k)
         return None
     if not here.stream.rows:
         here.put(node.links, node.links[0].node)
@@ -117,7 +117,7 @@ def _attach(above: _Frame, done: _Frame, context: Context) -> None:
     """Join a finished composite to the frame above by union, or say why it cannot be."""
     rows = done.stream.rows
     if len(rows) == 1:
-        above.stream.push("union", rows[0][1])
+        above.stream.push("union", rows[0][1], BLEND)
         return
     if not context.whole:
         above.stream.append(done.stream)

@@ -40,14 +40,15 @@ def push_transforms(graph: Graph, context: Context) -> Graph:
                     leaf = node.changed(node.look, _tidy(node, here.outward))
                 else:
                     leaf = node.noted("push_transforms", _alone)
-                here.links.append(Link(link.op, leaf))
+                here.links.append(Link(link.op, leaf, link.k))
             continue
         stack.pop()
         fold = Fold(here.fold.kind, tuple(here.links), (), here.fold.span)
         if not stack:
             return graph.rooted(fold)
         above = stack[-1]
-        above.links.append(Link(above.fold.links[len(above.links)].op, fold))
+        link = above.fold.links[len(above.links)]
+        above.links.append(Link(link.op, fold, link.k))
 
 
 def _alone(leaf: Leaf) -> Leaf:

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from math import hypot
+
 import numpy as np
 import numpy.typing as npt
 
 from scenelang.diagnostics.span import Span
 from scenelang.graph.bounds import felt_level, leaf_box
 from scenelang.graph.levels import split_levels
-from scenelang.graph.nodes import Graph, Leaf
-from scenelang.graph.space import Box
+from scenelang.graph.nodes import BLEND, Graph, Leaf
+from scenelang.graph.space import Space
+from scenelang.graph.spaces import SPACES
 from scenelang.lifting.exact import lift_colours, lift_many
 from scenelang.lifting.layout import LAYOUTS, WIDTH
 from scenelang.lifting.learned import lift_geometry, lift_material
 from scenelang.models.manifest import Manifest
 from scenelang.models.weights import Codes
 from scenelang.program.program import Place, Program, ProgramError
-from scenelang.words import TOKENS, Combine
+from scenelang.words import TOKENS
 
-Rows = list[tuple[Combine, Leaf]]
+Bound = tuple[float, float, float, float]
 
 
 def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
@@ -37,11 +40,12 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     rows = graph.rows()
     leaves = [leaf for _, leaf in rows]
     return Program(
-        vectors=_vectors(leaves, manifest, codes),
+        vectors=_blended(_vectors(leaves, manifest, codes), graph, manifest),
         tokens=np.array([TOKENS[op] for op, _ in rows], dtype=np.int8),
-        bounds=_bounds(rows, graph),
+        bounds=_bounds(graph),
         canvas=graph.canvas,
         background=graph.background,
+        stage=graph.stage,
         model=manifest.name,
         weights=codes.digest,
         objects=tuple([leaf.geometry for leaf in leaves]),
@@ -64,6 +68,14 @@ def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArra
     return np.stack([known[id(leaf)] for leaf in leaves])
 
 
+def _blended(vectors: npt.NDArray[np.float32], graph: Graph, manifest: Manifest) -> npt.NDArray[np.float32]:
+    """The same with the widths of blends that are not the usual one; these are of rows, not of leaves."""
+    for at, link in enumerate(graph.root.links):
+        if link.op == "smooth" and link.k != BLEND:
+            vectors[at, LAYOUTS[manifest.layout].blend] = link.k
+    return vectors
+
+
 def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
     if not leaves:
         return np.zeros((0, WIDTH), np.float32)
@@ -74,7 +86,8 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
         geometry = lift_geometry(codes.lifting, chains, geometries)
         material = lift_material(codes.lifting, colours, materials)
     else:
-        layout, levels = LAYOUTS[manifest.layout], [split_levels(chain, manifest.limits) for chain in chains]
+        layout, space = LAYOUTS[manifest.layout], SPACES[manifest.dimension]
+        levels = [split_levels(chain, manifest.limits, space) for chain in chains]
         geometry = lift_many(levels, [codes.geometry[leaf.geometry] for leaf in leaves], layout)
         material = lift_colours(colours, [codes.material[leaf.look.material] for leaf in leaves], layout)
     vectors = np.concatenate([geometry, material], 1)
@@ -84,22 +97,37 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
     return vectors.astype(np.float32) + np.float32(0.0)
 
 
-def _bounds(rows: Rows, graph: Graph) -> npt.NDArray[np.float32]:
-    window = graph.window()
-    boxes: list[Box] = []
-    smooths = 0
-    for op, leaf in reversed(rows):
-        level = felt_level(op, smooths)
-        everywhere = level is None or op == "intersect"
-        boxes.append(window if everywhere else leaf_box(leaf, level or 0.0, graph.space))
-        smooths += op == "smooth"
-    exact = np.array(boxes[::-1], dtype=np.float64).reshape(len(rows), 4)
+def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
+    """Boxes (N, 4) of the plane, or balls of space; outside a row makes no difference."""
+    found: list[Bound | None] = []
+    smooths = 0.0
+    for link in reversed(graph.root.links):
+        assert isinstance(link.node, Leaf)
+        level = felt_level(link.op, link.k, smooths)
+        everywhere = level is None or link.op == "intersect"
+        found.append(None if everywhere else _bound(link.node, level or 0.0, graph.space))
+        smooths += link.k / BLEND if link.op == "smooth" else 0.0
+    whole = graph.window()[:4]
+    if graph.stage is not None:
+        reach = max((hypot(*b[:3]) + b[3] for b in found if b is not None), default=0.0)
+        whole = 0.0, 0.0, 0.0, reach * (1.0 + 2.0**-20)
+    exact = np.array([b or whole for b in found[::-1]], dtype=np.float64).reshape(len(found), 4)
     most = np.finfo(np.float32).max
     rounded = np.clip(exact, -most, most).astype(np.float32)
+    if graph.stage is not None:
+        # A centre that is rounded moves by less than 2^-24 of itself.
+        rounded[:, 3] = np.clip(exact[:, 3] + 2.0**-22 * (1.0 + abs(exact).sum(1)), 0.0, most)
+        return rounded
     # Rounding to float32 may not shrink a box.
     low = np.where(rounded[:, :2] > exact[:, :2], np.nextafter(rounded[:, :2], -most), rounded[:, :2])
     high = np.where(rounded[:, 2:] < exact[:, 2:], np.nextafter(rounded[:, 2:], most), rounded[:, 2:])
     return np.concatenate([low, high], axis=1).astype(np.float32)
+
+
+def _bound(leaf: Leaf, level: float, space: Space) -> Bound:
+    if space.dimension == 2:
+        return leaf_box(leaf, level, space)[:4]
+    return leaf.noted(("bound", level), lambda leaf: space.bound(leaf.geometry, leaf.steps, level))
 
 
 def _places(spans: list[Span | None]) -> tuple[Place | None, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.files import write_output
+from scenelang.graph.stage import Stage, stage_data
 from scenelang.notebook import bundle
 from scenelang.tensors import FORMAT
 from scenelang.words import TOKENS
@@ -43,13 +44,15 @@ class Program:
         vectors: float32 (N, 64), geometry vector (32) then material vector (32) of each object.
         tokens: int8 (N,), how each joins what came before, as in `scenelang.words.TOKENS`; the first is 0.
         bounds: float32 (N, 4), world xmin, ymin, xmax, ymax: outside it the row makes no difference to
-            the picture. An intersection, which reaches everything, has the whole canvas.
+            the picture. An intersection, which reaches everything, has the whole canvas. Of solids it is a
+            ball, x, y, z and radius, and of intersections the one around all others.
         canvas: width and height in pixels.
         background: (r, g, b) as written, in [0, 1], or None for transparency.
         model: name of the model that draws it.
         weights: SHA-256 of that model's weights, hex.
         objects: geometry name of each row.
         places: where each row was written; None where that is unknown.
+        stage: camera, light, ground and sky of a scene of solids; None in the plane.
 
     Raises:
         ProgramError: anything is not as above.
@@ -64,6 +67,7 @@ class Program:
     weights: str
     objects: tuple[str, ...]
     places: tuple[Place | None, ...] = field(repr=False)
+    stage: Stage | None = None
 
     def __post_init__(self) -> None:
         count = len(self.objects)
@@ -93,7 +97,9 @@ class Program:
     def digest(self) -> str:
         """SHA-256, hex, of all that decides the picture: not of names or places in source text."""
         colour = self.background and tuple(float(v) for v in self.background)
-        settings = (tuple(self.canvas), colour, self.model, self.weights, len(self))
+        settings: tuple[object, ...] = (tuple(self.canvas), colour, self.model, self.weights, len(self))
+        if self.stage is not None:
+            settings = (*settings, repr(self.stage))
         total = hashlib.sha256(repr(settings).encode())
         for array, kind in ((self.vectors, "<f4"), (self.tokens, "i1"), (self.bounds, "<f4")):
             total.update(array.astype(kind).tobytes())
@@ -125,7 +131,7 @@ def program_bytes(program: Program) -> bytes:
     of_geometry = {name: index for index, name in enumerate(geometries)}
     of_file = {name: index for index, name in enumerate(files)}
     places = [(-1,) * 5 if place is None else (of_file[place.file], *place[1:]) for place in program.places]
-    header = {
+    header: dict[str, Any] = {
         "background": program.background,
         "canvas": program.canvas,
         "files": files,
@@ -134,6 +140,8 @@ def program_bytes(program: Program) -> bytes:
         "model": program.model,
         "weights": program.weights,
     }
+    if program.stage is not None:
+        header["stage"] = stage_data(program.stage)
     tensors: dict[str, npt.NDArray[Any]] = {
         "vectors": program.vectors,
         "tokens": program.tokens,
@@ -167,7 +175,10 @@ def _check_rows(program: Program) -> None:
         raise ProgramError(f"token {int(program.tokens[row])} of object {row}, where 0 to 3 are known")
     if len(program) and program.tokens[0] != 0:
         raise ProgramError(f"token {int(program.tokens[0])} of the first object, which is always 0")
-    if (program.bounds[:, :2] > program.bounds[:, 2:]).any():
+    if program.stage is not None:
+        if (program.bounds[:, 3:] < 0.0).any():
+            raise ProgramError("bounds with a negative radius")
+    elif (program.bounds[:, :2] > program.bounds[:, 2:]).any():
         raise ProgramError("bounds with a minimum above their maximum")
 
 
@@ -178,6 +189,8 @@ def _check_settings(program: Program) -> None:
     shares = colour is None or all(type(v) in (int, float) and 0 <= v <= 1 for v in colour)
     if not shares or (colour is not None and len(colour) != 3):
         raise ProgramError(f"a background of {colour!r}, which is not a colour")
+    if (stage := program.stage) is not None and (fault := stage.camera.fault() or stage.light.fault()):
+        raise ProgramError(fault)
     if not program.model:
         raise ProgramError("no model is named")
     if len(program.weights) != 64 or not set(program.weights) <= set("0123456789abcdef"):

@@ -2,7 +2,8 @@
 
 Tensors: ``vectors`` F32 (N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the
 header's ``geometries``, ``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line,
-end column), all -1 where unknown. The header is the metadata entry ``scenelang``.
+end column), all -1 where unknown. The header is the metadata entry ``scenelang``, where solids have a
+``stage``.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from scenelang.files import read_regular
+from scenelang.graph.stage import read_stage
 from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
 from scenelang.tensors import MOST_HEADER, TensorError, TensorFile, read_tensors
 
@@ -63,7 +65,9 @@ def parse_program(data: bytes) -> Program:
     except TensorError as error:
         raise ProgramError(f"not a program: {error}") from None
     header = file.header
-    if header.keys() != _HEADER.keys() or not all(isinstance(header[k], _HEADER[k]) for k in _HEADER):
+    if header.keys() - {"stage"} != _HEADER.keys() or not all(
+        isinstance(header[k], _HEADER[k]) for k in _HEADER
+    ):
         raise ProgramError("the header has missing, unknown or damaged fields")
     geometries, files = header["geometries"], header["files"]
     if not all(isinstance(name, str) for name in (*geometries, *files)):
@@ -74,7 +78,11 @@ def parse_program(data: bytes) -> Program:
         raise ProgramError("`objects` name what the header does not list")
     if (places[known, 0] >= len(files)).any() or (places[known, 1:] < 1).any():
         raise ProgramError("places that no file has")
-    background = header["background"]
+    background, stage = header["background"], header.get("stage")
+    try:
+        staged = None if stage is None else read_stage(stage)
+    except ValueError as error:
+        raise ProgramError(f"a damaged stage: {error}") from None
     return Program(
         vectors=tensors["vectors"],
         tokens=tensors["tokens"],
@@ -85,6 +93,7 @@ def parse_program(data: bytes) -> Program:
         weights=header["weights"],
         objects=tuple(geometries[index] for index in objects.tolist()),
         places=tuple(Place(files[at], *rest) if at >= 0 else None for at, *rest in places.tolist()),
+        stage=staged,
     )
 
 

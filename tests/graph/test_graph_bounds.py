@@ -70,7 +70,7 @@ def test_boxes_contain_the_leaf(name: str, level: float) -> None:
         box = leaf_box(Leaf(name, Look("flat"), moves), level, PLANE)
         points = forward(hull_points(name, reach * (1 - 1e-9), draw), [move.step for move in moves])
         assert (points >= np.array(box[:2])).all()
-        assert (points <= np.array(box[2:])).all()
+        assert (points <= np.array(box[2:4])).all()
         extent = np.ptp(points, axis=0)
         shares.append(np.prod(extent) / ((box[2] - box[0]) * (box[3] - box[1])))
     assert np.median(shares) > 0.4, "boxes are far too wide"
@@ -91,19 +91,19 @@ def test_boxes_contain_leaves_that_are_bent_away_from_the_origin() -> None:
         box = leaf_box(Leaf("square", Look("flat"), moves), 0.0, PLANE)
         points = forward(hull_points("square", 0.0, draw), [move.step for move in moves])
         assert (points >= np.array(box[:2])).all()
-        assert (points <= np.array(box[2:])).all()
+        assert (points <= np.array(box[2:4])).all()
 
 
 def test_boxes_of_straight_leaves_are_tight() -> None:
     leaf = Leaf("square", Look("flat"), (Move(Affine((0.5, 0, 0, 0.2, 0, 0.25, 0, 0, 0, 0, 1, 0))),))
     half = 2**-0.5
     expected = (0.2 - half / 2, -half / 4, 0.2 + half / 2, half / 4)
-    assert leaf_box(leaf, 0.0, PLANE) == pytest.approx(expected, abs=1e-8)
+    assert leaf_box(leaf, 0.0, PLANE)[:4] == pytest.approx(expected, abs=1e-8)
     # without an outline it is only known to lie in the unit disc
-    assert leaf_box(leaf, 0.0, Plane()) == pytest.approx((-0.3, -0.25, 0.7, 0.25), abs=1e-8)
+    assert leaf_box(leaf, 0.0, Plane())[:4] == pytest.approx((-0.3, -0.25, 0.7, 0.25), abs=1e-8)
     # the distance scale is 0.25, so a level of 0.1 reaches 0.4 in the leaf, 0.2 and 0.1 in the world
     wider = (expected[0] - 0.2, expected[1] - 0.1, expected[2] + 0.2, expected[3] + 0.1)
-    assert leaf_box(leaf, 0.1, PLANE) == pytest.approx(wider, abs=1e-8)
+    assert leaf_box(leaf, 0.1, PLANE)[:4] == pytest.approx(wider, abs=1e-8)
 
 
 def test_boxes_that_cannot_be_known() -> None:
@@ -116,18 +116,21 @@ def test_boxes_that_cannot_be_known() -> None:
     )
     assert leaf_box(huge, 1.0, PLANE) == EVERYWHERE
     assert leaf_box(flat, 1.0, PLANE) == EVERYWHERE
-    assert leaf_box(flat, 0.0, SPACES[3]) == EVERYWHERE
+    assert leaf_box(flat, 1.0, SPACES[3]) == EVERYWHERE
+    assert leaf_box(huge, 0.0, SPACES[3]) == EVERYWHERE
     assert not any(np.isnan(leaf_box(far, 0.1, PLANE)))
 
 
-def test_the_grid_finds_what_a_loop_finds() -> None:
+@pytest.mark.parametrize("deep", [0, 1])
+def test_the_grid_finds_what_a_loop_finds(deep: int) -> None:
     rng = random.Random(8)
     leaf = Leaf("square", Look("flat"))
 
     def box():
         x, y = rng.uniform(-3, 3), rng.uniform(-3, 3)
         w, h = 10 ** rng.uniform(-3, 0), 10 ** rng.uniform(-3, 0)
-        return x, y, x + w, y + h
+        z = rng.uniform(-1, 1) * deep
+        return x, y, x + w, y + h, z, z + w * deep
 
     grid, boxes = Grid(), []
     found = 0
@@ -140,7 +143,7 @@ def test_the_grid_finds_what_a_loop_finds() -> None:
             grid.add(new, leaf)
             boxes.append(new)
     assert 50 < found < 550
-    grid.clip((0.0, 0.0, 1.0, 1.0), leaf)
+    grid.clip((0.0, 0.0, 1.0, 1.0, -1.0, 2.0), leaf)
     assert len(grid.entries) == 1
-    assert grid.touched((2.0, 2.0, 3.0, 3.0)) is None
+    assert grid.touched((2.0, 2.0, 3.0, 3.0, -1.0, 2.0)) is None
     assert grid.touched(EVERYWHERE) is leaf

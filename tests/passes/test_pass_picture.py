@@ -31,7 +31,7 @@ def compiled(scene):
 
 
 def window_points(graph, seed: int, count: int = 400) -> np.ndarray:
-    left, bottom, right, top = graph.window()
+    left, bottom, right, top = graph.window()[:4]
     return np.random.default_rng(seed).uniform((left, bottom), (right, top), (count, 2))
 
 

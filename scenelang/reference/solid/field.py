@@ -50,7 +50,7 @@ NOTHING = State(np.float64(FAR), np.False_, np.float64(FAR), np.zeros((3, 1)), n
 
 def join(op: str, k: float, a: State, b: State) -> State:
     """One step of the fold; of two operands of equal distance the gradient is the later's."""
-    near = None if a.near is None else np.minimum(a.near, b.near)
+    near = None if a.near is None or b.near is None else np.minimum(a.near, b.near)
     paint: Any = None
     side = 1.0
     if op == "union":
@@ -63,11 +63,12 @@ def join(op: str, k: float, a: State, b: State) -> State:
         d, turn, side = np.maximum(a.d, -b.d), -b.d >= a.d, -1.0
     else:
         d, turn = np.maximum(a.d, b.d), b.d >= a.d
-    slope = None if a.slope is None else a.slope + (side * b.slope - a.slope) * turn
+    slope = None if a.slope is None or b.slope is None else a.slope + (side * b.slope - a.slope) * turn
     if paint is None:
         return State(d, a.medium, near, a.rgb, slope)
     medium = np.where(paint > 0.5, b.medium, a.medium)
-    return State(d, medium, near, None if a.rgb is None else a.rgb + (b.rgb - a.rgb) * paint, slope)
+    rgb = None if a.rgb is None or b.rgb is None else a.rgb + (b.rgb - a.rgb) * paint
+    return State(d, medium, near, rgb, slope)
 
 
 class Field:
