@@ -36,13 +36,16 @@ if TYPE_CHECKING:
     from scenelang.scene.schema import Animation as Animation
     from scenelang.scene.schema import Bend as Bend
     from scenelang.scene.schema import Boolean as Boolean
+    from scenelang.scene.schema import Camera as Camera
     from scenelang.scene.schema import Chain as Chain
     from scenelang.scene.schema import Color as Color
     from scenelang.scene.schema import Displace as Displace
     from scenelang.scene.schema import Flip as Flip
     from scenelang.scene.schema import Grayscale as Grayscale
+    from scenelang.scene.schema import Ground as Ground
     from scenelang.scene.schema import Group as Group
     from scenelang.scene.schema import Hue as Hue
+    from scenelang.scene.schema import Light as Light
     from scenelang.scene.schema import Link as Link
     from scenelang.scene.schema import Material as Material
     from scenelang.scene.schema import Matrix as Matrix
@@ -72,8 +75,8 @@ _HOME: Final = {
     "scenelang.program.program": "Place Program ProgramError",
     "scenelang.program.store": "load_program",
     "scenelang.scene.schema": (
-        "Animation Bend Boolean Chain Color Displace Flip Grayscale Group Hue Link Material Matrix Object "
-        "Rotate Scale Scene Shear Translate Twirl Twist"
+        "Animation Bend Boolean Camera Chain Color Displace Flip Grayscale Ground Group Hue Light Link "
+        "Material Matrix Object Rotate Scale Scene Shear Translate Twirl Twist"
     ),
 }
 _MODULE: Final = {name: module for module, names in _HOME.items() for name in names.split()}

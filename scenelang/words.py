@@ -15,6 +15,8 @@ Combine = Literal["union", "smooth", "subtract", "intersect"]
 COMBINE: Final[tuple[Combine, ...]] = get_args(Combine)
 TOKENS: Final[dict[str, int]] = {word: number for number, word in enumerate(COMBINE)}
 """How an object joins what came before, and the number that a Program stores for it."""
+BLEND: Final = 0.15
+"""The k of `smooth` unless said: it blends where distances differ by less, and lowers them by up to k/4."""
 
 
 class Word(Record):
@@ -62,6 +64,7 @@ def _call(
     names = [param.rstrip("?…") for param in given]
     required = sum(not param.endswith("?") for param in given)
     shown = ", ".join(names[:required]) + "".join(f"[, {param}]" for param in names[required:])
+    shown = shown if required or not names else f"[{', '.join(names)}]"
     variadic = params.endswith("…")
     if not snippet:
         holes = ", ".join(f"${{{at}:{param}}}" for at, param in enumerate(names, 1))
@@ -119,7 +122,9 @@ NODES: Final = _table(
         "chain {\n\t$0\n}",
     ),
     _word("union", "Joins: a later object is drawn over an earlier one."),
-    _word("smooth", "Joins with a blend of width 0.15, of shape and colour."),
+    _call(
+        "smooth", "k?", "Joins with a blend, of shape and colour.", ("its width, 0.15 by default",), "smooth"
+    ),
     _word("subtract", "Cuts the object out of what came before."),
     _word("intersect", "Keeps of what came before only what lies in the object."),
 )
@@ -130,15 +135,12 @@ MATERIAL: Final = _table(
         "material ${1:flat} { color(${2:#d33}); }",
     )
 )
-TRUTH: Final = _table(
-    _word("true", "The boolean."),
-    _word("false", "The boolean."),
-)
+TRUTH: Final = _table(_word("true", "The boolean."), _word("false", "The boolean."))
 KEYWORDS: Final = DECLARING | CONTROL | NODES | MATERIAL | TRUTH
 RESERVED: Final = tuple(word for word in KEYWORDS if word not in ("step", "as"))
 """The keywords that name nothing else; `step` and `as` are keywords only where they can follow something."""
 
-SETTINGS: Final = _table(
+PLAIN_SETTINGS: Final = _table(
     _call(
         "canvas",
         "w h",
@@ -149,8 +151,8 @@ SETTINGS: Final = _table(
     _call(
         "background",
         "c",
-        "2D: the colour where nothing is drawn, white without it; `none` leaves it transparent. In 3D it "
-        "belongs to the model.",
+        "The colour where nothing is drawn, without it white in 2D and the sky in 3D; `none` leaves it "
+        "transparent.",
         ("a colour, or `none`",),
         "background(${1:#fff});",
     ),
@@ -163,6 +165,31 @@ SETTINGS: Final = _table(
         head="animate(seconds, fps, loop = true)",
     ),
 )
+STAGE: Final = _table(
+    _call(
+        "camera",
+        "eye? target? fov?",
+        "3D: where the picture is taken from, without it from [0, 1.2, 6] to the origin.",
+        ("a point", "the point it looks at", "angle of view across the shorter side, 36.87° by default"),
+        "camera(eye = [${1:0}, ${2:1.2}, ${3:6}]);",
+    ),
+    _call(
+        "light",
+        "position? power? color?",
+        "3D: the point light, without it a white one of power 28 at [2.5, 4, 3].",
+        ("a point", "what a white surface at distance 1 receives, from 0", "its colour"),
+        "light(position = [${1:2.5}, ${2:4}, ${3:3}]);",
+    ),
+    _call(
+        "ground",
+        "y? color?",
+        "3D: the plane below, without it at y = −1; `ground(none)` leaves it out.",
+        ("its height, or `none`", "its colour"),
+        "ground(${1:-1});",
+    ),
+)
+"""Settings of 3D scenes; a scene's own module of such a name hides them."""
+SETTINGS: Final = PLAIN_SETTINGS | STAGE
 _BOTH: Final = _table(
     _call(
         "translate",
@@ -174,7 +201,7 @@ _BOTH: Final = _table(
     _call(
         "rotate",
         "angle axis?",
-        "Turns counter-clockwise about an axis through the origin.",
+        "Turns counter-clockwise about an axis through the origin, by the right hand in 3D.",
         (_ANGLE, "`X`, `Y`, `Z` or a vector; `Z` by default, the only one in 2D"),
         "rotate(${1:30}deg);",
         head="rotate(angle[, axis = Z])",
@@ -219,11 +246,11 @@ TRANSFORMS: Final = _BOTH | _table(
         _RATE,
         "bend(${1:0.5});",
     ),
-    _call("twist", "k", "3D: turns (x, z) by k·y.", _RATE, "twist(${1:1});"),
+    _call("twist", "k", "3D: turns (x, z) by k·y, on the way back.", _RATE, "twist(${1:1});"),
     _call(
         "displace",
         "amount frequency",
-        "3D: adds amount · sin(f x) sin(f y) sin(f z) to the distance.",
+        "3D: adds amount · sin(f x) sin(f y) sin(f z) to the leaf's distance; first in its block, and once.",
         ("how far", "f, radians per unit length"),
         "displace(${1:0.1}, ${2:8});",
     ),
@@ -312,7 +339,7 @@ MATERIALS: Final[dict[str, str]] = {
     "volumetric": "A medium that absorbs and scatters.",
 }
 
-LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *SETTINGS))
+LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *PLAIN_SETTINGS))
 """Words that head a statement; no module, material or geometry can have such a name."""
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from scenelang.models.manifest import Manifest
 
 SOLIDS = Manifest(
@@ -19,4 +21,7 @@ SOLIDS = Manifest(
     trained={},
     measured={},
     layout="solid",
+    any_blend=True,
 )
+STUDIO = replace(SOLIDS, name="solids3d-studio", set="solids3d", fixed_stage=True, any_blend=False)
+"""One whose camera, light, ground and sky are its own."""

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from scenelang.diagnostics.span import Span
 from scenelang.scene.schema import Link, Material
-from scenelang.words import Combine
+from scenelang.words import BLEND, Combine
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -68,11 +68,12 @@ class Builder:
 class ChainBuilder(Builder):
     """The block of a chain: each child is joined by the word before it."""
 
-    __slots__ = ("op",)
+    __slots__ = ("k", "op")
 
     def __init__(self) -> None:
         super().__init__()
         self.op: Combine = "union"
+        self.k = BLEND
 
     def add(self, node: Any) -> None:
-        self.children.append(make(Link, {"op": self.op, "node": node}))
+        self.children.append(make(Link, {"op": self.op, "node": node, "k": self.k}))

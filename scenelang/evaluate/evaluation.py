@@ -31,6 +31,7 @@ from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap, Written
 from scenelang.syntax import nodes, parse
+from scenelang.words import STAGE
 
 
 def evaluate(
@@ -144,6 +145,7 @@ class Evaluation:
             "model": chosen.name if chosen else None,
             "canvas": settings.canvas,
             "background": settings.background,
+            **{word: settings.stage.get(word, "default") for word in STAGE},
             "animation": settings.animation,
             "nodes": tuple(out.children),
         }

@@ -15,6 +15,7 @@ from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.records import Record
 from scenelang.scene.schema import Animation
 from scenelang.scene.spans import SpanMap
+from scenelang.scene.stage import Unsaid
 
 Watch = Callable[[Span, Any], None]
 """What an editor looks on with; it may raise `Halt` to end the evaluation."""
@@ -26,12 +27,14 @@ class Settings(Record, frozen=False):
     Args:
         canvas: width and height in pixels.
         background: colour as written, or None for transparency.
+        stage: camera, light and ground, where they are stated.
         animation: the scene's animation, if it has one.
         given: the place of each setting, by its word.
     """
 
     canvas: tuple[int, int] = (256, 256)
-    background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
+    background: tuple[float, float, float] | Unsaid | None = "default"
+    stage: dict[str, Any] = field(default_factory=dict)
     animation: Animation | None = None
     given: dict[str, Span] = field(default_factory=dict)
 

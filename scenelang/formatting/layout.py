@@ -256,11 +256,12 @@ class Layout(ExpressionLayout):
         depth = max(then.depth, otherwise.depth)
         return ends_of(Statement(flat, broken, depth, simple=False), begun, last)
 
-    def node(self, kind: Part, body: Block) -> Part:
-        return self._blocked([kind], body)
+    def node(self, kind: Part, *rest: Any) -> Part:
+        return self._blocked([kind, *rest[:-1]], rest[-1])
 
-    def combined(self, op: Part, child: Statement) -> Part:
-        parts = [op, " ", child]
+    def combined(self, op: Part, *rest: Any) -> Part:
+        child: Statement = rest[-1]
+        parts = [op, *rest[:-1], " ", child]
         stmt = Statement(joined(parts), lambda: sequence(parts), child.depth, child.simple)
         return ends_of(stmt, op, child)
 

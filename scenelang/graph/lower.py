@@ -13,12 +13,12 @@ from scenelang.graph.looks import WHITE, Look
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
 from scenelang.graph.space import Refusal, Space
 from scenelang.graph.spaces import PLANE, SPACES
-from scenelang.graph.stage import Stage, decoded
+from scenelang.graph.stage import stage_of
 from scenelang.graph.steps import Step
 from scenelang.graph.transforms import step_of
 from scenelang.models.manifest import Manifest
 from scenelang.scene import schema
-from scenelang.words import Combine
+from scenelang.words import BLEND, STAGE, Combine
 
 MAX_OBJECTS = 100_000
 MAX_DEPTH = 1_000
@@ -64,6 +64,11 @@ def lower(
         memory: of the frame before; holds this one afterwards.
     """
     _check_canvas(scene, manifest, spans.span(scene) if spans else None, diagnostics)
+    for word in (*STAGE, "background"):
+        stated = getattr(scene, word)
+        if stated != "default" and (refusal := manifest.refusal(word)):
+            place = None if spans is None else spans.span(stated) or spans.span(scene)
+            diagnostics.add(*refusal, place, help="leave it out, or draw with another model")
     space = replace(SPACES[manifest.dimension], outlines=manifest.outlines)
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
     lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {})
@@ -71,15 +76,8 @@ def lower(
     if memory is not None and lowering.kept is not None:
         memory.leaves, memory.model = lowering.kept, manifest.name
     stage = stage_of(scene) if space.dimension == 3 else None
-    return Graph(root, scene.canvas, scene.background, space, stage)
-
-
-def stage_of(scene: schema.Scene) -> Stage:
-    """The stage of a scene of solids."""
-    sky = scene.background
-    if sky is None:
-        return Stage(transparent=True)
-    return Stage() if sky == WHITE else Stage(horizon=decoded(sky), zenith=decoded(sky))
+    background = WHITE if scene.background == "default" else scene.background
+    return Graph(root, scene.canvas, background, space, stage)
 
 
 def _check_canvas(
@@ -95,7 +93,7 @@ def _check_canvas(
         fact = f"a canvas of {width} x {height} pixels; {model} draws only {sizes}"
         help = "give that size with `canvas(w, h)` or `--size`, or draw with another model"
         diagnostics.add("E0509", fact, place, help=help)
-    if manifest.white and scene.background != WHITE:
+    if manifest.white and scene.background not in (WHITE, "default"):
         help = "leave `background` out, or draw with another model"
         diagnostics.add("E0510", f"{model} draws only over white", place, help=help)
 
@@ -108,17 +106,21 @@ class _Open:
     """A composite whose children are being lowered, and the operator that joins it to what came before."""
 
     op: Combine
+    k: float
     node: Composite
     material: schema.Material | None
-    todo: Iterator[tuple[Combine, schema.SceneNode]]
+    todo: Iterator[tuple[Combine, float, schema.SceneNode]]
     links: list[Link] = field(default_factory=list)
 
 
-def _children(node: Composite) -> Iterator[tuple[Combine, schema.SceneNode]]:
+def _children(node: Composite) -> Iterator[tuple[Combine, float, schema.SceneNode]]:
     if isinstance(node, schema.Chain):
-        return ((link.op, link.node) for link in node.children)
-    op: Combine = node.op if isinstance(node, schema.Boolean) else "union"
-    return ((op, child) for child in (node.nodes if isinstance(node, schema.Scene) else node.children))
+        return ((link.op, link.k, link.node) for link in node.children)
+    op: Combine = "union"
+    k = BLEND
+    if isinstance(node, schema.Boolean):
+        op, k = node.op, node.k
+    return ((op, k, child) for child in (node.nodes if isinstance(node, schema.Scene) else node.children))
 
 
 @dataclass(slots=True)
@@ -135,7 +137,7 @@ class _Lowering:
     steps: dict[int, Step | Refusal] = field(default_factory=dict)
 
     def run(self, scene: schema.Scene) -> Fold:
-        stack = [_Open("union", scene, None, _children(scene))]
+        stack = [_Open("union", BLEND, scene, None, _children(scene))]
         while True:
             here = stack[-1]
             item = next(here.todo, None)
@@ -145,14 +147,18 @@ class _Lowering:
                     return Fold("scene", tuple(here.links))
                 kind = here.node.op if isinstance(here.node, schema.Boolean) else here.node.kind
                 fold = Fold(kind, tuple(here.links), self.moves(here.node), self.place(here.node))
-                stack[-1].links.append(Link(here.op, fold))
+                stack[-1].links.append(Link(here.op, fold, here.k))
                 continue
-            op, node = item
+            op, k, node = item
             if not here.links:
-                op = "union"
+                op, k = "union", BLEND
+            elif k != BLEND and not self.manifest.any_blend:
+                fact = f"model `{self.manifest.name}` blends over {BLEND} and no other width"
+                joined = here.node if isinstance(here.node, schema.Boolean) else node
+                self.say("E0512", fact, joined, "leave k out, or draw with another model")
             material = node.material or here.material
             if isinstance(node, schema.Object):
-                here.links.append(Link(op, self.leaf(node, material)))
+                here.links.append(Link(op, self.leaf(node, material), k))
                 self.objects += 1
                 if self.objects > MAX_OBJECTS:
                     self.say("E0320", f"more than {MAX_OBJECTS:,} objects in one scene", node)
@@ -162,7 +168,7 @@ class _Lowering:
                 self.say("E0405", fact, node, "a group of a single child can be dropped")
                 return Fold("scene", ())
             else:
-                stack.append(_Open(op, node, material, _children(node)))
+                stack.append(_Open(op, k, node, material, _children(node)))
 
     def leaf(self, node: schema.Object, material: schema.Material | None) -> Leaf:
         seen = self.old.get(id(node))
@@ -180,7 +186,10 @@ class _Lowering:
 
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
         found = []
-        for transform in node.transforms:
+        for at, transform in enumerate(node.transforms):
+            if isinstance(transform, schema.Displace) and (at or not isinstance(node, schema.Object)):
+                fact = "`displace` does not stand first in the block of an object"
+                self.say("E0407", fact, transform, "it changes the leaf's own distance, before any transform")
             if transform.kind not in self.manifest.transforms:
                 self.refuse("E0503", "transform", transform.kind, self.manifest.transforms, transform)
                 continue

@@ -18,10 +18,9 @@ from scenelang.graph.space import Box, Space
 from scenelang.graph.stage import Stage
 from scenelang.graph.steps import Step
 from scenelang.records import Record
+from scenelang.words import BLEND as BLEND
 from scenelang.words import Combine
 
-BLEND = 0.15
-"""The k of `smooth`: it blends where two distances differ by less, and lowers them by at most k/4."""
 BELOW = 1e-3  # world units below the ground that count as seen: more than a renderer's step behind a surface
 T = TypeVar("T")
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from math import atan, degrees, hypot, pi
-from typing import Any
+from math import atan, hypot
+from typing import TYPE_CHECKING, Any
 
 from scenelang.records import Record
+from scenelang.scene.faults import camera_fault, light_fault
+
+if TYPE_CHECKING:
+    from scenelang.scene.schema import Scene
 
 Triple = tuple[float, float, float]
 
@@ -42,11 +46,8 @@ class Camera(Record):
 
     def fault(self) -> str | None:
         """Why there is no picture from here, if there is none."""
-        if self.eye == self.target:
-            return "the eye is the target"
-        if not 0.0 < self.fov_rad < pi:
-            return f"a field of view of {degrees(self.fov_rad):g}° is not between 0° and 180°"
-        return None
+        fault = camera_fault(self.eye, self.target, self.fov_rad)
+        return None if fault is None else fault[1]
 
     def axes(self) -> tuple[Triple, Triple, Triple]:
         """Unit vectors forward, right and up; seen straight along y, up is -z."""
@@ -65,7 +66,7 @@ class Light(Record):
 
     def fault(self) -> str | None:
         """Why there is no such light, if there is none."""
-        return f"a power of {self.power:g} is negative" if self.power < 0.0 else None
+        return light_fault(self.power)
 
 
 class Ground(Record):
@@ -136,6 +137,21 @@ def _read(name: str, value: object) -> Any:
     if not all(type(v) in (int, float) and abs(v) < MOST for v in numbers):
         raise ValueError(f"`{name}` is not a number of float32")
     return tuple(map(float, numbers)) if three else float(numbers[0])
+
+
+def stage_of(scene: Scene) -> Stage:
+    """The stage that a scene states, over the defaults; written colours are decoded."""
+    camera, light, ground, sky = Camera(), Light(), scene.ground, scene.background
+    if scene.camera != "default":
+        camera = Camera(scene.camera.eye, scene.camera.target, scene.camera.fov)
+    if scene.light != "default":
+        light = Light(scene.light.position, scene.light.power, decoded(scene.light.color))
+    plane = None if ground is None else Ground()
+    if ground is not None and ground != "default":
+        plane = Ground(ground.y, Ground().rgb if ground.color == "default" else decoded(ground.color))
+    if sky is None or sky == "default":
+        return Stage(camera, light, plane, transparent=sky is None)
+    return Stage(camera, light, plane, decoded(sky), decoded(sky))
 
 
 def _cross(a: Triple, b: Triple) -> Triple:

@@ -46,7 +46,7 @@ class NsgLexer(RegexLexer):  # type: ignore[misc]  # Pygments has no types
             (words(nsg.TRUTH, r"\b", r"\b"), Keyword.Constant),
             (words(nsg.CONSTANTS, r"\b", r"\b"), Name.Constant),
             (words(nsg.ANIMATED, r"\b", r"\b(?!\s*[({])"), Name.Variable.Magic),
-            (words(nsg.LANGUAGE, r"\b", r"\b(?=\s*\()"), Name.Builtin),
+            (words((*nsg.LANGUAGE, *nsg.STAGE), r"\b", r"\b(?=\s*\()"), Name.Builtin),
             (words(nsg.FUNCTIONS, r"\b", r"\b(?=\s*\()"), Name.Builtin.Pseudo),
             (rf"{_NAME}(?=\s*\{{)", Name.Class),
             (rf"{_NAME}(?=\s*\()", Name.Function),

@@ -106,9 +106,11 @@ def manifest_schema() -> dict[str, Any]:
                     {"corners": {"type": "array", "items": pair, "minItems": 3}, "inner": {"type": "number"}}
                 ),
             },
+            "fixed_stage": {"description": "whether camera and light are its own", "type": "boolean"},
+            "any_blend": {"description": "whether it blends over any width", "type": "boolean"},
             "white": {"description": "whether it draws over white alone", "type": "boolean"},
         },
-        optional=("layout", "set", "sizes", "white", "outlines"),
+        optional=("layout", "set", "sizes", "white", "outlines", "fixed_stage", "any_blend"),
         title="Manifest",
         description="What a model states about itself.",
     )

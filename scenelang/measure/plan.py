@@ -108,7 +108,7 @@ def missing(scene: Scene, manifest: Manifest) -> list[str]:
     names = sorted(lacking(manifest, uses(scene)))
     if manifest.sizes and scene.canvas not in manifest.sizes:
         names.append("a canvas of {} × {}".format(*scene.canvas))
-    if manifest.white and scene.background != WHITE:
+    if manifest.white and scene.background not in (WHITE, "default"):
         names.append("a background that is not white")
     return names
 

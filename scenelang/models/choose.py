@@ -5,23 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from scenelang.models.manifest import Manifest
-from scenelang.scene.schema import Chain, Object, Scene, SceneNode
+from scenelang.scene.schema import Boolean, Chain, Object, Scene, SceneNode
+from scenelang.words import BLEND, STAGE
 
 WHITE = (1.0, 1.0, 1.0)
 
 
-def choose_model(scene: Scene, models: Iterable[Manifest]) -> Manifest | None:
+def choose_model(scene: Scene, models: Iterable[Manifest], *, names_only: bool = False) -> Manifest | None:
     """The smallest of ``models`` that has every name the scene uses and draws its canvas.
 
     Args:
         scene: a scene; if it names a model, only that one fits.
         models: manifests to choose from.
+        names_only: do not ask whether they take its settings.
 
     Returns:
         The fitting manifest with the fewest geometries, then the fewest other words, then the least measured
         error, then the first by name; None if none fits.
     """
-    used = list(uses(scene))
+    used = [use for use in uses(scene) if not names_only or use[1] != "settings"]
     fitting = [
         m for m in models if scene.model in (None, m.name) and not lacking(m, used) and paints(m, scene)
     ]
@@ -47,7 +49,7 @@ def best_of_sets(models: Iterable[Manifest]) -> list[Manifest]:
 def paints(model: Manifest, scene: Scene) -> bool:
     """Whether a model draws a scene's canvas and background."""
     return not (model.sizes and scene.canvas not in model.sizes) and not (
-        model.white and scene.background != WHITE
+        model.white and scene.background not in (WHITE, "default")
     )
 
 
@@ -78,6 +80,9 @@ Use = tuple[str, str, object]
 
 def uses(scene: Scene) -> Iterator[Use]:
     """Each name that a scene uses, once, in its order."""
+    for word in (*STAGE, "background"):
+        if getattr(scene, word) != "default":
+            yield word, "settings", getattr(scene, word)
     seen: set[tuple[str, str]] = set()
     stack: list[SceneNode] = list(reversed(scene.nodes))
     while stack:
@@ -90,8 +95,11 @@ def uses(scene: Scene) -> Iterator[Use]:
             found.insert(0, (node.geometry, "geometries", node))
         elif isinstance(node, Chain):
             stack.extend(link.node for link in reversed(node.children))
+            found += [("smooth(k)", "settings", link.node) for link in node.children if link.k != BLEND]
         else:
             stack.extend(reversed(node.children))
+            if isinstance(node, Boolean) and node.k != BLEND:
+                found.append(("smooth(k)", "settings", node))
         for use in found:
             if use[:2] not in seen:
                 seen.add(use[:2])

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from scenelang.files import read_json, read_regular
+from scenelang.words import STAGE
 
 ROOT = Path(__file__).parent
 MOST: Final = 1e300
@@ -55,6 +56,8 @@ class Manifest:
         sizes: canvases (width, height) that it draws; any within its limits where there are none.
         white: whether it draws only over white, knowing colours but no coverage.
         outlines: of its geometries, for bounds; see `Outline`.
+        fixed_stage: whether camera, light, ground and sky are its own.
+        any_blend: whether it draws `smooth` of any width k.
     """
 
     name: str
@@ -75,6 +78,8 @@ class Manifest:
     white: bool = False
     layout: str = "plane"
     outlines: dict[str, Outline] = field(default_factory=dict)
+    fixed_stage: bool = False
+    any_blend: bool = False
 
     @staticmethod
     def from_json(text: str | bytes) -> Manifest:
@@ -95,6 +100,8 @@ class Manifest:
             "sizes": [],
             "white": False,
             "outlines": {},
+            "fixed_stage": False,
+            "any_blend": False,
             **data,
         }
         if data.keys() != _KINDS.keys():
@@ -112,6 +119,20 @@ class Manifest:
             for name, shape in data["outlines"].items()
         }
         return Manifest(**{**data, **lists, "trained": trained, "sizes": sizes, "outlines": outlines})
+
+    def refusal(self, setting: str) -> tuple[str, str] | None:
+        """Code and message where it does not take a setting of a scene."""
+        if self.dimension == 2 and setting in STAGE:
+            return "E0511", f"model `{self.name}` is flat and has no {setting}"
+        if self.fixed_stage and setting in (*STAGE, "background"):
+            return "E0336", f"model `{self.name}` brings its own {setting}"
+        return None
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """What a scene may set and not every model takes."""
+        blend = ("smooth(k)",) if self.any_blend else ()
+        return *(word for word in (*STAGE, "background") if not self.refusal(word)), *blend
 
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
@@ -198,6 +219,8 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "sizes": lambda value: isinstance(value, list) and all(map(_is_size, value)),
     "white": lambda value: type(value) is bool,
     "outlines": _are(lambda _, value: _is_outline(value)),
+    "fixed_stage": lambda value: type(value) is bool,
+    "any_blend": lambda value: type(value) is bool,
 }
 """What each field may hold."""
 

@@ -14,7 +14,7 @@ from typing import Any
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.resolve.symbols import Kind, Role, Scope, Symbol, Use
 from scenelang.syntax import nodes
-from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, OPERATIONS, SETTINGS, TRANSFORMS
+from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, OPERATIONS, SETTINGS, STAGE, TRANSFORMS
 
 
 class Names:
@@ -145,7 +145,11 @@ class Names:
                 if at is not None:
                     self._walk(at, scope, kind)
             case nodes.Node():
+                self._arguments(node.args or (), scope, self._blend(node))
                 self._walk(node.body, scope, "chain" if node.kind == "chain" else "group")
+            case nodes.Combined():
+                self._arguments(node.args or (), scope, self._blend(node))
+                self._walk(node.child, scope, kind)
             case nodes.MaterialUse() | nodes.MaterialExpr():
                 self._add(node.name.span, node.name.text, "material")
                 if node.body is not None:
@@ -177,7 +181,8 @@ class Names:
     def _call(self, stmt: nodes.Call, scope: Scope, kind: str) -> None:
         name = stmt.name.text
         role: Role | None = None
-        if name in SETTINGS:
+        own = scope.find(name) if name in STAGE else None
+        if name in SETTINGS and (own is None or (own.kind != "module" and stmt.args is not None)):
             role = "setting"
         elif name in OPERATIONS and (kind == "material" or name not in TRANSFORMS):
             role = "operation"
@@ -190,6 +195,10 @@ class Names:
         if stmt.body is not None:
             value = head is not None and head.symbol is not None and head.symbol.kind in ("let", "argument")
             self._walk(stmt.body, scope, "material" if value else "object")
+
+    @staticmethod
+    def _blend(node: nodes.Node | nodes.Combined) -> Use:
+        return Use(node.keyword.start, node.keyword.end, node.keyword.text, "setting")
 
     @staticmethod
     def _own(text: str) -> Role | None:

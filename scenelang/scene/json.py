@@ -254,7 +254,7 @@ def _problem(item: ErrorDetails, location: tuple[Key, ...], root: Value, source:
 _FIELDS: Final = sorted(
     {
         name
-        for model in (*vars(modifiers).values(), *vars(nodes).values())
+        for model in (*vars(modifiers).values(), *vars(nodes).values())  # which hold those of the stage
         if isinstance(model, type) and issubclass(model, BaseModel)
         for name in model.__annotations__
         if not name.startswith(("_", "model_"))

@@ -10,9 +10,12 @@ from typing import Final
 
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.records import Record
+from scenelang.scene.fields import Frozen
 from scenelang.scene.modifiers import Transform
 from scenelang.scene.nodes import Chain, Object, SceneData, SceneNode
 from scenelang.scene.spans import SpanMap, Written
+from scenelang.scene.wording import TAGS
+from scenelang.words import STAGE
 
 Key = str | int
 
@@ -93,7 +96,7 @@ def follow(root: Value, location: Sequence[Key]) -> tuple[Value, str]:
     for at, key in enumerate(location):
         if key in value.items:
             value = value.items[key]
-        elif at + 1 < len(location) or isinstance(key, int):
+        elif at + 1 < len(location) or isinstance(key, int) or key in TAGS:
             continue
         path += f"[{key}]" if isinstance(key, int) else f".{key}" if path else key
     return value, path
@@ -104,6 +107,9 @@ def record_places(scene: SceneData, root: Value, source: SourceFile, spans: Span
     named = root.items.get("model")
     if named is not None:
         spans.record(scene, _written(named, root, source))
+    for word in STAGE:
+        if (value := root.items.get(word)) is not None and isinstance(getattr(scene, word), Frozen):
+            spans.record(getattr(scene, word), _written(value, value, source))
     todo: list[tuple[SceneNode, Value]] = _pairs(scene.nodes, root.get("nodes"))
     while todo:
         node, value = todo.pop()

@@ -17,10 +17,12 @@ from scenelang.scene.fields import (
     first_joins_by_union,
 )
 from scenelang.scene.modifiers import MaterialOp, Transform, Transforms
-from scenelang.words import Combine
+from scenelang.scene.stage import EITHER, STATED, Camera, Ground, Light, Unsaid
+from scenelang.words import BLEND, Combine
 
 MAX_FRAMES = 1_000_000
 MAX_NODE_DEPTH = 400  # nodes within nodes
+Blend = Annotated[Finite, Field(gt=0, description="width of the blend of `smooth`, which alone has one")]
 
 
 class Material(Frozen):
@@ -70,14 +72,26 @@ class Group(Frozen):
         ) -> None: ...
 
 
-class Boolean(Frozen):
-    """A boolean node over its children, folded left."""
+class _Joining(Frozen):
+    """What joins by an operator."""
+
+    @model_validator(mode="after")
+    def _blends_only_smooth(self) -> Self:
+        op, k = self.__dict__["op"], self.__dict__["k"]
+        if op != "smooth" and k != BLEND:
+            raise ValueError(f"`{op}` has no k: only smooth blends")
+        return self
+
+
+class Boolean(_Joining):
+    """A boolean node over its children, folded left; ``k`` is the width of a ``smooth`` blend."""
 
     kind: Literal["boolean"] = "boolean"
     op: Combine
     children: tuple[SceneNode, ...] = ()
     transforms: Transforms = ()
     material: Material | None = None
+    k: Blend = BLEND
 
     if TYPE_CHECKING:
 
@@ -87,21 +101,23 @@ class Boolean(Frozen):
             children: Iterable[SceneNode] | SceneNode = (),
             transforms: Iterable[Transform] | Transform = (),
             material: Material | None = None,
+            k: float = BLEND,
         ) -> None: ...
 
 
-class Link(Frozen):
+class Link(_Joining):
     """One child of a chain with the word that joins it to what came before (first: union)."""
 
     op: Combine = "union"
     node: SceneNode
+    k: Blend = BLEND
 
     if TYPE_CHECKING:
 
         @overload
-        def __init__(self, op: Combine, node: SceneNode) -> None: ...
+        def __init__(self, op: Combine, node: SceneNode, k: float = BLEND) -> None: ...
         @overload
-        def __init__(self, *, op: Combine = "union", node: SceneNode) -> None: ...
+        def __init__(self, *, op: Combine = "union", node: SceneNode, k: float = BLEND) -> None: ...
         def __init__(self, *args: Any, **data: Any) -> None: ...
 
 
@@ -179,8 +195,15 @@ class SceneData(Frozen):
     ] = None
     canvas: Annotated[tuple[Pixels, Pixels], Field(description="width and height in pixels")] = (256, 256)
     background: Annotated[
-        Opaque | None, Field(description="as colours are written; null gives an image with alpha")
-    ] = (1.0, 1.0, 1.0)
+        Annotated[Opaque | None, STATED] | Unsaid,
+        EITHER,
+        Field(description="default: white in 2D, the sky in 3D; null: an image with alpha"),
+    ] = "default"
+    camera: Annotated[Annotated[Camera, STATED] | Unsaid, EITHER, Field(description="3D")] = "default"
+    light: Annotated[Annotated[Light, STATED] | Unsaid, EITHER, Field(description="3D")] = "default"
+    ground: Annotated[
+        Annotated[Ground | None, STATED] | Unsaid, EITHER, Field(description="3D; null: without one")
+    ] = "default"
     animation: Annotated[
         Animation | None, Field(description="the animation that this Scene is one frame of")
     ] = None
@@ -194,7 +217,10 @@ class SceneData(Frozen):
             version: Literal[1] = 1,
             model: str | None = None,
             canvas: tuple[int, int] = (256, 256),
-            background: tuple[float, float, float] | None = (1.0, 1.0, 1.0),
+            background: tuple[float, float, float] | Unsaid | None = "default",
+            camera: Camera | Unsaid = "default",
+            light: Light | Unsaid = "default",
+            ground: Ground | Unsaid | None = "default",
             animation: Animation | None = None,
             nodes: Iterable[SceneNode] | SceneNode = (),
         ) -> None: ...

@@ -12,6 +12,7 @@ from scenelang.scene.fields import Rgb
 from scenelang.scene.modifiers import MaterialOp, Transform
 from scenelang.scene.nodes import Link, Object, SceneData, SceneNode
 from scenelang.scene.text import degrees, hex_colour, number, numbers
+from scenelang.words import BLEND, STAGE
 
 _WIDTH: Final = 88
 _INDENT: Final = "    "
@@ -53,8 +54,18 @@ class _Maker(Record, frozen=False):
             yield _tuple("canvas=", map(str, scene.canvas))
         if scene.background is None:
             yield "background=None"
-        elif scene.background != (1.0, 1.0, 1.0):
+        elif scene.background != "default":
             yield _numbers("background=", scene.background)
+        for word in STAGE:
+            value = getattr(scene, word)
+            if value is None:
+                yield f"{word}=None"
+            elif value != "default":
+                parts = [
+                    _numbers(f"{name}=", item) if isinstance(item, tuple) else f"{name}={number(item)}"
+                    for name, item in value.__repr_args__()
+                ]
+                yield _Call(f"{word}=nsg.{type(value).__name__}", tuple(parts))
         if scene.animation is not None:
             loop = () if scene.animation.loop else ("loop=False",)
             times = (f"seconds={number(scene.animation.seconds)}", f"fps={number(scene.animation.fps)}")
@@ -77,6 +88,8 @@ class _Maker(Record, frozen=False):
                 parts.append(_tuple("children=", [code for code, _ in children]))
         if node.transforms:
             parts.append(_tuple("transforms=", map(_step, node.transforms)))
+        if node.kind == "boolean" and node.k != BLEND:
+            parts.append(f"k={number(node.k)}")
         if node.material is not None:
             ops = (_tuple("ops=", map(_step, node.material.ops)),) if node.material.ops else ()
             parts.append(_Call("material=nsg.Material", (f'"{node.material.name}"', *ops)))
@@ -91,7 +104,8 @@ class _Maker(Record, frozen=False):
             return self.node("", child)
         code, height = self.node("node=", child.node)
         op = () if child.op == "union" else (f'op="{child.op}"',)
-        return _Call("nsg.Link", (*op, code)), height
+        width = () if child.k == BLEND else (f"k={number(child.k)}",)
+        return _Call("nsg.Link", (*op, code, *width)), height
 
 
 def _step(step: Transform | MaterialOp) -> _Code:

@@ -34,6 +34,10 @@ from scenelang.scene.nodes import Material as Material
 from scenelang.scene.nodes import Object as Object
 from scenelang.scene.nodes import SceneData
 from scenelang.scene.nodes import SceneNode as SceneNode
+from scenelang.scene.stage import Camera as Camera
+from scenelang.scene.stage import Ground as Ground
+from scenelang.scene.stage import Light as Light
+from scenelang.words import STAGE
 
 
 class Scene(SceneData):
@@ -76,10 +80,9 @@ class Scene(SceneData):
 
 
 def same_nodes(a: Scene, b: Scene) -> bool:
-    """Whether two frames are made of the very same nodes."""
+    """Whether two frames are made of the very same nodes, on one stage."""
     return (
         len(a.nodes) == len(b.nodes)
-        and a.canvas == b.canvas
-        and a.background == b.background
+        and all(getattr(a, name) == getattr(b, name) for name in ("canvas", "background", *STAGE))
         and all(x is y for x, y in zip(a.nodes, b.nodes, strict=True))
     )

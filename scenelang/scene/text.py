@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Final
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
 
 from scenelang.diagnostics.error import SceneError
 from scenelang.formatting import format_text
 from scenelang.scene.fields import Rgb
 from scenelang.scene.modifiers import MaterialOp, Transform
 from scenelang.scene.nodes import Boolean, Link, Material, Object, SceneData, SceneNode
+from scenelang.words import BLEND, STAGE
 
+_Line = str | tuple[str, SceneNode, int]
 _INDENT: Final = "  "
 _AXES: Final = {"[1, 0, 0]": "X", "[0, 1, 0]": "Y"}
 
@@ -30,13 +32,14 @@ def to_nsg(scene: SceneData, notes: Mapping[int, str] | None = None) -> str:
         lines.append(f"canvas({scene.canvas[0]}, {scene.canvas[1]});")
     if scene.background is None:
         lines.append("background(none);")
-    elif scene.background != (1.0, 1.0, 1.0):
+    elif scene.background != "default":
         lines.append(f"background({rgb(scene.background)});")
+    lines += [f"{word}({given});" for word, given in _stage(scene)]
     if scene.animation is not None:
         loop = "" if scene.animation.loop else ", loop = false"
         lines.append(f"animate({number(scene.animation.seconds)}s, {number(scene.animation.fps)}{loop});")
     # Nodes nest deeper than Python likes to recurse: a stack of lines and nodes still to print.
-    todo: list[str | tuple[str, SceneNode, int]] = [("", node, 0) for node in reversed(scene.nodes)]
+    todo: list[_Line] = [("", node, 0) for node in reversed(scene.nodes)]
     while todo:
         entry = todo.pop()
         if isinstance(entry, str):
@@ -53,18 +56,45 @@ def to_nsg(scene: SceneData, notes: Mapping[int, str] | None = None) -> str:
         return text
 
 
-def _node(word: str, node: SceneNode, depth: int) -> list[str | tuple[str, SceneNode, int]]:
+def _stage(scene: SceneData) -> Iterator[tuple[str, str]]:
+    """The settings of the stage, each with what differs from its defaults."""
+    for word in STAGE:
+        value = getattr(scene, word)
+        if value is None:
+            yield word, "none"
+        elif value != "default":
+            given = ((name, item) for name, item in value.__repr_args__())
+            yield word, ", ".join(f"{name} = {_field(name, item)}" for name, item in given)
+
+
+def _field(name: str | None, value: Any) -> str:
+    """A value of the stage."""
+    if name == "color":
+        return rgb(value)
+    if isinstance(value, tuple):
+        return _vector(value)
+    return angle(value) if name == "fov" else number(value)
+
+
+def blend(op: str, k: float) -> str:
+    """A word that joins, with its width where it is not the usual one."""
+    return op if k == BLEND else f"{op}(k = {number(k)})"
+
+
+def _node(word: str, node: SceneNode, depth: int) -> list[_Line]:
     """The lines of one node, with its children still to be printed."""
     margin = _INDENT * depth
     inside = margin + _INDENT
-    head = node.geometry if isinstance(node, Object) else node.op if isinstance(node, Boolean) else node.kind
+    head = node.geometry if isinstance(node, Object) else node.kind
+    if isinstance(node, Boolean):
+        head = blend(node.op, node.k)
     statements = [material(node.material)] if node.material is not None else []
     statements += [transform(t) for t in node.transforms]
     if isinstance(node, Object):
         return [f"{margin}{word}{head} {{ {' '.join(statements)} }}"]  # the formatter makes `{}` of `{  }`
-    parts: list[str | tuple[str, SceneNode, int]] = [f"{margin}{word}{head} {{"]
+    parts: list[_Line] = [f"{margin}{word}{head} {{"]
     for child in node.children:
-        op = child.op if isinstance(child, Link) else "union"
+        op = blend(child.op, child.k) if isinstance(child, Link) else "union"
         inner = child.node if isinstance(child, Link) else child
         parts.append(("" if op == "union" else f"{op} ", inner, depth + 1))
     parts.extend([inside + statement for statement in statements])

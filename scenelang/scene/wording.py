@@ -8,6 +8,8 @@ from typing import Any, Final
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+TAGS: Final = frozenset(("stated", "unsaid", "object", "group", "boolean", "chain"))
+"""What pydantic names in the place of a mistake and text does not nest by."""
 _MOST: Final = 3  # mistakes that one exception tells
 _WIDTH: Final = 40  # characters of a value that are shown
 _KINDS: Final = {
@@ -47,7 +49,8 @@ def refusal(name: str, error: ValidationError, known: list[str]) -> ValueError:
 
 
 def _line(item: ErrorDetails, known: list[str]) -> str:
-    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")
+    parts = [part for part in item["loc"] if part not in TAGS]
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
     kind, value = item["type"], item["input"]
     if kind == "extra_forbidden":
         near = get_close_matches(path, known, 1)

@@ -83,11 +83,13 @@ class Builder(ExpressionBuilder):
         otherwise = rest[1] if rest else None
         return nodes.If(condition, then, otherwise, self._span(word, otherwise or then))
 
-    def node(self, kind: Keyword, body: nodes.Block) -> nodes.Stmt:
-        return nodes.Node(kind[0], body, kind[1].to(body.span), kind[1])
+    def node(self, kind: Keyword, *rest: Any) -> nodes.Stmt:
+        args, body = (rest[0][0], rest[1]) if rest[1:] else (None, rest[0])
+        return nodes.Node(kind[0], body, kind[1].to(body.span), kind[1], args)
 
-    def combined(self, op: Keyword, child: nodes.Stmt) -> nodes.Stmt:
-        return nodes.Combined(op[0], child, op[1].to(child.span), op[1])
+    def combined(self, op: Keyword, *rest: Any) -> nodes.Stmt:
+        args, child = (rest[0][0], rest[1]) if rest[1:] else (None, rest[0])
+        return nodes.Combined(op[0], child, op[1].to(child.span), op[1], args)
 
     def material_use(self, word: int, name: nodes.Name, last: Any) -> nodes.Stmt:
         span = self._span(word, last)

@@ -248,12 +248,16 @@ class Call(Record):
 
 
 class Node(Record):
-    """``group``, ``union``, ``smooth``, ``subtract``, ``intersect`` or ``chain`` with its block."""
+    """``group``, ``union``, ``smooth``, ``subtract``, ``intersect`` or ``chain`` with its block.
+
+    Only ``smooth`` may have arguments, here and as the word of a chain's child.
+    """
 
     kind: Literal["group", "union", "smooth", "subtract", "intersect", "chain"]
     body: Block
     span: Span
     keyword: Span
+    args: tuple[Argument, ...] | None = None
 
 
 class Combined(Record):
@@ -263,6 +267,7 @@ class Combined(Record):
     child: Stmt
     span: Span
     keyword: Span
+    args: tuple[Argument, ...] | None = None
 
 
 class MaterialUse(Record):

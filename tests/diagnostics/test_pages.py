@@ -26,13 +26,13 @@ from scenelang.scene import schema
 from scenelang.scene.schema import Scene
 from scenelang.syntax import nesting, parse, tokens
 from scenelang.syntax.tables import tables
-from tests.models import SOLIDS
+from tests.models import SOLIDS, STUDIO
 
 PAGES = Path(scenelang.__file__).parent / "diagnostics/pages"
 ROOT = Path(__file__).parents[2]
 
 # Pages about what models lack need a second one.
-MODELS = [SOLIDS, *(load_manifest(name) for name in available() if name != SOLIDS.name)]
+MODELS = [SOLIDS, STUDIO, *(load_manifest(name) for name in available() if name != SOLIDS.name)]
 
 
 @pytest.fixture(autouse=True)

@@ -13,9 +13,9 @@ from scenelang.evaluate.evaluation import load_source
 from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap
-from tests.models import SOLIDS
+from tests.models import SOLIDS, STUDIO
 
-MODELS = (load_manifest("shapes2d"), SOLIDS)
+MODELS = (load_manifest("shapes2d"), SOLIDS, STUDIO)
 
 
 @dataclass

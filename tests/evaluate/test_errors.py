@@ -150,7 +150,7 @@ def test_diagnostics_of_what_recovery_skipped_stay_single() -> None:
         ('model "shapes2d"; sphere {}', ('model "shapes2d";', "the model of this scene")),
         ('model "shapes2d"; square { material diffuse; }', ('model "shapes2d";', "the model of this scene")),
         ('model "shapes2d"; square { twist(1); }', ('model "shapes2d";', "the model of this scene")),
-        ('model "solids3d"; background(#fff);', ('model "solids3d";', "the model of this scene")),
+        ('model "solids3d-studio"; light();', ('model "solids3d-studio";', "the model of this scene")),
     ],
 )
 def test_labels_show_the_model(text: str, label: tuple[str, str]) -> None:

@@ -26,16 +26,16 @@ from scenelang.evaluate.report.undefined import (
     within_effort,
 )
 from scenelang.syntax import nodes
-from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, NODES, OPERATIONS, SETTINGS, TRANSFORMS
+from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, LANGUAGE, NODES, SETTINGS
 
 
 def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
     name = stmt.name.text
-    if name in SETTINGS:
+    binding = None if name in LANGUAGE else lookup(stmt.name, place)
+    if name in SETTINGS and not hides(binding, stmt):
         return prepare_setting(stmt, place)
-    if name in TRANSFORMS or name in OPERATIONS:
+    if name in LANGUAGE:
         return prepare_move(stmt, place)
-    binding = lookup(stmt.name, place)
     if binding is None:
         if name in place.session.vocabulary.geometries:
             return prepare_object(stmt, place)
@@ -51,6 +51,13 @@ def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
     if binding.kind != "poison":
         wrong_kind(stmt.name, binding, place, "an object or a module")
     return None
+
+
+def hides(binding: Binding | None, stmt: nodes.Call) -> bool:
+    """Whether a scene's own name stands here for a setting: a module, or a material in use."""
+    return binding is not None and (
+        binding.kind in ("module", "poison") or (binding.kind in VALUES and stmt.args is None)
+    )
 
 
 def _skim(stmt: nodes.Call, place: Place) -> None:

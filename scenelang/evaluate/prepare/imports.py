@@ -9,6 +9,7 @@ from scenelang.evaluate.prepare.blocks import Body, define, prepare_block
 from scenelang.evaluate.prepare.settings import at_top_level
 from scenelang.evaluate.report.suppression import find_damage
 from scenelang.syntax import nodes
+from scenelang.words import STAGE
 
 _BROUGHT = (nodes.Param, nodes.Let, nodes.Fn, nodes.Module, nodes.Import, nodes.Version)
 
@@ -50,5 +51,12 @@ def prepare_file(context: FileContext, file: nodes.File, *, imported: bool = Fal
     if context.damage:
         report.damaged[context.source] = context.damage
     context.first = file.statements[0] if file.statements else None
+    if imported:
+        own = {s.name.text for s in file.statements if isinstance(s, nodes.Module)}
+        for stmt in file.statements:
+            if isinstance(stmt, nodes.Call) and stmt.name.text in STAGE and stmt.name.text not in own:
+                help = "it belongs to the scene: put it into the file that is drawn"
+                fact = f"`{stmt.name.text}` in an imported file"
+                report.error_once((fact, context.source), "E0330", fact, stmt.name.span, help=help)
     statements = [s for s in file.statements if not imported or isinstance(s, _BROUGHT)]
     return prepare_block(statements, Place(context, context.scope, "file"), file.span)

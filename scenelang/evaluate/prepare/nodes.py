@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
@@ -10,17 +11,20 @@ from scenelang.evaluate.builder import Builder, ChainBuilder, make
 from scenelang.evaluate.costs import MODULE_CALL, OBJECT
 from scenelang.evaluate.file_context import Action, Place
 from scenelang.evaluate.names import Definition, Env
+from scenelang.evaluate.prepare.arguments import bind
 from scenelang.evaluate.prepare.blocks import Body, misplaced, prepare_inner, prepare_statement
 from scenelang.evaluate.prepare.calls import entering
-from scenelang.evaluate.prepare.expressions import prepare_arguments
+from scenelang.evaluate.prepare.expressions import guarded, prepare_arguments
 from scenelang.evaluate.prepare.references import lookup
 from scenelang.evaluate.report.undefined import VALUES
 from scenelang.evaluate.session import Session
+from scenelang.evaluate.values.functions import number
+from scenelang.evaluate.values.value import POISON, Problem, show
 from scenelang.scene import library
 from scenelang.scene.schema import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object
 from scenelang.scene.spans import Written
 from scenelang.syntax import nodes
-from scenelang.words import LANGUAGE
+from scenelang.words import BLEND, KEYWORDS, LANGUAGE
 
 HOLDERS = ("file", "group", "chain", "unknown")
 
@@ -99,6 +103,7 @@ def prepare_node(stmt: nodes.Node, place: Place) -> Action | None:
     chain = stmt.kind == "chain"
     if chain:
         _check_first(stmt, place)
+    width = _width(stmt, place)
     body = prepare_inner(stmt.body, place.inner("chain" if chain else "group"))
     if not fits:
         return None
@@ -107,7 +112,7 @@ def prepare_node(stmt: nodes.Node, place: Place) -> Action | None:
     def action(env: Env, out: Builder) -> None:
         inside = ChainBuilder() if chain else Builder()
         _run_nested(body, env, inside, session, where.name)
-        node = _finish(stmt.kind, inside, inside.transforms, inside.material)
+        node = _finish(stmt.kind, inside, inside.transforms, inside.material, width(env))
         _place_child(node, where, out, session)
 
     return action
@@ -122,7 +127,31 @@ def _run_nested(body: Body, env: Env, inside: Builder, session: Session, span: S
     session.node_depth -= 1
 
 
-def _finish(kind: str, inside: Builder, transforms: list[Any], material: Material | None) -> Any:
+def _width(stmt: nodes.Node | nodes.Combined, place: Place) -> Callable[[Env], float]:
+    """The k of `smooth`, or the default's."""
+    word, given = KEYWORDS["smooth"], prepare_arguments(stmt.args, place)
+    bound = bind(place.report, nodes.Name(word.name, stmt.keyword), word.params, word.required, given)
+    if bound is None or bound[0] is None:
+        return lambda env: BLEND
+    get, operand = bound[0].code.run, bound[0].arg.value
+    check = guarded(place, _above_0, operand.span, (operand,))
+
+    def run(env: Env) -> float:
+        k = check(get(env))
+        return BLEND if k is POISON else float(k)
+
+    return run
+
+
+def _above_0(k: Any) -> float:
+    if number(k) <= 0.0:
+        raise Problem("E0311", f"a blend of width {show(k)} is not above 0", operand=0)
+    return float(k)
+
+
+def _finish(
+    kind: str, inside: Builder, transforms: list[Any], material: Material | None, k: float = BLEND
+) -> Any:
     fields: dict[str, Any] = {
         "children": tuple(inside.children),
         "transforms": tuple(transforms),
@@ -130,7 +159,7 @@ def _finish(kind: str, inside: Builder, transforms: list[Any], material: Materia
     }
     if kind in ("group", "chain"):
         return make(Group if kind == "group" else Chain, {"kind": kind, **fields})
-    return make(Boolean, {"kind": "boolean", "op": kind, **fields})
+    return make(Boolean, {"kind": "boolean", "op": kind, **fields, "k": k})
 
 
 # ---------------------------------------------------------------- chains
@@ -150,7 +179,7 @@ def _check_first(stmt: nodes.Node, place: Place) -> None:
 
 
 def prepare_combined(stmt: nodes.Combined, place: Place) -> Action | None:
-    report, op = place.report, stmt.op
+    report, op, width = place.report, stmt.op, _width(stmt, place)
     if place.kind not in ("chain", "unknown"):
         help = f"put the children into chain {{ … }}, or write a boolean node: {op} {{ … }}"
         misplaced(place, stmt.keyword, "`{}` before a child outside a chain", op, help)
@@ -169,9 +198,10 @@ def prepare_combined(stmt: nodes.Combined, place: Place) -> Action | None:
             return
         if not out.children and op in ("subtract", "intersect"):
             report.error("E0335", f"`{op}` with nothing before it", stmt.keyword)
-        out.op = op if out.children else "union"
+        if out.children:
+            out.op, out.k = op, width(env)
         act(env, out)
-        out.op = "union"
+        out.op, out.k = "union", BLEND
 
     return action
 

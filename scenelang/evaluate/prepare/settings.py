@@ -1,4 +1,4 @@
-"""Settings of a scene: version, model, canvas, background, animation."""
+"""Settings of a scene: version, model, canvas, background, animation, and the stage of a 3D scene."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from scenelang.evaluate.prepare.blocks import misplaced
 from scenelang.evaluate.prepare.expressions import prepare, prepare_arguments
 from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.session import Session
-from scenelang.evaluate.values.functions import number
-from scenelang.evaluate.values.transforms import color
+from scenelang.evaluate.values.functions import angle, number
+from scenelang.evaluate.values.transforms import color, vector
 from scenelang.evaluate.values.value import POISON, Problem, Time, Vec, show, unexpected
-from scenelang.scene.schema import MAX_FRAMES, Animation
+from scenelang.scene.faults import camera_fault, light_fault
+from scenelang.scene.schema import MAX_FRAMES, Animation, Camera, Ground, Light
+from scenelang.scene.spans import Written
 from scenelang.syntax import nodes
 from scenelang.words import SETTINGS
 
@@ -81,10 +83,14 @@ def prepare_model(stmt: nodes.Model, place: Place) -> Action | None:
 
 
 def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
-    """``canvas``, ``background`` or ``animate``."""
+    """``canvas``, ``background``, ``animate``, ``camera``, ``light`` or ``ground``."""
     session, name, span = place.session, stmt.name.text, stmt.name.span
     given = prepare_arguments(stmt.args, place)
     if not at_top_level(place, span, "`{}`", name) or not _once(session, name, span):
+        return None
+    chosen = session.vocabulary.chosen
+    if chosen is not None and (refusal := chosen.refusal(name)):
+        session.report.error(*refusal, span, help="leave it out", labels=session.model_label())
         return None
     if stmt.body is not None:
         session.report.error("E0330", f"`{name}` takes no block", span, help=f"write {name}(…);")
@@ -94,11 +100,13 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
     getters = [None if one is None else one.code.run for one in bound or ()]
     operands = tuple([None if one is None else one.arg.value for one in bound or ()])
 
+    where = Written(span, stmt.span)
+
     def action(env: Env, out: Builder) -> None:
         values = [LEFT_OUT if get is None else get(env) for get in getters]
         try:
             if bound is not None and POISON not in values:
-                apply(session, span, *values)
+                apply(session, where, *values)
                 return
         except Problem as problem:
             report_problem(session.report, problem, span, operands)
@@ -108,7 +116,7 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
     return action
 
 
-def _canvas(session: Session, span: Span, width: Any, height: Any) -> None:
+def _canvas(session: Session, where: Written, width: Any, height: Any) -> None:
     if width.__class__ is Vec and height is LEFT_OUT:
         if len(width.items) != 2:
             raise unexpected("a vector of 2 numbers", width, operand=0)
@@ -125,20 +133,57 @@ def _canvas(session: Session, span: Span, width: Any, height: Any) -> None:
     session.settings.canvas = (sides[0], sides[1])
 
 
-def _background(session: Session, span: Span, value: Any) -> None:
-    if session.vocabulary.chosen is not None and session.vocabulary.dimension == 3:
-        message = f"model `{session.vocabulary.chosen.name}` brings its own background"
-        help = "in 3D the background belongs to the model"
-        session.report.error("E0336", message, span, help=help, labels=session.model_label())
-        return
-    rgb = None if value is None else color(value)
-    for component in rgb or ():
+def _opaque(value: Any, what: str, operand: int) -> tuple[float, float, float]:
+    """A colour whose components are in 0..1."""
+    rgb = color(value, operand)
+    for component in rgb:
         if not 0.0 <= component <= 1.0:
-            raise Problem("E0311", f"background component {show(component)} is outside 0..1", operand=0)
-    session.settings.background = rgb
+            raise Problem("E0311", f"{what} component {show(component)} is outside 0..1", operand=operand)
+    return rgb
 
 
-def _animate(session: Session, span: Span, seconds: Any, fps: Any, loop: Any) -> None:
+def _background(session: Session, where: Written, value: Any) -> None:
+    session.settings.background = None if value is None else _opaque(value, "background", 0)
+
+
+def _state(session: Session, where: Written, cls: type[Camera | Light | Ground], *given: Any) -> None:
+    """Set one value of the stage from its fields in order, with defaults for those left out."""
+    default = [field.default for field in cls.model_fields.values()]
+    values = [own if value is LEFT_OUT else value for value, own in zip(given, default, strict=True)]
+    node = make(cls, dict(zip(cls.model_fields, values, strict=True)))
+    if isinstance(node, Camera) and (fault := camera_fault(node.eye, node.target, node.fov)):
+        at = list(cls.model_fields).index(fault[0])
+        raise Problem("E0338", fault[1], operand=1 if given[at] is LEFT_OUT else at)
+    if isinstance(node, Light) and (dark := light_fault(node.power)):
+        raise Problem("E0339", dark, operand=1)
+    session.settings.stage[cls.__name__.lower()] = node
+    session.spans.record(node, where)
+
+
+def _given(value: Any, read: Callable[..., Any], *rest: Any) -> Any:
+    return LEFT_OUT if value is LEFT_OUT else read(value, *rest)
+
+
+def _camera(session: Session, where: Written, eye: Any, target: Any, fov: Any) -> None:
+    points = [_given(value, vector, 3, at, "a point") for at, value in enumerate((eye, target))]
+    _state(session, where, Camera, *points, _given(fov, angle, 2))
+
+
+def _light(session: Session, where: Written, position: Any, power: Any, rgb: Any) -> None:
+    place = _given(position, vector, 3, 0, "a point")
+    _state(session, where, Light, place, _given(power, number, 1), _given(rgb, _opaque, "colour", 2))
+
+
+def _ground(session: Session, where: Written, y: Any, rgb: Any) -> None:
+    if y is not None:
+        _state(session, where, Ground, _given(y, number, 0), _given(rgb, _opaque, "colour", 1))
+        return
+    if rgb is not LEFT_OUT:
+        raise Problem("E0308", "`ground(none)` has no colour", operand=1)
+    session.settings.stage["ground"] = None
+
+
+def _animate(session: Session, where: Written, seconds: Any, fps: Any, loop: Any) -> None:
     length = seconds.size if seconds.__class__ is Time else number(seconds, 0)
     rate = number(fps, 1)
     for operand, (what, value) in enumerate((("length", length), ("frame rate", rate))):
@@ -163,4 +208,7 @@ _APPLY: Final[dict[str, Callable[..., None]]] = {
     "canvas": _canvas,
     "background": _background,
     "animate": _animate,
+    "camera": _camera,
+    "light": _light,
+    "ground": _ground,
 }

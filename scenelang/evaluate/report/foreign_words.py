@@ -129,7 +129,7 @@ WORDS: Final = _each_word(
 STATEMENTS: Final = _each_word(
     {
         "children": "what is called has no children: put what it draws into its block",
-        "blend smooth_union": "it is called `smooth` here, and always blends over a distance of 0.15",
+        "blend smooth_union": "it is called `smooth` here, as in smooth(k = 0.3) { … }",
         "hull": "there is no hull; smooth { … } blends objects into each other",
         "minkowski": "there is no Minkowski sum; smooth { … } blends objects into each other",
         "linear_extrude rotate_extrude": "a 2D scene is not extruded",

@@ -120,9 +120,6 @@ HABITS: Final = (
     # blocks
     Habit("<n> <VALUES>;", "<n>(<VALUES>);", _PARENTHESES, code="E0107"),
     Habit("<node>()", "<node>", "`<node>` takes no arguments"),
-    _unsafe(
-        "smooth(<E>)", "smooth", "`smooth` takes no arguments", "it always blends over a distance of 0.15"
-    ),
     Habit(
         "material { <call>(",
         "material <material> { <call>(",

@@ -1,0 +1,23 @@
+"""What no 3D scene can be drawn with."""
+
+from __future__ import annotations
+
+from math import degrees, dist, isfinite, pi
+
+Triple = tuple[float, float, float]
+
+
+def camera_fault(eye: Triple, target: Triple, fov_rad: float) -> tuple[str, str] | None:
+    """The argument that leaves a camera without a picture, and why, if one does."""
+    if eye == target:
+        return "eye", "the eye is the target"
+    if not isfinite(dist(eye, target)):
+        return "eye", "the eye is too far from the target"
+    if not 0.0 < fov_rad < pi:
+        return "fov", f"a field of view of {degrees(fov_rad):g}° is not between 0° and 180°"
+    return None
+
+
+def light_fault(power: float) -> str | None:
+    """Why there is no light of such a power, if there is none."""
+    return f"a power of {power:g} is negative" if power < 0.0 else None
