@@ -346,4 +346,4 @@ LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *PLAIN_SETTINGS))
 def word_for_call(name: str, in_material: bool) -> Word | None:
     """The word of the language that is called by a name."""
     tables = (OPERATIONS, TRANSFORMS) if in_material else (TRANSFORMS, OPERATIONS)
-    return next((table[name] for table in (*tables, SETTINGS, FUNCTIONS) if name in table), None)
+    return next((table[name] for table in (*tables, SETTINGS, FUNCTIONS, NODES) if name in table), None)

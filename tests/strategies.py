@@ -64,7 +64,19 @@ common: dict[str, Any] = {
     "transforms": st.lists(transforms, max_size=3).map(tuple),
     "material": materials,
 }
-words = st.sampled_from(["union", "smooth", "subtract", "intersect"])
+joins = st.sampled_from([(op, 0.15) for op in ("union", "smooth", "subtract", "intersect")]) | st.tuples(
+    st.just("smooth"), st.floats(1e-6, 100)
+)
+places = st.floats(-1e6, 1e6) | st.integers(-9, 9).map(float)
+points = st.tuples(places, places, places)
+cameras = st.builds(
+    lambda eye, away, fov: nsg.Camera(eye, tuple(a + b for a, b in zip(eye, away, strict=True)), fov=fov),
+    points,
+    st.tuples(st.floats(1, 9), places, places),
+    st.floats(0.01, 3.1),
+)
+lights = st.builds(nsg.Light, points, st.floats(0, 1e6), colours)
+grounds = st.builds(nsg.Ground, numbers, colours | st.just("default"))
 objects = st.builds(
     lambda geometry, transforms, material: nsg.Object(geometry, transforms=transforms, material=material),
     geometry=st.sampled_from(["square", "star", "triangle", "pentagon", "sphere", "torus"]),
@@ -74,14 +86,17 @@ objects = st.builds(
 
 def _nodes(children: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
     several = st.lists(children, max_size=3).map(tuple)
-    links = st.lists(st.tuples(words, children), max_size=3).map(
+    links = st.lists(st.tuples(joins, children), max_size=3).map(
         lambda pairs: tuple(
-            nsg.Link(op=op if i else "union", node=node) for i, (op, node) in enumerate(pairs)
+            nsg.Link(op=op, node=node, k=k) if i else nsg.Link(node=node)
+            for i, ((op, k), node) in enumerate(pairs)
         )
     )
     return st.one_of(
         st.builds(nsg.Group, children=several, **common),
-        st.builds(nsg.Boolean, op=words, children=several, **common),
+        st.builds(
+            lambda join, **more: nsg.Boolean(op=join[0], k=join[1], **more), joins, children=several, **common
+        ),
         st.builds(nsg.Chain, children=links, **common),
     )
 
@@ -89,7 +104,10 @@ def _nodes(children: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
 scenes = st.builds(
     nsg.Scene,
     canvas=st.tuples(st.integers(1, 8192), st.integers(1, 8192)),
-    background=st.none() | colours,
+    background=st.just("default") | st.none() | colours,
+    camera=st.just("default") | cameras,
+    light=st.just("default") | lights,
+    ground=st.just("default") | st.none() | grounds,
     animation=st.none()
     | st.builds(nsg.Animation, seconds=st.floats(0.001, 100), fps=st.floats(0.1, 240), loop=st.booleans()),
     nodes=st.lists(st.recursive(objects, _nodes, max_leaves=6), max_size=3).map(tuple),

@@ -190,6 +190,7 @@ class _Lowering:
             if isinstance(transform, schema.Displace) and (at or not isinstance(node, schema.Object)):
                 fact = "`displace` does not stand first in the block of an object"
                 self.say("E0407", fact, transform, "it changes the leaf's own distance, before any transform")
+                continue
             if transform.kind not in self.manifest.transforms:
                 self.refuse("E0503", "transform", transform.kind, self.manifest.transforms, transform)
                 continue

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import colorsys
+from typing import Final
 
 from lsprotocol import types
 
 from scenelang.lsp.workspace import Document
 from scenelang.syntax import nodes
 from scenelang.syntax.nodes import walk
+from scenelang.words import OPERATIONS, SETTINGS
+
+COLOURED: Final = ("color", "background", "light", "ground")
+"""What has an argument `c` or `color`."""
 
 
 def colours(document: Document) -> list[types.ColorInformation]:
@@ -17,8 +22,11 @@ def colours(document: Document) -> list[types.ColorInformation]:
     for stmt in document.file.statements:
         wanted: set[int] = set()
         for node in walk(stmt):
-            if isinstance(node, nodes.Call) and node.args and node.name.text in ("color", "background"):
-                wanted.update(id(arg.value) for arg in node.args[:1])
+            if isinstance(node, nodes.Call) and node.args and node.name.text in COLOURED:
+                params = (OPERATIONS | SETTINGS)[node.name.text].params
+                for arg, param in zip(node.args, params, strict=False):
+                    if (arg.name.text if arg.name else param) in ("c", "color"):
+                        wanted.add(id(arg.value))
             rgb = _colour(node, id(node) in wanted)
             if rgb is not None:
                 place = document.lines.span(node.span)

@@ -11,6 +11,7 @@ from lsprotocol import types
 from scenelang import words
 from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.lsp.callees import find_callee, word_of
+from scenelang.lsp.colours import COLOURED
 from scenelang.lsp.completion_items import Item, strings, units
 from scenelang.lsp.context import Cursor, cursor_at
 from scenelang.lsp.tree import sight_at
@@ -114,7 +115,7 @@ class _Maker:
                 yield Item("as", Kind.Keyword, "as ")
         elif last == "material":
             yield from self._materials()
-        elif len(before) == 1 and last in COMBINE:
+        elif (len(before) == 1 and last in COMBINE) or (before[0] == "smooth" and last == ")"):
             yield from self._children("a")
             yield from (self._keyword(word) for word in ("group", *COMBINE, "chain"))
         elif before[0] == "param" and len(before) > 3 and "in" not in before and _ends_operand(last):
@@ -247,16 +248,16 @@ class _Maker:
         elif param == "loop":
             for value in ("true", "false"):
                 yield Item(value, Kind.EnumMember, "", "0")
-        elif param == "angle":
+        elif param in ("angle", "fov"):
             for value, unit in (("30", "deg"), ("0.25", "turn"), ("0.5", "rad")):
                 text = f"${{1:{value}}}{unit}"
                 yield Item(f"{value}{unit}", Kind.Unit, text, "0", "an angle", "", True)
-        elif callee in ("color", "background") and param == "c":
+        elif param in ("c", "color") and callee in COLOURED:
             yield Item("#d33", Kind.Color, "#${1:d33}", "0", "a colour", "", True)
             for name in ("rgb", "hsv"):
                 yield Item(name, Kind.Function, words.FUNCTIONS[name].snippet, "0", "a colour", "", True)
-            if callee == "background":
-                yield Item("none", Kind.EnumMember, "", "0", about=words.CONSTANTS["none"].text)
+        if (callee, param) in (("background", "c"), ("ground", "y")):
+            yield Item("none", Kind.EnumMember, "", "0", about=words.CONSTANTS["none"].text)
 
     def _members(self, before: tuple[str, ...]) -> Iterator[Item]:
         alias = before[-2] if len(before) > 1 else ""

@@ -183,7 +183,7 @@ def _call(read: _Reader, head: int, index: int) -> Call | None:
 def _callee(read: _Reader, head: int, opening: int) -> tuple[str, int]:
     """The name before a `(`, and where it begins; empty for a parenthesis of another kind."""
     at = opening - 1
-    if at < head or read.kind(at) not in ("NAME", "step", "as"):
+    if at < head or read.kind(at) not in ("NAME", "step", "as", "smooth"):
         return "", 0
     if at > head and read.kind(at - 1) in ("fn", "module"):
         return "", 0
@@ -203,7 +203,10 @@ def _block(read: _Reader, index: int, values: frozenset[str]) -> Block:
         head = read.head(brace)
         words = [read.text(at) for at in range(head, brace)]
         while words[1:] and words[0] in COMBINE:
-            words.pop(0)
+            rest = words[1:]
+            if rest[0] == "(" and ")" in rest:  # the width of a blend
+                rest = rest[rest.index(")") + 1 :]
+            words = rest or words[:1]
         first = words[0] if words else ""
         if first in ("for", "if", "else"):
             nested, index = True, head

@@ -13,6 +13,7 @@ from scenelang.lsp.tree import path_to
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax import nodes
 from scenelang.syntax.nodes import walk
+from scenelang.words import STAGE
 
 Kind = types.SymbolKind
 _DEFINES: Final = {
@@ -64,7 +65,16 @@ def _entry(stmt: nodes.Stmt) -> tuple[str, types.SymbolKind, Any, tuple[nodes.St
         case nodes.Import():
             return stmt.alias.text, Kind.File, stmt.alias.span, (), stmt.path.value
         case nodes.Node():
-            return stmt.kind, Kind.Struct, stmt.keyword, stmt.body.statements, ""
+            detail = f"({', '.join(arg.span.text for arg in stmt.args)})" if stmt.args else ""
+            return stmt.kind, Kind.Struct, stmt.keyword, stmt.body.statements, detail
+        case nodes.Call() if stmt.name.text in STAGE and stmt.args is not None and stmt.body is None:
+            return (
+                stmt.name.text,
+                Kind.Field,
+                stmt.name.span,
+                (),
+                f"({', '.join(a.span.text for a in stmt.args)})",
+            )
         case nodes.For():
             return f"for {stmt.variable.text}", Kind.Array, stmt.variable.span, stmt.body.statements, ""
         case nodes.If():

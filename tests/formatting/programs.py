@@ -70,6 +70,8 @@ statement: st.SearchStrategy[Tokens] = st.deferred(
         _joined(path, _maybe(_arguments), ";"),
         _joined(path, _maybe(_arguments), block),
         _joined(_COMBINES, path, _maybe(_arguments), st.one_of(st.just([";"]), block)),
+        _joined("smooth", _arguments, block),
+        _joined("smooth", _arguments, path, _maybe(_arguments), st.one_of(st.just([";"]), block)),
         _joined(st.sampled_from([["group"], ["chain"], ["union"], ["smooth"], ["subtract"]]), block),
         _joined("material", path, st.one_of(st.just([";"]), block)),
         _joined("let", name, "=", value, ";"),

@@ -83,3 +83,20 @@ def test_signatures_follow_the_argument(client: Client, uri: str) -> None:
     assert found["activeParameter"] == 1
     label, (start, end) = found["signatures"][0]["label"], found["signatures"][0]["parameters"][1]["label"]
     assert label[start:end] == "y"
+
+
+STAGE = "smooth() { star; }\nchain { square; smooth(k = 0.3)  }\nsmooth(0.2) {  }\nlight(color = );\n"
+
+
+def test_the_stage_and_the_width_of_a_blend(client: Client, uri: str) -> None:
+    client.replace(uri, STAGE + "ground();\ncamera();\n\n")
+    assert {"camera", "light", "ground"} <= set(labels(client, client.at(uri, "();\n\n", 4)))
+    assert labels(client, client.at(uri, "camera(", 7))[:3] == ["eye =", "fov =", "target ="]
+    assert labels(client, client.at(uri, "color = )", 8))[0] == "#d33"
+    assert "none" in labels(client, client.at(uri, "ground(", 7))[:3]
+    assert labels(client, client.at(uri, "smooth(", 7))[0] == "k ="
+    assert set(labels(client, client.at(uri, "0.3)  }", 5))) >= {"square", "group"}
+    assert "star" in labels(client, client.at(uri, "0.2) {  }", 7))
+    found = client.request("textDocument/signatureHelp", client.at(uri, "smooth(k = 0.3", 13))
+    assert found["signatures"][0]["label"] == "smooth([k])"
+    assert found["activeParameter"] == 0

@@ -43,3 +43,13 @@ def test_hover_tells_what_a_model_offers_and_words_mean(client: Client, uri: str
     assert "sine" in hover(client, client.at(uri, "sin", 1))
     assert "2π" in hover(client, client.at(uri, "TAU", 1))
     assert "smallest one" in hover(client, client.at(uri, "model", 1))
+
+
+def test_hover_tells_the_stage_unless_a_module_hides_it(client: Client, uri: str) -> None:
+    client.replace(uri, "light(power = 3);\nsmooth(k = 0.2) { sphere; torus; }\n")
+    assert "point light" in hover(client, client.at(uri, "light", 1))
+    assert "power" in hover(client, client.at(uri, "power", 1))
+    assert "blend" in hover(client, client.at(uri, "smooth", 1))
+    assert "width" in hover(client, client.at(uri, "k = 0.2", 0))
+    client.replace(uri, "module light(power) { sphere; }\nlight(3);\n")
+    assert "module light(power)" in hover(client, client.at(uri, "light(3)", 1))

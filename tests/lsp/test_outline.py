@@ -15,6 +15,13 @@ def test_symbols_of_a_file_and_of_the_folder(client: Client, uri: str) -> None:
     assert [s["name"] for s in found] == ["lib", "k", "r", "ring"]
     assert [s["name"] for s in found[3]["children"]] == ["for i"]
     assert [s["name"] for s in found[3]["children"][0]["children"]] == ["square"]
+    client.replace(uri, "camera(fov = 40deg);\nsmooth(k = 0.2) { sphere; }\nlight;\n")
+    found = client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+    assert [(s["name"], s.get("detail")) for s in found] == [
+        ("camera", "(fov = 40deg)"),
+        ("smooth", "(k = 0.2)"),
+        ("light", None),
+    ]
     found = client.request("workspace/symbol", {"query": "tw"})
     assert [(s["name"], s["containerName"]) for s in found] == [("twice", "lib.nsg")]
 
@@ -44,7 +51,9 @@ def test_imports_are_links(client: Client, uri: str) -> None:
 
 def test_colours_are_shown_and_written(client: Client, uri: str) -> None:
     client.replace(
-        uri, "background([0, 0.5, 1]);\nlet c = rgb(1, 0, 0);\nlet d = hsv(120deg, 1, 1);\nlet e = #abc;\n"
+        uri,
+        "background([0, 0.5, 1]);\nlet c = rgb(1, 0, 0);\nlet d = hsv(120deg, 1, 1);\nlet e = #abc;\n"
+        "light([0, 1, 0], color = [1, 1, 0]);\nground(-1, [0, 1, 0]);\n",
     )
     found = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
     assert [client.shown(uri, f["range"]) for f in found] == [
@@ -52,6 +61,8 @@ def test_colours_are_shown_and_written(client: Client, uri: str) -> None:
         "rgb(1, 0, 0)",
         "hsv(120deg, 1, 1)",
         "#abc",
+        "[1, 1, 0]",
+        "[0, 1, 0]",
     ]
     assert found[2]["color"] == pytest.approx({"red": 0, "green": 1, "blue": 0, "alpha": 1})
     params = {"textDocument": {"uri": uri}, "range": found[1]["range"], "color": found[2]["color"]}
