@@ -60,7 +60,7 @@ class Painter:
             key = frame_key("reference", _version("scenelang"), self.clip.model, scene.to_json())
             return Drawable(shot.number, key, shot, None)
         program = self.clip.program(shot)
-        if single:
+        if single or program.stage is not None:
             from scenelang.backend.small import choose_drawer
 
             if choose_drawer(program, self.device).library == "numpy":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from scenelang.backend.errors import RenderError
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.graph.lower import Spans, lower
@@ -28,6 +29,7 @@ def draw_exact(
 
     Raises:
         SceneError: the scene uses what its model does not have.
+        RenderError: there is no picture from where the eye is.
     """
     found = diagnostics if diagnostics is not None else Diagnostics()
     before = len(found.errors)
@@ -35,4 +37,7 @@ def draw_exact(
     graph = lower(scene, manifest, spans, found) if manifest is not None else None
     if graph is None or len(found.errors) > before:
         raise SceneError(found)
-    return reference_image(graph)
+    try:
+        return reference_image(graph)
+    except ValueError as error:
+        raise RenderError(str(error)) from None

@@ -1,4 +1,4 @@
-"""How the C library gives memory back."""
+"""What of the machine is used: its cores, and how the C library gives memory back."""
 
 from __future__ import annotations
 
@@ -25,3 +25,10 @@ def keep_memory() -> bool:
     except (AttributeError, OSError, ValueError):
         return False  # musl has neither the name nor the function
     return all(mallopt(option, KEEP_BYTES) == 1 for option in (_M_MMAP_THRESHOLD, _M_TRIM_THRESHOLD))
+
+
+def usable_cores() -> int:
+    """Cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

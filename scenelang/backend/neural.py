@@ -7,7 +7,6 @@ busy process took up to thirty times as long, as they wait for each other after 
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,12 +19,14 @@ try:
 except ModuleNotFoundError as error:
     raise RenderError("this is drawn by torch, which is not installed; pip install torch") from error
 from scenelang.backend.memory import keep_memory
+from scenelang.backend.memory import usable_cores as usable_cores
 from scenelang.backend.options import Samples
 from scenelang.models.load import Model, ModelError, load_model, place_of
 from scenelang.program.program import Program, ProgramError
-from scenelang.renderers.draw import Drawing, draw
+from scenelang.renderers.draw import Drawing, draw_objects
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.kept import Kept
+from scenelang.renderers.solid.parameters import Solids
 from scenelang.renderers.whole import draw_whole
 
 _loading = threading.Lock()
@@ -49,13 +50,6 @@ def choose_device(device: str) -> str:
         built = "sees no device" if torch.version.cuda else "is built without it"
         raise RenderError(f"CUDA is asked for, but this torch {built}")
     return "cpu"
-
-
-def usable_cores() -> int:
-    """Cores that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @lru_cache(maxsize=8)
@@ -132,8 +126,8 @@ def draw_program(
     with _drawing, _one_torch_thread():
         try:
             program.check_weights(model.digest)
-            if isinstance(network, Framed):
-                return draw(
+            if isinstance(network, Framed | Solids):
+                return draw_objects(
                     network,
                     program,
                     threads=threads,

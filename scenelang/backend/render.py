@@ -82,7 +82,7 @@ def render(
     from scenelang.backend.small import choose_drawer, draw_small
 
     if choose_drawer(program, device, samples).library == "numpy":
-        return draw_small(program, samples=samples, progress=progress).image
+        return draw_small(program, samples=samples, progress=progress, threads=threads).image
     from scenelang.backend.neural import choose_device, draw_program, open_model
 
     model = open_model(program.model, choose_device(device))

@@ -11,14 +11,14 @@ from collections.abc import Callable
 from typing import Final, Literal, NamedTuple
 
 from scenelang.backend.errors import RenderError
-from scenelang.backend.memory import keep_memory
+from scenelang.backend.memory import keep_memory, usable_cores
 from scenelang.backend.options import Device, Samples
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError
 from scenelang.program.program import Program, ProgramError
 from scenelang.program.work import load_of
-from scenelang.renderers.draw import Drawing, draw
+from scenelang.renderers.draw import Drawing, draw_objects
 from scenelang.renderers.kept import Kept
 
 MOST_MS: Final = 250.0
@@ -50,6 +50,8 @@ def choose_drawer(program: Program, device: Device = "auto", samples: Samples = 
         renderer = load_manifest(program.model).renderer
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
+    if renderer == "solid":
+        return Drawer("numpy", "solids are, on every core")
     if renderer != "framed":
         return Drawer("torch", f"a `{renderer}` network is large work for any picture")
     ms = work_ms(program, samples)
@@ -73,14 +75,16 @@ def draw_small(
     samples: Samples = "adaptive",
     kept: Kept | None = None,
     progress: Callable[[float], None] | None = None,
+    threads: int | None = None,
 ) -> Drawing:
-    """Draw a Program by numpy, on one core.
+    """Draw a Program by numpy, on one core, or solids on all.
 
     Args:
-        program: of any size, for a model with a framed network.
+        program: of any size, for a model with a framed or a solids' network.
         samples: of a pixel: four near outlines, four everywhere, or one.
         kept: the picture before this one, of which tiles that show the same are taken over.
-        progress: called with the share done, in [0, 1].
+        progress: called with the share done, in [0, 1], from any thread.
+        threads: bands of solids drawn at the same time; by default one for each usable core.
 
     Raises:
         RenderError: its model's weights are missing, or it was compiled for others or by no compiler.
@@ -89,6 +93,7 @@ def draw_small(
     try:
         network, digest = load_arrays(program.model)
         program.check_weights(digest)
-        return draw(network, program, kept=kept, samples=samples, progress=progress)
+        count = 1 if program.stage is None else threads or usable_cores()
+        return draw_objects(network, program, threads=count, kept=kept, samples=samples, progress=progress)
     except (ModelError, ProgramError) as error:
         raise RenderError(str(error)) from None

@@ -68,9 +68,9 @@ def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) 
         assert job.program is not None
         library, why = choose_drawer(job.program, device, samples)
         if library == "numpy":
-            place = "one core"
+            place = "one core" if job.program.stage is None else "all cores"
             with clock("draw"):
-                drawing = draw_small(job.program, samples=samples, progress=progress)
+                drawing = draw_small(job.program, samples=samples, progress=progress, threads=threads)
         else:
             with clock("load torch"):
                 from scenelang.backend.neural import choose_device, draw_program, open_model

@@ -23,7 +23,7 @@ from math import hypot, inf, sqrt
 
 from scenelang.graph import affine
 from scenelang.graph.space import EVERYWHERE, Box, Refusal, Space
-from scenelang.graph.stage import decoded
+from scenelang.graph.stage import decoded, encoded
 from scenelang.graph.steps import IDENTITY, Affine, Displace, Rows, Step, Turn, Twist
 from scenelang.scene import schema
 
@@ -47,6 +47,9 @@ class Solid(Space):
     def inked(self, op: schema.MaterialOp) -> schema.MaterialOp:
         """Light adds up, so that colours are linear."""
         return schema.Color(decoded(op.rgb)) if isinstance(op, schema.Color) else op
+
+    def written(self, rgb: tuple[float, float, float]) -> tuple[float, float, float]:
+        return encoded(rgb)
 
     def holds(self, rows: Rows) -> bool:
         return True

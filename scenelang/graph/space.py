@@ -69,6 +69,10 @@ class Space(ABC):
         """An operation of a material in the space that colours are averaged in."""
         return op
 
+    def written(self, rgb: tuple[float, float, float]) -> tuple[float, float, float]:
+        """A colour of that space as it is written."""
+        return rgb
+
     @abstractmethod
     def holds(self, rows: Rows) -> bool:
         """Whether a map is one that `fitted` gives."""

@@ -32,6 +32,12 @@ def decoded(srgb: Triple) -> Triple:
     return r, g, b
 
 
+def encoded(linear: Triple) -> Triple:
+    """The inverse of `decoded`."""
+    r, g, b = (12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055 for v in linear)
+    return r, g, b
+
+
 class Camera(Record):
     """Where the picture is taken from.
 

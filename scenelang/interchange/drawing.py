@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from scenelang.graph.dump import hex_text, move_text
+from scenelang.graph.dump import hex_text, move_text, op_text, stage_text
 from scenelang.graph.looks import coloured
 from scenelang.graph.nodes import Fold, Graph, Leaf, Node
 from scenelang.graph.space import Space
@@ -100,11 +100,12 @@ def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:
     """A graph after `lower` or any pass."""
     drawn = Drawing()
     width, height = graph.canvas
-    top = drawn.add(Box((f"scene {width} x {height}",)))
+    stage = () if graph.stage is None else stage_text(graph.stage)
+    top = drawn.add(Box((f"scene {width} x {height}", *stage)))
     todo: deque[tuple[int, Fold]] = deque([(top, graph.root)])
     while todo:
         parent, fold = todo.popleft()
-        links = [("" if at == 0 else link.op, link.node) for at, link in enumerate(fold.links)]
+        links = [("" if at == 0 else op_text(link), link.node) for at, link in enumerate(fold.links)]
         for word, node in _some(drawn, parent, links, most):
             number = drawn.add(_graph_box(node, graph.space), parent, word)
             if isinstance(node, Fold):
@@ -115,7 +116,7 @@ def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:
 def _graph_box(node: Node, space: Space) -> Box:
     moves = _short([move_text(move, space) for move in node.moves])
     if isinstance(node, Leaf):
-        return Box((node.geometry, *moves), hex_text(node.look.colour()), leaf=True)
+        return Box((node.geometry, *moves), hex_text(space.written(node.look.colour())), leaf=True)
     return Box((node.kind, *moves))
 
 
@@ -125,7 +126,8 @@ def draw_program(program: Program, most: int = MOST_BOXES) -> Drawing:
 
     drawn = Drawing(sideways=True)
     width, height = program.canvas
-    last = drawn.add(Box((f"program {width} x {height}", f"model {program.model}")))
+    stage = () if program.stage is None else stage_text(program.stage)
+    last = drawn.add(Box((f"program {width} x {height}", f"model {program.model}", *stage)))
     names = {value: word for word, value in TOKENS.items()}
     tokens = program.tokens.tolist()
     for at, name in enumerate(program.objects[:most]):

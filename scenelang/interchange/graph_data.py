@@ -6,7 +6,9 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from scenelang.deep import deep_stack
-from scenelang.graph.nodes import Graph, Leaf, Move, Node
+from scenelang.graph.dump import stage_text
+from scenelang.graph.nodes import BLEND, Graph, Leaf, Link, Move, Node
+from scenelang.graph.stage import Stage, stage_data
 from scenelang.graph.steps import Affine
 
 if TYPE_CHECKING:
@@ -16,7 +18,8 @@ if TYPE_CHECKING:
 def graph_data(graph: Graph) -> dict[str, Any]:
     """A graph: leaves and folds with their moves, nearest the leaf first.
 
-    An affine move is the upper three rows of its matrix; the others are their fields.
+    An affine move is the upper three rows of its matrix; the others are their fields. Solids have a stage,
+    and linear colours.
     """
     with deep_stack():
         root = _node(graph.root)
@@ -24,8 +27,13 @@ def graph_data(graph: Graph) -> dict[str, Any]:
         "canvas": list(graph.canvas),
         "background": None if graph.background is None else list(graph.background),
         "dimension": graph.space.dimension,
+        **_staged(graph.stage),
         "root": root,
     }
+
+
+def _staged(stage: Stage | None) -> dict[str, Any]:
+    return {} if stage is None else {"stage": stage_data(stage)}
 
 
 def _node(node: Node) -> dict[str, Any]:
@@ -33,8 +41,13 @@ def _node(node: Node) -> dict[str, Any]:
     if isinstance(node, Leaf):
         look = {"geometry": node.geometry, "material": node.look.material, "rgb": list(node.look.colour())}
         return {"kind": "leaf", **look, "moves": moves}
-    links = [{"op": link.op, "node": _node(link.node)} for link in node.links]
+    links = [{"op": link.op, **_width(link), "node": _node(link.node)} for link in node.links]
     return {"kind": node.kind, "moves": moves, "links": links}
+
+
+def _width(link: Link) -> dict[str, Any]:
+    """The width of a blend that is not the usual one."""
+    return {"k": link.k} if link.op == "smooth" and link.k != BLEND else {}
 
 
 def _move(move: Move) -> dict[str, Any]:
@@ -66,6 +79,7 @@ def program_data(program: Program) -> dict[str, Any]:
     return {
         "canvas": list(program.canvas),
         "background": None if program.background is None else list(program.background),
+        **_staged(program.stage),
         "model": program.model,
         "weights": program.weights,
         "digest": program.digest(),
@@ -78,11 +92,13 @@ def program_table(program: Program) -> str:
     width, height = program.canvas
     head = f"program {width}x{height}, model {program.model}, weights {program.weights[:12]}"
     lines = [f"{head}, digest {program.digest()[:12]}"]
+    lines += [] if program.stage is None else stage_text(program.stage)
     rows = [("row", "token", "object", "bounds", "place")]
     for at, (name, token, bounds, place) in enumerate(
         zip(program.objects, _tokens(program), program.bounds.tolist(), program.places, strict=True)
     ):
-        box = f"[{bounds[0]:.4g} {bounds[1]:.4g}; {bounds[2]:.4g} {bounds[3]:.4g}]"
+        x, y, *rest = (f"{v:.4g}" for v in bounds)
+        box = f"[{x} {y}; {' '.join(rest)}]" if program.stage is None else f"({x} {y} {rest[0]}; {rest[1]})"
         where = "" if place is None else f"{place.file}:{place.line}:{place.column}"
         rows.append((str(at), token, name, box, where))
     widths = [max(len(row[column]) for row in rows) for column in range(4)]

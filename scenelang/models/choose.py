@@ -20,8 +20,8 @@ def choose_model(scene: Scene, models: Iterable[Manifest], *, names_only: bool =
         names_only: do not ask whether they take its settings.
 
     Returns:
-        The fitting manifest with the fewest geometries, then the fewest other words, then the least measured
-        error, then the first by name; None if none fits.
+        The fitting manifest with the fewest dimensions, then the fewest geometries, then the fewest other
+        words, then the least measured error, then the first by name; None if none fits.
     """
     used = [use for use in uses(scene) if not names_only or use[1] != "settings"]
     fitting = [
@@ -53,9 +53,9 @@ def paints(model: Manifest, scene: Scene) -> bool:
     )
 
 
-def _size(model: Manifest) -> tuple[int, int, float, str]:
+def _size(model: Manifest) -> tuple[int, int, int, float, str]:
     others = len(model.materials) + len(model.transforms) + len(model.material_ops)
-    return len(model.geometries), others, model.flip(), model.name
+    return model.dimension, len(model.geometries), others, model.flip(), model.name
 
 
 def lacking(model: Manifest, used: Iterable[Use]) -> list[str]:

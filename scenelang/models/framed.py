@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import hashlib
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scenelang.lifting.layout import LAYOUTS
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.weights import ModelError, check_shapes, open_weights, shipped_weights
 from scenelang.renderers.network import FramedArrays, FramedConfig, parameter_shapes
+
+if TYPE_CHECKING:
+    from scenelang.renderers.solid.network import SolidArrays
 
 MOST_WIDTH = 1024
 
@@ -17,7 +20,7 @@ MOST_WIDTH = 1024
 class ArrayModel(NamedTuple):
     """A shipped network that numpy draws with, and the SHA-256 of its weights file, hex."""
 
-    network: FramedArrays
+    network: FramedArrays | SolidArrays
     digest: str
 
 
@@ -69,4 +72,9 @@ def load_arrays(name: str) -> ArrayModel:
         ModelError: its weights are missing or damaged.
     """
     manifest, data = load_manifest(name), shipped_weights(name)
-    return ArrayModel(framed_arrays(data, manifest), hashlib.sha256(data).hexdigest())
+    digest = hashlib.sha256(data).hexdigest()
+    if manifest.renderer == "solid":
+        from scenelang.models.solid import solid_arrays
+
+        return ArrayModel(solid_arrays(data, len(manifest.geometries), len(manifest.materials)), digest)
+    return ArrayModel(framed_arrays(data, manifest), digest)

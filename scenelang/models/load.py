@@ -14,16 +14,18 @@ from torch import Tensor
 from scenelang.lifting.layout import LAYOUTS, WIDTH
 from scenelang.models.framed import MOST_WIDTH, framed_config
 from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.models.solid import solid_config
 from scenelang.models.weights import LIFTING, Codes, check_shapes, codes_of, open_weights, shipped_weights
 from scenelang.models.weights import ModelError as ModelError
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.reading import Reading, ReadingConfig
+from scenelang.renderers.solid.parameters import Solids
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 
 RENDERER = "renderer."
 """In front of the names of a renderer's tensors, where a file holds it beside a lifting's."""
 
-Network = Framed | Streaming | Reading
+Network = Framed | Solids | Streaming | Reading
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,7 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
             network = make(header["config"], manifest, len(data))
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise ModelError(f"bad network sizes: {error}") from None
-    if not isinstance(network, Framed):
+    if not isinstance(network, Framed | Solids):
         arrays = {
             name.removeprefix(RENDERER): array.astype(np.float32) if array.dtype == np.float16 else array
             for name, array in arrays.items()
@@ -90,6 +92,10 @@ def _framed(config: dict[str, Any], manifest: Manifest, size: int) -> Framed:
     made = Framed(framed_config(config, size), len(manifest.geometries), len(manifest.materials))
     made.layout = LAYOUTS[manifest.layout]
     return made
+
+
+def _solid(config: dict[str, Any], manifest: Manifest, size: int) -> Solids:
+    return Solids(solid_config(config), len(manifest.geometries), len(manifest.materials))
 
 
 def _streaming(config: dict[str, Any], manifest: Manifest, size: int) -> Streaming:
@@ -114,7 +120,7 @@ def _reading(config: dict[str, Any], manifest: Manifest, size: int) -> Reading:
 
 
 _Make = Callable[[dict[str, Any], Manifest, int], Network]
-_MAKERS: dict[str, _Make] = {"framed": _framed, "streaming": _streaming, "reading": _reading}
+_MAKERS: dict[str, _Make] = {"framed": _framed, "solid": _solid, "streaming": _streaming, "reading": _reading}
 
 
 def load_model(name: str, device: str = "cpu", path: Path | None = None) -> Model:

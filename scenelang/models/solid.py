@@ -2,9 +2,29 @@
 
 from __future__ import annotations
 
-from scenelang.models.framed import MOST_WIDTH
+from dataclasses import astuple
+from typing import Any, Final
+
 from scenelang.models.weights import ModelError, check_shapes, open_weights
 from scenelang.renderers.solid.network import SolidArrays, SolidConfig, solid_shapes
+
+MOST_SIZE: Final = 128
+"""Of a layer: so many units squared, times the code, are 9 MB."""
+
+
+def solid_config(config: Any) -> SolidConfig:
+    """Sizes of the network in a weights file.
+
+    Raises:
+        ModelError: they are missing, unknown or out of range.
+    """
+    try:
+        found = SolidConfig(**config["network"])
+    except (KeyError, TypeError) as error:
+        raise ModelError(f"bad network sizes: {error}") from None
+    if any(type(v) is not int or not 1 <= v <= MOST_SIZE for v in astuple(found)):
+        raise ModelError("a network size is out of range")
+    return found
 
 
 def solid_arrays(data: bytes, geometries: int, materials: int) -> SolidArrays:
@@ -14,12 +34,6 @@ def solid_arrays(data: bytes, geometries: int, materials: int) -> SolidArrays:
         ModelError: the file does not fit the model or itself, or holds numbers that are not finite.
     """
     header, arrays = open_weights(data)
-    try:
-        config = SolidConfig(**header["config"]["network"])
-    except (KeyError, TypeError) as error:
-        raise ModelError(f"bad network sizes: {error}") from None
-    sizes = (config.code, config.material_code, config.width, config.paint_lines, config.kind_lines)
-    if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes):
-        raise ModelError("a network size is out of range")
+    config = solid_config(header.get("config"))
     check_shapes(arrays, solid_shapes(config, geometries, materials))
     return SolidArrays(config, arrays)

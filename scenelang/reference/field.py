@@ -78,5 +78,5 @@ def evaluate(node: Node, p: Array, outer: tuple[Step, ...] = ()) -> tuple[Any, A
             big_d, big_c = d, c
         elif not (empty and link.op == "smooth"):  # nothing blends with the empty set
             with np.errstate(invalid="ignore"):
-                big_d, big_c = combine(big_d, big_c, d, c, TOKENS[link.op])
+                big_d, big_c = combine(big_d, big_c, d, c, TOKENS[link.op], link.k)
     return big_d, big_c

@@ -1,4 +1,4 @@
-"""The exact picture of a plane scene, in float64: the definition that accuracy is measured against.
+"""The exact picture of a scene, in float64: the definition that accuracy is measured against.
 
 It is drawn from the graph as written (`scenelang.graph.lower`), before any pass, so that it checks the
 compiler too. No renderer imports it.
@@ -27,7 +27,7 @@ def sample_points(canvas: tuple[int, int], rows: range, per_side: int) -> npt.ND
 
 
 def reference_image(graph: Graph, *, per_side: int = 2) -> Image:
-    """Draw the exact picture of a lowered 2D graph.
+    """Draw the exact picture of a lowered graph.
 
     Args:
         graph: from `lower`; passes keep its picture.
@@ -35,7 +35,14 @@ def reference_image(graph: Graph, *, per_side: int = 2) -> Image:
 
     Returns:
         (H, W, 3), or (H, W, 4) with straight alpha where the background is none.
+
+    Raises:
+        ValueError: the eye is inside something opaque.
     """
+    if graph.stage is not None:
+        from scenelang.reference.solid.image import solid_image
+
+        return solid_image(graph.root, graph.stage, graph.canvas, per_side=per_side)
     width, height = graph.canvas
     step = max(1, TILE // (width * per_side * per_side))
     colour = np.empty((height, width, 3))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from scenelang.renderers.coverage import Coverage, Tile
 from scenelang.renderers.field import Field
 from scenelang.renderers.kept import Kept
 from scenelang.renderers.network import FramedNetwork
+
+if TYPE_CHECKING:
+    from scenelang.renderers.solid.network import SolidNetwork
 
 TILE = 1 << 15  # pixels that are drawn at a time
 
@@ -32,6 +36,47 @@ class Drawing:
     pairs: int
     refined: int
     met: int
+
+
+def draw_objects(
+    network: FramedNetwork | SolidNetwork,
+    program: Program,
+    *,
+    threads: int = 1,
+    split: int | None = None,
+    kept: Kept | None = None,
+    skip: bool = True,
+    samples: str = "adaptive",
+    progress: Callable[[float], None] | None = None,
+) -> Drawing:
+    """Draw a Program of the plane or of solids, as `draw` does.
+
+    Solids are drawn anew in each picture, and always with the rules that ``skip`` leaves out.
+
+    Raises:
+        ProgramError: as `draw`, or the Program and the network are of different dimensions.
+    """
+    if network.layout.dimension == 2:
+        if program.stage is not None:
+            raise ProgramError("a program of solids, which the model does not draw")
+        return draw(
+            network,  # type: ignore[arg-type]
+            program,
+            threads=threads,
+            split=split,
+            kept=kept,
+            skip=skip,
+            samples=samples,
+            progress=progress,
+        )
+    from scenelang.renderers.solid.draw import draw_solids
+    from scenelang.renderers.solid.field import SolidField
+
+    if program.stage is None:
+        raise ProgramError("a program of the plane, which the model does not draw")
+    field = SolidField(network, program.vectors, program.tokens)  # type: ignore[arg-type]
+    image, met = draw_solids(field, program.stage, program.canvas, adaptive=samples == "adaptive")
+    return Drawing(image, met, 0, 0)
 
 
 def draw(

@@ -17,7 +17,8 @@ from scenelang.renderers.network import EMPTY, Cell, Decoder, FramedNetwork
 
 UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
-BLEND_REACH = 0.3  # world units: farther objects cannot change a blend (2 k for the trained k = 0.15)
+BLEND = 0.15  # world units: the width of the blends that the cell is trained on
+FARTHER = 2.0  # widths of a blend at which objects cannot change it
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +31,7 @@ class Row:
         colour: (R, 1).
         decoder: its own.
         reach: leaf units from its origin beyond which it changes nothing; inf where it concerns every point.
+        cell: the weights of its token and of the width of its blend.
     """
 
     frame: ObjectFrame
@@ -37,6 +39,7 @@ class Row:
     colour: Array
     decoder: Decoder
     reach: float
+    cell: Cell
 
     @property
     def draws(self) -> bool:
@@ -80,6 +83,8 @@ class Field:
             self.slope = float(self.xp.exp(network.read_slope)) / 4
             self.unit = float(np.linalg.norm(self.xp.to_numpy(self.cells[UNION].candidate[0])))
             """Growth of the margin per world unit."""
+            self.widest = BLEND
+            """Of the blends, at least the usual one."""
             self.rows = self._rows(vectors, tokens)
 
     def _rows(self, vectors: np.ndarray, tokens: np.ndarray) -> list[Row]:
@@ -98,21 +103,30 @@ class Field:
         albedo = xp.concat([albedo, xp.full((len(g), 1), 1.0, like)], 1)
         matrix = xp.array(m[:, layout.colour].reshape(-1, 3, 4).copy(), like)
         colours = (matrix @ albedo[:, :, None]).clip(0.0, 1.0)  # (N, 3, 1)
-        blends_after = np.cumsum((tokens == SMOOTH)[::-1])[::-1]  # smooth unions from this row on
+        widths = np.where(vectors[:, layout.blend] > 0, vectors[:, layout.blend].astype(float), BLEND)
+        # the widest of the smooth unions from each row on, 0 for none
+        blends_after = np.maximum.accumulate(np.where(tokens == SMOOTH, widths, 0.0)[::-1])[::-1]
+        self.widest = max(BLEND, float(blends_after[0]))
         rows = []
         for i, token in enumerate(tokens.tolist()):
             frame = self.frames[g[i].tobytes()]
             if token == INTERSECT or (token == SUBTRACT and blends_after[i]):
                 reach = float("inf")
             else:
-                reach = 1.0 + SLACK + (BLEND_REACH / frame.scale if blends_after[i] else 0.0)
-            rows.append(Row(frame, token, colours[i], shapes[tuple(g[i, : layout.code].tolist())], reach))
+                reach = 1.0 + SLACK + FARTHER * blends_after[i] / frame.scale
+            cell = self.cells[token]
+            if token == SMOOTH and widths[i] != BLEND:
+                # The fold of s d and s D is s D', so that the cell's own width is that of any other.
+                scale = BLEND / float(widths[i])
+                cell = Cell(cell.lines * scale, cell.bias, cell.candidate, cell.bump / scale)
+            decoder = shapes[tuple(g[i, : layout.code].tolist())]
+            rows.append(Row(frame, token, colours[i], decoder, float(reach), cell))
         return rows
 
     def empty(self, count: int) -> Array:
         """State and register (S + 3, M) of points that have met nothing."""
         memory = self.xp.full((self.network.config.state + 3, count), 0.0, self.network.codes)
-        memory[0] = EMPTY
+        memory[0] = EMPTY * self.widest / BLEND
         return memory
 
     def local(self, row: Row, p: Array) -> Array:
@@ -135,7 +149,7 @@ class Field:
         features = self.network.decode(q, radius, row.frame.scale, row.decoder)
         if row.frame.wild:
             features = features.clip(-FAR, FAR)
-        new = self.network.step(features, memory[:s], memory[s:], row.colour, self.cells[row.token])
+        new = self.network.step(features, memory[:s], memory[s:], row.colour, row.cell)
         return self.xp.concat(new, 0), abs(features[0]) / row.frame.stretch
 
     def picture(self, memory: Array) -> Array:

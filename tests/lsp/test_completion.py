@@ -29,7 +29,7 @@ def test_completion_of_statements_goes_by_the_block(client: Client, uri: str) ->
 
 
 def test_completion_in_a_material_offers_its_operations(client: Client, uri: str) -> None:
-    client.replace(uri, "square { material flat {  } }\n")
+    client.replace(uri, 'model "shapes2d";\nsquare { material flat {  } }\n')
     found = labels(client, client.at(uri, "{  }", 2))
     assert {"color", "hue", "grayscale", "flip"} <= set(found)
     assert not {"twirl", "square"} & set(found)

@@ -11,7 +11,7 @@ from scenelang.measure.scenes import draw_scene, reference_of, scenes_of
 from scenelang.models.manifest import available, load_manifest
 from scenelang.program.compile import compile_scene
 
-MODELS = available()
+MODELS = [name for name in available() if load_manifest(name).dimension == 2]
 
 
 @pytest.mark.parametrize("name", MODELS)

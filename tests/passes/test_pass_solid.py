@@ -12,13 +12,14 @@ from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link
 from scenelang.graph.stage import Stage
 from scenelang.graph.verify import verify
+from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
 from scenelang.passes.context import Context
 from scenelang.reference.solid.field import Field
 from scenelang.scene import schema
 from scenelang.words import COMBINE
-from tests.models import SOLIDS
 
+SOLIDS = load_manifest("solids3d")
 CHECKS = {"check_levels", "check_trained"}
 
 

@@ -128,7 +128,7 @@ class SolidField:
                     radius=radius,
                     centre=xp.array(centre, like),
                     extent=float(np.linalg.norm(back, 2)) * frame.ball(radius),
-                    cells=self.network.cell(token, frame.blend if smooth and frame.blend > 0 else BLEND),
+                    cells=self.network.cell(token, frame.blend if smooth else BLEND),
                 )
             )
         return solids[::-1]

@@ -15,6 +15,7 @@ from scenelang.lifting.layout import SOLID_LAYOUT, Layout
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.frames import MOST
+from scenelang.renderers.solid.network import BLEND
 
 
 class Turn(NamedTuple):
@@ -171,7 +172,7 @@ def read_solid_frame(g: np.ndarray, layout: Layout = SOLID_LAYOUT) -> SolidFrame
         moved=moved,
         amount=amount,
         frequency=frequency,
-        blend=blend,
+        blend=blend if blend > 0 else BLEND,
     )
 
 

@@ -1,0 +1,106 @@
+"""Scenes of solids from text to picture, by the network and exactly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+from scenelang.backend.errors import RenderError
+from scenelang.backend.neural import draw_program, open_model
+from scenelang.backend.small import choose_drawer, draw_small
+from scenelang.measure.plan import plan_of
+from scenelang.program.program import Program
+
+TEXT = """nsg 1;
+canvas(72, 48);
+animate(seconds = 1, fps = 3);
+let mist = material volumetric { color([0.3, 0.5, 1.0]); };
+module ball(at, c = #e8c060) {
+  sphere { scale(0.6); translate(at); material diffuse { color(c); } }
+}
+chain {
+  ball(at = [0, 0.5 - u, 0]);
+  smooth torus { displace(0.04, 6); twist(0.7); twirl(0.4); scale(0.8); rotate(40deg, axis = [1, 2, 0]); }
+  subtract sphere { scale(0.4); translate(0.3, 0.6, 0.6); }
+  torus  { scale(1.2, 1.2, 0.4); bend(0.3); rotate(70deg, axis = X); mist { hue(0.1turn); } }
+}
+"""
+
+
+def psnr(a: nsg.Image, b: nsg.Image) -> float:
+    return float(-10 * np.log10(np.square(np.asarray(a, float) - np.asarray(b, float)).mean() + 1e-12))
+
+
+@pytest.fixture(scope="module")
+def scene() -> nsg.Scene:
+    return nsg.loads(TEXT)
+
+
+@pytest.fixture(scope="module")
+def program(scene: nsg.Scene) -> Program:
+    return nsg.compile(scene)
+
+
+@pytest.fixture(scope="module")
+def exact(scene: nsg.Scene) -> nsg.Image:
+    return nsg.render(scene, backend="reference")
+
+
+def test_the_network_draws_what_the_reference_does(
+    scene: nsg.Scene, program: Program, exact: nsg.Image, tmp_path: Path
+) -> None:
+    picture = nsg.render(scene)
+    assert picture.shape == (48, 72, 3)
+    assert psnr(picture, exact) > 42
+    assert np.array_equal(nsg.render(program), picture)
+    program.save(tmp_path / "p.safetensors")
+    assert np.array_equal(nsg.render(nsg.load_program(tmp_path / "p.safetensors")), picture)
+    assert np.array_equal(nsg.render(scene, threads=1), nsg.render(scene, threads=3))
+
+
+def test_torch_draws_the_same(program: Program, exact: nsg.Image) -> None:
+    assert choose_drawer(program).library == "numpy"
+    assert choose_drawer(program, "cpu").library == "torch"
+    drawn = nsg.render(program, device="cpu")
+    assert psnr(drawn, nsg.render(program)) > 48
+    assert psnr(drawn, exact) > 42
+
+
+def test_samples_and_backgrounds(scene: nsg.Scene, exact: nsg.Image) -> None:
+    program = nsg.compile(scene)
+    four, one = (draw_small(program, samples=samples) for samples in ("four", "one"))
+    assert psnr(four.image, exact) > 42
+    assert 20 < psnr(one.image, exact) < psnr(four.image, exact)
+    assert four.pairs > 2 * one.pairs
+    clear = scene.model_copy(update={"background": None})
+    ours, theirs = nsg.render(clear), nsg.render(clear, backend="reference")
+    assert ours.shape == theirs.shape == (48, 72, 4)
+    assert abs(np.asarray(ours)[..., 3] - np.asarray(theirs)[..., 3]).mean() < 2e-3
+
+
+def test_a_model_draws_its_own_dimension(scene: nsg.Scene, program: Program) -> None:
+    flat = nsg.compile(nsg.loads("square { }"))
+    with pytest.raises(RenderError):
+        draw_program(program, open_model("shapes2d"))
+    with pytest.raises(RenderError):
+        draw_program(flat, open_model("solids3d"))
+    assert flat.model == "shapes2d"
+    assert nsg.compile(nsg.loads("canvas(8, 8);")).model == "shapes2d"
+    assert program.model == "solids3d"
+
+
+def test_plans_of_solids(scene: nsg.Scene, program: Program) -> None:
+    found = plan_of(scene, program, {}, open_model("solids3d"))
+    assert found["model"] == "solids3d"
+    assert found["rows"] == 4
+    assert found["drawing"]["psnr"] > 40
+    assert 0 < found["drawing"]["refined"] < found["drawing"]["pixels"]
+
+
+def test_nothing_is_seen_from_inside() -> None:
+    inside = nsg.loads("sphere { translate(0, 1.2, 6); }")
+    with pytest.raises(RenderError, match="inside"):
+        nsg.render(inside, backend="reference")
