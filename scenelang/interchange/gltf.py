@@ -108,9 +108,9 @@ def _manifest(gltf: Gltf, model: str | None) -> Manifest:
     leaves = [_names(gltf, node) for node in gltf.nodes if node.mesh is not None or not node.children]
     manifests = [load_manifest(name) for name in available()]
 
-    def rank(manifest: Manifest) -> tuple[int, int]:
+    def rank(manifest: Manifest) -> tuple[int, int, int]:
         fitting = sum(geometry_of(names, manifest.geometries) is not None for names in leaves)
-        return -fitting, len(manifest.geometries)
+        return -fitting, manifest.dimension, len(manifest.geometries)
 
     return min(manifests, key=rank)
 

@@ -15,6 +15,7 @@ from scenelang.graph.lower import Memory, Spans, lower
 from scenelang.graph.nodes import Graph
 from scenelang.graph.verify import Invariant, Sound, verify
 from scenelang.models.manifest import Manifest
+from scenelang.passes.check_eye import check_eye
 from scenelang.passes.check_levels import check_levels
 from scenelang.passes.check_trained import check_trained
 from scenelang.passes.context import Context
@@ -47,6 +48,7 @@ PASSES: tuple[Pass, ...] = (
     Pass(fold_warps, frozenset({Invariant.NO_IDENTITIES})),
     Pass(check_levels),
     Pass(linearise, frozenset({Invariant.STREAM})),
+    Pass(check_eye),
     Pass(drop_unseen),
     Pass(drop_hidden),
     Pass(check_trained),

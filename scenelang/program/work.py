@@ -1,4 +1,4 @@
-"""How much there is to draw in a Program, counted from its rows and bounds alone."""
+"""How much there is to draw in a Program of the plane, counted from its rows and bounds alone."""
 
 from __future__ import annotations
 

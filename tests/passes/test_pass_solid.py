@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,17 +11,19 @@ import pytest
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link
-from scenelang.graph.stage import Stage
+from scenelang.graph.stage import Camera, Stage
 from scenelang.graph.verify import verify
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
+from scenelang.passes.check_eye import check_eye
 from scenelang.passes.context import Context
+from scenelang.passes.linearise import linearise
 from scenelang.reference.solid.field import Field
 from scenelang.scene import schema
 from scenelang.words import COMBINE
 
 SOLIDS = load_manifest("solids3d")
-CHECKS = {"check_levels", "check_trained"}
+CHECKS = {"check_eye", "check_levels", "check_trained"}
 
 
 def random_transform(rng: random.Random) -> schema.Transform:
@@ -116,6 +119,28 @@ def test_random_trees_keep_their_picture(block: int) -> None:
     assert accepted > 40
     assert covered > 1000
     assert shorter > 0
+
+
+def test_eyes_inside_are_reported() -> None:
+    """Where the exact field says so."""
+    seen = {"opaque": 0, "clear": 0}
+    for seed in range(250):
+        rng = random.Random(seed)
+        scene = schema.Scene(nodes=[random_leaf(rng, 0.3) for _ in range(2)])
+        chain = schema.Chain(
+            [schema.Link(rng.choice(COMBINE) if i else "union", n) for i, n in enumerate(scene.nodes)]
+        )
+        graph = widened(lower(schema.Scene(nodes=chain), SOLIDS, None, Diagnostics()), rng)
+        context = Context(SOLIDS, Diagnostics())
+        for step in PASSES[: [step.run for step in PASSES].index(linearise) + 1]:
+            graph = step.run(graph, context)
+        eye = rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3)
+        found = Field(graph.root).at(np.reshape(eye, (3, 1)))
+        opaque = bool(found.d[0] < 0.0) and not np.atleast_1d(found.medium)[0]
+        check_eye(replace(graph, stage=Stage(Camera(eye))), context)
+        assert [d.code for d in context.diagnostics] == ["E0408"] * opaque
+        seen["opaque" if opaque else "clear"] += 1
+    assert min(seen.values()) > 15
 
 
 def test_what_is_below_the_ground_is_left_out() -> None:
