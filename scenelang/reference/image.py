@@ -7,23 +7,14 @@ compiler too. No renderer imports it.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from scenelang.graph.nodes import Graph
 from scenelang.image import Image, from_samples
 from scenelang.reference.field import evaluate
+from scenelang.reference.samples import sample_points
+from scenelang.reference.solid.image import solid_image
 
 TILE = 1 << 18  # samples at a time
-
-
-def sample_points(canvas: tuple[int, int], rows: range, per_side: int) -> npt.NDArray[np.float64]:
-    """World coordinates (2, M) of the samples of some pixel rows, row by row of samples."""
-    width, height = canvas
-    unit = min(width, height) / 2
-    x = ((np.arange(width * per_side) + 0.5) / per_side - width / 2) / unit
-    fine = np.arange(rows.start * per_side, rows.stop * per_side)
-    y = (height / 2 - (fine + 0.5) / per_side) / unit
-    return np.stack([np.tile(x, len(y)), np.repeat(y, len(x))])
 
 
 def reference_image(graph: Graph, *, per_side: int = 2) -> Image:
@@ -40,8 +31,6 @@ def reference_image(graph: Graph, *, per_side: int = 2) -> Image:
         ValueError: the eye is inside something opaque.
     """
     if graph.stage is not None:
-        from scenelang.reference.solid.image import solid_image
-
         return solid_image(graph.root, graph.stage, graph.canvas, per_side=per_side)
     width, height = graph.canvas
     step = max(1, TILE // (width * per_side * per_side))

@@ -71,9 +71,8 @@ def test_torch_draws_the_same(program: Program, exact: nsg.Image) -> None:
 
 def test_samples_and_backgrounds(scene: nsg.Scene, exact: nsg.Image) -> None:
     program = nsg.compile(scene)
-    four, few = (draw_small(program, samples=samples) for samples in ("four", "adaptive"))
+    four = draw_small(program, samples="four")
     assert psnr(four.image, exact) > 42
-    assert four.pairs > 1.5 * few.pairs
     clear = scene.model_copy(update={"background": None})
     ours, theirs = nsg.render(clear), nsg.render(clear, backend="reference")
     assert ours.shape == theirs.shape == (48, 72, 4)
