@@ -146,9 +146,9 @@ def test_missing_weights(device: Device, monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 def test_what_is_refused() -> None:
     with pytest.raises(nsg.SceneError, match="E0501"):
-        nsg.render(nsg.Scene(nodes=(nsg.Object("sphere"),)))
+        nsg.render(nsg.Scene(nodes=(nsg.Object("circle"),)))
     with pytest.raises(nsg.SceneError, match="E0501"):
-        nsg.render(nsg.Scene(nodes=(nsg.Object("sphere"),)), backend="reference")
+        nsg.render(nsg.Scene(nodes=(nsg.Object("circle"),)), backend="reference")
     with pytest.raises(nsg.RenderError, match="the reference draws scenes"):
         nsg.render(program(SMALL), backend="reference")
     with pytest.raises(ValueError, match="unknown backend"):

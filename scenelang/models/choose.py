@@ -11,19 +11,21 @@ from scenelang.words import BLEND, STAGE
 WHITE = (1.0, 1.0, 1.0)
 
 
-def choose_model(scene: Scene, models: Iterable[Manifest], *, names_only: bool = False) -> Manifest | None:
+def choose_model(scene: Scene, models: Iterable[Manifest], *, lenient: bool = False) -> Manifest | None:
     """The smallest of ``models`` that has every name the scene uses and draws its canvas.
 
     Args:
         scene: a scene; if it names a model, only that one fits.
         models: manifests to choose from.
-        names_only: do not ask whether they take its settings.
+        lenient: leave its settings out, and names that none of them has.
 
     Returns:
         The fitting manifest with the fewest dimensions, then the fewest geometries, then the fewest other
         words, then the least measured error, then the first by name; None if none fits.
     """
-    used = [use for use in uses(scene) if not names_only or use[1] != "settings"]
+    models, used = list(models), list(uses(scene))
+    if lenient:
+        used = [use for use in used if use[1] != "settings" and any(not lacking(m, [use]) for m in models)]
     fitting = [
         m for m in models if scene.model in (None, m.name) and not lacking(m, used) and paints(m, scene)
     ]

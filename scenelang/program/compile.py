@@ -84,8 +84,8 @@ def find_model(
         diagnostics.add("E0210", f"unknown model `{name}`", place, help=f"the models are {listed}")
         return None
     manifests = [load_manifest(k) for k in known]
-    # Of what no model takes, one that has all names says what it lacks.
-    fitting = choose_model(scene, manifests) or choose_model(scene, manifests, names_only=True)
+    # Of what no model has or takes, one that has all else says what it lacks.
+    fitting = choose_model(scene, manifests) or choose_model(scene, manifests, lenient=True)
     if fitting is not None:
         return fitting
     best = best_of_sets(manifests)

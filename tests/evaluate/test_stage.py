@@ -96,8 +96,9 @@ def test_imported_files_have_no_stage(tmp_path: Path) -> None:
         ("ground(none);", "solids3d"),
         ("background(#000);", "shapes2d"),
         ("light(); square;", None),
+        ("ground(); smooth(k = 0.3) { square; star; }", None),
         ("smooth(k = 0.3) { sphere; torus; }", "solids3d"),
-        ("chain { square; smooth(k = 0.3) star; }", None),
+        ("chain { square; smooth(k = 0.3) star; }", "shapes2d"),
     ],
 )
 def test_settings_choose_the_model(text: str, model: str | None) -> None:
@@ -111,8 +112,8 @@ def test_settings_choose_the_model(text: str, model: str | None) -> None:
         (nsg.Scene(camera=nsg.Camera(), ground=None), SHAPES, ["E0511", "E0511"]),
         (nsg.Scene(camera=nsg.Camera(), ground=None), SOLIDS, []),
         (nsg.Scene(light=nsg.Light(), background=(1, 1, 1)), STUDIO, ["E0336", "E0336"]),
-        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("star")] * 2, k=0.2)), SHAPES, ["E0512"]),
-        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("star")], k=0.2)), SHAPES, []),
+        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("torus")] * 2, k=0.2)), STUDIO, ["E0512"]),
+        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("torus")], k=0.2)), STUDIO, []),
         (nsg.Scene(nodes=nsg.Group(nsg.Object("sphere"), nsg.Displace(1, 2))), SOLIDS, ["E0407"]),
         (nsg.Scene(nodes=nsg.Object("sphere", [nsg.Displace(1, 2), nsg.Displace(1, 3)])), SOLIDS, ["E0407"]),
         (nsg.Scene(nodes=nsg.Object("sphere", [nsg.Displace(1, 2), nsg.Twist(3)])), SOLIDS, []),
