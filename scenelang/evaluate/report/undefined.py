@@ -7,7 +7,7 @@ from typing import Final
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.diagnostics.suggest import did_you_mean, is_slip, listing, ranked
+from scenelang.diagnostics.suggest import Suggestion, did_you_mean, is_slip, listing, ranked
 from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.names import Binding, Scope
 from scenelang.evaluate.report import foreign_words
@@ -89,7 +89,8 @@ def report_unknown(
     if help is None:
         unused = [n for n, b in around if report.is_unused(n, b.span)]
         help, _ = did_you_mean(name.text, unused, name.span, slips=1, effort=report.effort)
-    suggested = next((b.labels() for n, b in around if help == f"did you mean `{n}`?"), ())
+    meant = help.name if isinstance(help, Suggestion) else None
+    suggested = next((b.labels() for n, b in around if n == meant), ())
     found = report.error(code, message, name.span, help=help, fix=fix, labels=suggested)
     if found is not None:
         report.shared[key] = found
