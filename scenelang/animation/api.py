@@ -117,13 +117,7 @@ def animate(
         _ = clip.animation  # what is wrong with it is said before anything is drawn
     painter = Painter(clip, backend, device, threads)
     return make(
-        painter,
-        target,
-        _numbers(clip, frames),
-        jobs=jobs,
-        palette=palette,
-        dither=dither,
-        progress=progress,
+        painter, target, _numbers(clip, frames), jobs=jobs, palette=palette, dither=dither, progress=progress
     )
 
 

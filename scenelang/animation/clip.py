@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,12 +75,9 @@ class Clip:
     """A scene to be evaluated and compiled frame by frame, or Scenes that are its frames.
 
     Args:
-        source: its text, or the Scenes.
-        path: where it was read from.
         diagnostics: collects what is found, in each frame; a mistake in any frame ends the clip.
-        defines: values for params.
         model: name of the model to draw with, instead of the scene's.
-        root: folder that imports cannot leave; by default that of ``path``.
+        root: folder that imports cannot leave; by default that of ``path``, where the text was read from.
         size: canvas in pixels, instead of the scene's.
         fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
             seconds × fps frames, and t and u follow.
@@ -119,18 +117,15 @@ class Clip:
         self._memory = Memory() if reuse else None
         self.wanted = self._evaluation.wanted
         """All files that it imports, also those that are not there."""
-        self._first: Shot | None = None
 
-    @property
+    @cached_property
     def first(self) -> Shot:
         """The first frame, which every scene has.
 
         Raises:
             SceneError: it has errors.
         """
-        if self._first is None:
-            self._first = self.shot(0)
-        return self._first
+        return self.shot(0)
 
     @property
     def animates(self) -> bool:
@@ -178,11 +173,7 @@ class Clip:
         if self.reuse and self._last is not None and same_nodes(self._last[0].scene, shot.scene):
             return self._last[1]
         program = compile_scene(
-            shot.scene,
-            spans=shot.spans,
-            diagnostics=self.diagnostics,
-            model=self.model,
-            memory=self._memory,
+            shot.scene, spans=shot.spans, diagnostics=self.diagnostics, model=self.model, memory=self._memory
         )
         self._last = shot, program
         return program

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from scenelang.renderers.kept import Kept
 
 Progress = Callable[[float], None]
+_version = lru_cache(version)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,19 +108,8 @@ class Painter:
             from scenelang.backend.small import draw_small
 
             return draw_small(frame.program, kept=self.kept, progress=progress).image
-        return paint(
-            frame.program,
-            self.place,
-            threads=self.split,
-            split=self.split,
-            kept=self.kept,
-            progress=progress,
-        )
-
-
-@lru_cache
-def _version(package: str) -> str:
-    return version(package)
+        split = self.split
+        return paint(frame.program, self.place, threads=split, split=split, kept=self.kept, progress=progress)
 
 
 def paint(
@@ -131,15 +121,7 @@ def paint(
     kept: Kept | None,
     progress: Progress | None = None,
 ) -> Image:
-    """Draw a Program.
-
-    Args:
-        program: a compiled frame.
-        place: a torch device.
-        threads: tiles drawn at the same time.
-        split: how many threads the picture is split for.
-        kept: the picture before it.
-        progress: called with the share done, from any thread.
+    """Draw a Program on a torch device, split for so many threads, of which so many draw at the same time.
 
     Raises:
         RenderError: as for `scenelang.render`.

@@ -78,8 +78,19 @@ class Store:
 
     def has(self, key: str, size: tuple[int, int]) -> bool:
         """Whether a frame is there, whole and of a size (width, height)."""
+        from PIL import Image
+
+        from scenelang.image import image_format
+
         file = self.file(key)
-        return not file.is_symlink() and file.is_file() and _whole(file, size)
+        if file.is_symlink() or not file.is_file():
+            return False
+        # Pillow has no base class for what its readers raise
+        with contextlib.suppress(Exception), Image.open(file, formats=[image_format(file)]) as image:
+            if image.size == size:
+                image.load()
+                return True
+        return False
 
     def remove(self) -> None:
         """Take our files away, and where nothing else is there the folder and those that were made for it."""
@@ -95,22 +106,6 @@ class Store:
         with contextlib.suppress(FileNotFoundError):
             return [self.folder / name for name in os.listdir(self.folder) if pattern.fullmatch(name)]
         return []
-
-
-def _whole(file: Path, size: tuple[int, int]) -> bool:
-    """Whether a file holds a picture of a size, without damage."""
-    from PIL import Image
-
-    from scenelang.image import image_format
-
-    try:
-        with Image.open(file, formats=[image_format(file)]) as image:
-            if image.size != size:
-                return False
-            image.load()
-    except Exception:  # Pillow has no base class for what its readers raise
-        return False
-    return True
 
 
 def put_frame(file: Path, image: Image) -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 from collections.abc import Callable
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen, run
 from typing import Final
 
 import numpy as np
@@ -19,16 +19,7 @@ from scenelang.backend.errors import RenderError
 _H264: Final = ("libx264", "-preset", "medium", "-crf", "16")
 _OTHERS: Final = (("libopenh264", "-b:v", "8M"), ("mpeg4", "-q:v", "2"))
 _VP9: Final = ("libvpx-vp9", "-crf", "18", "-b:v", "0", "-row-mt", "1")
-_BT709: Final = (
-    "-colorspace",
-    "bt709",
-    "-color_primaries",
-    "bt709",
-    "-color_trc",
-    "bt709",
-    "-color_range",
-    "tv",
-)
+_SCALE: Final = "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp"
 _FORMATS: Final = {".mp4": "mp4", ".m4v": "mp4", ".mov": "mov", ".mkv": "matroska", ".webm": "webm"}
 MISSING: Final = "video needs ffmpeg, which is not on the PATH: install it, or pip install 'scenelang[video]'"
 
@@ -57,33 +48,25 @@ def find_ffmpeg() -> str:
 
 @lru_cache(maxsize=1)
 def _encoders(ffmpeg: str) -> frozenset[str]:
-    done = subprocess.run(
-        [ffmpeg, "-hide_banner", "-encoders"],
-        capture_output=True,
-        text=True,
-        errors="replace",
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
-    return frozenset(words[1] for line in done.stdout.splitlines() if len(words := line.split()) > 1)
+    command = [ffmpeg, "-hide_banner", "-encoders"]
+    done = run(command, capture_output=True, check=False, stdin=DEVNULL)
+    lines = done.stdout.decode(errors="replace").splitlines()
+    return frozenset(words[1] for line in lines if len(words := line.split()) > 1)
 
 
-def _codec(ffmpeg: str, suffix: str) -> tuple[str, ...]:
-    known = _encoders(ffmpeg)
-    wanted = (_VP9,) if suffix == ".webm" else (_H264, *_OTHERS)
-    for codec in wanted:
-        if codec[0] in known:
-            return codec
-    raise NoFfmpeg(f"`{ffmpeg}` has no encoder {' or '.join(c[0] for c in wanted)}, which {suffix} needs")
-
-
-def check_video(suffix: str) -> None:
-    """Find an ffmpeg that can write files of this suffix.
+def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
+    """An ffmpeg that can write files of a suffix, and its options for that.
 
     Raises:
         NoFfmpeg: there is none.
     """
-    _codec(find_ffmpeg(), suffix)
+    ffmpeg = find_ffmpeg()
+    known = _encoders(ffmpeg)
+    wanted = (_VP9,) if suffix == ".webm" else (_H264, *_OTHERS)
+    for codec in wanted:
+        if codec[0] in known:
+            return ffmpeg, codec
+    raise NoFfmpeg(f"`{ffmpeg}` has no encoder {' or '.join(c[0] for c in wanted)}, which {suffix} needs")
 
 
 def write_video(film: Film, part: Path, progress: Callable[[float], None], *, suffix: str) -> None:
@@ -98,32 +81,21 @@ def write_video(film: Film, part: Path, progress: Callable[[float], None], *, su
         NoFfmpeg: there is none, or it lacks an encoder.
         RenderError: it fails.
     """
-    ffmpeg = find_ffmpeg()
-    codec = _codec(ffmpeg, suffix)
+    ffmpeg, codec = find_codec(suffix)
     keeps = film.alpha and suffix == ".webm"
     width, height = (side + side % 2 for side in film.size)
     command = [
         *(ffmpeg, "-hide_banner", "-loglevel", "error", "-nostdin", "-y"),
         *("-f", "rawvideo", "-pix_fmt", "rgba" if keeps else "rgb24", "-s", f"{width}x{height}"),
         *("-r", str(Fraction(film.fps).limit_denominator(100_000)), "-i", "-"),
-        *(
-            "-vf",
-            "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp",
-        ),
-        *("-c:v", *codec, "-pix_fmt", "yuva420p" if keeps else "yuv420p"),
+        *("-vf", _SCALE, "-c:v", *codec, "-pix_fmt", "yuva420p" if keeps else "yuv420p"),
         *(("-auto-alt-ref", "0") if keeps else ()),
-        *_BT709,
+        *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
         *(("-movflags", "+faststart") if _FORMATS[suffix] in ("mp4", "mov") else ()),
         *("-f", _FORMATS[suffix], os.fspath(part)),
     ]
     # in a session of its own, so that Ctrl-C reaches us alone and we end it
-    with subprocess.Popen(
-        command,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    ) as process:
+    with Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=PIPE, start_new_session=True) as process:
         assert process.stdin is not None
         assert process.stderr is not None
         try:
