@@ -50,10 +50,12 @@ class Slots(Record, frozen=False):
     Args:
         parent: those of where it was defined; None for a file.
         root: a file's live slots, which exist while it is prepared; None for a call.
+        owner: the name of the function or module that is called.
     """
 
     parent: Slots | None = None
     root: Env | None = None
+    owner: Span | None = None
     size: int = 1
 
     def add(self) -> int:

@@ -9,7 +9,7 @@ from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.evaluate.prepare.expressions import Given
 from scenelang.evaluate.report.reporter import Reporter
-from scenelang.evaluate.report.undefined import reported_at_definition
+from scenelang.evaluate.report.undefined import advise_parameter, reported_at_definition
 from scenelang.syntax import nodes
 
 
@@ -65,6 +65,10 @@ def bind(
     ) -> None:
         outer = definition.name.span if definition else span
         key = code, way, outer.source, outer
+        known = report.shared.get(key)
+        if known is not None and known.code != code:
+            advise_parameter(report, known, outer)
+            return
         report.error_once(key, code, message, span, help=help, fix=fix, labels=labels)
 
     good, position = True, 0

@@ -179,7 +179,7 @@ def _declare(stmt: nodes.Fn | nodes.Module, place: Place) -> Callable[[], None] 
 
 def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, place: Place) -> None:
     file, report, session = place.file, place.report, place.session
-    slots = Slots(definition.outer)
+    slots = Slots(definition.outer, owner=stmt.name.span)
     inside = Place(file, Scope(slots, place.scope), "group")
     defaults: list[Callable[[Env], Any]] = []
     places = [slots.add() for _ in stmt.params]

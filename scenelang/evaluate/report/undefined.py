@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Final
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
@@ -11,7 +12,7 @@ from scenelang.diagnostics.suggest import Suggestion, did_you_mean, is_slip, lis
 from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.names import Binding, Scope
 from scenelang.evaluate.report import foreign_words
-from scenelang.evaluate.report.reporter import Advice, Reporter, shown_places
+from scenelang.evaluate.report.reporter import Advice, Reporter, Shared, shown_places
 from scenelang.syntax import nodes
 from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS
 
@@ -91,9 +92,25 @@ def report_unknown(
         help, _ = did_you_mean(name.text, unused, name.span, slips=1, effort=report.effort)
     meant = help.name if isinstance(help, Suggestion) else None
     suggested = next((b.labels() for n, b in around if n == meant), ())
-    found = report.error(code, message, name.span, help=help, fix=fix, labels=suggested)
+    owner, found, calls = place.scope.slots.owner, None, []
+    if owner is not None and code == "E0201":
+        ways = ("E0308", "surplus"), ("E0206", name.text)
+        calls = [(*way, owner.source, owner) for way in ways]
+        found = next((misfit for call in calls if (misfit := report.shared.get(call)) is not None), None)
+    if owner is not None and found is not None and found.code != code:  # calls give what it has lost
+        report.diagnostics.items[found.index] = Diagnostic(code, message, name.span)
+        found.code, found.own, found.again = code, (), {}
+        advise_parameter(report, found, owner)
+    else:
+        found = report.error(code, message, name.span, help=help, fix=fix, labels=suggested)
     if found is not None:
-        report.shared[key] = found
+        report.shared.update(dict.fromkeys([key, *calls], found))
+
+
+def advise_parameter(report: Reporter, unknown: Shared, owner: Span) -> None:
+    """An unknown name in a definition that is called with more than it takes: it has lost a parameter."""
+    items, help = report.diagnostics.items, f"add it to the parameters of `{owner.text}`"
+    items[unknown.index] = replace(items[unknown.index], help=help, fix=None)
 
 
 def within_effort(place: Place, kinds: Sequence[str]) -> list[tuple[str, Binding]]:
