@@ -57,6 +57,14 @@ class Arrays:
         """The largest over rows: (…, 1, M) of (…, R, M)."""
         return x.max(-2, keepdims=True)
 
+    def least(self, x: Array) -> Array:
+        """The least of the first axis: (M,) of (R, M)."""
+        return x.min(0)
+
+    def unit(self, x: Array) -> Array:
+        """Clamped to [0, 1], in place."""
+        return np.minimum(np.maximum(x, 0.0, out=x), 1.0, out=x)
+
     def length(self, p: Sequence[Array]) -> Array:
         """Euclidean lengths of points, by their coordinates."""
         return np.sqrt(sum(coordinate * coordinate for coordinate in p))

@@ -26,7 +26,7 @@ rng = np.random.default_rng(7)
 def everywhere(solids: SolidField, p: np.ndarray, gradient: bool = False) -> Meeting:
     """What a field answers where every object is met."""
     with solids.xp.inference():
-        return solids.meet(p, [np.ones(p.shape[1], bool)] * len(solids.solids), Wanted.ALL, gradient)
+        return solids.meet(p, np.ones((len(solids.solids), p.shape[1]), bool), Wanted.ALL, gradient)
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:
@@ -111,7 +111,7 @@ def test_objects_change_nothing_out_of_their_reach() -> None:
     p = rng.uniform(-1.5, 1.5, (3, 20000)).astype(np.float32)
     t = np.linalg.norm(p - origin[:, None], axis=0)
     begin, end, _ = solids.spans(origin, (p - origin[:, None]) / t, t + 10)
-    near = solids.meet(p, list((begin <= t) & (t <= end)), Wanted.ALL)
+    near = solids.meet(p, (begin <= t) & (t <= end), Wanted.ALL)
     whole = everywhere(solids, p)
     inside = whole.distance < -1e-4
     assert ((near.distance < 0) == inside)[abs(whole.distance) > 1e-4].all()

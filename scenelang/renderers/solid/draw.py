@@ -137,7 +137,7 @@ class Lighting:
     def _look(self, way: Array, t: Array, gradient: bool = False) -> Meeting:
         """All about points at t (K,) of rays (3, K) from the eye."""
         begin, end, _ = self.field.spans(self.eye, way, t)
-        inside = [(begin[i] <= t) & (t <= end[i]) for i in range(len(begin))]
+        inside = (begin <= t) & (t <= end)
         return self.field.meet(self.eye[:, None] + way * t, inside, Wanted.ALL, gradient)
 
     def _ahead(self, found: Meeting, way: Array, index: Array | None) -> Array:

@@ -6,7 +6,6 @@ object lies in a ball; farther than its blends reach beyond that, it changes not
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -87,8 +86,9 @@ class SolidField:
         self.network, self.xp = network, network.xp
         with self.xp.inference():
             self.solids = self._solids(vectors, tokens)
-        self.plain = all(solid.token == UNION for solid in self.solids)
-        """Whether every object draws."""
+        draws = [i for i, solid in enumerate(self.solids) if solid.draws]
+        self.draws = None if len(draws) == len(self.solids) else draws
+        """The objects that draw, None if all do."""
         self.media = any(float(solid.look[3, 0]) > 0.5 for solid in self.solids)
         """Whether some object is a medium."""
         self.mixed = self.media and any(float(solid.look[3, 0]) <= 0.5 for solid in self.solids)
@@ -180,13 +180,13 @@ class SolidField:
         return begin, end, rate
 
     def meet(
-        self, p: Array, inside: Sequence[Array], wanted: Wanted, gradient: bool = False, change: bool = False
+        self, p: Array, inside: Array, wanted: Wanted, gradient: bool = False, change: bool = False
     ) -> Meeting:
         """Let points meet the objects.
 
         Args:
             p: world points (3, M).
-            inside: of each object, which points (M,) may be in its reach.
+            inside: of each object, which points (N, M) may be in its reach.
             wanted: what of the register to answer beside the distance.
             gradient, change: what else.
         """
@@ -195,7 +195,7 @@ class SolidField:
         memory[0] = EMPTY
         slope = xp.full((3, count), 0.0, p) if gradient else None
         bound = xp.full((count,), EMPTY, p) if change else None
-        touched = None if self.plain else inside[0] & ~inside[0]
+        touched = None if self.draws is None else inside[0] & ~inside[0]
         for solid, mask in zip(self.solids, inside, strict=True):
             if touched is not None:
                 if solid.draws:
