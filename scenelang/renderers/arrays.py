@@ -100,7 +100,8 @@ class Arrays:
 
     def silu(self, x: Array) -> Array:
         """``x sigmoid(x)``, in place."""
-        found = np.exp(-x)
+        found = np.negative(x)
+        np.exp(found, out=found)
         found += 1.0
         return np.divide(x, found, out=x)
 

@@ -221,7 +221,7 @@ def test_both_libraries_draw_the_same() -> None:
 def test_tiles_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     whole, _ = draw_solids(field(MIXED), Stage(), (48, 40))
     monkeypatch.setattr(draw, "TILE", 48 * 7)
-    assert psnr(draw_solids(field(MIXED), Stage(), (48, 40))[0], whole) > 100
+    assert psnr(draw_solids(field(MIXED), Stage(), (48, 40), threads=3)[0], whole) > 100
 
 
 def test_what_is_drawn_is_in_codes_and_cell() -> None:
