@@ -138,7 +138,7 @@ class Frontier:
     machine: str
     revision: str
     torch: str
-    yardstick_ms: Amount  # what `scenelang.measure.cost.yardstick` took there
+    yardstick_ms: Amount  # what `scenelang.measure.choose.yardstick` took there
     streaming_ms: Amount  # a frame of the paper's streaming renderer at its full size, in the same run
     # mean FLIP of some points against 64 samples a pixel, by name: how near the definition is
     converged: dict[str, Amount]

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import sys
+from codecs import BOM_UTF8
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from scenelang.cli import options
-from scenelang.cli.diffs import show_difference
 from scenelang.cli.main import describe
-from scenelang.cli.say import say_trouble, wants_color, width_of
+from scenelang.cli.say import say_trouble, show_difference, wants_color, width_of
 from scenelang.diagnostics.cells import printable
 from scenelang.files import followed, write_whole
 
@@ -158,7 +157,6 @@ def _wrong(left: Sequence[Diagnostic], strict: bool) -> bool:
 
 def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> set[str]:
     """Write what changed, and standard input to standard output; returns what cannot be written."""
-    from scenelang.cli.checking import in_bytes
     from scenelang.cli.inputs import STDIN
 
     lost = set()
@@ -166,7 +164,9 @@ def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> se
         if name == STDIN:
             continue
         try:
-            write_whole(followed(name), in_bytes(text, Path(name)))
+            with open(name, "rb") as file:
+                mark = BOM_UTF8 if file.read(3) == BOM_UTF8 else b""
+            write_whole(followed(name), mark + text.encode("utf-8"))
         except OSError as error:
             say_trouble(describe(error))
             lost.add(name)

@@ -44,8 +44,7 @@ def command(
         ctx.exit(1)
     from scenelang.backend.exact import draw_exact
     from scenelang.backend.neural import choose_device, draw_program, open_model
-    from scenelang.measure.metrics import compare, over_white
-    from scenelang.measure.sheet import side_by_side
+    from scenelang.measure.metrics import compare, over_white, side_by_side
 
     opened = open_model(job.program.model, choose_device(device))
     picture = over_white(draw_program(job.program, opened, threads=threads).image)

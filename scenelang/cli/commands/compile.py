@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from scenelang.cli import options
-from scenelang.cli.clock import Clock
+from scenelang.cli.progress import Clock
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request

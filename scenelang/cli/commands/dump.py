@@ -45,8 +45,7 @@ def command(
     written), the passes in their order (`--after help` lists them) and program. A scene with mistakes is
     shown as far as it goes; then the exit code is 1.
     """
-    from scenelang.cli.jobs import prepare_scene
-    from scenelang.cli.stages import STAGES, check_stages
+    from scenelang.cli.jobs import STAGES, check_stages, prepare_scene
 
     if stages == ("help",):
         click.echo("\n".join(STAGES))

@@ -56,8 +56,7 @@ def command(
     FILE is a scene, or - for standard input. Mermaid and DOT are text; .svg and .png need the program `dot`
     of Graphviz. Large scenes are cut, and a box says how many nodes are left out.
     """
-    from scenelang.cli.jobs import prepare_scene
-    from scenelang.cli.stages import STAGES, check_stages
+    from scenelang.cli.jobs import STAGES, check_stages, prepare_scene
     from scenelang.interchange.drawing import draw_graph, draw_program, draw_scene, to_dot, to_mermaid
 
     wanted = _kind(out, kind)

@@ -8,17 +8,14 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from scenelang.cli import options
-from scenelang.cli.clock import Clock
 from scenelang.cli.main import describe
-from scenelang.cli.progress import Bar
+from scenelang.cli.progress import Bar, Clock
 from scenelang.cli.say import say_diagnostics, say_trouble
 
 if TYPE_CHECKING:
     from scenelang.backend.options import Samples
-    from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import Job
-    from scenelang.cli.progress import Bar
     from scenelang.diagnostics.span import SourceFile
     from scenelang.evaluate.inputs import Defines
     from scenelang.measure.frontier import Limits
@@ -121,8 +118,7 @@ def command(
     says which, why, and what was next.
     """
     from scenelang.cli.animation import Requested, animate, wanted_target
-    from scenelang.cli.choosing import check_options
-    from scenelang.cli.drawing import chosen, exact, neural
+    from scenelang.cli.drawing import check_options, chosen, exact, neural
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import PROGRAM
     from scenelang.cli.outputs import targets

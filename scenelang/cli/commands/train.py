@@ -116,7 +116,7 @@ def command(
     elif isinstance(wanted, SolidsConfig):
         click.echo(f"done{reached}: {weights}")
     else:
-        from scenelang.measure.record import record_measured
+        from scenelang.measure.scenes import record_measured
 
         figures = record_measured(weights, wanted.cell or wanted.model)
         means = ", ".join(f"{k[5:]} {v['mean']:.1f}" for k, v in figures.items() if k.startswith("psnr_"))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.measure.cost import UNITS
+from scenelang.measure.choose import UNITS
 from scenelang.measure.frontier import Cost
 from scenelang.program.work import Load
 

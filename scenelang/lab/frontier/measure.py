@@ -25,7 +25,7 @@ from scenelang.image import Image, from_samples
 from scenelang.lab.about import Report, silent
 from scenelang.lab.frontier.fit import fit_cost
 from scenelang.lab.frontier.ways import Draw, Way, ways_of
-from scenelang.measure.cost import yardstick
+from scenelang.measure.choose import yardstick
 from scenelang.measure.frontier import Cost, Errors, Frontier, Point, Quality, Times, front
 from scenelang.measure.metrics import flip, psnr
 from scenelang.measure.scenes import reference_of, scenes_of
