@@ -21,8 +21,7 @@ from scenelang.evaluate.inputs import Defines
 from scenelang.formatting import format_text
 from scenelang.interchange.gltf import import_gltf
 from scenelang.interchange.gltf_file import GltfError, parse_gltf
-from scenelang.program.program import ProgramError
-from scenelang.program.store import parse_program
+from scenelang.program.program import ProgramError, parse_program
 
 NUMBER: Final = "¤"
 """Stands in a unit for the number of the repetition, so that pieces may differ."""

@@ -19,8 +19,8 @@ from safetensors.torch import save
 from fuzz import tensors, trees
 from fuzz.oracles import check_diagnostics
 from fuzz.target import Target, hold
-from scenelang.backend.errors import RenderError
 from scenelang.backend.neural import draw_program
+from scenelang.backend.options import RenderError
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
     from scenelang.program.program import Program
-    from scenelang.renderers.kept import Kept
+    from scenelang.renderers.draw import Kept
 
 Progress = Callable[[float], None]
 _version = lru_cache(version)
@@ -100,7 +100,7 @@ class Painter:
             from scenelang.backend.exact import draw_exact
 
             return draw_exact(frame.shot.scene, spans=frame.shot.spans, model=self.clip.model)
-        from scenelang.renderers.kept import Kept
+        from scenelang.renderers.draw import Kept
 
         if self.kept is None and self.clip.reuse:
             self.kept = Kept()

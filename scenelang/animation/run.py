@@ -18,7 +18,7 @@ from scenelang.animation.store import Store, deliver, put_frame
 from scenelang.animation.targets import Target
 from scenelang.animation.video import find_codec, write_video
 from scenelang.animation.webp import write_webp
-from scenelang.backend.errors import RenderError
+from scenelang.backend.options import RenderError
 from scenelang.diagnostics.error import SceneError
 from scenelang.files import output_place, write_whole
 

@@ -14,7 +14,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from scenelang.backend.errors import RenderError
+from scenelang.backend.options import RenderError
 from scenelang.files import lock, open_own, output_place, write_whole
 
 if TYPE_CHECKING:

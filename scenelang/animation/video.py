@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from scenelang.animation.pictures import Film, Pixels
-from scenelang.backend.errors import RenderError
+from scenelang.backend.options import RenderError
 
 _H264: Final = ("libx264", "-preset", "medium", "-crf", "16")
 _OTHERS: Final = (("libopenh264", "-b:v", "8M"), ("mpeg4", "-q:v", "2"))

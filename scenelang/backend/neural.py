@@ -13,19 +13,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 
-from scenelang.backend.errors import RenderError
+from scenelang.backend.options import RenderError
 
 try:
     import torch
 except ModuleNotFoundError as error:
     raise RenderError("this is drawn by torch, which is not installed; pip install torch") from error
-from scenelang.backend.memory import keep_memory
-from scenelang.backend.options import Samples
+from scenelang.backend.options import Samples, keep_memory
 from scenelang.models.load import Model, ModelError, load_model, place_of
 from scenelang.program.program import Program, ProgramError
-from scenelang.renderers.draw import Drawing, draw
+from scenelang.renderers.draw import Drawing, Kept, draw
 from scenelang.renderers.framed import Framed
-from scenelang.renderers.kept import Kept
 from scenelang.renderers.whole import draw_whole
 
 _loading = threading.Lock()

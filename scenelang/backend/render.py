@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, get_args
 
-from scenelang.backend.errors import RenderError
-from scenelang.backend.options import Backend, Device, Samples
+from scenelang.backend.options import Backend, Device, RenderError, Samples
 from scenelang.scene.schema import Scene
 
 if TYPE_CHECKING:

@@ -10,16 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, Literal, NamedTuple
 
-from scenelang.backend.errors import RenderError
-from scenelang.backend.memory import keep_memory
-from scenelang.backend.options import Device, Samples
+from scenelang.backend.options import Device, RenderError, Samples, keep_memory
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError
 from scenelang.program.program import Program, ProgramError
 from scenelang.program.work import load_of
-from scenelang.renderers.draw import Drawing, draw
-from scenelang.renderers.kept import Kept
+from scenelang.renderers.draw import Drawing, Kept, draw
 
 MOST_MS: Final = 250.0
 """Work up to which numpy draws: a quarter of the least that importing torch was seen to take."""

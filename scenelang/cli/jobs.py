@@ -17,8 +17,7 @@ from scenelang.cli.say import say_diagnostics
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.graph.nodes import Graph, Leaf
-from scenelang.graph.walk import nodes
+from scenelang.graph.nodes import Graph, Leaf, nodes
 from scenelang.models.choose import why_chosen
 from scenelang.passes import PASSES
 from scenelang.program.compile import compile_scene
@@ -122,8 +121,7 @@ def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> tu
 
 
 def _stored(name: str, request: Request, clock: Clock) -> Job:
-    from scenelang.program.program import ProgramError
-    from scenelang.program.store import load_program
+    from scenelang.program.program import ProgramError, load_program
 
     try:
         with clock("load program"):

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import click
 
-from scenelang.backend.errors import RenderError
+from scenelang.backend.options import RenderError
 from scenelang.files import NotWritten, inputs_kept
 
 # Command -> what `--help` says. Each is `command` in a file of its name, imported when it is called; the file

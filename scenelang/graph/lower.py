@@ -11,13 +11,62 @@ from scenelang.diagnostics.span import Span
 from scenelang.graph import affine
 from scenelang.graph.looks import WHITE, Look
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
-from scenelang.graph.space import Refusal, Space
+from scenelang.graph.space import REACH, SINGULAR, Refusal, Space
 from scenelang.graph.spaces import PLANE, SPACES
-from scenelang.graph.steps import Step
-from scenelang.graph.transforms import step_of
+from scenelang.graph.steps import Affine, Rows, Step, Warp
 from scenelang.models.manifest import Manifest
 from scenelang.scene import schema
 from scenelang.words import Combine
+
+
+def step_of(transform: schema.Transform, space: Space) -> Step | Refusal:
+    """The step that a transform stands for, or why there is none.
+
+    Args:
+        transform: any transform of a geometry.
+        space: the model's; in the plane nothing may leave it, and scales along z drop out.
+    """
+    if isinstance(transform, schema.Twirl):
+        return Warp(transform.k, (0.0, 0.0))
+    if isinstance(transform, schema.Bend):
+        return Warp(0.0, (transform.k, 0.0))
+    if isinstance(transform, (schema.Twist, schema.Displace)):
+        return Refusal(
+            "E0503",
+            f"no renderer of this version draws `{transform.kind}`",
+            "bend the shape with `twirl` or `bend` instead",
+        )
+    fitted = space.fitted(transform, _rows(transform))
+    if isinstance(fitted, Refusal):
+        return fitted
+    if not space.usable(fitted):
+        return Refusal("E0312", *_singular(transform.kind, fitted, space))
+    return Affine(fitted)
+
+
+def _rows(transform: schema.Transform) -> Rows:
+    if isinstance(transform, schema.Translate):
+        return affine.translation(transform.x, transform.y, transform.z)
+    if isinstance(transform, schema.Scale):
+        return affine.scaling(transform.x, transform.y, transform.z)
+    if isinstance(transform, schema.Rotate):
+        return affine.rotation(transform.angle, transform.axis)
+    if isinstance(transform, schema.Shear):
+        return affine.shearing(transform.axes, transform.k)
+    assert isinstance(transform, schema.Matrix)
+    first, second, third, _ = transform.rows
+    return (*first, *second, *third)
+
+
+def _singular(kind: str, rows: Rows, space: Space) -> tuple[str, str]:
+    smallest, largest = space.stretches(rows)
+    if smallest <= SINGULAR * largest:
+        return f"`{kind}` is singular: it flattens everything to {space.thinner}", "use factors other than 0"
+    return (
+        f"`{kind}` is singular in float32: it stretches by {smallest:.3g} to {largest:.3g}",
+        f"stretches between {1 / REACH:g} and {REACH:g} can be undone",
+    )
+
 
 MAX_OBJECTS = 100_000
 MAX_DEPTH = 1_000

@@ -23,8 +23,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import field
 
-from scenelang.graph.bounds import leaf_box
-from scenelang.graph.grid import Grid
+from scenelang.graph.bounds import Grid, leaf_box
 from scenelang.graph.nodes import BLEND, Leaf
 from scenelang.graph.space import Space
 from scenelang.records import Record

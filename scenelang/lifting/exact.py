@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenelang.graph.levels import Levels
+from scenelang.graph.chain import Levels
 from scenelang.graph.steps import Rows, Warp
 from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH, Layout
 

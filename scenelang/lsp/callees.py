@@ -7,9 +7,8 @@ from typing import Final
 
 from lsprotocol import types
 
-from scenelang.lsp.context import Cursor, cursor_at
+from scenelang.lsp.context import Cursor, cursor_at, sight_at
 from scenelang.lsp.text import width
-from scenelang.lsp.tree import sight_at
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.resolve.names import Names
 from scenelang.resolve.symbols import Symbol

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator
+from itertools import islice
 from typing import Final
 
 from lsprotocol import types
@@ -11,17 +13,76 @@ from lsprotocol import types
 from scenelang import words
 from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.lsp.callees import find_callee, word_of
-from scenelang.lsp.completion_items import Item, strings, units
-from scenelang.lsp.context import Cursor, cursor_at
-from scenelang.lsp.tree import sight_at
+from scenelang.lsp.context import Cursor, cursor_at, sight_at
 from scenelang.lsp.values import vocabulary_of
-from scenelang.lsp.workspace import Document, Workspace
+from scenelang.lsp.workspace import Document, Workspace, scenes_below
+from scenelang.records import Record
 from scenelang.resolve.names import Names
 from scenelang.resolve.symbols import Symbol
+from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import COMBINE
+from scenelang.words import COMBINE, UNITS
 
 Kind = types.CompletionItemKind
+_MOST_PATHS: Final = 200
+_MOST_FILES: Final = 2000
+
+
+class Item(Record):
+    """A proposal.
+
+    Args:
+        label: what the list shows.
+        kind: its icon.
+        text: what is inserted; the label without it.
+        rank: one letter; what is likelier comes first.
+        detail: a line beside the label.
+        about: Markdown.
+        snippet: whether ``text`` has placeholders.
+    """
+
+    label: str
+    kind: Kind
+    text: str = ""
+    rank: str = "m"
+    detail: str = ""
+    about: str = ""
+    snippet: bool = False
+
+
+def units(typed: str) -> Iterator[Item]:
+    """Units that a number may be getting."""
+    number = re.match(r"[0-9]*\.?[0-9]*", typed)
+    if number is None or not number[0] or number[0] == ".":
+        return
+    rest = typed[number.end() :]
+    for unit in UNITS:
+        if rest and unit.startswith(rest):
+            yield Item(f"{number[0]}{unit}", Kind.Unit)
+
+
+def strings(
+    docs: Workspace, document: Document, words: Vocabulary, before: tuple[str, ...]
+) -> Iterator[Item]:
+    """What a string may say: a model's name, a file to import."""
+    if before == ("model",):
+        for manifest in words.models:
+            yield Item(manifest.name, Kind.Module, about=manifest.summary)
+    elif before == ("import",):
+        yield from _paths(docs, document)
+
+
+def _paths(docs: Workspace, document: Document) -> Iterator[Item]:
+    """Scenes that can be imported: the library's, and those below the import root."""
+    yield from (Item(name, Kind.File, rank="a") for name in library.names())
+    folder = document.path.parent if document.path is not None else next(iter(docs.folders), None)
+    if folder is None:
+        return
+    for path in islice(scenes_below(folder, _MOST_FILES), _MOST_PATHS):
+        if path != document.path:
+            yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
+
+
 _HEADS: Final = ("let", "fn", "module", "for", "if", *words.NODES)
 _SYMBOLS: Final = {
     "let": Kind.Variable,
@@ -50,16 +111,12 @@ def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -
     cursor = cursor_at(document.parsed, offset, values)
     start, end = cursor.start, cursor.end
     if cursor.inside == "string":
-        start, end = (
-            start + 1,
-            max(end - (document.text[end - 1 : end] == '"' and end - 1 > start), start + 1),
-        )
-    maker = _Maker(docs, document, cursor, names)
-    lines = document.lines
-    place = lines.range(start, max(end, start))
+        start += 1
+        end = max(end - (end > start and document.text[end - 1] == '"'), start)
+    place = document.lines.range(start, end)
     items = []
     seen = set()
-    for item in maker.items():
+    for item in _Maker(docs, document, cursor, names).items():
         if item.label in seen:
             continue
         seen.add(item.label)
@@ -119,8 +176,10 @@ class _Maker:
             yield from (self._keyword(word) for word in ("group", *COMBINE, "chain"))
         elif before[0] == "param" and len(before) > 3 and "in" not in before and _ends_operand(last):
             yield Item("in", Kind.Keyword, "in ", "a", about=words.KEYWORDS["in"].text)
-        elif (last == ")" and before[0] == "if") or _in_parameters(before):
+        elif last == ")" and before[0] == "if":
             return
+        elif before[0] in ("fn", "module") and ")" not in before and last in ("(", ","):
+            return  # the name of a parameter
         elif not _ends_operand(last):
             yield from self._expressions()
         elif ".." in before or "..<" in before:
@@ -284,10 +343,3 @@ def _ends_operand(text: str) -> bool:
     return text in (")", "]", "}", "true", "false") or (
         (text[:1].isalnum() or text[:1] in '_#"') and text not in words.KEYWORDS
     )
-
-
-def _in_parameters(before: tuple[str, ...]) -> bool:
-    """Whether the cursor is where a fn or module names its parameters."""
-    if before[0] not in ("fn", "module") or ")" in before:
-        return False
-    return before[-1] in ("(", ",")

@@ -10,7 +10,7 @@ from lsprotocol import types
 from pygls.exceptions import JsonRpcException
 
 from scenelang.diagnostics.error import SceneError
-from scenelang.lsp import actions, callees, colours, completion, hints, hover, navigation, outline, tokens
+from scenelang.lsp import actions, callees, completion, hover, navigation, outline, tokens
 from scenelang.lsp.server import Server, Settings
 from scenelang.lsp.workspace import Document, path_of
 
@@ -163,10 +163,10 @@ _LISTS: Final[dict[str, Callable[[Server, Document, Any], list[Any]]]] = {
     ],
     types.TEXT_DOCUMENT_DOCUMENT_SYMBOL: lambda s, d, p: outline.document_symbols(d),
     types.TEXT_DOCUMENT_FOLDING_RANGE: lambda s, d, p: outline.folding(d),
-    types.TEXT_DOCUMENT_DOCUMENT_COLOR: lambda s, d, p: colours.colours(d),
-    types.TEXT_DOCUMENT_COLOR_PRESENTATION: lambda s, d, p: colours.presentations(d, p.color, p.range),
+    types.TEXT_DOCUMENT_DOCUMENT_COLOR: lambda s, d, p: tokens.colours(d),
+    types.TEXT_DOCUMENT_COLOR_PRESENTATION: lambda s, d, p: tokens.presentations(d, p.color, p.range),
     types.TEXT_DOCUMENT_CODE_ACTION: lambda s, d, p: actions.code_actions(d, p.range, p.context.only),
-    types.TEXT_DOCUMENT_INLAY_HINT: lambda s, d, p: hints.inlay_hints(s.docs, d, p.range, s.settings),
+    types.TEXT_DOCUMENT_INLAY_HINT: lambda s, d, p: hover.inlay_hints(s.docs, d, p.range, s.settings),
     types.TEXT_DOCUMENT_DOCUMENT_LINK: lambda s, d, p: navigation.links(s.docs, d),
 }
 _OPTIONS: Final = {

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from lsprotocol import types
 
-from scenelang.lsp.tree import path_to
+from scenelang.lsp.context import path_to
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.syntax import nodes
 from scenelang.syntax.nodes import walk

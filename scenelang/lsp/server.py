@@ -23,8 +23,8 @@ from pygls.lsp.server import LanguageServer
 from pygls.protocol import LanguageServerProtocol
 from pygls.protocol.language_server import lsp_method
 
+from scenelang.lsp.actions import to_diagnostic
 from scenelang.lsp.check import Checked, Superseded, Task, check
-from scenelang.lsp.convert import to_diagnostic
 from scenelang.lsp.workspace import Document, Workspace, path_of
 from scenelang.records import Record
 

@@ -10,11 +10,11 @@ from scenelang.evaluate.values.value import POISON, Angle, MaterialValue, RangeV
 from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.graph import affine
 from scenelang.graph.chain import merged
+from scenelang.graph.lower import step_of
 from scenelang.graph.nodes import Move
 from scenelang.graph.space import Space
 from scenelang.graph.spaces import SPACES
 from scenelang.graph.steps import Affine, Rows, Warp
-from scenelang.graph.transforms import step_of
 from scenelang.lsp.workspace import Document
 from scenelang.scene import text as to_nsg
 from scenelang.syntax import nodes

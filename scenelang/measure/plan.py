@@ -10,9 +10,8 @@ import numpy as np
 
 from scenelang.backend.neural import draw_program
 from scenelang.graph.lower import Spans
-from scenelang.graph.nodes import Fold, Graph
+from scenelang.graph.nodes import Fold, Graph, nodes
 from scenelang.graph.steps import Affine
-from scenelang.graph.walk import nodes
 from scenelang.measure.metrics import MOST_DB, flip, over_white, psnr
 from scenelang.measure.scenes import reference_of
 from scenelang.models.choose import WHITE, choose_model, lacking, uses, why_chosen

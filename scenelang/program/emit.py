@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from scenelang.diagnostics.span import Span
 from scenelang.graph.bounds import felt_level, leaf_box
-from scenelang.graph.levels import split_levels
+from scenelang.graph.chain import split_levels
 from scenelang.graph.nodes import Graph, Leaf
 from scenelang.graph.space import Box
 from scenelang.lifting.exact import lift_colours, lift_many

@@ -20,8 +20,7 @@ from torch import Tensor
 from torch.func import grad_and_value, jacrev, vmap
 
 from scenelang.files import write_whole
-from scenelang.reference.fold import combine
-from scenelang.reference.leaves import TORUS, leaf_distance
+from scenelang.reference.field import TORUS, combine, leaf_distance
 from scenelang.renderers.solid.network import BLEND, RADIUS, Wanted
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.training.checkpoint import load_tensors, save_tensors

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from scenelang.animation.targets import Target
     from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
-    from scenelang.renderers.kept import Kept
+    from scenelang.renderers.draw import Kept
 
 
 class Outdated(Exception):

@@ -102,7 +102,7 @@ def _find(show: Show) -> Any:
         from textual_image.renderable import HalfcellImage, Image, UnicodeImage
     except ImportError:
         if show == "always":
-            from scenelang.backend.errors import RenderError
+            from scenelang.backend.options import RenderError
 
             raise RenderError(
                 "showing pictures needs textual-image: pip install 'scenelang[watch]'"

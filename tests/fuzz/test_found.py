@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fuzz.oracles import check_rendering
-from scenelang.backend.errors import RenderError
+from scenelang.backend.options import RenderError
 from scenelang.backend.render import render
 from scenelang.diagnostics.cells import in_cells
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics

@@ -8,8 +8,7 @@ import torch
 
 from scenelang.graph.stage import Light, Stage
 from scenelang.graph.steps import Displace, Twist, Warp
-from scenelang.reference.fold import combine
-from scenelang.reference.leaves import leaf_distance
+from scenelang.reference.field import combine, leaf_distance
 from scenelang.reference.solid.image import solid_image
 from scenelang.renderers.solid import draw
 from scenelang.renderers.solid.draw import draw_solids

@@ -65,7 +65,7 @@ def command(
 def _changes(job: Job, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
     """The differences that the passes made, of those that made any; all passes, or the wanted."""
     from scenelang.graph.dump import dump
-    from scenelang.interchange.changes import changes
+    from scenelang.interchange.dumps import changes
 
     before, old = "", "nothing"
     for name, graph in job.graphs.items():
@@ -80,8 +80,7 @@ def _changes(job: Job, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
 def _whole(job: Job, source: Input, wanted: tuple[str, ...], kind: str) -> Iterator[dict[str, Any]]:
     """The stages that were reached, as text or as data."""
     from scenelang.graph.dump import dump
-    from scenelang.interchange.graph_data import graph_data, program_data, program_table
-    from scenelang.interchange.tree import tree_data, tree_text
+    from scenelang.interchange.dumps import graph_data, program_data, program_table, tree_data, tree_text
 
     known: dict[str, tuple[str, Any, Callable[[Any], Any], Callable[[Any], str]]] = {
         name: ("graph", graph, graph_data, dump) for name, graph in job.graphs.items()

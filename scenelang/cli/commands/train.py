@@ -146,8 +146,8 @@ def prepare_torch(device: str, threads: int | None) -> str:
     """Set torch up for a long computation; returns the device."""
     import torch
 
-    from scenelang.backend.memory import keep_memory
     from scenelang.backend.neural import choose_device
+    from scenelang.backend.options import keep_memory
 
     keep_memory()
     torch.set_num_threads(threads or 1)

@@ -103,7 +103,7 @@ def command(
 
 
 def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] | None]) -> None:
-    from scenelang.backend.errors import RenderError
+    from scenelang.backend.options import RenderError
     from scenelang.diagnostics.render_text import plural
 
     clock = time.strftime("%H:%M:%S")

@@ -19,8 +19,8 @@ import numpy as np
 import PIL.Image
 import torch
 
-from scenelang.backend.memory import keep_memory
 from scenelang.backend.neural import open_model
+from scenelang.backend.options import keep_memory
 from scenelang.image import Image, from_samples
 from scenelang.lab.about import Report, silent
 from scenelang.lab.frontier.fit import fit_cost

@@ -1,4 +1,4 @@
-"""Warnings where a scene lies outside what its model was trained or measured in."""
+"""Passes that only report: chains that a model cannot hold, and what it was not trained for."""
 
 from __future__ import annotations
 
@@ -7,12 +7,72 @@ from functools import partial
 from math import hypot
 from operator import itemgetter
 
+from scenelang.diagnostics.diagnostic import Label
+from scenelang.diagnostics.span import Span
 from scenelang.graph import affine
-from scenelang.graph.nodes import Graph, Leaf
-from scenelang.graph.space import Space
-from scenelang.graph.steps import Warp
+from scenelang.graph.chain import LevelsError, split_levels
+from scenelang.graph.nodes import Graph, Leaf, leaves
+from scenelang.graph.space import REACH, Space
+from scenelang.graph.steps import Affine, Warp
 from scenelang.passes.context import Context
 from scenelang.words import Combine
+
+
+def check_levels(graph: Graph, context: Context) -> Graph:
+    """Report objects whose deformations or affine maps the model cannot hold; the graph is unchanged.
+
+    Before: the normal form of `fold_warps`.
+    """
+    check = partial(_check, space=graph.space, context=context)
+    for leaf in leaves(graph.root):
+        leaf.noted("check_levels", check)
+    return graph
+
+
+def _check(leaf: Leaf, space: Space, context: Context) -> None:
+    manifest = context.manifest
+    if manifest.lifting == "exact" and any(isinstance(move.step, Warp) for move in leaf.moves):
+        try:  # other liftings take any chain
+            split_levels(leaf.steps, manifest.limits)
+        except LevelsError as error:
+            inner, outer = manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)
+            fact = f"the deformations of `{leaf.geometry}` do not fit model `{manifest.name}`: {error}"
+            help = (
+                f"the model holds up to {inner} deformations, an affine map, up to {outer} deformations "
+                "and an affine map; a `twirl` merges with the deformation after it, also across rotations "
+                "and uniform scales about the origin"
+            )
+            context.diagnostics.add("E0506", fact, leaf.span, labels=_places(leaf), help=help)
+            return
+    # Each map is lifted by itself, so each needs an inverse, and so does what they compose to.
+    maps = [move.step.rows for move in leaf.moves if isinstance(move.step, Affine)]
+    maps += [affine.composed(leaf.steps)] if len(maps) > 1 else []
+    bad = next((rows for rows in maps if not space.usable(rows)), None)
+    if bad is not None:
+        smallest, largest = space.stretches(bad)
+        fact = f"the transforms of `{leaf.geometry}` compose to a singular one, which stretches by "
+        fact, help = f"{fact}{smallest:.3g} to {largest:.3g}", "scale less along one direction, or less often"
+    elif not all(_mild(move.step) for move in leaf.moves if isinstance(move.step, Warp)):
+        fact, help = f"the deformations of `{leaf.geometry}` compose to one beyond float32", "deform less"
+    else:
+        return
+    context.diagnostics.add("E0406", fact, leaf.span, labels=_places(leaf), help=help)
+
+
+def _mild(warp: Warp) -> bool:
+    return abs(warp.twirl) < REACH and hypot(*warp.bend) < REACH
+
+
+def _places(leaf: Leaf) -> list[Label]:
+    found: list[Label] = []
+    seen: set[Span] = {leaf.span} if leaf.span else set()
+    for move in leaf.moves:
+        if move.span is not None and move.span not in seen:
+            seen.add(move.span)
+            what = "affine from here on" if isinstance(move.step, Affine) else "deforms here"
+            found.append(Label(move.span, what))
+    return found[:8]
+
 
 Measures = list[tuple[str, float]]
 

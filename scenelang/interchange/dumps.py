@@ -1,0 +1,193 @@
+"""What `scenelang dump` writes: trees, graphs and Programs as data and as text, and what a pass changed."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING, Any, Final
+
+from scenelang.deep import deep_stack
+from scenelang.diagnostics.span import Span
+from scenelang.graph.nodes import Graph, Leaf, Move, Node
+from scenelang.graph.steps import Affine
+from scenelang.syntax import nodes
+
+if TYPE_CHECKING:
+    from scenelang.program.program import Program
+
+
+def tree_data(file: nodes.File) -> dict[str, Any]:
+    """The tree as JSON data: each node's kind, its fields and its place (from 1, the end exclusive)."""
+    with deep_stack():
+        return _data(file)  # type: ignore[no-any-return]
+
+
+def _data(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_data(item) for item in value]
+    if isinstance(value, Span):
+        start, end = value.locate()
+        return {"start": _position(start), "end": _position(end)}
+    if not hasattr(value, "__dataclass_fields__"):
+        return value
+    return {"node": type(value).__name__, **{f.name: _data(getattr(value, f.name)) for f in fields(value)}}
+
+
+def _position(place: tuple[int, int]) -> dict[str, int]:
+    return {"line": place[0], "column": place[1]}
+
+
+def tree_text(file: nodes.File) -> str:
+    """One line for each node: the field that holds it, its kind, what is not a node in it, its place."""
+    with deep_stack():
+        return "".join(_lines(file, "", ""))
+
+
+def _lines(node: Any, margin: str, label: str) -> Iterator[str]:
+    words: list[str] = []
+    inside: list[tuple[str, Any]] = []
+    for field in fields(node):
+        value = getattr(node, field.name)
+        if isinstance(value, Span) or value in (None, (), False, "") or field.name == "is_integer":
+            continue
+        if isinstance(value, nodes.Name):
+            words.append(value.text if field.name == "name" else f"{field.name}={value.text}")
+        elif hasattr(value, "__dataclass_fields__"):
+            inside.append((f"{field.name}: ", value))
+        elif isinstance(value, tuple) and hasattr(value[0], "__dataclass_fields__"):
+            one = len(value) == 1 and field.name not in ("statements", "items")
+            inside += [(f"{field.name}: " if one else "", item) for item in value]
+        else:
+            words.append(
+                repr(value) if isinstance(value, str) and field.name == "value" else _word(field.name, value)
+            )
+    line, column = node.span.locate()[0]
+    said = " ".join([f"{label}{type(node).__name__}", *words])
+    yield f"{margin}{said}  @{line}:{column}\n"
+    for name, child in inside:
+        yield from _lines(child, margin + "  ", name)
+
+
+def _word(name: str, value: Any) -> str:
+    if value is True:
+        return name
+    if isinstance(value, float) and value.is_integer():
+        value = int(value) if abs(value) < 1e15 else value
+    return str(value) if name in ("value", "op", "unit") else f"{name}={value}"
+
+
+def graph_data(graph: Graph) -> dict[str, Any]:
+    """A graph: leaves and folds with their moves, nearest the leaf first.
+
+    An affine move is the upper three rows of its matrix; the others are their fields.
+    """
+    with deep_stack():
+        root = _node(graph.root)
+    return {
+        "canvas": list(graph.canvas),
+        "background": None if graph.background is None else list(graph.background),
+        "dimension": graph.space.dimension,
+        "root": root,
+    }
+
+
+def _node(node: Node) -> dict[str, Any]:
+    moves = [_move(move) for move in node.moves]
+    if isinstance(node, Leaf):
+        look = {"geometry": node.geometry, "material": node.look.material, "rgb": list(node.look.colour())}
+        return {"kind": "leaf", **look, "moves": moves}
+    links = [{"op": link.op, "node": _node(link.node)} for link in node.links]
+    return {"kind": node.kind, "moves": moves, "links": links}
+
+
+def _move(move: Move) -> dict[str, Any]:
+    step = move.step
+    if isinstance(step, Affine):
+        return {"affine": [list(step.rows[at : at + 4]) for at in (0, 4, 8)]}
+    return asdict(step)
+
+
+def program_data(program: Program) -> dict[str, Any]:
+    """A Program with its numbers; float32 values are written so that they read back exactly."""
+    rows = [
+        {
+            "object": name,
+            "token": token,
+            "bounds": bounds,
+            "place": None if place is None else place._asdict(),
+            "vector": vector,
+        }
+        for name, token, bounds, place, vector in zip(
+            program.objects,
+            _tokens(program),
+            program.bounds.tolist(),
+            program.places,
+            program.vectors.tolist(),
+            strict=True,
+        )
+    ]
+    return {
+        "canvas": list(program.canvas),
+        "background": None if program.background is None else list(program.background),
+        "model": program.model,
+        "weights": program.weights,
+        "digest": program.digest(),
+        "rows": rows,
+    }
+
+
+def program_table(program: Program) -> str:
+    """A Program as a table: each row's token, object, bounds in the world and place in the source."""
+    width, height = program.canvas
+    head = f"program {width}x{height}, model {program.model}, weights {program.weights[:12]}"
+    lines = [f"{head}, digest {program.digest()[:12]}"]
+    rows = [("row", "token", "object", "bounds", "place")]
+    for at, (name, token, bounds, place) in enumerate(
+        zip(program.objects, _tokens(program), program.bounds.tolist(), program.places, strict=True)
+    ):
+        box = f"[{bounds[0]:.4g} {bounds[1]:.4g}; {bounds[2]:.4g} {bounds[3]:.4g}]"
+        where = "" if place is None else f"{place.file}:{place.line}:{place.column}"
+        rows.append((str(at), token, name, box, where))
+    widths = [max(len(row[column]) for row in rows) for column in range(4)]
+    for row in rows:
+        cells = [cell.ljust(width) for cell, width in zip(row[:4], widths, strict=True)]
+        lines.append("  ".join([*cells, row[4]]).rstrip())
+    return "\n".join(lines) + "\n"
+
+
+def _tokens(program: Program) -> list[str]:
+    from scenelang.words import TOKENS
+
+    names = {value: word for word, value in TOKENS.items()}
+    return [names[token] for token in program.tokens.tolist()]
+
+
+_MOST_LINES: Final = 3000
+
+
+def changes(before: str, after: str, old: str, new: str) -> str:
+    """The diff of two dumps; empty where nothing changed.
+
+    Comparing line by line takes quadratic time, so of very large changes only the size is told.
+
+    Args:
+        before: the dump of the stage ``old``.
+        after: the dump of the stage ``new``.
+        old: name of a stage.
+        new: name of a stage.
+    """
+    if before == after:
+        return ""
+    a, b = before.splitlines(), after.splitlines()
+    head = 0
+    while head < min(len(a), len(b)) and a[head] == b[head]:
+        head += 1
+    tail = 0
+    while tail < min(len(a), len(b)) - head and a[-1 - tail] == b[-1 - tail]:
+        tail += 1
+    if max(len(a), len(b)) - head - tail > _MOST_LINES:
+        counts = f"{len(a) - head - tail:,} lines became {len(b) - head - tail:,}"
+        return f"--- {old}\n+++ {new}\n@@ from line {head + 1:,}: {counts} @@\n"
+    lines = difflib.unified_diff(a, b, old, new, lineterm="")
+    return "\n".join(lines) + "\n"
