@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
 from scenelang.evaluate.file_context import Place
@@ -24,14 +25,12 @@ _FAST: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "!=": operator.ne,
 }
 """What operators mean on two numbers, unless that is an error or not finite."""
-
-
-def _meaning(op: str, a: Any, b: Any) -> Any:
-    if op in operators.ARITHMETIC:
-        return operators.binary(op, a, b)
-    if op in operators.COMPARE:
-        return operators.compare(op, a, b)
-    return operators.equal(a, b) is (op == "==")
+_MEANINGS: Final[dict[str, Callable[[Any, Any], Any]]] = {
+    **{op: partial(operators.binary, op) for op in operators.ARITHMETIC},
+    **{op: partial(operators.compare, op) for op in operators.COMPARE},
+    "==": operators.equal,
+    "!=": lambda a, b: not operators.equal(a, b),
+}
 
 
 def prepare_binary(expr: nodes.Binary, place: Place) -> Code:
@@ -41,12 +40,9 @@ def prepare_binary(expr: nodes.Binary, place: Place) -> Code:
     codes = [prepare(expr.left, place), prepare(expr.right, place)]
     if op not in _FAST:
         return POISONED  # recovery kept what was written, and reported it
-
-    def meaning(a: Any, b: Any) -> Any:
-        return _meaning(op, a, b)
-
+    fast, meaning = _FAST[op], _MEANINGS[op]
     slow = guarded(place, meaning, expr.op_span, (expr.left, expr.right))
-    left, right, fast = codes[0].run, codes[1].run, _FAST[op]
+    left, right = codes[0].run, codes[1].run
 
     def arithmetic(env: Env) -> Any:
         a, b = left(env), right(env)
