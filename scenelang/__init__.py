@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
     from scenelang.diagnostics.diagnostic import Diagnostics as Diagnostics
     from scenelang.diagnostics.error import SceneError as SceneError
-    from scenelang.evaluate.api import load as load
-    from scenelang.evaluate.api import loads as loads
+    from scenelang.evaluate.evaluation import load as load
+    from scenelang.evaluate.evaluation import loads as loads
     from scenelang.formatting.format import format_text as format_text
     from scenelang.image import Image as Image
     from scenelang.measure.metrics import compare as compare
@@ -63,7 +63,7 @@ _HOME: Final = {
     "scenelang.backend.render": "render",
     "scenelang.diagnostics.diagnostic": "Diagnostic Diagnostics",
     "scenelang.diagnostics.error": "SceneError",
-    "scenelang.evaluate.api": "load loads",
+    "scenelang.evaluate.evaluation": "load loads",
     "scenelang.formatting.format": "format_text",
     "scenelang.image": "Image",
     "scenelang.measure.metrics": "compare",

@@ -13,7 +13,7 @@ from fuzz.target import Target, hold
 from scenelang.backend.options import RenderError
 from scenelang.backend.render import render
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.api import loads
+from scenelang.evaluate.evaluation import loads
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program, ProgramError, parse_program, program_bytes
 

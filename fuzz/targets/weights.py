@@ -24,8 +24,7 @@ from scenelang.backend.options import RenderError
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.api import loads
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import load_source, loads
 from scenelang.models import weights
 from scenelang.models.load import Model, load_network
 from scenelang.models.manifest import ROOT, Manifest, load_manifest

@@ -10,8 +10,7 @@ from lsprotocol import types
 from scenelang.lsp.context import Cursor, cursor_at, sight_at
 from scenelang.lsp.text import width
 from scenelang.lsp.workspace import Document, Workspace
-from scenelang.resolve.names import Names
-from scenelang.resolve.symbols import Symbol
+from scenelang.resolve.names import Names, Symbol
 from scenelang.syntax import nodes
 from scenelang.words import Word, word_for_call
 

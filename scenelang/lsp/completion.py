@@ -17,8 +17,7 @@ from scenelang.lsp.context import Cursor, cursor_at, sight_at
 from scenelang.lsp.values import vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace, scenes_below
 from scenelang.records import Record
-from scenelang.resolve.names import Names
-from scenelang.resolve.symbols import Symbol
+from scenelang.resolve.names import Names, Symbol
 from scenelang.scene import library
 from scenelang.syntax import nodes
 from scenelang.words import COMBINE, UNITS

@@ -11,8 +11,7 @@ from typing import Any, Final, Literal
 
 from scenelang.diagnostics.span import Span
 from scenelang.records import Record
-from scenelang.resolve.names import Names
-from scenelang.resolve.symbols import Kind, Symbol
+from scenelang.resolve.names import Kind, Names, Symbol
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Parsed
 from scenelang.syntax.nodes import children

@@ -17,7 +17,7 @@ from scenelang.lsp.server import Settings
 from scenelang.lsp.values import space_of, vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.models.manifest import Manifest
-from scenelang.resolve.symbols import Symbol, Use
+from scenelang.resolve.names import Symbol, Use
 from scenelang.scene import text as to_nsg
 from scenelang.syntax import nodes
 from scenelang.syntax.nodes import walk

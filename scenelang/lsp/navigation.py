@@ -8,7 +8,7 @@ from typing import Final
 from lsprotocol import types
 
 from scenelang.lsp.workspace import Document, Workspace, uri_of
-from scenelang.resolve.symbols import Scope, Symbol, Use
+from scenelang.resolve.names import Scope, Symbol, Use
 from scenelang.scene import library
 from scenelang.syntax import nodes
 from scenelang.words import LANGUAGE, RESERVED

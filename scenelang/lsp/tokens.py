@@ -11,7 +11,7 @@ from lsprotocol import types
 
 from scenelang.lsp.text import width
 from scenelang.lsp.workspace import Document, Workspace
-from scenelang.resolve.symbols import Symbol, Use
+from scenelang.resolve.names import Symbol, Use
 from scenelang.syntax import nodes
 from scenelang.syntax.nodes import walk
 from scenelang.syntax.tables import tables

@@ -20,8 +20,7 @@ from scenelang.diagnostics.diagnostic import Edit as Change
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.loader import Unreadable, read_source
 from scenelang.lsp.text import Encoding, Lines, applied
-from scenelang.resolve.names import Names
-from scenelang.resolve.symbols import Symbol, Use
+from scenelang.resolve.names import Names, Symbol, Use
 from scenelang.scene import library
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Edit, Parsed, parse_edited, parse_whole

@@ -6,8 +6,7 @@ from typing import Final
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix
 from scenelang.diagnostics.fixes import removal
-from scenelang.resolve.names import Names
-from scenelang.resolve.symbols import Symbol, Use
+from scenelang.resolve.names import Names, Symbol, Use
 from scenelang.syntax import nodes
 
 _DRAWING: Final = (nodes.Call, nodes.Node, nodes.For, nodes.If, nodes.Combined)

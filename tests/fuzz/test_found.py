@@ -18,7 +18,7 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.render_machine import render_sarif
 from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.api import loads
+from scenelang.evaluate.evaluation import loads
 from scenelang.formatting import format_text
 from scenelang.models.manifest import ROOT, Manifest
 from scenelang.models.weights import ModelError, read_facts

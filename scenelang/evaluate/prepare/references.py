@@ -7,7 +7,7 @@ from typing import Any
 from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.names import UNBOUND, Binding, Env
 from scenelang.evaluate.prepare.expressions import POISONED, Code, constant, prepare
-from scenelang.evaluate.prepare.literals import member
+from scenelang.evaluate.prepare.operations import member
 from scenelang.evaluate.report.undefined import VALUES, unknown, unknown_member
 from scenelang.evaluate.values.functions import CONSTANTS, FUNCTIONS
 from scenelang.evaluate.values.value import POISON

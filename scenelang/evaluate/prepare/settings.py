@@ -1,4 +1,4 @@
-"""Settings of a scene: version, model, canvas, background, animation."""
+"""Statements of the top level: version, model, canvas, background, animation, imports; and whole files."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from scenelang.diagnostics.fixes import removal
 from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.evaluate.builder import Builder, make
-from scenelang.evaluate.file_context import Action, Place
-from scenelang.evaluate.names import Env
-from scenelang.evaluate.prepare.arguments import bind
-from scenelang.evaluate.prepare.blocks import misplaced
+from scenelang.evaluate.file_context import Action, FileContext, Place
+from scenelang.evaluate.names import Binding, Env
+from scenelang.evaluate.prepare.blocks import Body, define, misplaced, prepare_block
+from scenelang.evaluate.prepare.calls import bind
 from scenelang.evaluate.prepare.expressions import prepare, prepare_arguments
+from scenelang.evaluate.report.suppression import find_damage
 from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import number
@@ -164,3 +165,47 @@ _APPLY: Final[dict[str, Callable[..., None]]] = {
     "background": _background,
     "animate": _animate,
 }
+
+
+_BROUGHT = (nodes.Param, nodes.Let, nodes.Fn, nodes.Module, nodes.Import, nodes.Version)
+
+
+def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
+    context, alias = place.file, stmt.alias
+    if not at_top_level(place, stmt.span, "an import"):
+        define(alias, Binding("poison", alias.span), place)
+        return None
+    loader = context.loader
+    binding = Binding("import", alias.span)
+    good = define(alias, binding, place)
+    found = loader.load(stmt, context.path, context.session)
+    if found is None or not good:
+        return None
+    path, file = found
+    prefix = f"{context.prefix}{alias.text}."
+    brought = FileContext(file.span.source, context.session, loader, context.defines, path, prefix)
+    loader.chain.append(path)
+    loader.sites.append(stmt.path.span)
+    try:
+        body = prepare_file(brought, file, imported=True)
+    finally:
+        loader.chain.pop()
+        loader.sites.pop()
+    binding.value = brought
+
+    def action(_: Env, out: Builder) -> None:
+        for act in body.actions:
+            act(brought.env, Builder())
+
+    return action
+
+
+def prepare_file(context: FileContext, file: nodes.File, *, imported: bool = False) -> Body:
+    """Prepare a file's statements; of an imported one only what it brings."""
+    report = context.session.report
+    context.damage = find_damage(file, report.diagnostics)
+    if context.damage:
+        report.damaged[context.source] = context.damage
+    context.first = file.statements[0] if file.statements else None
+    statements = [s for s in file.statements if not imported or isinstance(s, _BROUGHT)]
+    return prepare_block(statements, Place(context, context.scope, "file"), file.span)

@@ -11,8 +11,8 @@ from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.costs import MATRIX, MOVE, SAME_MOVE
 from scenelang.evaluate.file_context import Action, Place
 from scenelang.evaluate.names import Env
-from scenelang.evaluate.prepare.arguments import bind
 from scenelang.evaluate.prepare.blocks import misplaced, prepare_inner
+from scenelang.evaluate.prepare.calls import bind
 from scenelang.evaluate.prepare.expressions import VARIES, Given, prepare_arguments
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.report.type_errors import report_problem
