@@ -18,27 +18,16 @@ TOKENS: Final[dict[str, int]] = {word: number for number, word in enumerate(COMB
 
 
 class Word(Record):
-    """A word of the language.
-
-    Args:
-        name: the word.
-        head: how it is written, as in a reference.
-        text: what it means, in Markdown.
-        params: names of its arguments, in order; several forms of a call have those of the longest.
-        required: how many of them, from the left, have to be given.
-        about: a line for each argument.
-        snippet: what completion inserts, with placeholders; empty for the word itself.
-        variadic: whether its one argument may be repeated.
-    """
+    """A word of the language."""
 
     name: str
-    head: str
-    text: str
-    params: tuple[str, ...] = ()
-    required: int = 0
-    about: tuple[str, ...] = ()
-    snippet: str = ""
-    variadic: bool = False
+    head: str  # how it is written, as in a reference
+    text: str  # what it means, in Markdown
+    params: tuple[str, ...] = ()  # names of its arguments, in order; of several forms those of the longest
+    required: int = 0  # how many of them, from the left, have to be given
+    about: tuple[str, ...] = ()  # a line for each argument
+    snippet: str = ""  # what completion inserts, with placeholders; empty for the word itself
+    variadic: bool = False  # whether its one argument may be repeated
 
     @property
     def notes(self) -> dict[str, str]:
@@ -130,10 +119,7 @@ MATERIAL: Final = _table(
         "material ${1:flat} { color(${2:#d33}); }",
     )
 )
-TRUTH: Final = _table(
-    _word("true", "The boolean."),
-    _word("false", "The boolean."),
-)
+TRUTH: Final = _table(_word("true", "The boolean."), _word("false", "The boolean."))
 KEYWORDS: Final = DECLARING | CONTROL | NODES | MATERIAL | TRUTH
 RESERVED: Final = tuple(word for word in KEYWORDS if word not in ("step", "as"))
 """The keywords that name nothing else; `step` and `as` are keywords only where they can follow something."""

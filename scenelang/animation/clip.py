@@ -54,11 +54,7 @@ class Given:
 
     @property
     def animation(self) -> Animation:
-        """How long they last.
-
-        Raises:
-            ValueError: nothing says how fast they follow each other, or they differ in their canvas.
-        """
+        """How long they last; raises `ValueError` where nothing says how fast, or their canvases differ."""
         if len({scene.canvas for scene in self.scenes}) > 1:
             raise ValueError("scenes with several canvases, where size says one for all")
         first, count = self.scenes[0].animation, len(self.scenes)
@@ -120,11 +116,7 @@ class Clip:
 
     @cached_property
     def first(self) -> Shot:
-        """The first frame, which every scene has.
-
-        Raises:
-            SceneError: it has errors.
-        """
+        """The first frame, which every scene has; raises `SceneError` if it has errors."""
         return self.shot(0)
 
     @property
@@ -146,11 +138,7 @@ class Clip:
         return len(given.scenes) if isinstance(given, Given) else self.animation.frames
 
     def shot(self, number: int) -> Shot:
-        """Evaluate a frame.
-
-        Raises:
-            SceneError: it has errors.
-        """
+        """Evaluate a frame; raises `SceneError` if it has errors."""
         scene, spans = self._evaluation.run(number)
         if scene is None or self.diagnostics.errors:
             raise SceneError(self.diagnostics)
@@ -162,12 +150,7 @@ class Clip:
         return Shot(number, scene, spans)
 
     def program(self, shot: Shot) -> Program:
-        """Compile a frame.
-
-        Raises:
-            SceneError: it has errors.
-            FileNotFoundError: the model has no weights.
-        """
+        """Compile a frame; raises `SceneError`, or `FileNotFoundError` where the model has no weights."""
         from scenelang.program.compile import compile_scene
 
         if self.reuse and self._last is not None and same_nodes(self._last[0].scene, shot.scene):
@@ -180,12 +163,7 @@ class Clip:
 
 
 def open_clip(path: str | os.PathLike[str], **options: Any) -> Clip:
-    """A clip of a scene file; ``options`` as for `Clip`.
-
-    Raises:
-        SceneError: the file is not text.
-        OSError: the file cannot be opened.
-    """
+    """A clip of a scene file; ``options`` as for `Clip`. Raises `SceneError` where it is not text."""
     where = Path(path)
     name = os.fspath(path)
     try:

@@ -188,11 +188,9 @@ class Census:
 
 
 class Mapper:
-    """Pictures to indices of a palette: exact where the colour is in it, the nearest otherwise.
+    """Pictures to indices of a palette (K, 3): exact where the colour is in it, the nearest otherwise.
 
-    Args:
-        colours: (K, 3).
-        dither: spread the error to neighbouring pixels (Floyd and Steinberg 1976).
+    If asked, the error is dithered over neighbouring pixels (Floyd and Steinberg 1976).
     """
 
     def __init__(self, colours: Colours, dither: bool) -> None:

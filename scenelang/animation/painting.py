@@ -46,15 +46,9 @@ class Painter:
     load_s: float = 0.0  # what loading torch took
 
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
-        """Compile a frame and say what its picture depends on.
+        """Compile a frame and say what its picture depends on; raises as `Clip.program`, or `RenderError`.
 
-        Args:
-            shot: the frame.
-            single: it is a picture by itself, which numpy draws if it is small; torch draws animations.
-
-        Raises:
-            SceneError: it has errors.
-            RenderError: there is no such device.
+        Numpy draws a picture by itself (``single``) if it is small, torch draws animations.
         """
         if self.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})
@@ -91,11 +85,7 @@ class Painter:
         return usable_cores()
 
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
-        """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit.
-
-        Raises:
-            SceneError, RenderError: as for `scenelang.render`.
-        """
+        """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit."""
         if frame.program is None:
             from scenelang.backend.exact import draw_exact
 
@@ -121,11 +111,7 @@ def paint(
     kept: Kept | None,
     progress: Progress | None = None,
 ) -> Image:
-    """Draw a Program on a torch device, split for so many threads, of which so many draw at the same time.
-
-    Raises:
-        RenderError: as for `scenelang.render`.
-    """
+    """Draw a Program on a torch device, split for so many threads, of which so many draw at the same time."""
     from scenelang.backend.neural import draw_program, open_model
 
     model = open_model(program.model, place)

@@ -27,11 +27,7 @@ class Film:
     alpha: bool  # whether the pictures are transparent
 
     def read(self, file: Path) -> Pixels:
-        """The pixels (H, W, 3 or 4) of a frame.
-
-        Raises:
-            OSError: the file is damaged.
-        """
+        """The pixels (H, W, 3 or 4) of a frame; raises `OSError` where its file is damaged."""
         from PIL import Image
 
         with Image.open(file) as image:

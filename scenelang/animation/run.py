@@ -102,12 +102,8 @@ def make(
     same call goes on with those that are missing.
 
     Args:
-        painter: draws the clip's frames.
-        target: where they go.
-        numbers: which frames.
         jobs: processes that draw; by default this one, and others as soon as they would pay.
-        palette: of a GIF, see `write_gif`.
-        dither: of a GIF.
+        palette, dither: of a GIF, see `write_gif`.
         strict: count warnings as errors.
         progress: called from any thread.
 
@@ -234,12 +230,7 @@ def _numbered(store: Store, target: Target, numbers: range, keys: Sequence[str])
 
 
 def ready(target: Target) -> None:
-    """Find out before any work whether a format can be written, and that no input is lost by it.
-
-    Raises:
-        RenderError: it cannot.
-        NotWritten: the target is an input.
-    """
+    """Raise `RenderError` where a format cannot be written, `NotWritten` where an input would be lost."""
     output_place(target.path)
     if target.kind == "video":
         find_codec(target.path.suffix.lower())

@@ -36,13 +36,9 @@ def frame_key(*parts: object) -> str:
 
 
 class Store:
-    """A folder of frames; while it is open no other process may use it.
+    """A folder of frames, made if it is not there; while it is open no other process may use it.
 
     The folder may be a stranger's: no link in it is followed, and only files named like our own are removed.
-
-    Args:
-        folder: made if it is not there.
-        suffix: of the frames' files, which names their format.
 
     Raises:
         Busy: another process has it.
@@ -109,22 +105,14 @@ class Store:
 
 
 def put_frame(file: Path, image: Image) -> None:
-    """Write a picture in the format that its file's suffix names; a link in its place is replaced.
-
-    Raises:
-        OSError: it cannot be written.
-    """
+    """Write a picture in the format that its file's suffix names; a link in its place is replaced."""
     from scenelang.image import image_format
 
     write_whole(file, image.encode(image_format(file)))
 
 
 def deliver(part: Path, target: Path) -> None:
-    """Flush a finished file of the same file system to the disk and rename it over ``target``.
-
-    Raises:
-        OSError: it cannot; ``target`` stays as it was.
-    """
+    """Flush a finished file to the disk and rename it over ``target``, which stays as it was if it cannot."""
     place = output_place(target)
     with part.open("rb") as file:
         os.fsync(file.fileno())

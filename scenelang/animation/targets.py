@@ -53,14 +53,10 @@ def is_animation(out: str) -> bool:
 
 
 def find_target(out: str, stem: str = "frame") -> Target:
-    """What ``out`` asks for.
+    """What ``out`` asks for: a file with one of the suffixes of `ENCODED`, a pattern, or a folder.
 
-    Args:
-        out: a file with one of the suffixes of `ENCODED`; a pattern; or a folder.
-        stem: what the files in a folder start with.
-
-    Raises:
-        TargetError: the name fits none of these, or its folder is not there.
+    The files in a folder start with ``stem``. Raises `TargetError` where the name fits none of these, or its
+    folder is not there.
     """
     path = Path(out)
     if is_pattern(out):

@@ -30,11 +30,7 @@ class NoFfmpeg(RenderError):
 
 @lru_cache(maxsize=1)
 def find_ffmpeg() -> str:
-    """The ffmpeg on the PATH, or else the one that imageio-ffmpeg brings.
-
-    Raises:
-        NoFfmpeg: there is neither.
-    """
+    """The ffmpeg on the PATH, or the one that imageio-ffmpeg brings; raises `NoFfmpeg` without either."""
     found = shutil.which("ffmpeg")
     if found is not None:
         return found
@@ -55,11 +51,7 @@ def _encoders(ffmpeg: str) -> frozenset[str]:
 
 
 def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
-    """An ffmpeg that can write files of a suffix, and its options for that.
-
-    Raises:
-        NoFfmpeg: there is none.
-    """
+    """An ffmpeg that can write files of a suffix, and its options for that; raises `NoFfmpeg` without."""
     ffmpeg = find_ffmpeg()
     known = _encoders(ffmpeg)
     wanted = (_VP9,) if suffix == ".webm" else (_H264, *_OTHERS)
@@ -72,14 +64,8 @@ def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
 def write_video(film: Film, part: Path, progress: Callable[[float], None], *, suffix: str) -> None:
     """Encode a film as 4:2:0 video with BT.709 colours; only WebM keeps alpha, the others lie over white.
 
-    A side of odd length gets one more row or column, a copy of its neighbour.
-
-    Args:
-        suffix: ``.mp4``, ``.mov``, ``.mkv`` or ``.webm``.
-
-    Raises:
-        NoFfmpeg: there is none, or it lacks an encoder.
-        RenderError: it fails.
+    A side of odd length gets one more row or column, a copy of its neighbour. Raises `NoFfmpeg`, or
+    `RenderError` where it fails.
     """
     ffmpeg, codec = find_codec(suffix)
     keeps = film.alpha and suffix == ".webm"

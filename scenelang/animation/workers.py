@@ -27,12 +27,7 @@ AHEAD = 2  # frames that wait for each process, so that none is idle and few are
 
 
 class Workers:
-    """Processes that draw Programs into files.
-
-    Args:
-        count: of processes.
-        split: how many threads a picture is split for; each draws with one, and the same pixels.
-    """
+    """Processes that draw Programs into files, each with one thread and the pixels of ``split`` threads."""
 
     def __init__(self, count: int, split: int) -> None:
         self.count, self.split = count, split
@@ -55,21 +50,13 @@ class Workers:
         return len(self._waiting)
 
     def submit(self, program: Program, file: Path) -> None:
-        """Have a Program drawn to a picture file; waits while many are under way.
-
-        Raises:
-            RenderError, OSError: an earlier one failed.
-        """
+        """Have a Program drawn to a picture file; waits while many are under way. Raises as `take`."""
         while len(self._waiting) >= AHEAD * self.count:
             self.take()
         self._waiting.append(self._pool.submit(self._draw, program_bytes(program), file))
 
     def take(self) -> None:
-        """Wait for the first of those asked for.
-
-        Raises:
-            RenderError, OSError: it failed.
-        """
+        """Wait for the first of those asked for; raises the `RenderError` or `OSError` by which it failed."""
         self._waiting.popleft().result()
 
     def _draw(self, program: bytes, file: Path) -> None:

@@ -55,11 +55,7 @@ class Requested:
 
     @property
     def frames(self) -> FrameRange:
-        """Which frames.
-
-        Raises:
-            click.UsageError: the range is not one.
-        """
+        """Which frames; raises `click.UsageError` where the range is not one."""
         try:
             return FrameRange() if self.range is None else FrameRange.parse(self.range)
         except FramesError as error:
@@ -69,8 +65,7 @@ class Requested:
 def wanted_target(name: str, out: str, wanted: Requested) -> Target | None:
     """Where the animation of a scene goes if it has one; None where ``out`` is a single picture.
 
-    Raises:
-        click.UsageError: frames are asked for, and ``out`` holds one picture.
+    Raises `click.UsageError` where frames are asked for all the same.
     """
     folder = out.endswith(("/", "\\")) or Path(out).is_dir()
     if not (is_animation(out) or folder or wanted.certain):
@@ -84,8 +79,7 @@ def wanted_target(name: str, out: str, wanted: Requested) -> Target | None:
 def still_picture(clip: Clip, target: Target, wanted: Requested, out: str) -> bool:
     """Whether a scene without an animation is drawn as one picture; reports where it cannot be.
 
-    Raises:
-        click.UsageError: ``out`` cannot hold one.
+    Raises `click.UsageError` where ``out`` cannot hold one.
     """
     if clip.animates:
         return False

@@ -46,11 +46,7 @@ class Scenes(Record, frozen=False):
     """How many frames that were to be looked at were not, as they exceed the limits of one scene."""
 
     def read(self, name: str) -> None:
-        """Take a scene in, once under any name.
-
-        Raises:
-            OSError: it cannot be opened.
-        """
+        """Take a scene in, once under any name; raises `OSError` where it cannot be opened."""
         place = _place(name)
         if place in self.names:
             return

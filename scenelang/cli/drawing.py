@@ -74,11 +74,7 @@ def exact(request: Request, clock: Clock) -> Draw:
 
 
 def check_options(ctx: click.Context, limits: Limits, device: str) -> None:
-    """Refuse options that the frontier decides.
-
-    Raises:
-        click.UsageError: one of them is given beside a limit.
-    """
+    """Raise `click.UsageError` where an option that the frontier decides is given beside a limit."""
     from click.core import ParameterSource
 
     asked = "--max-ms" if limits.ms is not None else "--max-flip"
@@ -124,9 +120,7 @@ def chosen(
 def choose_point(job: Job, limits: Limits, model: str | None, here_ms: float) -> Point | None:
     """Choose how to draw a job, and compile it for the model that does; None leaves a trouble in it.
 
-    Args:
-        model: the only model to choose, where the command line names one.
-        here_ms: the yardstick's time on this machine.
+    ``model`` is the only one to choose where it is given; ``here_ms`` the yardstick's time on this machine.
     """
     from scenelang.measure.choose import NothingFits, machine_scale
     from scenelang.measure.frontier import load_frontier

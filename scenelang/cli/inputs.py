@@ -52,11 +52,7 @@ def stem_of(name: str) -> str:
 
 
 def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
-    """The text of a scene; None after a report that it cannot be read as text.
-
-    Raises:
-        OSError: it cannot be opened.
-    """
+    """The text of a scene, None after a report that it is not text; raises `OSError` if it cannot be read."""
     try:
         if name == STDIN:
             note_input("/dev/stdin")  # which may be a file, by `<`
@@ -73,11 +69,7 @@ def read_input(
 ) -> Input:
     """Read one scene: text is evaluated, JSON (by its suffix, or `{` first in standard input) just read.
 
-    Args:
-        source: its text, where it was read before.
-
-    Raises:
-        OSError: it cannot be opened.
+    ``source`` is its text, where it was read before. Raises `OSError` where it cannot be opened.
     """
     clock = clock or Clock()
     found = Input()

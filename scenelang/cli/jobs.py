@@ -31,11 +31,7 @@ STAGES = ("syntax", "scene", "lower", *(step.name for step in PASSES), "program"
 
 
 def check_stages(wanted: Collection[str], known: Collection[str] = STAGES) -> None:
-    """Refuse names that are none of the stages.
-
-    Raises:
-        click.UsageError: one is not.
-    """
+    """Raise `click.UsageError` for names that are none of the stages."""
     for name in wanted:
         if name not in known:
             from difflib import get_close_matches

@@ -17,12 +17,9 @@ _DIFF_STYLES = {"-": "removed", "+": "added", "@": "frame"}
 
 
 def wants_color(stream: IO[Any], choice: str = "auto") -> bool:
-    """Whether to colour what goes to a stream.
+    """Whether to colour what goes to a stream: ``always``, ``never``, or ``auto``.
 
-    Args:
-        stream: where it goes.
-        choice: ``always``, ``never``, or ``auto``: a terminal that can, whose user has not switched colours
-            off (https://no-color.org).
+    That is on a terminal that can, whose user has not switched colours off (https://no-color.org).
     """
     if choice != "auto":
         return choice == "always"
@@ -53,11 +50,7 @@ def say_trouble(message: str) -> None:
 
 
 def put_out(made: str | bytes, out: str | None) -> None:
-    """Write what a command made to a file, whole or not at all; ``-`` or none is standard output.
-
-    Raises:
-        OSError: the file cannot be written; nothing is left behind.
-    """
+    """Write what a command made to a file, whole or not at all; ``-`` or none is standard output."""
     if out is None or out == "-":
         click.echo(made, nl=False)
         return

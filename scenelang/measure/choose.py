@@ -61,13 +61,9 @@ def error_scale(canvas: tuple[int, int], objects: int) -> float:
 
 
 def refusal(point: Point, manifest: Manifest | None, scene: Scene | None, compiled: str | None) -> str | None:
-    """Why a point cannot draw a scene, None if it can.
+    """Why a point cannot draw a scene, or what was compiled for a model; None if it can.
 
-    Args:
-        point: from the frontier.
-        manifest: of the point's model; None for the reference.
-        scene: the scene; None for a compiled program.
-        compiled: the model that the program was compiled for.
+    The reference has no manifest, and a compiled program no scene.
     """
     if not point.offered:
         return point.why_not or "not offered"
@@ -88,14 +84,7 @@ def refusal(point: Point, manifest: Manifest | None, scene: Scene | None, compil
 
 
 def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: float) -> list[Offer]:
-    """What points promise for a scene, the fastest first.
-
-    Args:
-        points: that can draw it.
-        load: of the scene.
-        canvas: its pixels.
-        scale: how much slower this machine is than the one that was measured.
-    """
+    """What points that can draw a scene promise for it, the fastest first; ``scale`` from `machine_scale`."""
     found = []
     for point in points:
         if point.cost is None or point.flip is None:
@@ -108,15 +97,8 @@ def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: 
 def choose(found: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> Choice:
     """The fastest offer that keeps the error, or the one of least error that keeps the time.
 
-    Of offers that promise nearly the same error, within 2 %, the faster one is better.
-
-    Args:
-        found: from `offers`.
-        limits: at least one. With both the fastest that keeps both is taken.
-        refused: why other points cannot draw the scene, to be told.
-
-    Raises:
-        NothingFits: no offer keeps the limits.
+    Of offers that promise nearly the same error, within 2 %, the faster one is better. With both limits the
+    fastest that keeps both is taken. Raises `NothingFits` where no offer keeps them.
     """
     if not found:
         raise NothingFits("nothing on the frontier draws this scene" + _because(refused))

@@ -27,13 +27,9 @@ RECORDED = 60  # scenes of each set that a weights' header tells the error of
 
 
 def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: Spans | None = None) -> Image:
-    """The exact picture of a scene over its background.
+    """The exact picture of a scene over its background, names as a model knows them.
 
-    Args:
-        scene: what is drawn.
-        manifest: of the model that its names are known by.
-        per_side: samples along each side of a pixel; 2 is the definition.
-        spans: where it was written.
+    ``per_side`` is samples along each side of a pixel; 2 is the definition.
     """
     return reference_image(lower(scene, manifest, spans, Diagnostics()), per_side=per_side)
 

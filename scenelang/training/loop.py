@@ -140,9 +140,7 @@ def _cut(log: Path, done: int) -> None:
 def take_cell(network: Framed, model: str) -> None:
     """Give a network the cell, the materials and the slopes of a shipped framed model.
 
-    Raises:
-        ModelError: its weights are missing, damaged or of another renderer.
-        RuntimeError: its cell has other sizes.
+    Raises `ModelError` where its weights cannot be had, `RuntimeError` where its cell has other sizes.
     """
     given = load_model(model).framed.state_dict()
     decoder, _ = network.parts()

@@ -34,11 +34,7 @@ def _stamp(path: Path) -> Stamp:
 
 
 def wait(before: Stamps) -> None:
-    """Return as soon as any file is not as it was, and has come to rest.
-
-    Args:
-        before: the files, as they were before they were read.
-    """
+    """Return as soon as any file is not as it was before it was read, and has come to rest."""
     while stamps(before) == before:
         time.sleep(LOOK_S)
     settle(before)

@@ -83,11 +83,8 @@ class Easel:
     def draw(self, before: Stamps) -> Outcome:
         """Read, compile, draw and save.
 
-        Args:
-            before: the files as they were; where they change meanwhile, the drawing of an animation ends.
-
         Raises:
-            Outdated: they did.
+            Outdated: files are not as they were ``before``, which ends the drawing of an animation.
             RenderError: there is no such device, or no weights.
             OSError: the picture cannot be written, or the scene not be read.
         """

@@ -21,12 +21,7 @@ _LINES = 5  # of text, beside the picture
 
 
 class Screen:
-    """Standard output.
-
-    Args:
-        show: whether to show pictures: in terminals that can, never, or as coloured characters at least.
-        colour: whether to colour text.
-    """
+    """Standard output; pictures are shown if it can, never, or always: as coloured characters at least."""
 
     def __init__(self, show: Show, colour: bool) -> None:
         self.colour = colour
