@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import GifImagePlugin, Image
 
-from scenelang.animation.pictures import Box, Film, Pixels, changed
+from scenelang.animation.store import Box, Film, Pixels, changed
 from scenelang.animation.timing import delays
 
 Palette = Literal["auto", "global", "frame"]

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Final
 from scenelang.animation.apng import write_apng
 from scenelang.animation.gif import write_gif
 from scenelang.animation.painting import Painter
-from scenelang.animation.pictures import Encoder, Film
-from scenelang.animation.store import Store, deliver, put_frame
+from scenelang.animation.store import Encoder, Film, Store, deliver, put_frame
 from scenelang.animation.targets import Target
 from scenelang.animation.video import find_codec, write_video
 from scenelang.animation.webp import write_webp

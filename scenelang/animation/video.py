@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from scenelang.animation.pictures import Film, Pixels
+from scenelang.animation.store import Film, Pixels
 from scenelang.backend.options import RenderError
 
 _H264: Final = ("libx264", "-preset", "medium", "-crf", "16")

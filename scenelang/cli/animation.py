@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from scenelang.animation.run import RenderResult
     from scenelang.backend.options import Backend, Device
 
-SIZES = ("B", "kB", "MB", "GB")
-
 
 @dataclass(frozen=True, slots=True)
 class Requested:
@@ -207,8 +205,8 @@ def strays(target: Target, made: RenderResult) -> str | None:
 
 def readable(size: float) -> str:
     """Human-readable byte count."""
-    for unit in SIZES:
-        if size < 1000 or unit == SIZES[-1]:
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000 or unit == "GB":
             break
         size /= 1000
     return f"{size:.0f} {unit}" if size >= 100 or unit == "B" else f"{size:.1f} {unit}"

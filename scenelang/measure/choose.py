@@ -101,7 +101,8 @@ def choose(found: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> C
     fastest that keeps both is taken. Raises `NothingFits` where no offer keeps them.
     """
     if not found:
-        raise NothingFits("nothing on the frontier draws this scene" + _because(refused))
+        told = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
+        raise NothingFits("nothing on the frontier draws this scene" + (f" ({told})" if told else ""))
     good = [offer for offer in found if not _lacks(offer, limits)]
     if not good:
         raise NothingFits(_nearest(found, limits))
@@ -141,11 +142,6 @@ def _nearest(found: Sequence[Offer], limits: Limits) -> str:
     else:
         told = f"the fastest is {min(found, key=lambda o: o.ms).told()}"
     return f"nothing draws this scene within {' and '.join(asked)}; {told}"
-
-
-def _because(refused: dict[str, str]) -> str:
-    told = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
-    return f" ({told})" if told else ""
 
 
 # ---------------------------------------------------------------- what a frame will take

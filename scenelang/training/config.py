@@ -75,11 +75,6 @@ def config_data(name: str) -> bytes:
     return read_regular(path, _MOST_BYTES)
 
 
-def is_study(data: bytes) -> bool:
-    """Whether a configuration is one of a study, which the laboratory trains."""
-    return b'"study"' in data
-
-
 def is_solids(data: bytes) -> bool:
     """Whether a configuration is a `SolidsConfig`."""
     return b'"polish"' in data

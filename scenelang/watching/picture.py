@@ -74,12 +74,6 @@ class Easel:
     def __post_init__(self) -> None:
         self.paths = (Path(os.path.abspath(self.file)),)
 
-    def _warm(self) -> None:
-        """Load torch in the background, so that a scene that is mended need not wait for it."""
-        name = "scenelang.backend.neural"
-        if self.backend == "neural" and name not in sys.modules:
-            threading.Thread(target=importlib.import_module, args=(name,), daemon=True).start()
-
     def draw(self, before: Stamps) -> Outcome:
         """Read, compile, draw and save.
 
@@ -93,8 +87,10 @@ class Easel:
         with contextlib.suppress(SceneError):  # its diagnostics are `found`
             self._draw(found, outcome, before)
         outcome.diagnostics = found.items
-        if not outcome.good:
-            self._warm()
+        torch = "scenelang.backend.neural"
+        if not outcome.good and self.backend == "neural" and torch not in sys.modules:
+            # loaded in the background, so that a scene that is mended need not wait for it
+            threading.Thread(target=importlib.import_module, args=(torch,), daemon=True).start()
         return outcome
 
     def _draw(self, found: Diagnostics, outcome: Outcome, before: Stamps) -> None:

@@ -8,13 +8,13 @@ import sys
 import warnings
 from typing import TYPE_CHECKING, Any, Literal
 
+from scenelang.backend.options import RenderError
 from scenelang.diagnostics.diagnostic import Diagnostic
 
 if TYPE_CHECKING:
     import PIL.Image
 
 Show = Literal["auto", "never", "always"]
-Protocol = Literal["pixels", "cells"]
 
 _CLEAR = "\x1b[2J\x1b[H"  # the screen, not what was scrolled off it
 _LINES = 5  # of text, beside the picture
@@ -62,13 +62,7 @@ class Screen:
         from rich.console import Console
 
         columns, lines = shutil.get_terminal_size()
-        console = Console(
-            file=sys.stdout,
-            force_terminal=True,
-            width=columns,
-            color_system="truecolor",
-            legacy_windows=False,
-        )
+        console = Console(force_terminal=True, width=columns, color_system="truecolor", legacy_windows=False)
         room = max(4, lines - _LINES)
         cell_width, cell_height = _cell()
         wide, high = picture.width / cell_width, picture.height / cell_height
@@ -96,13 +90,9 @@ def _find(show: Show) -> Any:
             return Cells if show == "always" else None
         from textual_image.renderable import HalfcellImage, Image, UnicodeImage
     except ImportError:
-        if show == "always":
-            from scenelang.backend.options import RenderError
-
-            raise RenderError(
-                "showing pictures needs textual-image: pip install 'scenelang[watch]'"
-            ) from None
-        return None
+        if show != "always":
+            return None
+        raise RenderError("showing pictures needs textual-image: pip install 'scenelang[watch]'") from None
     except Exception:  # whatever a terminal answers
         return None
     if Image in (HalfcellImage, UnicodeImage):

@@ -15,7 +15,7 @@ from PIL import Image
 
 from scenelang.animation.apng import write_apng
 from scenelang.animation.gif import Census, Mapper, Palette, write_gif
-from scenelang.animation.pictures import Film, Pixels
+from scenelang.animation.store import Film, Pixels
 from scenelang.animation.video import NoFfmpeg, find_ffmpeg, write_video
 from scenelang.animation.webp import write_webp
 

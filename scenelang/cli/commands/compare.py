@@ -22,12 +22,7 @@ if TYPE_CHECKING:
 @options.threads
 @click.pass_context
 def command(
-    ctx: click.Context,
-    scene: str,
-    out: Path | None,
-    request: Request,
-    device: str,
-    threads: int | None,
+    ctx: click.Context, scene: str, out: Path | None, request: Request, device: str, threads: int | None
 ) -> None:
     """Draw SCENE with the network and exactly, and show where they differ.
 

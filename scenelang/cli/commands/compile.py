@@ -20,14 +20,7 @@ if TYPE_CHECKING:
 @options.strict
 @options.verbose
 @click.pass_context
-def command(
-    ctx: click.Context,
-    file: str,
-    out: str,
-    request: Request,
-    strict: bool,
-    verbose: bool,
-) -> None:
+def command(ctx: click.Context, file: str, out: str, request: Request, strict: bool, verbose: bool) -> None:
     """Compile a scene to a program that `scenelang render` draws and other software can read.
 
     FILE is a scene, or - for standard input. `scenelang dump` shows what the compiler made of it.

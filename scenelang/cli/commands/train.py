@@ -55,13 +55,7 @@ def training(made: Callable[..., None]) -> Callable[..., None]:
 @click.command("train")
 @training
 def command(
-    config: str,
-    out: Path,
-    budget_s: float,
-    device: str,
-    threads: int | None,
-    every: int,
-    save_every: float,
+    config: str, out: Path, budget_s: float, device: str, threads: int | None, every: int, save_every: float
 ) -> None:
     """Train, or go on where the checkpoint in FOLDER was saved.
 
@@ -72,14 +66,13 @@ def command(
         SolidsConfig,
         config_data,
         is_solids,
-        is_study,
         read_config,
         read_solids_config,
     )
     from scenelang.training.loop import train
     from scenelang.training.solids import train_solids
 
-    if is_study(config_data(config)):
+    if b'"study"' in config_data(config):
         raise click.UsageError(f"`{config}` configures a study; scenelang lab train trains it.")
     last: dict[str, float] = {}
     with reporting_mistakes(config, out), Bar() as bar:

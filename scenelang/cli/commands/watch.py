@@ -81,16 +81,7 @@ def command(
     options = {"model": model, "root": folder, "size": size, "fps": fps}
     screen = Screen(show, wants_color(sys.stdout))
     easel = Easel(
-        file,
-        path,
-        target,
-        wanted.frames,
-        frame or 0,
-        defines.values,
-        options,
-        backend,
-        device,
-        threads,
+        file, path, target, wanted.frames, frame or 0, defines.values, options, backend, device, threads
     )
     while True:
         before = stamps(easel.paths)
