@@ -21,9 +21,6 @@ def draw_exact(
     """Draw a scene from its graph as written, before any pass.
 
     Args:
-        scene: a concrete scene.
-        spans: where its nodes were written, for diagnostics.
-        diagnostics: collects errors and warnings.
         model: take names from this model instead of the one the scene names.
 
     Raises:

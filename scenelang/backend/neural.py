@@ -108,8 +108,6 @@ def draw_program(
     One drawing runs at a time, on all of ``threads``: torch's number of threads is the process's.
 
     Args:
-        program: compiled for this model's weights.
-        model: from `open_model`.
         threads: tiles drawn at the same time; by default one for each usable core.
         split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.

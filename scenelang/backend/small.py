@@ -77,7 +77,6 @@ def draw_small(
         program: of any size, for a model with a framed network.
         samples: of a pixel: four near outlines, four everywhere, or one.
         kept: the picture before this one, of which tiles that show the same are taken over.
-        progress: called with the share done, in [0, 1].
 
     Raises:
         RenderError: its model's weights are missing, or it was compiled for others or by no compiler.

@@ -23,7 +23,6 @@ def leaf_box(leaf: Leaf, level: float, space: Space) -> Box:
     Args:
         leaf: with all its moves into the world.
         level: world distance, at least 0; 0 for the leaf itself.
-        space: the model's.
     """
     return leaf.noted(level, lambda leaf: space.box(leaf.geometry, leaf.steps, level))
 
@@ -38,7 +37,6 @@ def felt_level(op: Combine, smooths: int) -> float | None:
 
     Args:
         op: the row's operator; for an intersection the level within which anything before it can remain.
-        smooths: how many `smooth` rows follow.
 
     Returns:
         The level, or None where the row may matter anywhere.

@@ -28,7 +28,6 @@ class Look(Record):
     """A material as an object wears it.
 
     Args:
-        material: name in the model's manifest.
         texture: moves of its texture, the first written first.
         colours: operations on its colour, the first written first.
         rgb: what the operations start from, in [0, 1], as written (sRGB in 2D): white, or what they came to

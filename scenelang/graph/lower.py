@@ -23,7 +23,6 @@ def step_of(transform: schema.Transform, space: Space) -> Step | Refusal:
     """The step that a transform stands for, or why there is none.
 
     Args:
-        transform: any transform of a geometry.
         space: the model's; in the plane nothing may leave it, and scales along z drop out.
     """
     if isinstance(transform, schema.Twirl):
@@ -105,8 +104,6 @@ def lower(
     without it, so that everything else is checked too.
 
     Args:
-        scene: a concrete scene.
-        manifest: the model's.
         spans: where nodes were written; None for a scene that did not come from text.
         diagnostics: receives E03xx and E05xx.
         memory: of the frame before; holds this one afterwards.

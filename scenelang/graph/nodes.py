@@ -34,10 +34,7 @@ class Leaf(Record):
     """One object: a leaf geometry of a model, its look and its moves.
 
     Args:
-        geometry: name in the model's manifest.
-        look: material and what is done to its texture and colour.
         moves: steps into the parent's space, nearest the leaf first.
-        span: where the object was written.
         notes: what was worked out about a leaf that stays from frame to frame of an animation, by what it
             is; None for a leaf that is used once. It is not part of the value.
     """
@@ -84,9 +81,7 @@ class Fold(Record):
 
     Args:
         kind: the word it was written with: ``scene``, ``group``, ``chain`` or a boolean.
-        links: children in order.
         moves: steps that apply to all children, nearest the leaf first.
-        span: where it was written.
     """
 
     kind: str
@@ -103,9 +98,7 @@ class Graph(Record):
 
     Args:
         root: the top level, a fold of kind ``scene``; after `linearise` all its children are leaves.
-        canvas: width and height in pixels.
         background: colour in [0, 1] as written, or None for transparency.
-        space: the model's.
     """
 
     root: Fold
@@ -168,7 +161,6 @@ def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph
     """The graph with ``change`` applied to every leaf.
 
     Args:
-        graph: any graph.
         change: depends on nothing but the leaf and the graph's space; gives the leaf itself where it stays.
         name: of the change, under which leaves that stay from frame to frame note what became of them.
     """

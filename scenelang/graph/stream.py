@@ -36,11 +36,7 @@ _MOST_CUTS = 64
 
 
 class Stream(Record, frozen=False):
-    """Rows in order; the first one is a union.
-
-    Args:
-        space: the model's.
-    """
+    """Rows in order; the first one is a union."""
 
     space: Space
     rows: deque[Row] = field(default_factory=deque)

@@ -36,7 +36,6 @@ def verify(graph: Graph, stage: str, holds: Collection[Invariant] = (), sound: S
     """Check a graph after ``stage``, the name of a pass or ``lower``.
 
     Args:
-        graph: any graph.
         stage: whom to name.
         holds: what this stage and those before it established.
         sound: leaves that an earlier stage left sound and this one may have kept; takes those of this graph.

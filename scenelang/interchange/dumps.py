@@ -170,12 +170,6 @@ def changes(before: str, after: str, old: str, new: str) -> str:
     """The diff of two dumps; empty where nothing changed.
 
     Comparing line by line takes quadratic time, so of very large changes only the size is told.
-
-    Args:
-        before: the dump of the stage ``old``.
-        after: the dump of the stage ``new``.
-        old: name of a stage.
-        new: name of a stage.
     """
     if before == after:
         return ""

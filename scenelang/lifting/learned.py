@@ -48,7 +48,6 @@ def read_lifting(tensors: Mapping[str, npt.NDArray[Any]], prefix: str = "lifting
 
     Args:
         tensors: by name, as `safetensors.numpy.load` returns them.
-        prefix: of the lifting's names.
 
     Raises:
         KeyError: something is missing.
@@ -101,8 +100,6 @@ def lift_geometry(lifting: Lifting, chains: Sequence[Sequence[Step]], leaves: Se
     """Geometry vectors (N, d_g): T_n … T_1 g of each chain, nearest the leaf first.
 
     Args:
-        lifting: of the model.
-        chains: steps of each object.
         leaves: geometry of each object, a row of the codes.
     """
     out: Array = lifting.codes[np.asarray(leaves, int)].copy()

@@ -109,8 +109,6 @@ def code_actions(
     """What may be done about the mistakes in a range.
 
     Args:
-        document: the text.
-        place: where the cursor or the selection is.
         only: the kinds that the client asks for; None for all.
     """
     lines = document.lines

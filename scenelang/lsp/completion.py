@@ -31,11 +31,8 @@ class Item(Record):
     """A proposal.
 
     Args:
-        label: what the list shows.
-        kind: its icon.
         text: what is inserted; the label without it.
         rank: one letter; what is likelier comes first.
-        detail: a line beside the label.
         about: Markdown.
         snippet: whether ``text`` has placeholders.
     """
@@ -95,14 +92,7 @@ _SYMBOLS: Final = {
 
 
 def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
-    """What may stand at an offset.
-
-    Args:
-        docs: all documents.
-        document: the text.
-        offset: where the cursor is.
-        snippets: whether the client fills in placeholders.
-    """
+    """What may stand at an offset."""
     names = sight_at(document.parsed, offset)
     values = frozenset(
         s.name for s in names.visible(offset) if s.kind in ("let", "argument", "loop", "param")

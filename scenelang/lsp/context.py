@@ -109,12 +109,9 @@ class Cursor(Record):
     """What is around an offset.
 
     Args:
-        offset: the place.
         start, end: the word that the cursor is in or behind; equal to ``offset`` where there is none.
         inside: ``comment``, ``string``, ``number``, ``colour`` or ``code``.
         before: the tokens of the statement before that word, as text.
-        call: the innermost call.
-        block: the innermost block.
     """
 
     offset: int
@@ -166,8 +163,6 @@ def cursor_at(parsed: Parsed, offset: int, values: frozenset[str] = frozenset())
     """What is around an offset.
 
     Args:
-        parsed: the text.
-        offset: the place.
         values: names in sight that may be materials.
     """
     read = _Reader(parsed)

@@ -46,8 +46,6 @@ class Settings(Record):
         debounce_ms: how long typing has to pause before a scene is evaluated.
         model: draw with this model instead of the scene's.
         root: the folder that imports cannot leave, instead of the scene's.
-        value_hints: show values behind lets.
-        argument_hints: show parameter names in calls.
     """
 
     debounce_ms: float = 200.0
@@ -84,7 +82,6 @@ class Incoming:
     No JSON holds a line that ends like a header, as newlines in strings are escaped.
 
     Args:
-        stream: the client's.
         refuse: called for each message that is passed over, from the thread that reads.
     """
 

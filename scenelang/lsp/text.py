@@ -20,12 +20,7 @@ _NEWLINE: Final = re.compile(r"\r\n|\n|\r")
 
 
 class Lines:
-    """The lines of one text.
-
-    Args:
-        text: the text.
-        encoding: what columns count.
-    """
+    """The lines of one text."""
 
     def __init__(self, text: str, encoding: Encoding = "utf-16") -> None:
         self.text = text

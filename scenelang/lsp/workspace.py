@@ -44,9 +44,7 @@ class Document:
     Args:
         uri: what the client calls it.
         path: its resolved file; None for a buffer that has none.
-        parsed: text and tree.
         version: the client's number of this text; None for a file that is not open.
-        encoding: what the client's columns count.
         checked: the last evaluation that ended, perhaps of an older text.
         edits: what has been edited since that.
         semantic: what it found, at the places of now.
@@ -125,12 +123,7 @@ def _carried(diagnostic: Diagnostic, edit: Edit, source: SourceFile) -> Diagnost
 
 
 class Workspace:
-    """All documents.
-
-    Args:
-        encoding: what the client's columns count.
-        folders: the client's folders.
-    """
+    """All documents."""
 
     def __init__(self, encoding: Encoding = "utf-16", folders: list[Path] | None = None) -> None:
         self.encoding = encoding

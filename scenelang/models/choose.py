@@ -15,7 +15,6 @@ def choose_model(scene: Scene, models: Iterable[Manifest]) -> Manifest | None:
 
     Args:
         scene: a scene; if it names a model, only that one fits.
-        models: manifests to choose from.
 
     Returns:
         The fitting manifest with the fewest geometries, then the fewest other words, then the least measured

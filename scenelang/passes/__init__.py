@@ -66,10 +66,7 @@ def check_scene(
     The graph is verified after each. No numpy is imported.
 
     Args:
-        scene: a concrete scene.
         spans: where its nodes were written, None if it did not come from text.
-        diagnostics: receives errors and warnings.
-        manifest: of the model to draw with.
         after: called with ``"lower"`` and each pass's name and the graph it left.
         without: names of `OPTIONAL` passes to leave out.
         memory: as for `lower`.

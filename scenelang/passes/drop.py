@@ -90,7 +90,6 @@ def begun(links: Sequence[Link], keep: Sequence[bool]) -> Fold:
     """The stream of the rows to keep; where its first row goes, so do those that only cut what is left.
 
     Args:
-        links: a stream.
         keep: for each row whether it stays; a row that goes had no effect, or was the first.
     """
     kept: list[Link] = []

@@ -42,9 +42,7 @@ def check_compiles(
     """Run the compiler's checks.
 
     Args:
-        scene: a concrete scene.
         spans: where its nodes were written, None if it did not come from text.
-        diagnostics: receives errors and warnings.
         model: draw with this model instead of the scene's.
         after, memory: as for `check_scene`.
 
@@ -116,7 +114,6 @@ def check_evaluated(
         tree: its text's; None for JSON.
         evaluation: has run one frame, the first unless ``frames`` is ``"one"``; None for JSON.
         scene: what came of it, None if it has errors.
-        spans: where that was written.
         diagnostics: those of the evaluation; receives the others.
         model: draw with this model instead of the scene's.
         frames: which are looked at.

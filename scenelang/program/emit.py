@@ -26,8 +26,6 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
 
     Args:
         graph: after all passes, without errors.
-        manifest: of the model it was made for.
-        codes: that model's learned codes.
 
     Raises:
         ProgramError: the model's lifting is not one of this version.

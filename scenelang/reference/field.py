@@ -73,7 +73,6 @@ def leaf_distance(geometry: str, p: Array) -> Array:
     """Exact Euclidean signed distance of a leaf in its own space; raises KeyError if unknown.
 
     Args:
-        geometry: name of a leaf.
         p: points in leaf units, (2, …), or (3, …) for the sphere and the torus.
     """
     if geometry in ("sphere", "torus"):
@@ -187,7 +186,6 @@ def evaluate(node: Node, p: Array, outer: tuple[Step, ...] = ()) -> tuple[Any, A
     """Distance D (M,) and colour C (M, 3) of a node at world points.
 
     Args:
-        node: a leaf or a fold.
         p: world points (d, M), float64.
         outer: steps of the folds around it, nearest first.
     """

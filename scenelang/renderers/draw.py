@@ -42,13 +42,7 @@ class Kept:
         return self.picture.shape == shape and len(self.keys) == len(keys) and self.keys[index] == keys[index]
 
     def look(self, coverage: Coverage, canvas: tuple[int, int], tiles: Sequence[range]) -> list[bytes]:
-        """A digest of what each tile of a new picture will show.
-
-        Args:
-            coverage: its objects.
-            canvas: width and height in pixels.
-            tiles: rows of pixels of each tile.
-        """
+        """A digest of what each tile of a new picture will show."""
         width, height = canvas
         px = 2 / min(width, height)  # world units
         scene = coverage.field
@@ -108,11 +102,9 @@ def draw(
 
     Args:
         network: trained parameters; the picture is computed on their device.
-        program: compiled for them.
         threads: tiles drawn at the same time.
         split: tiles are as high as for so many threads; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
-        skip: leave out points that an object cannot reach.
         samples: of a pixel: ``"adaptive"``, four near outlines and one elsewhere, ``"four"`` or ``"one"``.
         tile: pixels at a time, at least one row.
         progress: called with the share done, from any thread.

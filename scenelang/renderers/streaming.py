@@ -104,7 +104,6 @@ class Streaming(nn.Module):
     """Parameters and forward pass of the streaming renderer.
 
     Args:
-        config: sizes.
         grown: build the levels of growing too, from 4 x 4; else the last alone.
     """
 
