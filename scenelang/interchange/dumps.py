@@ -5,13 +5,14 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.span import Span
 from scenelang.graph.nodes import Graph, Leaf, Move, Node
 from scenelang.graph.steps import Affine
 from scenelang.syntax import nodes
+from scenelang.syntax.incremental import difference
 
 if TYPE_CHECKING:
     from scenelang.program.program import Program
@@ -163,9 +164,6 @@ def _tokens(program: Program) -> list[str]:
     return [names[token] for token in program.tokens.tolist()]
 
 
-_MOST_LINES: Final = 3000
-
-
 def changes(before: str, after: str, old: str, new: str) -> str:
     """The diff of two dumps; empty where nothing changed.
 
@@ -174,14 +172,10 @@ def changes(before: str, after: str, old: str, new: str) -> str:
     if before == after:
         return ""
     a, b = before.splitlines(), after.splitlines()
-    head = 0
-    while head < min(len(a), len(b)) and a[head] == b[head]:
-        head += 1
-    tail = 0
-    while tail < min(len(a), len(b)) - head and a[-1 - tail] == b[-1 - tail]:
-        tail += 1
-    if max(len(a), len(b)) - head - tail > _MOST_LINES:
-        counts = f"{len(a) - head - tail:,} lines became {len(b) - head - tail:,}"
-        return f"--- {old}\n+++ {new}\n@@ from line {head + 1:,}: {counts} @@\n"
+    edit = difference(a, b)
+    gone, come = edit.old_end - edit.start, edit.new_end - edit.start
+    if max(gone, come) > 3000:
+        counts = f"{gone:,} lines became {come:,}"
+        return f"--- {old}\n+++ {new}\n@@ from line {edit.start + 1:,}: {counts} @@\n"
     lines = difflib.unified_diff(a, b, old, new, lineterm="")
     return "\n".join(lines) + "\n"

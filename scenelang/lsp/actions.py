@@ -17,27 +17,19 @@ from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.span import Span
 from scenelang.lsp.text import Lines
 from scenelang.lsp.workspace import Document, uri_of
+from scenelang.syntax.incremental import difference
 
 if TYPE_CHECKING:
     from scenelang.lsp.workspace import Document
 
-SOURCE: Final = "scenelang"
-_UNUSED: Final = frozenset({"W0201"})
-
-
-def name_to_uri(name: str, document: Document) -> str:
-    """The address of a file by what its source is called."""
-    if name == document.source.name:
-        return document.uri
-    return uri_of(Path(name)) if Path(name).is_absolute() else name
-
 
 def to_location(span: Span, document: Document) -> types.Location:
     """A span of any file as a place for the client."""
-    if span.source.name == document.source.name:
+    name = span.source.name
+    if name == document.source.name:
         return types.Location(document.uri, document.lines.span(span))
-    lines = Lines(span.source.text, document.encoding)
-    return types.Location(name_to_uri(span.source.name, document), lines.span(span))
+    uri = uri_of(Path(name)) if Path(name).is_absolute() else name
+    return types.Location(uri, Lines(span.source.text, document.encoding).span(span))
 
 
 def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnostic | None:
@@ -73,8 +65,8 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
         else types.DiagnosticSeverity.Warning,
         code=d.code,
         code_description=_description(d.code),
-        source=SOURCE,
-        tags=[types.DiagnosticTag.Unnecessary] if d.code in _UNUSED else None,
+        source="scenelang",
+        tags=[types.DiagnosticTag.Unnecessary] if d.code == "W0201" else None,
         related_information=related or None,
     )
 
@@ -119,21 +111,16 @@ def code_actions(
         for d in found
         if d.span is not None
         and d.span.source.name == document.source.name
-        and _line(document, d.span.start) <= _line(document, end)
-        and _line(document, d.span.end) >= _line(document, start)
+        and lines.position(d.span.start).line <= lines.position(end).line
+        and lines.position(d.span.end).line >= lines.position(start).line
     ]
     actions = []
     if _wants(only, types.CodeActionKind.QuickFix):
         near = [d for d in here if d.span is not None and d.span.start <= end and d.span.end >= start]
         actions += [_quick(document, d, d in near) for d in here if _is_ours(document, d)]
-    whole = _fix_all(document, found) if _wants(only, FIX_ALL) else None
-    if whole is not None:
-        actions.append(whole)
+    if _wants(only, FIX_ALL):
+        actions += _fix_all(document, found)
     return actions
-
-
-def _line(document: Document, offset: int) -> int:
-    return document.lines.position(offset).line
 
 
 def _wants(only: Sequence[str] | None, kind: str) -> bool:
@@ -156,23 +143,17 @@ def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeActi
         kind=types.CodeActionKind.QuickFix,
         diagnostics=[shown] if shown is not None else None,
         is_preferred=preferred,
-        edit=_edit(document, edits),
+        edit=types.WorkspaceEdit(changes={document.uri: edits}),
     )
 
 
-def _edit(document: Document, edits: list[types.TextEdit]) -> types.WorkspaceEdit:
-    return types.WorkspaceEdit(changes={document.uri: edits})
-
-
-def _fix_all(document: Document, found: Sequence[Diagnostic]) -> types.CodeAction | None:
+def _fix_all(document: Document, found: Sequence[Diagnostic]) -> list[types.CodeAction]:
     text, done = apply_fixes(document.text, [d for d in found if _is_ours(document, d)])
     if not done or text == document.text:
-        return None
-    return types.CodeAction(
-        title=f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake",
-        kind=FIX_ALL,
-        edit=_edit(document, text_edits(document, text)),
-    )
+        return []
+    title = f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake"
+    edit = types.WorkspaceEdit(changes={document.uri: text_edits(document, text)})
+    return [types.CodeAction(title, kind=FIX_ALL, edit=edit)]
 
 
 # ---------------------------------------------------------------- formatting
@@ -200,15 +181,8 @@ def text_edits(document: Document, text: str) -> list[types.TextEdit]:
     starts = [0]
     for line in old:
         starts.append(starts[-1] + len(line))
-    head = 0
-    while head < min(len(old), len(new)) and old[head] == new[head]:
-        head += 1
-    tail = 0
-    while tail < min(len(old), len(new)) - head and old[-1 - tail] == new[-1 - tail]:
-        tail += 1
-    inner_old, inner_new = old[head : len(old) - tail], new[head : len(new) - tail]
-    if not inner_old and not inner_new:
-        return []
+    edit = difference(old, new)
+    head, inner_old, inner_new = edit.start, old[edit.start : edit.old_end], new[edit.start : edit.new_end]
     if len(inner_old) + len(inner_new) > _MOST_LINES:
         blocks = [(0, len(inner_old), 0, len(inner_new))]
     else:

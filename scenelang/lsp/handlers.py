@@ -104,11 +104,10 @@ def _completion(server: Server, document: Document, offset: int) -> types.Comple
 
 def _rename(server: Server, document: Document, params: types.RenameParams) -> types.WorkspaceEdit | None:
     offset = document.lines.offset(params.position)
-    edit = navigation.rename(server.docs, document, offset, params.new_name)
     workspace = server.client_capabilities.workspace
     known = workspace.workspace_edit if workspace is not None else None
-    versioned = known is not None and known.document_changes
-    return edit if edit is None or versioned else navigation.plain_edit(edit)
+    versioned = known is not None and bool(known.document_changes)
+    return navigation.rename(server.docs, document, offset, params.new_name, versioned)
 
 
 def _formatted(server: Server, document: Document, place: types.Range | None) -> list[types.TextEdit] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from lsprotocol import types
@@ -84,9 +84,11 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             table = words.OPERATIONS if use.role == "operation" else words.TRANSFORMS
             return (_word(table[text]) + _transform_facts(document, use)) if text in table else None
         case "geometry":
-            return _geometry(docs, document, use)
+            about = _offered(document, text, "geometries", text, words.GEOMETRIES)
+            node = next((n for n in _calls(document, use) if n.name.text == text), None)
+            return about and about + _node_facts(document, node)
         case "material":
-            return _material(document, text)
+            return _offered(document, f"material {text}", "materials", text, words.MATERIALS)
         case "model":
             return next((_model(m) for m in vocabulary_of(document).models if m.name == text), None)
         case "argument":
@@ -111,17 +113,13 @@ def _definition(document: Document, where: Document, symbol: Symbol) -> str:
     parts = [_code(word.head), *([word.text] if word.text else [])]
     seen = seen_at(document, where, symbol.span.start, symbol.span.end)
     line = describe_values(seen)
-    if line and not (isinstance(symbol.node, nodes.Let | nodes.Param) and _says_it(symbol.node, line)):
+    node = symbol.node
+    value = node.value if isinstance(node, nodes.Let) else getattr(node, "default", None)
+    if line and not (value is not None and line == f"= `{value.span.text}`"):  # it stands there
         parts.append(line)
     if where is not document and where.path is not None:
         parts.append(f"in `{where.path.name}`")
     return "\n\n".join(parts)
-
-
-def _says_it(node: nodes.Let | nodes.Param, line: str) -> bool:
-    """Whether a definition shows its value already."""
-    value = node.value if isinstance(node, nodes.Let) else node.default
-    return line == f"= `{value.span.text}`"
 
 
 def seen_at(document: Document, where: Document, start: int, end: int) -> Seen | None:
@@ -134,7 +132,7 @@ def seen_at(document: Document, where: Document, start: int, end: int) -> Seen |
         if old_start is None or old_end is None:
             return None
         start, end = old_start, old_end
-    return checked.at(where.source.name, start, end)
+    return checked.seen.get((where.source.name, start, end))
 
 
 def describe_values(seen: Seen | None) -> str:
@@ -151,28 +149,13 @@ def describe_values(seen: Seen | None) -> str:
 # ---------------------------------------------------------------- what the model offers
 
 
-def _geometry(docs: Workspace, document: Document, use: Use) -> str | None:
-    text = use.text
-    owners = [m.name for m in vocabulary_of(document).models if text in m.geometries]
+def _offered(document: Document, head: str, field: str, text: str, about: Mapping[str, str]) -> str | None:
+    """A geometry or a material, where a model has it: ``field`` of manifests lists such."""
+    owners = [f"model `{m.name}`" for m in vocabulary_of(document).models if text in getattr(m, field)]
     if not owners:
         return None
-    parts = [_code(f"{text} {{ … }}"), words.GEOMETRIES.get(text, ""), "of " + _listed(owners)]
-    path = path_to(document.parsed, use.start)
-    node = next((n for n in reversed(path) if isinstance(n, nodes.Call) and n.name.text == text), None)
-    return "\n\n".join(part for part in parts if part) + (_node_facts(document, node) if node else "")
-
-
-def _listed(names: Iterable[str]) -> str:
-    return ", ".join(f"model `{name}`" for name in names)
-
-
-def _material(document: Document, text: str) -> str | None:
-    owners = [m.name for m in vocabulary_of(document).models if text in m.materials]
-    if not owners:
-        return None
-    return "\n\n".join(
-        [_code(f"material {text} {{ … }}"), words.MATERIALS.get(text, ""), "of " + _listed(owners)]
-    )
+    parts = [_code(f"{head} {{ … }}"), about.get(text, ""), "of " + ", ".join(owners)]
+    return "\n\n".join(part for part in parts if part)
 
 
 def _model(manifest: Manifest) -> str:
@@ -193,25 +176,22 @@ def _model(manifest: Manifest) -> str:
 # ---------------------------------------------------------------- transforms and objects
 
 
-def _nodes_of(document: Document, node: Any) -> list[Any]:
-    """Scene nodes that a statement made."""
-    seen = seen_at(document, document, node.span.start, node.span.end)
-    return list(seen.values) if seen is not None else []
+def _calls(document: Document, use: Use) -> Iterator[nodes.Call]:
+    """The calls around a name, the innermost first."""
+    path = path_to(document.parsed, use.start)
+    return (node for node in reversed(path) if isinstance(node, nodes.Call))
 
 
 def _transform_facts(document: Document, use: Use) -> str:
     """The matrix or the formula that a transform came to."""
-    path = path_to(document.parsed, use.start)
-    node = next((n for n in reversed(path) if isinstance(n, nodes.Call)), None)
-    if node is None:
-        return ""
-    made = _nodes_of(document, node)
+    node = next(_calls(document, use), None)
+    seen = seen_at(document, document, node.span.start, node.span.end) if node is not None else None
+    made = seen.values if seen is not None else []
     parts = []
     for item in made[:2]:
         shown = values.show_transform(item, space_of(document))
         if shown is not None:
-            called = to_nsg.transform(item)
-            parts.append(f"`{called}`\n\n```text\n{shown}\n```")
+            parts.append(f"`{to_nsg.transform(item)}`\n\n```text\n{shown}\n```")
     more = "\n\n…" if len(made) > 2 else ""
     return "\n\n---\n\n" + "\n\n".join(parts) + more if parts else ""
 

@@ -88,8 +88,13 @@ def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.Pr
     return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
 
 
-def rename(docs: Workspace, document: Document, offset: int, new: str) -> types.WorkspaceEdit | None:
+def rename(
+    docs: Workspace, document: Document, offset: int, new: str, versioned: bool
+) -> types.WorkspaceEdit | None:
     """Change a name wherever it is meant, in all files.
+
+    Args:
+        versioned: whether the client knows edits of a version of a document.
 
     Raises:
         Refused: the new name is none, or would mean something else somewhere.
@@ -107,26 +112,15 @@ def rename(docs: Workspace, document: Document, offset: int, new: str) -> types.
     for other, place in places:
         _check_place(other, place, symbol, new)
     _check_captures(docs, where, symbol, new)
-    edits: dict[str, tuple[Document, list[types.TextEdit]]] = {}
+    edits: dict[str, list[types.TextEdit]] = {}
     for other, place in places:
-        text_edit = types.TextEdit(other.lines.range(place.start, place.end), new)
-        edits.setdefault(other.uri, (other, []))[1].append(text_edit)
+        edits.setdefault(other.uri, []).append(types.TextEdit(other.lines.range(place.start, place.end), new))
+    if not versioned:
+        return types.WorkspaceEdit(changes=edits)
+    name, versions = types.OptionalVersionedTextDocumentIdentifier, {d.uri: d.version for d, _ in places}
     return types.WorkspaceEdit(
-        document_changes=[
-            types.TextDocumentEdit(types.OptionalVersionedTextDocumentIdentifier(uri, other.version), changes)
-            for uri, (other, changes) in edits.items()
-        ],
+        document_changes=[types.TextDocumentEdit(name(uri, versions[uri]), edits[uri]) for uri in edits]
     )
-
-
-def plain_edit(edit: types.WorkspaceEdit) -> types.WorkspaceEdit:
-    """The same for clients that know no versioned edits."""
-    changes = {
-        item.text_document.uri: [e for e in item.edits if isinstance(e, types.TextEdit)]
-        for item in edit.document_changes or ()
-        if isinstance(item, types.TextDocumentEdit)
-    }
-    return types.WorkspaceEdit(changes=changes)
 
 
 def _check_owner(where: Document, use: Use) -> None:
@@ -153,7 +147,7 @@ def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
         taken = inner.symbols.get(new)
         if taken is not None:
             line = taken.span.locate()[0][0]
-            raise Refused(f"`{new}` is already defined in line {line} of {_called(other)}")
+            raise Refused(f"`{new}` is already defined in line {line} of {other.name}")
         inner = None if inner is symbol.scope else inner.parent
 
 
@@ -171,11 +165,7 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
         meant = inner.find(new)
         if meant is None or not (scope.start <= meant.scope.start and meant.scope.end <= scope.end):
             line = where.lines.position(use.start).line + 1
-            raise Refused(f"`{new}` in line {line} of {_called(where)} would mean this")
-
-
-def _called(document: Document) -> str:
-    return document.path.name if document.path is not None else document.uri
+            raise Refused(f"`{new}` in line {line} of {where.name} would mean this")
 
 
 # ---------------------------------------------------------------- links

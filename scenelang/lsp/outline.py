@@ -73,14 +73,11 @@ def _entry(stmt: nodes.Stmt) -> tuple[str, types.SymbolKind, Any, tuple[nodes.St
             inner += (other,) if isinstance(other, nodes.If) else other.statements if other else ()
             return "if", Kind.Boolean, stmt.condition.span, inner, ""
         case nodes.Call() if stmt.body is not None or stmt.args is None:
-            nested = tuple(s for s in (stmt.body.statements if stmt.body else ()) if _has_children(s))
+            within = stmt.body.statements if stmt.body else ()
+            nested = tuple(s for s in within if isinstance(s, nodes.Let | nodes.For | nodes.If))
             return stmt.name.text, Kind.Object, stmt.name.span, nested, ""
         case _:
             return None
-
-
-def _has_children(stmt: nodes.Stmt) -> bool:
-    return isinstance(stmt, nodes.Let | nodes.For | nodes.If)
 
 
 def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol]:
@@ -93,12 +90,8 @@ def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol
                 if not all(letter in letters for letter in query):
                     continue
                 place = types.Location(document.uri, document.lines.span(stmt.name.span))
-                container = document.path.name if document.path is not None else document.uri
-                found.append(
-                    types.WorkspaceSymbol(
-                        place, stmt.name.text, _DEFINES[type(stmt)], container_name=container
-                    )
-                )
+                kind = _DEFINES[type(stmt)]
+                found.append(types.WorkspaceSymbol(place, stmt.name.text, kind, container_name=document.name))
                 if len(found) >= 500:
                     return found
     return found

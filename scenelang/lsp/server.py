@@ -24,14 +24,12 @@ from pygls.protocol import LanguageServerProtocol
 from pygls.protocol.language_server import lsp_method
 
 from scenelang.lsp.actions import to_diagnostic
-from scenelang.lsp.check import Checked, Superseded, Task, check
+from scenelang.lsp.check import Checked, Superseded, check
 from scenelang.lsp.workspace import Document, Workspace, path_of
 from scenelang.records import Record
 
 log = logging.getLogger("scenelang.lsp")
 _DEEP: Final = 10_000  # trees are up to 200 levels deep, walks take a few calls a level
-
-
 MAX_PAUSE_MS: Final = 60_000
 _LENGTH: Final = re.compile(rb"Content-Length: *(\d+)\r\n\Z")
 _MOST_DIGITS: Final = 8  # below 100 MB: the largest text there may be, each character escaped
@@ -211,8 +209,8 @@ class Server(LanguageServer):
             if stop.is_set():
                 return
             try:
-                task = Task(parsed.file, document.path, root, texts, model, len(parsed.diagnostics))
-                checked = check(task, stop)
+                whole = not parsed.diagnostics
+                checked = check(parsed.file, document.path, root, texts, model, whole, stop)
             except Superseded:
                 return
             except Exception:
@@ -229,13 +227,10 @@ class Server(LanguageServer):
         document.checked, document.edits = checked, []
         document.semantic = checked.diagnostics
         self.publish(document)
-        if self.settings.value_hints and self._refreshes():
-            self.workspace_inlay_hint_refresh(None)
-
-    def _refreshes(self) -> bool:
         workspace = self.client_capabilities.workspace
         hint = workspace.inlay_hint if workspace is not None else None
-        return bool(hint is not None and hint.refresh_support)
+        if self.settings.value_hints and hint is not None and hint.refresh_support:
+            self.workspace_inlay_hint_refresh(None)
 
     def changed(self, path: Path | None, but: str = "") -> None:
         """Check again what imports a file."""

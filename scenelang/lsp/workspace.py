@@ -60,6 +60,11 @@ class Document:
     semantic: list[Diagnostic] = field(default_factory=list)
 
     @property
+    def name(self) -> str:
+        """What messages call it."""
+        return self.path.name if self.path is not None else self.uri
+
+    @property
     def source(self) -> SourceFile:
         return self.parsed.source
 
@@ -141,10 +146,6 @@ class Workspace:
         self.open[uri] = document
         return document
 
-    def close(self, uri: str) -> None:
-        """Forget a buffer; its file counts again."""
-        self.open.pop(uri, None)
-
     def get(self, uri: str) -> Document | None:
         """An open buffer, or the file that the address means."""
         return self.open.get(uri) or self.by_path(_resolved(path_of(uri)))
@@ -183,17 +184,14 @@ class Workspace:
         """Every document: open ones, then the scenes in the client's folders."""
         yield from list(self.open.values())
         seen = {d.path for d in self.open.values()}
-        for path in self._scenes():
-            if path not in seen:
-                seen.add(path)
-                document = self.by_path(path)
-                if document is not None:
-                    yield document
-
-    def _scenes(self) -> Iterator[Path]:
         folders = self.folders or sorted({d.path.parent for d in self.open.values() if d.path is not None})
         for folder in folders:
-            yield from (path.resolve() for path in scenes_below(folder, MAX_FILES * 10))
+            for path in map(Path.resolve, scenes_below(folder, MAX_FILES * 10)):
+                if path not in seen:
+                    seen.add(path)
+                    document = self.by_path(path)
+                    if document is not None:
+                        yield document
 
     # ------------------------------------------------------------ names across files
 
@@ -234,9 +232,7 @@ class Workspace:
         if not (symbol.is_exported or (symbol.owner is not None and symbol.owner.is_exported)):
             return
         for other in self.known():
-            if other is document or other.uri == document.uri:
-                continue
-            if symbol.name not in other.text:
+            if other.uri == document.uri or symbol.name not in other.text:
                 continue
             for use in other.names.uses:
                 if use.text != symbol.name or use.role not in ("member", "argument"):

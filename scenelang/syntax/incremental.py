@@ -17,6 +17,7 @@ moves everything after it and costs nothing where nobody looks.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
@@ -56,6 +57,19 @@ class Edit:
     @property
     def delta(self) -> int:
         return self.new_end - self.old_end
+
+
+def difference(old: Sequence[str], new: Sequence[str]) -> Edit:
+    """The shortest single edit from one text, or list of lines, to another."""
+    start = _common(old, new)
+    end = _common(old[start:][::-1], new[start:][::-1])
+    return Edit(start, len(old) - end, len(new) - end)
+
+
+def _common(left: Sequence[str], right: Sequence[str]) -> int:
+    """How many items two sequences begin with alike."""
+    pairs = enumerate(zip(left, right, strict=False))
+    return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))
 
 
 @dataclass
