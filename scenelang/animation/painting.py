@@ -87,7 +87,7 @@ class Painter:
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
         """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit."""
         if frame.program is None:
-            from scenelang.backend.exact import draw_exact
+            from scenelang.backend.render import draw_exact
 
             return draw_exact(frame.shot.scene, spans=frame.shot.spans, model=self.clip.model)
         from scenelang.renderers.draw import Kept

@@ -57,7 +57,7 @@ def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) 
 
 def exact(request: Request, clock: Clock) -> Draw:
     """Draw by the exact definition."""
-    from scenelang.backend.exact import draw_exact
+    from scenelang.backend.render import draw_exact
 
     def draw(job: Job, progress: Callable[[float], None]) -> Image:
         assert job.source is not None

@@ -30,17 +30,19 @@ def step_of(transform: schema.Transform, space: Space) -> Step | Refusal:
     if isinstance(transform, schema.Bend):
         return Warp(0.0, (transform.k, 0.0))
     if isinstance(transform, (schema.Twist, schema.Displace)):
-        return Refusal(
-            "E0503",
-            f"no renderer of this version draws `{transform.kind}`",
-            "bend the shape with `twirl` or `bend` instead",
-        )
+        fact = f"no renderer of this version draws `{transform.kind}`"
+        return Refusal("E0503", fact, "bend the shape with `twirl` or `bend` instead")
     fitted = space.fitted(transform, _rows(transform))
     if isinstance(fitted, Refusal):
         return fitted
-    if not space.usable(fitted):
-        return Refusal("E0312", *_singular(transform.kind, fitted, space))
-    return Affine(fitted)
+    if space.usable(fitted):
+        return Affine(fitted)
+    (smallest, largest), singular = space.stretches(fitted), f"`{transform.kind}` is singular"
+    if smallest <= SINGULAR * largest:
+        fact = f"{singular}: it flattens everything to {space.thinner}"
+        return Refusal("E0312", fact, "use factors other than 0")
+    fact = f"{singular} in float32: it stretches by {smallest:.3g} to {largest:.3g}"
+    return Refusal("E0312", fact, f"stretches between {1 / REACH:g} and {REACH:g} can be undone")
 
 
 def _rows(transform: schema.Transform) -> Rows:
@@ -55,16 +57,6 @@ def _rows(transform: schema.Transform) -> Rows:
     assert isinstance(transform, schema.Matrix)
     first, second, third, _ = transform.rows
     return (*first, *second, *third)
-
-
-def _singular(kind: str, rows: Rows, space: Space) -> tuple[str, str]:
-    smallest, largest = space.stretches(rows)
-    if smallest <= SINGULAR * largest:
-        return f"`{kind}` is singular: it flattens everything to {space.thinner}", "use factors other than 0"
-    return (
-        f"`{kind}` is singular in float32: it stretches by {smallest:.3g} to {largest:.3g}",
-        f"stretches between {1 / REACH:g} and {REACH:g} can be undone",
-    )
 
 
 MAX_OBJECTS = 100_000

@@ -96,13 +96,13 @@ class Stream(Record, frozen=False):
         if apart is not None:
             return apart
         if len(self.rows) == 1 and self._swaps(other):
-            self._prepend(other)
+            self.append(other, before=True)
             return None
         reached = self._followed(other)
         if reached is None:
             self.append(other)
         elif self._swaps(other):
-            self._prepend(other)
+            self.append(other, before=True)
         else:
             return reached
         return None
@@ -130,31 +130,17 @@ class Stream(Record, frozen=False):
         solid = other.grid(0.0)
         return all(solid.touched(leaf_box(leaf, 0.0, self.space)) is None for leaf in self.cuts)
 
-    def append(self, other: Stream) -> None:
-        """Join a composite by union after this stream, unproved."""
-        self._absorb(other)
-        if len(other.rows) > len(self.rows):
-            other.rows.extendleft(reversed(self.rows))
-            self.rows = other.rows
-        else:
-            self.rows.extend(other.rows)
-        self._count(other)
-
-    def _prepend(self, other: Stream) -> None:
-        self._absorb(other)
-        if len(other.rows) > len(self.rows):
-            other.rows.extend(self.rows)
-            self.rows = other.rows
-        else:
-            self.rows.extendleft(reversed(other.rows))
-        self._count(other)
-
-    def _absorb(self, other: Stream) -> None:
+    def append(self, other: Stream, before: bool = False) -> None:
+        """Join a composite by union after this stream, or before it, unproved."""
         for level, grid in self._grids.items():
             for box, leaf in other.grid(level).entries:
                 grid.add(box, leaf)
-
-    def _count(self, other: Stream) -> None:
+        few, many = sorted((self.rows, other.rows), key=len)
+        if (many is self.rows) is before:
+            many.extendleft(reversed(few))
+        else:
+            many.extend(few)
+        self.rows = many
         self.cuts.extend(other.cuts)
         self.smooths += other.smooths
         self.clipped = self.clipped or other.clipped

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from scenelang.graph.dump import hex_text, move_text
 from scenelang.graph.looks import coloured
 from scenelang.graph.nodes import Fold, Graph, Leaf, Node
 from scenelang.graph.space import Space
+from scenelang.interchange.dumps import hex_text, move_text
 from scenelang.scene import schema
 from scenelang.scene.text import material, transform
 
@@ -78,9 +78,7 @@ def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Drawing:
     return drawn
 
 
-def _children(
-    node: schema.Group | schema.Boolean | schema.Chain,
-) -> Iterable[tuple[str, schema.SceneNode]]:
+def _children(node: schema.Group | schema.Boolean | schema.Chain) -> Iterable[tuple[str, schema.SceneNode]]:
     if isinstance(node, schema.Chain):
         return [("" if at == 0 else link.op, link.node) for at, link in enumerate(node.children)]
     return [("", child) for child in node.children]

@@ -45,22 +45,20 @@ def _check(leaf: Leaf, space: Space, context: Context) -> None:
             context.diagnostics.add("E0506", fact, leaf.span, labels=_places(leaf), help=help)
             return
     # Each map is lifted by itself, so each needs an inverse, and so does what they compose to.
-    maps = [move.step.rows for move in leaf.moves if isinstance(move.step, Affine)]
+    maps = [step.rows for step in leaf.steps if isinstance(step, Affine)]
     maps += [affine.composed(leaf.steps)] if len(maps) > 1 else []
     bad = next((rows for rows in maps if not space.usable(rows)), None)
     if bad is not None:
         smallest, largest = space.stretches(bad)
         fact = f"the transforms of `{leaf.geometry}` compose to a singular one, which stretches by "
         fact, help = f"{fact}{smallest:.3g} to {largest:.3g}", "scale less along one direction, or less often"
-    elif not all(_mild(move.step) for move in leaf.moves if isinstance(move.step, Warp)):
+    elif not all(
+        abs(step.twirl) < REACH and hypot(*step.bend) < REACH for step in leaf.steps if isinstance(step, Warp)
+    ):
         fact, help = f"the deformations of `{leaf.geometry}` compose to one beyond float32", "deform less"
     else:
         return
     context.diagnostics.add("E0406", fact, leaf.span, labels=_places(leaf), help=help)
-
-
-def _mild(warp: Warp) -> bool:
-    return abs(warp.twirl) < REACH and hypot(*warp.bend) < REACH
 
 
 def _places(leaf: Leaf) -> list[Label]:
@@ -163,23 +161,21 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
     found = [("scale", smallest), ("scale", largest)]
     if smallest > 0:
         found.append(("thin", largest / smallest))
-    for move in leaf.moves:
-        if isinstance(move.step, Warp):
-            if move.step.twirl:
-                found.append(("twirl", move.step.twirl))
-            if move.step.bend != (0.0, 0.0):
-                found.append(("bend", hypot(*move.step.bend)))
+    for step in leaf.steps:
+        if isinstance(step, Warp):
+            if step.twirl:
+                found.append(("twirl", step.twirl))
+            if step.bend != (0.0, 0.0):
+                found.append(("bend", hypot(*step.bend)))
     return found
 
 
 def _warn(context: Context, quantity: str, message: str, leaf: Leaf) -> None:
     low, high = context.manifest.trained[quantity]
     figures = context.manifest.measured.get("stability", {}).get(quantity)
-    context.diagnostics.add(
-        _CODES[quantity],
-        message.format(f"{low:g} to {high:g} of model `{context.manifest.name}`"),
-        leaf.span,
-        help=f"measured there: {figures}"
-        if figures
-        else "the picture may be less exact than the model's figures",
+    help = (
+        f"measured there: {figures}" if figures else "the picture may be less exact than the model's figures"
     )
+    fact = message.format(f"{low:g} to {high:g} of model `{context.manifest.name}`")
+    help = f"measured there: {figures}" if figures else doubt
+    context.diagnostics.add(_CODES[quantity], fact, leaf.span, help=help)

@@ -38,13 +38,9 @@ def drop_empty(graph: Graph, context: Context) -> Graph:
             return Leaf(only.geometry, only.look, moves, only.span)
         return Fold(only.kind, only.links, moves, only.span)
 
-    children = [bottom_up(link.node, _same, fold) for link in graph.root.links]
+    children = [bottom_up(link.node, lambda leaf: leaf, fold) for link in graph.root.links]
     root = Fold("scene", tuple(_linked(graph.root, children, context)))
     return graph.rooted(root)
-
-
-def _same(leaf: Leaf) -> Node | None:
-    return leaf
 
 
 def _linked(fold: Fold, children: list[Node | None], context: Context) -> list[Link]:

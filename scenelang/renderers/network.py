@@ -148,13 +148,7 @@ class FramedNetwork:
         return self.update(levels, candidate @ features, bump, state, colour, object_colour)
 
     def update(
-        self,
-        levels: Array,
-        candidate: Array,
-        bump: Array,
-        state: Array,
-        colour: Array,
-        object_colour: Array,
+        self, levels: Array, candidate: Array, bump: Array, state: Array, colour: Array, object_colour: Array
     ) -> tuple[Array, Array]:
         """State and register behind the gates.
 

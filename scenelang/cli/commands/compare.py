@@ -37,8 +37,8 @@ def command(
     job, found = prepare_scene(scene, request)
     if job.program is None or found.scene is None or job.failed():
         ctx.exit(1)
-    from scenelang.backend.exact import draw_exact
     from scenelang.backend.neural import choose_device, draw_program, open_model
+    from scenelang.backend.render import draw_exact
     from scenelang.measure.metrics import compare, over_white, side_by_side
 
     opened = open_model(job.program.model, choose_device(device))

@@ -64,8 +64,7 @@ def command(
 
 def _changes(job: Job, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
     """The differences that the passes made, of those that made any; all passes, or the wanted."""
-    from scenelang.graph.dump import dump
-    from scenelang.interchange.dumps import changes
+    from scenelang.interchange.dumps import changes, dump
 
     before, old = "", "nothing"
     for name, graph in job.graphs.items():
@@ -79,8 +78,14 @@ def _changes(job: Job, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
 
 def _whole(job: Job, source: Input, wanted: tuple[str, ...], kind: str) -> Iterator[dict[str, Any]]:
     """The stages that were reached, as text or as data."""
-    from scenelang.graph.dump import dump
-    from scenelang.interchange.dumps import graph_data, program_data, program_table, tree_data, tree_text
+    from scenelang.interchange.dumps import (
+        dump,
+        graph_data,
+        program_data,
+        program_table,
+        tree_data,
+        tree_text,
+    )
 
     known: dict[str, tuple[str, Any, Callable[[Any], Any], Callable[[Any], str]]] = {
         name: ("graph", graph, graph_data, dump) for name, graph in job.graphs.items()
