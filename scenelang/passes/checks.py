@@ -173,9 +173,7 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
 def _warn(context: Context, quantity: str, message: str, leaf: Leaf) -> None:
     low, high = context.manifest.trained[quantity]
     figures = context.manifest.measured.get("stability", {}).get(quantity)
-    help = (
-        f"measured there: {figures}" if figures else "the picture may be less exact than the model's figures"
-    )
+    doubt = "the picture may be less exact than the model's figures"
     fact = message.format(f"{low:g} to {high:g} of model `{context.manifest.name}`")
     help = f"measured there: {figures}" if figures else doubt
     context.diagnostics.add(_CODES[quantity], fact, leaf.span, help=help)
