@@ -17,7 +17,7 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.render_machine import render_github, render_json, render_sarif
 from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.session import Defines
 from scenelang.formatting import format_text
 from scenelang.interchange.gltf import import_gltf
 from scenelang.interchange.gltf_file import GltfError, parse_gltf

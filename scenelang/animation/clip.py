@@ -17,8 +17,8 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.evaluation import Evaluation
-from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.loader import Unreadable, read_source
+from scenelang.evaluate.session import Defines
 from scenelang.graph.lower import Memory
 from scenelang.scene.schema import Animation, Scene, same_nodes
 from scenelang.scene.spans import SpanMap

@@ -11,7 +11,7 @@ from scenelang.cli.inputs import STDIN, Request, merged, read_input, read_text, 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import Settled, settle
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.session import Defines
 from scenelang.program.check import Frames, check_evaluated
 from scenelang.records import Record
 

@@ -11,9 +11,9 @@ from scenelang.cli.progress import Clock
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.evaluation import Evaluation
-from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.evaluate.loader import Unreadable, decode_source, read_source
+from scenelang.evaluate.session import Defines
 from scenelang.files import note_input
 from scenelang.records import Record
 from scenelang.scene.schema import Scene

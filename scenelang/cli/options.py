@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 if TYPE_CHECKING:
-    from scenelang.evaluate.inputs import Defines
+    from scenelang.evaluate.session import Defines
 
 Backend = Literal["neural", "reference"]
 Color = Literal["auto", "always", "never"]
@@ -29,7 +29,7 @@ def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tupl
 
 
 def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Defines:
-    from scenelang.evaluate.inputs import Defines
+    from scenelang.evaluate.session import Defines
 
     found: dict[str, str] = {}
     for value in values:

@@ -20,7 +20,6 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.file_context import FileContext
-from scenelang.evaluate.inputs import Defines, Inputs
 from scenelang.evaluate.limits import MAX_OBJECTS, MAX_STEPS, Halt
 from scenelang.evaluate.loader import Loader, Unreadable, read_source
 from scenelang.evaluate.names import UNBOUND
@@ -28,7 +27,7 @@ from scenelang.evaluate.prepare import EXPRESSIONS, STATEMENTS
 from scenelang.evaluate.prepare.blocks import Body
 from scenelang.evaluate.prepare.settings import prepare_file
 from scenelang.evaluate.report.reporter import Reporter
-from scenelang.evaluate.session import Session
+from scenelang.evaluate.session import Defines, Inputs, Session
 from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap, Written

@@ -9,12 +9,11 @@ from typing import Literal, NamedTuple
 
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.builder import Builder
-from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.loader import Loader
 from scenelang.evaluate.names import UNBOUND, Env, Scope, Slots
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.report.suppression import NONE, Damage
-from scenelang.evaluate.session import Session
+from scenelang.evaluate.session import Defines, Session
 from scenelang.syntax import nodes
 
 Kind = Literal["file", "group", "chain", "object", "material", "unknown"]

@@ -19,7 +19,7 @@ from scenelang.animation.run import make
 from scenelang.animation.timing import FrameRange, FramesError
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.session import Defines
 from scenelang.watching.changes import Stamps, stamps
 
 if TYPE_CHECKING:

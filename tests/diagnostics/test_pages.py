@@ -14,8 +14,8 @@ from scenelang.diagnostics.pages import AREAS, CODES, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate import limits, loader
 from scenelang.evaluate.evaluation import Evaluation, load_source
-from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.prepare import settings
+from scenelang.evaluate.session import Defines
 from scenelang.evaluate.values import functions
 from scenelang.evaluate.values import value as values
 from scenelang.graph import lower

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from scenelang.cli.checking import Scenes
     from scenelang.diagnostics.diagnostic import Diagnostic
     from scenelang.diagnostics.fixes import Settled
-    from scenelang.evaluate.inputs import Defines
+    from scenelang.evaluate.session import Defines
     from scenelang.program.check import Frames
 
 Format = Literal["human", "json", "sarif", "github", "concise"]

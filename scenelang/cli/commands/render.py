@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import Job
     from scenelang.diagnostics.span import SourceFile
-    from scenelang.evaluate.inputs import Defines
+    from scenelang.evaluate.session import Defines
     from scenelang.measure.frontier import Limits
 
 

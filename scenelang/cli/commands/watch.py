@@ -15,7 +15,7 @@ from scenelang.cli.say import wants_color
 if TYPE_CHECKING:
     import PIL.Image
 
-    from scenelang.evaluate.inputs import Defines
+    from scenelang.evaluate.session import Defines
     from scenelang.watching.picture import Easel, Outcome
     from scenelang.watching.screen import Screen
 
