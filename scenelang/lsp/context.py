@@ -51,7 +51,7 @@ def sight_at(parsed: Parsed, offset: int) -> Names:
     """
     index = parsed.at(offset)
     whole = Span(parsed.source, 0, len(parsed.source.text))
-    names = Names(nodes.File(() if index is None else (parsed.statement(index),), whole))
+    names = Names(nodes.File(whole, () if index is None else (parsed.statement(index),)))
     top = names.top
     for at, stmt in enumerate(parsed.heads()):
         kind = _TOP.get(stmt.__class__)

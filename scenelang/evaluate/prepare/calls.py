@@ -190,11 +190,11 @@ def _method(expr: nodes.CallExpr, place: Place) -> None:
     """Report `v.length()`: a value has no functions."""
     alias, _, rest = expr.name.text.partition(".")
     source, start = expr.name.span.source, expr.name.span.start
-    value = nodes.Name(alias, Span(source, start, start + len(alias)))
-    last = nodes.Name(rest, Span(source, expr.name.span.end - len(rest), expr.span.end))
+    value = nodes.Name(Span(source, start, start + len(alias)), alias)
+    last = nodes.Name(Span(source, expr.name.span.end - len(rest), expr.span.end), rest)
     from scenelang.evaluate.report.habits import member_advice  # only mistakes need it
 
-    help, fix = member_advice(nodes.NameRef(value, value.span), last)
+    help, fix = member_advice(nodes.NameRef(value.span, value), last)
     help = help or f"write {rest}(…) with the value as an argument"
     place.report.error("E0128", "only a name can be called", expr.name.span, help=help, fix=fix)
 

@@ -115,7 +115,7 @@ def prepare_member(expr: nodes.Member, place: Place) -> Code:
     if binding is None or binding.kind != "import":
         code = prepare(value, place)
         return POISONED if code.value is POISON else member(code, expr.name, place, value)
-    name = nodes.Name(f"{value.span.text}.{expr.name.text}", expr.span)
+    name = nodes.Name(expr.span, f"{value.span.text}.{expr.name.text}")
     found = lookup(name, place)
     if found is not None:
         return _as_value(name, found, place)

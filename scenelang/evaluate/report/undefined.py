@@ -136,7 +136,7 @@ def unknown_member(name: nodes.Name, place: Place, exported: FileContext | None)
         return help or (f"it has {listing(known)}" if known else "it defines nothing"), fix
 
     nowhere = place._replace(scope=Scope(place.file.scope.slots))
-    report_unknown(nodes.Name(rest, last), nowhere, "E0212", f"`{alias}` has no `{rest}`", advise=advise)
+    report_unknown(nodes.Name(last, rest), nowhere, "E0212", f"`{alias}` has no `{rest}`", advise=advise)
 
 
 def report_early(name: nodes.Name, place: Place) -> bool:
@@ -157,7 +157,7 @@ def unknown(name: nodes.Name, place: Place, call: nodes.CallExpr | None = None) 
     alias, dot, _ = text.partition(".")
     if dot:
         head = Span(name.span.source, name.span.start, name.span.start + len(alias))
-        unknown(nodes.Name(alias, head), place)
+        unknown(nodes.Name(head, alias), place)
     elif not report_early(name, place):
         kinds = ("fn",) if call else (*VALUES, "import")
         code, what = ("E0207", "function") if call else ("E0201", "name")
