@@ -38,13 +38,7 @@ from scenelang.syntax.tables import tables
 
 
 class Statement(Group):
-    """A statement.
-
-    Args:
-        flat, maker: see `Group`.
-        depth: how many blocks it has within each other.
-        simple: it may stand in a block that is on one line.
-    """
+    """A statement with ``depth`` blocks within each other; a simple one may stand in a block on one line."""
 
     __slots__ = ("depth", "simple")
 
@@ -55,13 +49,7 @@ class Statement(Group):
 
 
 class Block:
-    """``{ … }``, whose place in a line is for the statement around it to say.
-
-    Args:
-        opening: its first brace.
-        statements: what it holds.
-        closing: its last brace.
-    """
+    """``{ … }``, whose place in a line is for the statement around it to say."""
 
     __slots__ = ("closing", "depth", "flat", "opening", "statements")
 
@@ -136,9 +124,6 @@ class Layout(ExpressionLayout):
         items.append(Item(item))
         return items
 
-    def keyword(self, token: int) -> Part:
-        return self.word(token)
-
     # ------------------------------------------------------------ statements without a block
 
     def _ended(self, parts: Sequence[Part], last: int, simple: bool = False) -> Statement:
@@ -197,11 +182,9 @@ class Layout(ExpressionLayout):
         return self._use([name, *rest[:-1]], rest[-1])
 
     def _use(self, head: list[Part], last: int | Block) -> Part:
-        return (
-            self._blocked(head, last, structure=False)
-            if isinstance(last, Block)
-            else self._ended(head, last, simple=True)
-        )
+        if isinstance(last, Block):
+            return self._blocked(head, last, structure=False)
+        return self._ended(head, last, simple=True)
 
     def parameter(self, name: Part, *default: Any) -> Part:
         return sequence([name, " ", self.word(default[0]), " ", default[1]]) if default else name
