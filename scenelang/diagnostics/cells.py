@@ -92,12 +92,9 @@ def left_out(text: str, at: int) -> int:
 
 
 def window(line: Line, first: int, last: int, width: int) -> tuple[Sequence[str], int]:
-    """The part of a line that is shown, and how far to the left it moves.
+    """The part of a line that is shown in ``width`` cells, and how far to the left it moves.
 
-    Args:
-        line: the whole line.
-        first, last: the cells that should be seen; the first of them are where both do not fit.
-        width: cells at hand.
+    The cells from ``first`` to ``last`` should be seen; where not all fit, the first of them are.
     """
     cells = line.cells
     if len(cells) <= width:

@@ -112,8 +112,7 @@ class Settled(Record, Generic[Key]):
 
 
 def settle(
-    texts: Mapping[Key, str],
-    check: Callable[[Mapping[Key, str]], Iterable[tuple[Key | None, Diagnostic]]],
+    texts: Mapping[Key, str], check: Callable[[Mapping[Key, str]], Iterable[tuple[Key | None, Diagnostic]]]
 ) -> Settled[Key]:
     """Apply fixes until none is left.
 

@@ -142,15 +142,9 @@ def read_page(code: str) -> Page:
             beside.append((title[1], fence["text"]))
         elif info in ("{.bad}", "{.good}"):
             limits = [item.split("=") for item in (fence["limits"] or "").split(",") if item]
-            examples.append(
-                Example(
-                    "bad" if info == "{.bad}" else "good",
-                    language,
-                    fence["text"],
-                    (),
-                    tuple((name.strip(), int(value)) for name, value in limits),
-                )
-            )
+            lowered = tuple((name.strip(), int(value)) for name, value in limits)
+            kind: Literal["bad", "good"] = "bad" if info == "{.bad}" else "good"
+            examples.append(Example(kind, language, fence["text"], (), lowered))
         elif language == "sh" and examples:
             last = examples[-1]
             options = tuple(shlex.split(fence["text"])[3:])
