@@ -20,13 +20,12 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.syntax import nodes
 from scenelang.syntax.lexer import scan
-from scenelang.syntax.move import move
 from scenelang.syntax.parser import parse, parse_tokens
 from scenelang.syntax.recovery.repairs import FOLLOWED
 from scenelang.syntax.tables import tables
@@ -77,9 +76,7 @@ class Parsed:
     """A text and its tree, ready to be edited.
 
     Args:
-        source: the text.
-        starts: where each top-level statement begins.
-        ends: where it ends.
+        starts, ends: where each top-level statement begins and ends.
         tokens: the text's tokens, as they were before recovery.
         diagnostics: all syntax mistakes, in the order of the text.
         pieces: the statements, perhaps at older places.
@@ -99,10 +96,10 @@ class Parsed:
     def statement(self, index: int) -> nodes.Stmt:
         """Top-level statement number ``index``, at its place in this text."""
         piece = self.pieces[index]
-        delta = self.starts[index] - piece.node.span.start
         if piece.version != self.version:
             # A new piece: the old one may belong to an older text that somebody still reads.
-            piece = _Piece(move(piece.node, delta, self.source), self.version)
+            delta = self.starts[index] - piece.node.span.start
+            piece = _Piece(_moved(piece.node, delta, self.source), self.version)
             self.pieces[index] = piece
         return piece.node
 
@@ -119,7 +116,7 @@ class Parsed:
     def file(self) -> nodes.File:
         """The whole tree."""
         statements = tuple(self.statement(index) for index in range(len(self.pieces)))
-        return nodes.File(statements, Span(self.source, 0, len(self.source.text)))
+        return nodes.File(Span(self.source, 0, len(self.source.text)), statements)
 
     @cached_property
     def is_local(self) -> bool:
@@ -149,11 +146,6 @@ def parse_whole(source: SourceFile) -> Parsed:
 def parse_edited(old: Parsed, source: SourceFile, edit: Edit) -> Parsed:
     """Parse a text of which an older version is known.
 
-    Args:
-        old: the older version.
-        source: the new text.
-        edit: the one difference between the two.
-
     Returns:
         What `parse_whole` gives, for less work.
     """
@@ -166,14 +158,7 @@ def parse_edited(old: Parsed, source: SourceFile, edit: Edit) -> Parsed:
 
 
 def _spliced(old: Parsed, source: SourceFile, edit: Edit, reach: int) -> Parsed | None:
-    """The new version, or None where reading so little does not tell.
-
-    Args:
-        old: the older version.
-        source: the new text.
-        edit: the difference.
-        reach: how many unchanged tokens to read after the edit; `_REACH` allows for mistakes.
-    """
+    """The new version, or None where reading ``reach`` unchanged tokens after the edit does not tell."""
     delta = edit.delta
     first, last = _first(old, edit.start), _last(old, edit.old_end, reach)
     to_end = last == len(old.pieces)
@@ -195,11 +180,11 @@ def _spliced(old: Parsed, source: SourceFile, edit: Edit, reach: int) -> Parsed 
         before = old.pieces[last].node
         if not fresh or fresh[-1].span.end != end:
             return None
-        if fresh[-1] != move(before, fresh[-1].span.start - before.span.start, source):
+        if fresh[-1] != _moved(before, fresh[-1].span.start - before.span.start, source):
             return None
     placed = [(d, d.span.start) for d in old.diagnostics if d.span is not None]
-    before_it = [move(d, 0, source) for d, start in placed if start < begin]
-    after_it = [move(d, delta, source) for d, start in placed if not to_end and start > end - delta]
+    before_it = [_moved(d, 0, source) for d, start in placed if start < begin]
+    after_it = [_moved(d, delta, source) for d, start in placed if not to_end and start > end - delta]
     rest = slice(last + 1, None)
     version = old.version + 1
     return Parsed(
@@ -261,6 +246,17 @@ def _is_sound(
     behind = len(tokens.starts) - bisect_left(tokens.starts, furthest)
     # A string that is not closed might be closed further on in its line.
     return behind >= _REACH and "\n" in text[furthest - begin :]
+
+
+def _moved(value: Any, delta: int, source: SourceFile) -> Any:
+    """A tree or a diagnostic with its spans ``delta`` further on, in ``source``."""
+    cls = value.__class__
+    if cls is Span:
+        return Span(source, value.start + delta, value.end + delta)
+    if cls is tuple:
+        return tuple([_moved(item, delta, source) for item in value])
+    names = getattr(cls, "__match_args__", ())
+    return cls(*[_moved(getattr(value, name), delta, source) for name in names]) if names else value
 
 
 def _copy(tokens: Tokens) -> Tokens:

@@ -41,12 +41,7 @@ _SLIPS = {
 _SAID = {
     "open_comment": ("", "E0115", "comment is never closed", "a comment ends with `*/`; the rest is skipped"),
     "colour": ("COLOR", "E0118", "`{}` is not a colour", "a colour is `#` and 3 or 6 hexadecimal digits"),
-    "name": (
-        "NAME",
-        "E0124",
-        "`{}` is not a name",
-        "names are made of ASCII letters, digits and `_`",
-    ),
+    "name": ("NAME", "E0124", "`{}` is not a name", "names are made of ASCII letters, digits and `_`"),
     "variable": ("NAME", "E0113", "illegal name `{}`", "names have no `$`"),
 }
 """Slips without a fix: what stands in their place, code, message, help."""

@@ -85,12 +85,9 @@ def source_mark(grammar: Path) -> int:
 
 
 def current(grammar: Path, place: Path, *, shipped: bool) -> dict[str, Any]:
-    """The plain data of `tables.json`, made anew where it is missing, damaged or of another grammar.
+    """The plain data of `tables.json` at ``place``, made anew where missing, damaged or of another grammar.
 
-    Args:
-        grammar: the grammar's file.
-        place: of `tables.json`.
-        shipped: whether both came in a wheel, where they belong together.
+    What was ``shipped`` in a wheel belongs together.
     """
     with contextlib.suppress(OSError, ValueError):
         found = json.loads(place.read_text("utf-8"))

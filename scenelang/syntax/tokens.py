@@ -12,17 +12,12 @@ from scenelang.syntax.tables import tables
 MAX_MISTAKES = 200
 """After so many the rest of a file is not reported: it is not a scene."""
 
-
 Token = tuple[int, int, int]
 """Kind, start and end."""
 
 
 class Report:
-    """The mistakes of one file, in the order of finding; at most `MAX_MISTAKES`.
-
-    Args:
-        source: the file they are in.
-    """
+    """The mistakes of one file, in the order of finding; at most `MAX_MISTAKES`."""
 
     def __init__(self, source: SourceFile) -> None:
         self.source = source
@@ -45,15 +40,8 @@ class Report:
             return
         if len(self.found) == MAX_MISTAKES:
             self.full = True
-            self.found.append(
-                Diagnostic(
-                    "E0121",
-                    f"more than {MAX_MISTAKES} syntax mistakes",
-                    Span(self.source, start, end),
-                    help="the rest of the file was not checked",
-                )
-            )
-            return
+            code, message, labels, fix = "E0121", f"more than {MAX_MISTAKES} syntax mistakes", (), None
+            help = "the rest of the file was not checked"
         if isinstance(fix, str):
             fix = self.change(start, end, fix)
         self.found.append(Diagnostic(code, message, Span(self.source, start, end), tuple(labels), help, fix))
@@ -67,12 +55,8 @@ class Report:
 
     def flush(self, diagnostics: Diagnostics) -> None:
         """Hand everything over, in the order of the text."""
-        for d in sorted(self.found, key=_place):
+        for d in sorted(self.found, key=lambda d: d.span.start if d.span is not None else 0):
             diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
-
-
-def _place(diagnostic: Diagnostic) -> int:
-    return diagnostic.span.start if diagnostic.span is not None else 0
 
 
 class Tokens:

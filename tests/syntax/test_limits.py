@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from scenelang.syntax.nesting import MAX_DEPTH
+from scenelang.syntax.parser import MAX_DEPTH
 from tests.syntax.reading import read, read_well
 from tests.work import ends, lines_run
 

@@ -24,12 +24,9 @@ _CODES = {")": "E0103", "]": "E0103", "BAD_EXPRESSION": "E0108", "NAME": "E0109"
 def report_repair(
     tokens: Tokens, report: Report, repair: Repair, open_brackets: Sequence[int], sure: bool = True
 ) -> None:
-    """Report the mistake that a repair mends.
+    """Report the mistake that a repair is going to mend.
 
     Args:
-        tokens: the tokens before the repair.
-        report: takes the diagnostic.
-        repair: what is going to be done.
         open_brackets: indices of the brackets open before it.
         sure: what is inserted can stand nowhere else.
     """

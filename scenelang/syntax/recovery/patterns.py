@@ -52,21 +52,13 @@ _TYPED = re.compile(rf"\b(?:{'|'.join(TYPES)})\s+(?=[A-Za-z_])|\s*:\s*[A-Za-z_]\
 
 
 class Piece(Record):
-    """A hole or a literal text of a pattern.
+    """A hole or a literal text of a pattern."""
 
-    Args:
-        text: the name of the hole, or the literal text.
-        is_hole: which of both.
-        spaced: whether a space stands before it.
-        optional: whether it may be missing.
-        words: what it takes, where that is one of some words.
-    """
-
-    text: str
+    text: str  # the name of the hole, or the literal text
     is_hole: bool
-    spaced: bool
+    spaced: bool  # a space stands before it
     optional: bool = False
-    words: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()  # what it takes, where that is one of some words
 
 
 @cache
@@ -86,8 +78,6 @@ class Match(Record):
     """Where the pieces of a pattern were found.
 
     Args:
-        tokens: the tokens.
-        start, stop: the tokens that it covers.
         parts: for each piece that is there its key and its tokens. The key of a word is its text.
         words: the words found for those of `WORDS`.
     """
@@ -240,10 +230,7 @@ def _alike(keys: list[str], others: list[str]) -> int:
 def change(match: Match, replacement: str, extra: Mapping[str, str]) -> Change | None:
     """What to do to a match for it to become a replacement; None where nothing would change.
 
-    Args:
-        match: where the pattern was found.
-        replacement: the pattern to make of it.
-        extra: texts of holes that the match does not have.
+    The texts of holes that the match does not have are in ``extra``.
     """
     tokens, holes = match.tokens, match.holes()
     known = {**extra, **match.words}
