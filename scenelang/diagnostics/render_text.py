@@ -19,17 +19,13 @@ _MOST_LINES = 6
 """Of a longer change the rest is left out."""
 
 
-def sort_key(diagnostic: Diagnostic) -> tuple[str, int, int, str]:
-    """File, then place, then code; what has no place comes first."""
-    span = diagnostic.span
-    if span is None:
-        return "", -1, -1, diagnostic.code
-    return span.source.name, span.start, span.end, diagnostic.code
-
-
 def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
-    """All diagnostics in the order in which every format gives them."""
-    return sorted(diagnostics, key=sort_key)
+    """All diagnostics as every format gives them: by file, place and code; what has no place comes first."""
+
+    def key(d: Diagnostic) -> tuple[str, int, int, str]:
+        return (d.span.source.name, d.span.start, d.span.end, d.code) if d.span else ("", -1, -1, d.code)
+
+    return sorted(diagnostics, key=key)
 
 
 def render_text(
@@ -93,22 +89,14 @@ def _block(diagnostic: Diagnostic, width: int, color: bool) -> str:
     fix = diagnostic.fix
     gutter = len(str(max([1, *numbers, _largest_line(fix) if fix else 1])))
     lines += draw(marks, severity, gutter, width, color)
-    notes = []
-    if diagnostic.help is not None:
-        notes.append(_note("help", diagnostic.help, gutter, color))
-    if fix is not None:
-        notes.append(_note("fix", fix.message, gutter, color))
+    said = (("help", diagnostic.help), ("fix", fix and fix.message))
+    notes = [f"{paint('bold', word, color)}: {printable(text)}" for word, text in said if text is not None]
     if notes and marks:
         lines.append(paint("frame", " " * gutter + " |", color))
-    lines += notes
+    lines += [paint("frame", " " * gutter + " =", color) + f" {note}" for note in notes]
     if fix is not None:
         lines += _preview(fix, gutter, width, color)
     return "\n".join(lines)
-
-
-def _note(word: str, text: str, gutter: int, color: bool) -> str:
-    sign = paint("frame", " " * gutter + " =", color)
-    return f"{sign} {paint('bold', word, color)}: {printable(text)}"
 
 
 # ---------------------------------------------------------------- what a fix does

@@ -168,7 +168,7 @@ def _spliced(old: Parsed, source: SourceFile, edit: Edit, reach: int) -> Parsed 
     tokens = scan(source, report, begin, end)
     if tokens.cut or not _settled(tokens.kinds):
         return None
-    pristine = _copy(tokens)
+    pristine = scan(source, Report(source), begin, end)  # recovery edits the others
     fresh = parse_tokens(tokens, report).statements
     found = Diagnostics()
     report.flush(found)
@@ -257,13 +257,6 @@ def _moved(value: Any, delta: int, source: SourceFile) -> Any:
         return tuple([_moved(item, delta, source) for item in value])
     names = getattr(cls, "__match_args__", ())
     return cls(*[_moved(getattr(value, name), delta, source) for name in names]) if names else value
-
-
-def _copy(tokens: Tokens) -> Tokens:
-    copy = Tokens(tokens.source)
-    copy.kinds, copy.starts, copy.ends = tokens.kinds.copy(), tokens.starts.copy(), tokens.ends.copy()
-    copy.reported, copy.cut = tokens.reported.copy(), tokens.cut
-    return copy
 
 
 def _joined(old: Tokens, new: Tokens, source: SourceFile, begin: int, old_end: int, delta: int) -> Tokens:

@@ -82,7 +82,7 @@ class Page(Record):
 
     @property
     def severity(self) -> str:
-        return severity_of(self.code)
+        return "warning" if self.code.startswith("W") else "error"
 
     @property
     def area(self) -> str:
@@ -117,11 +117,6 @@ class Page(Record):
                     filled = textwrap.fill(prose, width, break_long_words=False, break_on_hyphens=False)
                     blocks.append(re.sub(r"`[^`\n]+`", lambda code: paint(code[0], "frame"), filled))
         return "\n\n".join(blocks) + "\n"
-
-
-def severity_of(code: str) -> str:
-    """``error`` or ``warning``."""
-    return "warning" if code.startswith("W") else "error"
 
 
 @cache
