@@ -46,15 +46,10 @@ def paint(style: str, text: str, color: bool) -> str:
 
 
 class Line(Record):
-    """One source line in cells.
+    """One source line in cells."""
 
-    Args:
-        cells: what stands in each; empty behind a wide character.
-        starts: the cell of each code point, and after the last one where the line ends.
-    """
-
-    cells: Sequence[str]
-    starts: Sequence[int]
+    cells: Sequence[str]  # what stands in each; empty behind a wide character
+    starts: Sequence[int]  # the cell of each code point, and after the last one where the line ends
 
     def cell(self, column: int) -> int:
         """The cell of a column from 1; past the end the line goes on in single cells."""

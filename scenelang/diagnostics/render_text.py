@@ -89,7 +89,7 @@ def _block(diagnostic: Diagnostic, width: int, color: bool) -> str:
     fix = diagnostic.fix
     gutter = len(str(max([1, *numbers, _largest_line(fix) if fix else 1])))
     lines += draw(marks, severity, gutter, width, color)
-    said = (("help", diagnostic.help), ("fix", fix and fix.message))
+    said = (("help", diagnostic.help), ("fix", fix.message if fix else None))
     notes = [f"{paint('bold', word, color)}: {printable(text)}" for word, text in said if text is not None]
     if notes and marks:
         lines.append(paint("frame", " " * gutter + " |", color))

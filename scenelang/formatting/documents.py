@@ -102,12 +102,7 @@ class Fill(Doc):
 
 
 class Comments(Doc):
-    """Comments after which the line ends.
-
-    Args:
-        comments: in order.
-        inside: they stand in the middle of something, so what follows is indented.
-    """
+    """Comments after which the line ends; ``inside`` something, what follows them is indented."""
 
     __slots__ = ("comments", "inside")
 

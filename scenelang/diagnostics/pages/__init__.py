@@ -44,37 +44,22 @@ _FENCE: Final = re.compile(
 
 
 class Example(Record):
-    """A scene of a page.
+    """A scene of a page."""
 
-    Args:
-        kind: ``bad`` gives the page's code and nothing else, ``good`` nothing.
-        language: ``nsg``, ``json`` or ``python``.
-        text: the scene.
-        options: what `scenelang check` is told besides, as words.
-        limits: limits that are lowered for it, by their dotted names.
-    """
-
-    kind: Literal["bad", "good"]
-    language: str
+    kind: Literal["bad", "good"]  # ``bad`` gives the page's code and nothing else, ``good`` nothing
+    language: str  # ``nsg``, ``json`` or ``python``
     text: str
-    options: tuple[str, ...] = ()
-    limits: tuple[tuple[str, int], ...] = ()
+    options: tuple[str, ...] = ()  # what `scenelang check` is told besides, as words
+    limits: tuple[tuple[str, int], ...] = ()  # limits that are lowered for it, by their dotted names
 
 
 class Page(Record):
-    """What there is to know about a code.
+    """What there is to know about a code."""
 
-    Args:
-        code: such as ``E0302``.
-        text: the Markdown, with its first line.
-        examples: in the order of the page.
-        files: names and texts of files beside the examples.
-    """
-
-    code: str
-    text: str
-    examples: tuple[Example, ...]
-    files: tuple[tuple[str, str], ...]
+    code: str  # such as ``E0302``
+    text: str  # the Markdown, with its first line
+    examples: tuple[Example, ...]  # in the order of the page
+    files: tuple[tuple[str, str], ...]  # names and texts of files beside the examples
 
     @property
     def title(self) -> str:

@@ -100,13 +100,7 @@ class _Mender:
             self._apply(mend)
 
     def _best(self, slip: Slip, stop: int, count: int) -> tuple[Repair, bool]:
-        """How to mend a line, and whether all fits then.
-
-        Args:
-            slip: the line; it lacks `{` or has `}` too many, or the other way about.
-            stop: index of the first token of the next line.
-            count: how many braces it is about.
-        """
+        """How to mend ``count`` braces of a line, up to the token ``stop``, and whether all fits then."""
         kinds, first, opens = self.tokens.kinds, slip.first, slip.shift > 0
         # The layout cannot tell a brace at the end of a line from one at the start of the next.
         limit = stop

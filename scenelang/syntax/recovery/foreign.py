@@ -29,23 +29,14 @@ def keywords_near(text: str) -> tuple[str, ...]:
 
 
 class Habit(Record):
-    """One habit.
+    """One habit."""
 
-    Args:
-        pattern: what is written (see `syntax.recovery.patterns`).
-        meant: what is written here. It is also read in its place, so that the rest can be checked.
-        message: the fact; names and words that the pattern has found may stand in it.
-        help: advice.
-        code: code of the diagnostic.
-        safe: whether ``meant`` is sure to mean the same, and so is a fix.
-    """
-
-    pattern: str
-    meant: str
-    message: str
+    pattern: str  # what is written (see `syntax.recovery.patterns`)
+    meant: str  # what is written here; also read in its place, so that the rest can be checked
+    message: str  # the fact; names and words that the pattern has found may stand in it
     help: str | None = None
     code: str = "E0133"
-    safe: bool = True
+    safe: bool = True  # whether ``meant`` is sure to mean the same, and so is a fix
 
 
 _unsafe: Final = partial(Habit, safe=False)

@@ -49,6 +49,7 @@ _PIECE = re.compile(
     r"|(?P<text>[A-Za-z_]\w*|\.\.<(?!\w+>)|\.\.|[<>=!]=|&&|\|\||\S))"
 )
 _TYPED = re.compile(rf"\b(?:{'|'.join(TYPES)})\s+(?=[A-Za-z_])|\s*:\s*[A-Za-z_]\w*")
+"""The types that stand before or after the names of parameters."""
 
 
 class Piece(Record):
@@ -75,18 +76,13 @@ def pieces(pattern: str) -> tuple[Piece, ...]:
 
 
 class Match(Record):
-    """Where the pieces of a pattern were found.
-
-    Args:
-        parts: for each piece that is there its key and its tokens. The key of a word is its text.
-        words: the words found for those of `WORDS`.
-    """
+    """Where the pieces of a pattern were found."""
 
     tokens: Tokens
     start: int
     stop: int
-    parts: tuple[tuple[str, int, int], ...]
-    words: Mapping[str, str]
+    parts: tuple[tuple[str, int, int], ...]  # key and tokens of each piece; the key of a word is its text
+    words: Mapping[str, str]  # the words found for those of `WORDS`
 
     def holes(self) -> dict[str, tuple[int, int]]:
         """The tokens of each hole."""
@@ -197,29 +193,16 @@ def _body(tokens: Tokens, at: int, head: int) -> int:
     return min(at + 20 * MOST, len(tokens.kinds) - 1)
 
 
-def without_types(text: str) -> str:
-    """Parameters without the types that stand before or after their names."""
-    return _TYPED.sub("", text)
-
-
 class Change(Record):
-    """What a replacement makes of a match, less what both have in common at their ends.
+    """What a replacement makes of a match, less what both have in common at their ends."""
 
-    Args:
-        first, stop: the tokens that go.
-        place: where it is shown: the text that goes, with the name before it.
-        new: the tokens that come; holes that change their order are left out.
-        start, end: the text that goes.
-        text: the text that comes.
-    """
-
-    first: int
+    first: int  # of the tokens that go
     stop: int
-    place: tuple[int, int]
-    new: list[Token]
-    start: int
+    place: tuple[int, int]  # where it is shown: the text that goes, with the name before it
+    new: list[Token]  # the tokens that come; holes that change their order are left out
+    start: int  # of the text that goes
     end: int
-    text: str
+    text: str  # that comes
 
 
 def _alike(keys: list[str], others: list[str]) -> int:
@@ -240,10 +223,7 @@ def change(match: Match, replacement: str, extra: Mapping[str, str]) -> Change |
         if not p.is_hole or p.text in known or f"<{p.text}>" in holes
     ]
     keys = [f"<{p.text}>" if p.is_hole else p.text for p in wanted]
-    had = [
-        "" if key == "<PARAMS>" and without_types(match.text(i, j)) != match.text(i, j) else key
-        for key, i, j in match.parts
-    ]
+    had = ["" if key == "<PARAMS>" and _TYPED.search(match.text(i, j)) else key for key, i, j in match.parts]
     before = _alike(keys, had)
     behind = _alike(keys[before:][::-1], had[before:][::-1])
     middle, gone = wanted[before : len(wanted) - behind], match.parts[before : len(had) - behind]
@@ -287,6 +267,6 @@ def _written(match: Match, pieces: list[Piece], first: int, stop: int) -> tuple[
         else:
             new.append((language.literals.get(text, language.kind("NAME")), at, at))
         if place is not None:
-            text = without_types(match.text(*place)) if typed else match.text(*place)
+            text = _TYPED.sub("", match.text(*place)) if typed else match.text(*place)
         written += " " * (piece.spaced and number > 0) + text
     return written, new
