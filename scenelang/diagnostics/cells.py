@@ -35,9 +35,7 @@ def printable(text: str) -> str:
     """Text without control characters and invisible ones that reorder it."""
     if text.isprintable():
         return text
-    return "".join(
-        char if char.isprintable() or char == " " else "\N{REPLACEMENT CHARACTER}" for char in text
-    )
+    return "".join(char if char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text)
 
 
 def paint(style: str, text: str, color: bool) -> str:

@@ -134,10 +134,6 @@ def before_of(part: Part) -> Sequence[Comment]:
     return () if isinstance(part, str) else part.before
 
 
-def blank_of(part: Part) -> bool:
-    return not isinstance(part, str) and part.blank
-
-
 def after_of(part: Part) -> Sequence[Comment]:
     return () if isinstance(part, str) else part.after
 

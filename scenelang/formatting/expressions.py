@@ -20,7 +20,6 @@ from scenelang.formatting.documents import (
     Word,
     after_of,
     before_of,
-    blank_of,
     ends_of,
     flat_of,
     joined,
@@ -179,7 +178,7 @@ class ExpressionLayout:
             else:
                 return sequence(parts)
         word = Word(text)
-        word.blank = blank_of(parts[0])
+        word.blank = not isinstance(parts[0], str) and parts[0].blank
         return word if word.blank else text
 
     # ------------------------------------------------------------ expressions

@@ -46,7 +46,7 @@ def _named(word: str, scope: str, what: str = NAME) -> dict[str, Any]:
     return {"match": rf"\b({word})\s+({what})", "captures": captures}
 
 
-_UNITS: Final = "|".join(words.UNITS)
+_UNITS: Final = _any(words.UNITS)
 _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
     "comments": [
         {
@@ -90,9 +90,7 @@ _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
     ],
     "numbers": [
         {
-            "match": tables()
-            .patterns["NUMBER"]
-            .replace(f"(?:{_any(words.UNITS)})", f"({_any(words.UNITS)})"),
+            "match": tables().patterns["NUMBER"].replace(f"(?:{_UNITS})", f"({_UNITS})"),
             "name": "constant.numeric.nsg",
             "captures": {"1": {"name": "keyword.other.unit.nsg"}},
         },

@@ -73,25 +73,16 @@ def _common(left: Sequence[str], right: Sequence[str]) -> int:
 
 @dataclass
 class Parsed:
-    """A text and its tree, ready to be edited.
-
-    Args:
-        starts, ends: where each top-level statement begins and ends.
-        tokens: the text's tokens, as they were before recovery.
-        diagnostics: all syntax mistakes, in the order of the text.
-        pieces: the statements, perhaps at older places.
-        reparsed: how many statements were read to get here.
-        version: the number of edits so far.
-    """
+    """A text and its tree, ready to be edited."""
 
     source: SourceFile
-    starts: list[int]
-    ends: list[int]
-    tokens: Tokens
-    diagnostics: tuple[Diagnostic, ...]
-    pieces: list[_Piece] = field(repr=False)
-    reparsed: int = 0
-    version: int = 0
+    starts: list[int]  # where each top-level statement begins
+    ends: list[int]  # and where it ends
+    tokens: Tokens  # the text's tokens, as they were before recovery
+    diagnostics: tuple[Diagnostic, ...]  # all syntax mistakes, in the order of the text
+    pieces: list[_Piece] = field(repr=False)  # the statements, perhaps at older places
+    reparsed: int = 0  # how many statements were read to get here
+    version: int = 0  # the number of edits so far
 
     def statement(self, index: int) -> nodes.Stmt:
         """Top-level statement number ``index``, at its place in this text."""

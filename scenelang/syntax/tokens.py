@@ -63,25 +63,17 @@ class Tokens:
     """Tokens as parallel lists of kinds, starts and ends; the last one is the end of the text.
 
     A token that recovery put in is empty (``start == end``).
-
-    Args:
-        source: the file.
-        kinds: kind of each token, an index into `Tables.kinds`.
-        starts: offset of its first code point.
-        ends: offset after its last one.
-        reported: where tokens and illegal characters begin that a mistake has been reported for.
-        cut: the text ends inside a comment, so what is missing at its end is not a further mistake.
     """
 
     __slots__ = ("cut", "ends", "kinds", "reported", "source", "starts")
 
     def __init__(self, source: SourceFile) -> None:
         self.source = source
-        self.kinds: list[int] = []
-        self.starts: list[int] = []
-        self.ends: list[int] = []
-        self.reported: set[int] = set()
-        self.cut = False
+        self.kinds: list[int] = []  # indices into `Tables.kinds`
+        self.starts: list[int] = []  # offsets of first code points
+        self.ends: list[int] = []  # offsets after the last ones
+        self.reported: set[int] = set()  # where tokens and characters begin whose mistake is reported
+        self.cut = False  # the text ends inside a comment, so what it lacks is not a further mistake
 
     def append(self, kind: int, start: int, end: int) -> None:
         self.kinds.append(kind)

@@ -155,13 +155,11 @@ class Habits:
             child = stop
         if not calls or calls[0][1] != at or tokens.text(child) in _PREFIXES:
             return False
-        kinds = tokens.kinds
-        if tokens.starts[child] == tokens.ends[child - 1]:
+        named = tokens.kinds[child] == tables().kind("NAME")
+        glued = tokens.starts[child] == tokens.ends[child - 1]
+        if glued or not (named or self._is(child, *NODES, "for", "if")):
             return False
-        named = kinds[child] == tables().kind("NAME")
-        if not (named or self._is(child, *NODES, "for", "if")):
-            return False
-        if reach(stack.copy(), kinds, child, child + 2) <= child + named:
+        if reach(stack.copy(), tokens.kinds, child, child + 2) <= child + named:
             return False
         start, end = tokens.starts[first], tokens.ends[calls[-1][1] - 1]
         message = f"`{tokens.text(first)}` stands before what it applies to"
@@ -185,9 +183,8 @@ class Habits:
         colours = words.count("color")
         if self._is(child, "for", "if") or not set(words) <= _MOVES or colours > 1:
             return None
-        if "//" in inside or "/*" in inside:
-            return None
-        if colours and (self._materials[0] is None or "material" in inside):
+        known = self._materials[0] is not None and "material" not in inside
+        if "//" in inside or "/*" in inside or (colours and not known):
             return None
         moves = [f"{text[tokens.starts[call] : tokens.ends[last - 1]]};" for call, last in reversed(calls)]
         moves = [m if m[:5] != "color" else f"material {self._materials[0]} {{ {m} }}" for m in moves]
