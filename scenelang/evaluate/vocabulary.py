@@ -35,10 +35,7 @@ class Vocabulary:
 
     def choose(self, name: str) -> Vocabulary | None:
         """The same with model ``name`` chosen; None if there is no such model."""
-        for manifest in self.models:
-            if manifest.name == name:
-                return Vocabulary(self.models, manifest)
-        return None
+        return next((Vocabulary(self.models, m) for m in self.models if m.name == name), None)
 
     geometries = _offered("geometries")
     materials = _offered("materials")

@@ -243,8 +243,10 @@ class Names:
                 self._call(node, scope, kind)
             case nodes.NameRef():
                 text = node.name.text
-                own = self._own(text) if scope.find(text) is None else None
-                if own is None:
+                own: Role | None = (
+                    "constant" if text in CONSTANTS else "animated" if text in ANIMATED else None
+                )
+                if own is None or scope.find(text) is not None:
                     self._reference(node.name, scope, "name")
                 else:
                     self._add(node.name.span, text, own)
@@ -279,11 +281,6 @@ class Names:
         if stmt.body is not None:
             value = head is not None and head.symbol is not None and head.symbol.kind in ("let", "argument")
             self._walk(stmt.body, scope, "material" if value else "object")
-
-    @staticmethod
-    def _own(text: str) -> Role | None:
-        """What a word of the language is in an expression."""
-        return "constant" if text in CONSTANTS else "animated" if text in ANIMATED else None
 
     def _add(self, span: Span, text: str, role: Role, symbol: Symbol | None = None) -> Use:
         use = Use(span.start, span.end, text, role, symbol)

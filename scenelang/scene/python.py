@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import field
-from typing import Final
+from typing import Any, Final
 
 from scenelang.deep import deep_stack
 from scenelang.records import Record
-from scenelang.scene.fields import Rgb
+from scenelang.scene.fields import Frozen, Rgb
 from scenelang.scene.modifiers import MaterialOp, Transform
-from scenelang.scene.nodes import Link, Object, SceneData, SceneNode
+from scenelang.scene.nodes import SceneData
 from scenelang.scene.text import degrees, hex_colour, number, numbers
+from scenelang.words import OPERATIONS, TRANSFORMS
 
 _WIDTH: Final = 88
 _INDENT: Final = "    "
 _DEEPEST: Final = 10
 """Nodes within nodes of one expression; Python itself takes no more than 200 brackets."""
+_UNNAMED: Final = ("geometry", "name")
+"""Arguments that go without their names."""
+_STEPS: Final = {*TRANSFORMS, *OPERATIONS}
 
 
 class _Call(Record):
@@ -34,7 +38,7 @@ def to_python(scene: SceneData) -> str:
     """The code of ``scene``: the import, parts that nest too deep, and ``scene = nsg.Scene(…)``."""
     with deep_stack():
         made = _Maker()
-        whole = _Call("nsg.Scene", tuple(made.settings(scene)))
+        whole, _ = made.code("", scene)
         lines = ["import scenelang as nsg", ""]
         for name, code in [*made.parts, ("scene", whole)]:
             lines.append(f"{name} = {_laid_out(code, len(name) + 3, '')}")
@@ -42,56 +46,30 @@ def to_python(scene: SceneData) -> str:
 
 
 class _Maker(Record, frozen=False):
-    """Makes code of nodes; what nests too deep becomes a variable of its own in ``parts``."""
+    """Makes code of a Scene; what nests too deep becomes a variable of its own in ``parts``."""
 
     parts: list[tuple[str, _Code]] = field(default_factory=list)
 
-    def settings(self, scene: SceneData) -> Iterable[_Code]:
-        if scene.model is not None:
-            yield f'model="{scene.model}"'
-        if scene.canvas != (256, 256):
-            yield _tuple("canvas=", map(str, scene.canvas))
-        if scene.background is None:
-            yield "background=None"
-        elif scene.background != (1.0, 1.0, 1.0):
-            yield _numbers("background=", scene.background)
-        if scene.animation is not None:
-            loop = () if scene.animation.loop else ("loop=False",)
-            times = (f"seconds={number(scene.animation.seconds)}", f"fps={number(scene.animation.fps)}")
-            yield _Call("animation=nsg.Animation", (*times, *loop))
-        if scene.nodes:
-            yield _tuple("nodes=", [self.node("", node)[0] for node in scene.nodes])
-
-    def node(self, prefix: str, node: SceneNode) -> tuple[_Code, int]:
-        """The code of a node, and how deep nodes nest in it."""
-        height, name = 0, type(node).__name__
-        parts: list[_Code] = []
-        if isinstance(node, Object):
-            parts.append(f'"{node.geometry}"')
-        else:
-            if node.kind == "boolean":
-                parts.append(f'op="{node.op}"')
-            children = [self.child(child) for child in node.children]
-            height = max([inner + 1 for _, inner in children], default=0)
-            if children:
-                parts.append(_tuple("children=", [code for code, _ in children]))
-        if node.transforms:
-            parts.append(_tuple("transforms=", map(_step, node.transforms)))
-        if node.material is not None:
-            ops = (_tuple("ops=", map(_step, node.material.ops)),) if node.material.ops else ()
-            parts.append(_Call("material=nsg.Material", (f'"{node.material.name}"', *ops)))
+    def code(self, head: str, value: Any) -> tuple[_Code, int]:
+        """The code of a value, with something before it, and how deep nodes nest in it."""
+        if isinstance(value, tuple):
+            items = [self.code("", item) for item in value]
+            return _tuple(head, [code for code, _ in items]), max([height for _, height in items], default=0)
+        if getattr(value, "kind", "") in _STEPS:
+            return _step(value), 0
+        if not isinstance(value, Frozen):
+            plain = f'"{value}"' if isinstance(value, str) else value
+            return f"{head}{number(value) if isinstance(value, float) else plain}", 0
+        parts, height, name = [], 0, f"nsg.{type(value).__name__}"
+        for key, item in value.__repr_args__():
+            code, inner = self.code("" if key in _UNNAMED else f"{key}=", item)
+            parts.append(code)
+            height = max(height, inner + (key == "children"))
         if height < _DEEPEST:
-            return _Call(f"{prefix}nsg.{name}", tuple(parts)), height
+            return _Call(f"{head}{name}", tuple(parts)), height
         variable = f"part_{len(self.parts) + 1}"
-        self.parts.append((variable, _Call(f"nsg.{name}", tuple(parts))))
-        return f"{prefix}{variable}", 0
-
-    def child(self, child: SceneNode | Link) -> tuple[_Code, int]:
-        if not isinstance(child, Link):
-            return self.node("", child)
-        code, height = self.node("node=", child.node)
-        op = () if child.op == "union" else (f'op="{child.op}"',)
-        return _Call("nsg.Link", (*op, code)), height
+        self.parts.append((variable, _Call(name, tuple(parts))))
+        return f"{head}{variable}", 0
 
 
 def _step(step: Transform | MaterialOp) -> _Code:

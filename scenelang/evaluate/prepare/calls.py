@@ -51,10 +51,7 @@ def bind(
     Calls of one definition that fail in the same way are places of one report.
 
     Args:
-        report: where mistakes are reported.
-        name: what is called.
-        params: parameter names in order.
-        required: how many of them, from the left, have to be given.
+        required: how many of ``params``, from the left, have to be given.
         args: arguments as written; positional ones fill the parameters in order.
         definition: what is called, unless the language has it.
         spread: one positional argument may be a vector of all.

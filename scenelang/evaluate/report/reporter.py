@@ -44,10 +44,7 @@ class Shared(Record, frozen=False):
 def shown_places(places: Collection[Span], words: str, rest: str = "") -> tuple[Label, ...]:
     """Labels for the places that share one report: the first few, and how many there are beyond.
 
-    Args:
-        places: in the order in which they were met.
-        words: what is said at each place.
-        rest: how the number of the others is put: "in" for "and in 2 more".
+    ``rest`` is how their number is put: "in" for "and in 2 more".
     """
     labels = [Label(place, words) for place in islice(places, _SHOWN)]
     if len(places) > _SHOWN:

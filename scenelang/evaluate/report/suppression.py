@@ -72,12 +72,7 @@ NONE = Damage()
 
 
 def find_damage(file: nodes.File, found: Iterable[Diagnostic]) -> Damage:
-    """The damage that a file's syntax mistakes have done.
-
-    Args:
-        file: its tree.
-        found: diagnostics; those of syntax in this file count.
-    """
+    """The damage that a file's syntax mistakes, those among ``found``, have done."""
     source = file.span.source
     marks = [
         (d.code, d.span)

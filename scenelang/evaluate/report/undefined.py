@@ -27,11 +27,7 @@ def reported_at_definition(
 ) -> bool:
     """Report a name that is used several times at the definition that was misspelt, if there is one.
 
-    Args:
-        report: where it is reported.
-        text: the unknown name.
-        source: the file that it is used in.
-        defined: names that are defined around it, each with its place and the kind of its binding.
+    ``defined`` are the names around it, each with its place and the kind of its binding.
     """
     places = report.uses(source).get(text, [])
     if len(places) < 2 or "." in text or report.effort.spent:
@@ -67,10 +63,6 @@ def report_unknown(
     """Report a name that stands for nothing; again only as a further place of the first report.
 
     Args:
-        name: the name.
-        place: where it is used.
-        code: code of the diagnostic.
-        message: the fact.
         advise: makes advice and a safe change; where there is neither an unused name nearby is suggested.
         kinds: kinds of bindings that it could have stood for.
     """
