@@ -97,28 +97,29 @@ def chosen(
 
     Scenes that nothing on the frontier draws well or fast enough are reported and left out.
     """
-    from scenelang.measure.choose import yardstick
+    from scenelang.measure.choose import NothingFits, yardstick
 
+    points: dict[int, Point] = {}
     with clock("choose"):
         here_ms = yardstick()
-        points = {id(job): choose_point(job, limits, request.model, here_ms) for job, _ in ready}
-    for job, _ in ready:
-        if points[id(job)] is None:
-            say_trouble(f"{job.name}: {job.trouble}")
-            code = 2
+        for job, _ in ready:
+            try:
+                points[id(job)] = choose_point(job, limits, request.model, here_ms)
+            except NothingFits as error:
+                say_trouble(f"{job.name}: {error}")
+                code = 2
 
     def draw(job: Job, progress: Callable[[float], None]) -> Image:
         point = points[id(job)]
-        assert point is not None
         if point.backend == "reference":
             return exact(request, clock)(job, progress)
         return neural(clock, "cpu", threads, point.samples)(job, progress)
 
-    return draw, [(job, path) for job, path in ready if points[id(job)] is not None], code
+    return draw, [(job, path) for job, path in ready if id(job) in points], code
 
 
-def choose_point(job: Job, limits: Limits, model: str | None, here_ms: float) -> Point | None:
-    """Choose how to draw a job, and compile it for the model that does; None leaves a trouble in it.
+def choose_point(job: Job, limits: Limits, model: str | None, here_ms: float) -> Point:
+    """Choose how to draw a job, and compile it for the model that does; raises `NothingFits`.
 
     ``model`` is the only one to choose where it is given; ``here_ms`` the yardstick's time on this machine.
     """
@@ -130,17 +131,11 @@ def choose_point(job: Job, limits: Limits, model: str | None, here_ms: float) ->
     try:
         frontier = load_frontier(name)
     except ValueError as error:
-        job.trouble = f"the frontier of `{name}` is damaged: {error}"
-        return None
+        raise NothingFits(f"the frontier of `{name}` is damaged: {error}") from None
     if frontier is None:
-        job.trouble = f"model `{name}` ships no frontier to choose from"
-        return None
+        raise NothingFits(f"model `{name}` ships no frontier to choose from")
     scale = machine_scale(frontier, here_ms)
-    try:
-        choice, job.program = _chosen(frontier, job, job.program, limits, model, scale)
-    except NothingFits as error:
-        job.trouble = str(error)
-        return None
+    choice, job.program = _chosen(frontier, job, job.program, limits, model, scale)
     point = choice.offer.point
     notes = program_notes(job.program, "chosen by the frontier") if point.backend == "neural" else []
     told = f"this machine takes {scale:.2f} times as long as the one that was measured"

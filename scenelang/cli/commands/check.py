@@ -53,13 +53,8 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
     "--select", multiple=True, metavar="CODES", callback=_codes, help="Of warnings report only these."
 )
 @click.option("--ignore", multiple=True, metavar="CODES", callback=_codes, help="Leave these warnings out.")
-@click.option(
-    "--format",
-    "kind",
-    type=click.Choice(["human", "json", "sarif", "github", "concise"]),
-    default="human",
-    show_default=True,
-    help="How diagnostics are written.",
+@options.choice(
+    "--format", "kind", words="human json sarif github concise", help="How diagnostics are written."
 )
 @click.option(
     "--max-diagnostics", "most", type=click.IntRange(0), metavar="N", help="Write so many; count them all."

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     help="A stage or pass; may be given several times. Default: program, with --diff all.",
 )
 @click.option("--diff", is_flag=True, help="Only what each pass changed.")
-@click.option("--format", "kind", type=click.Choice(["text", "json"]), default="text", show_default=True)
+@options.choice("--format", "kind", words="text json")
 @options.out
 @options.request
 @click.pass_context

@@ -20,11 +20,9 @@ _SUFFIXES: Final = (".gltf", ".glb")
 @click.command("import")
 @click.argument("file", metavar="FILE")
 @click.option("-o", "--out", metavar="OUT", help="A file instead of standard output, .nsg or .json.")
-@click.option(
+@options.choice(
     "--plane",
-    type=click.Choice(["xy", "xz"]),
-    default="xy",
-    show_default=True,
+    words="xy xz",
     help="What a 2D model sees of 3D: xy from the front, or xz, the ground, from above.",
 )
 @options.model

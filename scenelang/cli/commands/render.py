@@ -41,21 +41,15 @@ if TYPE_CHECKING:
     metavar="N",
     help="Processes that draw frames; by default one, and more where that is faster.",
 )
-@click.option(
-    "--palette",
-    type=click.Choice(["auto", "global", "frame"]),
-    default="auto",
-    show_default=True,
-    help="Colours of a GIF: 255 for all frames or for each.",
+@options.choice(
+    "--palette", words="auto global frame", help="Colours of a GIF: 255 for all frames or for each."
 )
 @click.option("--dither", is_flag=True, help="Dither what a GIF's palette lacks.")
 @options.model
 @options.backend
-@click.option(
+@options.choice(
     "--samples",
-    type=click.Choice(["adaptive", "four", "one"]),
-    default="adaptive",
-    show_default=True,
+    words="adaptive four one",
     help="Samples of a pixel: four near outlines, four everywhere, or one, with hard edges.",
 )
 @click.option(

@@ -29,11 +29,9 @@ if TYPE_CHECKING:
 @options.frames
 @options.fps
 @options.model
-@click.option(
+@options.choice(
     "--show",
-    type=click.Choice(["auto", "never", "always"]),
-    default="auto",
-    show_default=True,
+    words="auto never always",
     help="Show the picture in the terminal; always does with coloured characters if need be.",
 )
 @options.backend
@@ -65,8 +63,7 @@ def command(
     from scenelang.animation.targets import is_animation
     from scenelang.cli.animation import Requested, wanted_target
     from scenelang.cli.outputs import composed, targets
-    from scenelang.watching.changes import stamps, wait
-    from scenelang.watching.picture import Easel, Outdated
+    from scenelang.watching.picture import Easel, Outdated, stamps, wait
     from scenelang.watching.screen import Screen
 
     out = str(composed(Path(f"{file.stem}.png"))) if out is None else out
