@@ -29,7 +29,7 @@ from scenelang.formatting.documents import (
 )
 from scenelang.formatting.lists import Bracketed, Item, broken, inline
 from scenelang.formatting.trivia import Notes, texts_of
-from scenelang.syntax.tokens import Tokens
+from scenelang.syntax.lexer import Tokens
 
 _PATH = re.compile(r"\w+(\.\w+)*")
 _NUMBER_LAST = re.compile(r"(?:^|\s)\.?[0-9][\w.+-]*$")  # comments may stand before it

@@ -10,9 +10,8 @@ from scenelang.formatting.layout import Layout
 from scenelang.formatting.trivia import attach, comments_of
 from scenelang.syntax import parse
 from scenelang.syntax.automaton import run
-from scenelang.syntax.lexer import scan
+from scenelang.syntax.lexer import Report, Tokens, scan
 from scenelang.syntax.parser import limit_nesting
-from scenelang.syntax.tokens import Report, Tokens
 
 _BOM = "\ufeff"
 

@@ -12,8 +12,8 @@ from dataclasses import field
 from typing import NamedTuple
 
 from scenelang.records import Record
+from scenelang.syntax.lexer import Tokens
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Tokens
 
 _COMMENT = re.compile(r"//[^\n]*|/\*(?:[\s\S]*?\*/|[\s\S]*)")
 

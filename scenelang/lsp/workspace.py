@@ -24,8 +24,8 @@ from scenelang.resolve.names import Names, Symbol, Use
 from scenelang.scene import library
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Edit, Parsed, parse_edited, parse_whole
+from scenelang.syntax.lexer import Tokens
 from scenelang.syntax.tables import END
-from scenelang.syntax.tokens import Tokens
 
 if TYPE_CHECKING:
     from lsprotocol import types

@@ -14,8 +14,8 @@ from typing import Any, Final
 
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import nodes
+from scenelang.syntax.lexer import Report, Tokens
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report, Tokens
 
 Arguments = tuple[tuple[nodes.Argument, ...], int]
 Keyword = tuple[Any, Span]

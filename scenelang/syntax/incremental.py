@@ -25,11 +25,10 @@ from typing import Any, Final
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.syntax import nodes
-from scenelang.syntax.lexer import scan
+from scenelang.syntax.lexer import Report, Tokens, scan
 from scenelang.syntax.parser import parse, parse_tokens
 from scenelang.syntax.recovery.repairs import FOLLOWED
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report, Tokens
 
 _REACH: Final = 3 * FOLLOWED
 _MOST_MISTAKES: Final = 50  # with more of them the whole text is read: some limit may be near

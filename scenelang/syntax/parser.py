@@ -11,9 +11,8 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.syntax import nodes
 from scenelang.syntax.automaton import run
 from scenelang.syntax.build import Builder
-from scenelang.syntax.lexer import scan
+from scenelang.syntax.lexer import Report, Tokens, scan
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report, Tokens
 
 if TYPE_CHECKING:
     from scenelang.syntax.recovery.recover import Recovery

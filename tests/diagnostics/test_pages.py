@@ -24,7 +24,7 @@ from scenelang.program.check import check_compiles, check_frames
 from scenelang.resolve.unused import find_unused
 from scenelang.scene import schema
 from scenelang.scene.schema import Scene
-from scenelang.syntax import parse, parser, tokens
+from scenelang.syntax import lexer, parse, parser
 from scenelang.syntax.tables import tables
 from tests.models import SOLIDS
 
@@ -144,7 +144,7 @@ def test_pages_state_the_lists_and_limits_of_the_code() -> None:
     assert set(listed[1].split()) == set(functions.FUNCTIONS)
     for code, number in {
         "E0120": f"{parser.MAX_DEPTH} levels",
-        "E0121": f"more than {tokens.MAX_MISTAKES} syntax",
+        "E0121": f"more than {lexer.MAX_MISTAKES} syntax",
         "E0311": f"above {settings.MAX_SIDE_PX}",
         "E0320": f"{limits.MAX_OBJECTS:,} objects",
         "E0321": f"{limits.MAX_DEPTH} deep, or groups more than {schema.MAX_NODE_DEPTH}",

@@ -15,9 +15,8 @@ from scenelang.evaluate.report.suppression import NONE, Damage
 from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.scene.spans import Calls
-from scenelang.syntax.lexer import scan
+from scenelang.syntax.lexer import Report, scan
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report
 
 Advice = tuple[str | None, Fix | None]
 """Help, and a fix."""

@@ -13,11 +13,11 @@ from functools import cache
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.syntax.automaton import advance, completion, fits, reach
+from scenelang.syntax.lexer import Report, Tokens
 from scenelang.syntax.recovery.layout import Slip, find_slips
 from scenelang.syntax.recovery.mistakes import report_broken_off, report_instead
 from scenelang.syntax.recovery.repairs import Kinds, Repair
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report, Tokens
 
 _BEHIND = 4  # so many tokens after the line have to fit as well
 _LONGEST = 80  # so many places before the first misfit are tried

@@ -10,13 +10,12 @@ from typing import Final
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
 from scenelang.syntax.automaton import fits, reach
-from scenelang.syntax.lexer import UNIT_ALIASES
+from scenelang.syntax.lexer import UNIT_ALIASES, Report, Token, Tokens
 from scenelang.syntax.recovery import mistakes
 from scenelang.syntax.recovery.foreign import HABITS, OPERATORS, Habit
 from scenelang.syntax.recovery.patterns import MOST, Change, Match, change, closing, find, pieces
 from scenelang.syntax.recovery.repairs import FOLLOWED
 from scenelang.syntax.tables import END, tables
-from scenelang.syntax.tokens import Report, Token, Tokens
 from scenelang.words import NODES, TRANSFORMS, UNITS
 
 _FLAT: Final = frozenset(("square", "triangle", "pentagon", "star"))

@@ -11,8 +11,8 @@ from collections import Counter
 from itertools import pairwise
 
 from scenelang.records import Record
+from scenelang.syntax.lexer import Tokens
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Tokens
 
 _SLIP = 1.4  # a slip costs as much as so many lines at the wrong depth
 _WIDEST = 12  # further off than this is not searched

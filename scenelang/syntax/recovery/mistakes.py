@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
+from scenelang.syntax.lexer import Report, Tokens
 from scenelang.syntax.recovery.foreign import OPERATORS, keywords_near
 from scenelang.syntax.recovery.repairs import MAX_REPLAY, REPLACEMENTS, Repair
 from scenelang.syntax.tables import END, tables
-from scenelang.syntax.tokens import Report, Tokens
 
 DEFINITIONS = ("let", "param", "fn")
 _OPERATORS = ("+", "-", "*", "/", "%", "^", "<", "<=", ">", ">=", "==", "!=", "&&", "||", "?", "..", "..<")

@@ -25,8 +25,8 @@ from itertools import takewhile
 from typing import Final
 
 from scenelang.records import Record
+from scenelang.syntax.lexer import Token, Tokens
 from scenelang.syntax.tables import END, tables
-from scenelang.syntax.tokens import Token, Tokens
 from scenelang.words import NODES, OPERATIONS, TRANSFORMS
 
 MOST: Final = 200

@@ -12,13 +12,13 @@ from typing import Any
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import nodes
 from scenelang.syntax.automaton import advance, reach, statement_depth
+from scenelang.syntax.lexer import MAX_MISTAKES, Report, Tokens
 from scenelang.syntax.recovery import mistakes
 from scenelang.syntax.recovery.foreign import HEADS, keywords_near
 from scenelang.syntax.recovery.habits import Habits
 from scenelang.syntax.recovery.patterns import closing
 from scenelang.syntax.recovery.repairs import FOLLOWED, MAX_REPLAY, Repair, Search
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
 from scenelang.words import DECLARING, NODES
 
 _WORDS = (*(word for word in DECLARING if word != "as"), "for", "if", "material", *NODES)

@@ -11,10 +11,10 @@ from functools import cache
 
 from scenelang.records import Record
 from scenelang.syntax.automaton import LOOKAHEAD, advance, completion, fits, reach
+from scenelang.syntax.lexer import Tokens
 from scenelang.syntax.recovery.foreign import OPERATORS, keywords_near
 from scenelang.syntax.recovery.layout import leaves_open
 from scenelang.syntax.tables import END, tables
-from scenelang.syntax.tokens import Tokens
 
 Kinds = tuple[int, ...]
 
