@@ -70,7 +70,6 @@ class Definition(Record, frozen=False):
     """A fn or module: what calls refer to; ``run`` is set once its body is prepared.
 
     Args:
-        node: its statement.
         outer: the slots of where it was defined.
         run: of a fn ``run(env) -> value``; of a module its block's actions.
         defaults: how to get each parameter's default.
@@ -92,10 +91,8 @@ class Binding(Record, frozen=False):
     """What a name stands for.
 
     Args:
-        kind: how it came about.
         span: where; None for the language's own names.
         slots: what holds its slot.
-        slot: its slot.
         value: a `Definition`, an imported file, or the value of a ``let`` that never changes.
         known: whether ``value`` is that of such a ``let``.
         needs: what the value of a ``let`` depends on.

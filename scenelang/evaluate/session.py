@@ -30,7 +30,6 @@ class Settings(Record, frozen=False):
     Args:
         canvas: width and height in pixels.
         background: colour as written, or None for transparency.
-        animation: the scene's animation, if it has one.
         given: the place of each setting, by its word.
     """
 
@@ -44,8 +43,6 @@ class Session(Record, frozen=False):
     """The state of one evaluation over all its files.
 
     Args:
-        report: where mistakes go.
-        vocabulary: names that models offer.
         expressions, statements: how each class of the syntax tree is prepared.
         frame, fps: as of `Inputs`.
         replays: run what no frame changes once; the evaluation is for several frames.

@@ -19,7 +19,6 @@ class Vocabulary:
     """What a scene may name: the chosen model's words, or those of all models.
 
     Args:
-        models: all models that are at hand.
         chosen: the scene's model; None where the compiler picks one later.
         blind: the scene names a model that is not at hand, so nothing is known about its words.
     """

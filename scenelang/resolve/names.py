@@ -10,7 +10,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import field
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.records import Record
@@ -36,18 +36,17 @@ Role = Literal[
 ]
 
 
+_OWN: Final[dict[str, Role]] = {**dict.fromkeys(CONSTANTS, "constant"), **dict.fromkeys(ANIMATED, "animated")}
+"""What words of the language are in an expression."""
+
+
 class Symbol(Record, frozen=False):
     """A definition.
 
     Args:
-        name: its name.
-        kind: how it came about.
-        span: the name.
         node: its statement or formal parameter.
-        scope: the scope that it belongs to.
         since: the offset from which on it is in sight.
         owner: the fn or module that it is a parameter of.
-        params: the parameters of a fn or module.
     """
 
     name: str
@@ -90,8 +89,6 @@ class Use(Record, frozen=False):
 
     Args:
         start, end: the place.
-        text: the name.
-        role: what it is there.
         symbol: its definition in this file, or that of the import a member belongs to.
         callee: for an argument, the use of what is called.
         defines: whether this is the definition itself.
@@ -107,11 +104,7 @@ class Use(Record, frozen=False):
 
 
 class Names:
-    """All names of a file.
-
-    Args:
-        file: its tree.
-    """
+    """All names of a file."""
 
     def __init__(self, file: nodes.File) -> None:
         self.source: SourceFile = file.span.source
@@ -243,9 +236,7 @@ class Names:
                 self._call(node, scope, kind)
             case nodes.NameRef():
                 text = node.name.text
-                own: Role | None = (
-                    "constant" if text in CONSTANTS else "animated" if text in ANIMATED else None
-                )
+                own = _OWN.get(text)
                 if own is None or scope.find(text) is not None:
                     self._reference(node.name, scope, "name")
                 else:

@@ -11,7 +11,6 @@ from difflib import get_close_matches
 from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
-from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticSerializationError
 
 from scenelang.deep import deep_stack
@@ -56,14 +55,14 @@ def _plain(value: Any, *, brief: bool = False) -> Any:
         return {
             name: _plain(item, brief=brief)
             for name, item in value.__dict__.items()
-            if not brief or name in ("kind", "version") or not _is_default(item, fields[name])
+            if not brief or name in ("kind", "version") or not _same(item, fields[name].default)
         }
     return [_plain(item, brief=brief) for item in value] if isinstance(value, tuple) else value
 
 
-def _is_default(item: Any, field: FieldInfo) -> bool:
+def _same(item: Any, default: Any) -> bool:
     """Whether a value is the default, bit for bit: -0.0 is not 0.0."""
-    return not field.is_required() and item == field.default and repr(item) == repr(field.default)
+    return bool(item == default) and repr(item) == repr(default)
 
 
 def _laid_out(value: Any, margin: str) -> str:

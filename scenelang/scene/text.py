@@ -20,7 +20,6 @@ def to_nsg(scene: SceneData, notes: Mapping[int, str] | None = None) -> str:
     """The text of ``scene``: settings that differ from the defaults, then its nodes in order.
 
     Args:
-        scene: any Scene.
         notes: comments to put before nodes, a line each, by the nodes' `id`.
     """
     lines = ["nsg 1;"]

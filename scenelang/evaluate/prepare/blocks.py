@@ -114,10 +114,8 @@ def misplaced(
 ) -> None:
     """Report a statement in the wrong place, unless nothing is known about the place.
 
-    Several of a sort in one block are one report: it is the block that is of the wrong kind.
-
-    Args:
-        fact: the message, with ``{}`` for the name: those with the same fact are of a sort.
+    Several in one block with the same ``fact``, a message with ``{}`` for the name, are one report: it is the
+    block that is of the wrong kind.
     """
     if place.kind != "unknown":
         key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, fact)
@@ -284,10 +282,6 @@ class Replayed(Record, frozen=False):
     """The action of a statement of a file or a group that runs at most once in a frame.
 
     Args:
-        action: runs it.
-        needs: what it depends on.
-        session: the evaluation.
-        span: of the statement.
         varies: whether frames change it, once that was asked.
         kept: what it put into its block, the places of that, and the steps, objects and parts it counted.
     """

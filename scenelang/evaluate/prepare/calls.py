@@ -46,7 +46,7 @@ def bind(
     spread: bool = False,
     help: str | None = None,
 ) -> list[Given | None] | None:
-    """The argument of each parameter, None where it is left out.
+    """The argument of each parameter, None where it is left out; or None if a mistake was reported.
 
     Calls of one definition that fail in the same way are places of one report.
 
@@ -56,9 +56,6 @@ def bind(
         definition: what is called, unless the language has it.
         spread: one positional argument may be a vector of all.
         help: advice for a wrong number of arguments; by default the signature.
-
-    Returns:
-        One entry a parameter, or None if a mistake was reported.
     """
     bound: list[Given | None] = [None] * len(params)
     called, places = name.text, [param.name for param in definition.params] if definition else []

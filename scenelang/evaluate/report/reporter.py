@@ -25,14 +25,7 @@ _SHOWN: Final = 3  # places of one report
 
 
 class Shared(Record, frozen=False):
-    """A report that several places share.
-
-    Args:
-        index: its index among the diagnostics.
-        code: its code.
-        own: labels of its own.
-        again: further places.
-    """
+    """A report that several places share: its index among the diagnostics, its own labels, further places."""
 
     index: int
     code: str
@@ -56,7 +49,6 @@ class Reporter(Record, frozen=False):
     """Where the mistakes of one evaluation go, and what is known of those reported.
 
     Args:
-        diagnostics: receives them.
         calls: the calls that are running.
         damaged: what syntax mistakes have damaged, by file.
         reported: the code that was reported at each place.

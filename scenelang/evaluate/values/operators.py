@@ -128,11 +128,7 @@ def _unfit(message: str, a: Any, b: Any, operand: int, shared: bool = True) -> P
 
 
 def binary(op: str, a: Any, b: Any) -> Any:
-    """``a op b`` for the arithmetic operators, componentwise on vectors.
-
-    Raises:
-        Problem: values that do not combine, or no finite result.
-    """
+    """``a op b`` for the arithmetic operators, componentwise on vectors."""
     ca, cb = a.__class__, b.__class__
     if ca in UNITS and cb in UNITS:
         x, ua = unpack(a)

@@ -32,7 +32,6 @@ class Spec(Record):
     """One transform or operation.
 
     Args:
-        word: its arguments.
         build: the node from one value an argument, None where left out; raises Problem.
         spread: whether one vector may stand for all arguments.
         help: advice for a wrong number of arguments; None prints the signature.
