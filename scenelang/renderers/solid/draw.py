@@ -290,9 +290,8 @@ def _shade(
 
 def _rough(picture: np.ndarray) -> np.ndarray:
     """Pixels (H, W) of (4, H, W) that differ from what lies evenly between neighbours on opposite sides."""
-    shown = np.pad(
-        np.sqrt(np.clip(picture, 0.0, 1.0)), ((0, 0), (1, 1), (1, 1)), "edge"
-    )  # nearly as it looks
+    shown = np.sqrt(np.clip(picture, 0.0, 1.0))  # nearly as bright as it looks
+    shown = np.pad(shown, ((0, 0), (1, 1), (1, 1)), "edge")
     here = 2 * shown[:, 1:-1, 1:-1]
     across = abs(shown[:, 1:-1, 2:] + shown[:, 1:-1, :-2] - here).max(0)
     along = abs(shown[:, 2:, 1:-1] + shown[:, :-2, 1:-1] - here).max(0)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenelang.renderers.arrays import Array, Arrays, Layers
-from scenelang.renderers.field import INTERSECT, SMOOTH, UNION
+from scenelang.renderers.field import INTERSECT, SMOOTH, SUBTRACT, UNION
 from scenelang.renderers.solid.frames import SolidFrame, read_solid_frame
 from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted
 
@@ -30,7 +30,6 @@ class Solid:
         token: how it joins what came before.
         look: colour and medium (4, 1).
         layers: its decoder.
-        direct: the same from world points, where its way back is a single map.
         radius: leaf units from its origin beyond which it changes nothing.
         centre, extent: a ball (3,) of the world around that.
         cells: of its token, by what is wanted.
@@ -40,7 +39,6 @@ class Solid:
     token: int
     look: Array
     layers: Layers
-    direct: Layers | None
     radius: float
     centre: Array
     extent: float
@@ -97,10 +95,11 @@ class SolidField:
     def _solids(self, vectors: np.ndarray, tokens: np.ndarray) -> list[Solid]:
         xp, layout, like = self.xp, self.network.layout, self.network.codes
         solids: list[Solid] = []
+        frames = [read_solid_frame(vector[: layout.geometry], layout) for vector in vectors]
+        deepest = max((frame.scale * (1 + abs(frame.amount)) for frame in frames), default=0.0)
         smooths, widest = 0, 0.0  # of the blends from an object on
-        for vector, token in zip(vectors[::-1], tokens[::-1].tolist(), strict=True):
+        for frame, vector, token in zip(frames[::-1], vectors[::-1], tokens[::-1].tolist(), strict=True):
             g, m = vector[: layout.geometry], vector[layout.geometry :]
-            frame = read_solid_frame(g, layout)
             smooth = token == SMOOTH
             smooths, widest = smooths + smooth, max(widest, frame.blend * smooth)
             layers = [
@@ -111,11 +110,10 @@ class SolidField:
             colour = (matrix[:, :3] @ look[:3] + matrix[:, 3]).clip(0.0, 1.0)
             outer = frame.outer.placed(xp, like)
             steps = [step.placed(xp, like) for step in frame.steps]
-            direct = None
-            radius = 1 + SLACK + abs(frame.amount) + widest * (1 + smooths / 4) / frame.scale
-            if not steps and not frame.amount and radius <= RADIUS:
-                (w, b), *rest = layers
-                direct = [(w @ outer.linear, w @ outer.shift + b), *rest]
+            blends = widest * (1 + smooths / 4)
+            if smooths and token == SUBTRACT:  # it says how deep points inside others lie
+                blends += deepest
+            radius = 1 + SLACK + abs(frame.amount) + blends / frame.scale
             back = np.linalg.inv(frame.outer.linear.astype(np.float64))
             centre = (-back @ frame.outer.shift).astype(np.float32)
             solids.append(
@@ -124,7 +122,6 @@ class SolidField:
                     token=token,
                     look=xp.concat([colour, look[3:]], 0)[:, None],
                     layers=layers,
-                    direct=direct,
                     radius=radius,
                     centre=xp.array(centre, like),
                     extent=float(np.linalg.norm(back, 2)) * frame.ball(radius),
@@ -230,11 +227,6 @@ class SolidField:
         """An object's world distance (M,) at world points (3, M), and its gradient (3, M) if asked for."""
         xp, network, frame = self.xp, self.network, solid.frame
         scale = frame.scale
-        if solid.direct is not None:
-            if not gradient:
-                return network.distance(p, solid.direct) * scale, None
-            d, g = network.gradient(p, solid.direct)
-            return d * scale, g * scale
         q = frame.local(xp, p)
         rim = length = None
         at = q
