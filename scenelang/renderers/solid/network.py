@@ -44,7 +44,7 @@ class SolidConfig:
 
     code: int = 4
     material_code: int = 2
-    width: int = 16
+    width: int = 8
     paint_lines: int = 2
     kind_lines: int = 2
 
