@@ -103,17 +103,17 @@ def _edit(scene: str) -> None:
     """What an editor asks for when a document is opened, and again when a letter is typed in it."""
     from lsprotocol import types
 
-    from scenelang.lsp import callees, completion, hover, outline, tokens
+    from scenelang.lsp import callees, completion, hover, navigation, tokens
     from scenelang.lsp.workspace import Workspace
 
     docs = Workspace()
     document = docs.put("untitled:pump", scene, 1)
     offset = len(scene) // 2
     middle = document.lines.position(offset)
-    outline.document_symbols(document)
-    outline.folding(document)
-    outline.selection(document, offset)
-    outline.workspace_symbols(docs, "aaaaaaaab")
+    navigation.document_symbols(document)
+    navigation.folding(document)
+    navigation.selection(document, offset)
+    navigation.workspace_symbols(docs, "aaaaaaaab")
     hover.hover(docs, document, offset)
     document.change(types.TextDocumentContentChangePartial(types.Range(middle, middle), "x"))
     for place in (offset, len(document.text)):

@@ -22,10 +22,8 @@ _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
 def keep_memory() -> bool:
     """Have glibc reuse blocks up to `KEEP_BYTES` instead of giving each back to the kernel.
 
-    Otherwise every operation on a large array pays a page fault for every 4 KB of its result.
-
-    Returns:
-        Whether the C library is glibc and took it.
+    Otherwise every operation on a large array pays a page fault for every 4 KB of its result. False where
+    the C library is another or did not take it.
     """
     import ctypes
 

@@ -14,8 +14,7 @@ from scenelang.backend.options import Device, RenderError, Samples, keep_memory
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError
-from scenelang.program.program import Program, ProgramError
-from scenelang.program.work import load_of
+from scenelang.program.program import Program, ProgramError, load_of
 from scenelang.renderers.draw import Drawing, Kept, draw
 
 MOST_MS: Final = 250.0

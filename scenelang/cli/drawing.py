@@ -149,7 +149,7 @@ def _chosen(
 ) -> tuple[Choice, Program]:
     """The best choice whose model draws the scene without further warnings, and its Program."""
     from scenelang.measure.choose import choose, offers
-    from scenelang.program.work import load_of
+    from scenelang.program.program import load_of
 
     refused: dict[str, str] = {}
     able = []

@@ -33,13 +33,11 @@ def felt_level(op: Combine, smooths: int) -> float | None:
     Two streams whose distances at a point are equal, or both at a level or above, are after a `smooth`
     equal, or both at that level less k or above; a union, a subtraction or an intersection keeps the level.
     So with n `smooth` rows still to come, a union matters within n k of its leaf and a `smooth` within
-    (n + 1) k. A subtraction changes distances inside the picture, which a later `smooth` blends by.
+    (n + 1) k. A subtraction changes distances inside the picture, which a later `smooth` blends by: it may
+    matter anywhere, and there is no level.
 
     Args:
         op: the row's operator; for an intersection the level within which anything before it can remain.
-
-    Returns:
-        The level, or None where the row may matter anywhere.
     """
     if op == "subtract" and smooths:
         return None

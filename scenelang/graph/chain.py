@@ -37,10 +37,6 @@ def normal(moves: Iterable[Move], space: Space) -> Moves:
       with q = M u, |q| = s|u| and b.q = (M^T b).u, while M^-1 R(a) M is R(a) for a rotation and R(-a)
       for a reflection. So ``[M, Warp(t, b)] = [Warp(+-s t, +-M^T b), M]``.
     - Steps that do nothing vanish, and neighbouring affine maps compose.
-
-    Args:
-        moves: nearest the leaf first.
-        space: the model's; the second rule is the plane's.
     """
     out: list[Move] = []
     for move in moves:

@@ -22,8 +22,7 @@ from scenelang.words import Combine
 def step_of(transform: schema.Transform, space: Space) -> Step | Refusal:
     """The step that a transform stands for, or why there is none.
 
-    Args:
-        space: the model's; in the plane nothing may leave it, and scales along z drop out.
+    In the plane nothing may leave it, and scales along z drop out.
     """
     if isinstance(transform, schema.Twirl):
         return Warp(transform.k, (0.0, 0.0))

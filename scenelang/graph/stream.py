@@ -83,11 +83,9 @@ class Stream(Record, frozen=False):
             grid.add(leaf_box(leaf, level, self.space), leaf)
 
     def attach(self, other: Stream) -> tuple[Leaf, Leaf] | None:
-        """Join a composite by union, after this stream or before it.
+        """Join a composite by union, after this stream or before it, or leave both as they are.
 
-        Returns:
-            None when done; else nothing is changed and the pair of leaves that stands in the way, one of
-            this stream and one of ``other``.
+        Then it gives the pair of leaves that stands in the way, one of this stream and one of ``other``.
         """
         if not self.rows:
             self.append(other)

@@ -33,15 +33,12 @@ class InternalError(RuntimeError):
 
 
 def verify(graph: Graph, stage: str, holds: Collection[Invariant] = (), sound: Sound | None = None) -> Graph:
-    """Check a graph after ``stage``, the name of a pass or ``lower``.
+    """Check a graph after ``stage``, the name of a pass or ``lower``, and give it back.
 
     Args:
         stage: whom to name.
         holds: what this stage and those before it established.
         sound: leaves that an earlier stage left sound and this one may have kept; takes those of this graph.
-
-    Returns:
-        The graph itself.
 
     Raises:
         InternalError: an invariant is broken.

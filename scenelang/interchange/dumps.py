@@ -172,7 +172,7 @@ def program_data(program: Program) -> dict[str, Any]:
         }
         for name, token, bounds, place, vector in zip(
             program.objects,
-            _tokens(program),
+            token_names(program),
             program.bounds.tolist(),
             program.places,
             program.vectors.tolist(),
@@ -196,7 +196,7 @@ def program_table(program: Program) -> str:
     lines = [f"{head}, digest {program.digest()[:12]}"]
     rows = [("row", "token", "object", "bounds", "place")]
     for at, (name, token, bounds, place) in enumerate(
-        zip(program.objects, _tokens(program), program.bounds.tolist(), program.places, strict=True)
+        zip(program.objects, token_names(program), program.bounds.tolist(), program.places, strict=True)
     ):
         box = f"[{bounds[0]:.4g} {bounds[1]:.4g}; {bounds[2]:.4g} {bounds[3]:.4g}]"
         where = "" if place is None else f"{place.file}:{place.line}:{place.column}"
@@ -208,7 +208,8 @@ def program_table(program: Program) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _tokens(program: Program) -> list[str]:
+def token_names(program: Program) -> list[str]:
+    """How each row joins what came before it, in words."""
     from scenelang.words import TOKENS
 
     names = {value: word for word, value in TOKENS.items()}

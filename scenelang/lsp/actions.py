@@ -33,11 +33,7 @@ def to_location(span: Span, document: Document) -> types.Location:
 
 
 def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnostic | None:
-    """A diagnostic for the client; one of an imported file stands at what led there.
-
-    Returns:
-        None where nothing of this file has to do with it.
-    """
+    """A diagnostic for the client; one of an imported file stands at what led there, if this file did."""
     d, name = diagnostic, document.source.name
     message = d.message if d.help is None else f"{d.message}\nhelp: {d.help}"
     related = [
@@ -98,11 +94,7 @@ _MOST_LINES: Final = 4000  # of a difference that is looked at line by line
 def code_actions(
     document: Document, place: types.Range, only: Sequence[str] | None
 ) -> list[types.CodeAction]:
-    """What may be done about the mistakes in a range.
-
-    Args:
-        only: the kinds that the client asks for; None for all.
-    """
+    """What may be done about the mistakes in a range: of the kinds asked for, or of all."""
     lines = document.lines
     start, end = lines.offset(place.start), lines.offset(place.end)
     found = [*document.parsed.diagnostics, *document.semantic]

@@ -47,7 +47,6 @@ class Checked:
     """What a check found.
 
     Args:
-        source: the text that was checked.
         diagnostics: mistakes and warnings of evaluation and compiler, without those of syntax.
         wanted: the files that it imports, also those that are not there.
         seen: by file name, start and end: values of names, nodes of statements.

@@ -65,18 +65,11 @@ def strings(
         for manifest in words.models:
             yield Item(manifest.name, Kind.Module, about=manifest.summary)
     elif before == ("import",):
-        yield from _paths(docs, document)
-
-
-def _paths(docs: Workspace, document: Document) -> Iterator[Item]:
-    """Scenes that can be imported: the library's, and those below the import root."""
-    yield from (Item(name, Kind.File, rank="a") for name in library.names())
-    folder = document.path.parent if document.path is not None else next(iter(docs.folders), None)
-    if folder is None:
-        return
-    for path in islice(scenes_below(folder, _MOST_FILES), _MOST_PATHS):
-        if path != document.path:
-            yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
+        yield from (Item(name, Kind.File, rank="a") for name in library.names())
+        folder = document.path.parent if document.path is not None else next(iter(docs.folders), None)
+        for path in islice(scenes_below(folder, _MOST_FILES), _MOST_PATHS) if folder is not None else ():
+            if path != document.path:
+                yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
 
 
 _HEADS: Final = ("let", "fn", "module", "for", "if", *words.NODES)
@@ -94,9 +87,8 @@ _SYMBOLS: Final = {
 def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
     """What may stand at an offset."""
     names = sight_at(document.parsed, offset)
-    values = frozenset(
-        s.name for s in names.visible(offset) if s.kind in ("let", "argument", "loop", "param")
-    )
+    holders = ("let", "argument", "loop", "param")
+    values = frozenset(s.name for s in names.visible(offset) if s.kind in holders)
     cursor = cursor_at(document.parsed, offset, values)
     start, end = cursor.start, cursor.end
     if cursor.inside == "string":
@@ -109,20 +101,18 @@ def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -
         if item.label in seen:
             continue
         seen.add(item.label)
-        text = item.text or item.label
-        if item.snippet and not snippets:
-            text = item.label
+        filled = item.snippet and snippets
+        text = item.text if item.text and (filled or not item.snippet) else item.label
+        about = types.MarkupContent(types.MarkupKind.Markdown, item.about) if item.about else None
         items.append(
             types.CompletionItem(
                 label=item.label,
                 kind=item.kind,
                 detail=item.detail or None,
-                documentation=types.MarkupContent(types.MarkupKind.Markdown, item.about)
-                if item.about
-                else None,
+                documentation=about,
                 sort_text=f"{item.rank}{item.label}",
                 filter_text=item.label,
-                insert_text_format=types.InsertTextFormat.Snippet if item.snippet and snippets else None,
+                insert_text_format=types.InsertTextFormat.Snippet if filled else None,
                 text_edit=types.TextEdit(place, text),
             )
         )
@@ -205,9 +195,8 @@ class _Maker:
             return
         yield from self._children("a")
         if kind == "chain":
-            yield from (
-                Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text) for word in COMBINE
-            )
+            for word in COMBINE:
+                yield Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text)
         yield from (self._keyword(word) for word in _HEADS if kind != "chain" or word not in COMBINE)
         if kind in ("group", "chain"):
             yield from self._calls(words.TRANSFORMS, self.words.transforms, "n")
@@ -230,13 +219,11 @@ class _Maker:
                 yield self._symbol(symbol)
 
     def _material_values(self, rank: str) -> Iterator[Item]:
+        may_be = nodes.MaterialExpr | nodes.NameRef | nodes.Member
         for symbol in self.names.visible(self.cursor.offset):
-            if symbol.kind in ("let", "argument", "loop"):
-                value = getattr(symbol.node, "value", None)
-                if symbol.kind != "let" or isinstance(
-                    value, nodes.MaterialExpr | nodes.NameRef | nodes.Member
-                ):
-                    yield Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
+            fits = symbol.kind != "let" or isinstance(getattr(symbol.node, "value", None), may_be)
+            if fits and symbol.kind in ("let", "argument", "loop"):
+                yield Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
 
     def _materials(self) -> Iterator[Item]:
         for name in sorted(self.words.materials):

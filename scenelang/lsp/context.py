@@ -160,11 +160,7 @@ class _Reader:
 
 
 def cursor_at(parsed: Parsed, offset: int, values: frozenset[str] = frozenset()) -> Cursor:
-    """What is around an offset.
-
-    Args:
-        values: names in sight that may be materials.
-    """
+    """What is around an offset; ``values`` are names in sight that may be materials."""
     read = _Reader(parsed)
     count = len(read.kinds) - 1
     index = min(bisect_left(read.starts, offset), count)  # tokens before this one begin before the cursor

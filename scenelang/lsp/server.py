@@ -77,10 +77,8 @@ class Settings(Record):
 class Incoming:
     """A stream whose messages of 100 MB and more are passed over, up to the next one's header.
 
-    No JSON holds a line that ends like a header, as newlines in strings are escaped.
-
-    Args:
-        refuse: called for each message that is passed over, from the thread that reads.
+    No JSON holds a line that ends like a header, as newlines in strings are escaped. For each message that is
+    passed over, ``refuse`` is called from the thread that reads.
     """
 
     def __init__(self, stream: BinaryIO, refuse: Callable[[], None]) -> None:

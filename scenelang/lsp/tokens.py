@@ -164,14 +164,11 @@ def _number(expr: nodes.Expr) -> float | None:
 
 
 def _clamped(parts: list[float | None], first_free: bool = False) -> tuple[float, float, float] | None:
-    if len(parts) != 3:
+    known = [part for part in parts if part is not None]
+    if not len(known) == len(parts) == 3:
         return None
-    values = []
-    for index, part in enumerate(parts):
-        if part is None:
-            return None
-        values.append(part if first_free and index == 0 else min(max(part, 0.0), 1.0))
-    return values[0], values[1], values[2]
+    first, second, third = (min(max(part, 0.0), 1.0) for part in known)
+    return known[0] if first_free else first, second, third
 
 
 def presentations(

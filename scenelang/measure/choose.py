@@ -14,7 +14,7 @@ import torch
 from scenelang.measure.frontier import Cost, Frontier, Limits, Point
 from scenelang.models.choose import lacking, paints, uses
 from scenelang.models.manifest import Manifest
-from scenelang.program.work import Load
+from scenelang.program.program import Load
 from scenelang.scene.schema import Scene
 
 UNITS: Final = (1.0, 1e3, 1e6, 1e6, 1e3)  # of the terms of a `Cost`

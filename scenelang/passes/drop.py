@@ -85,8 +85,7 @@ def drop_unseen(graph: Graph, context: Context) -> Graph:
 def begun(links: Sequence[Link], keep: Sequence[bool]) -> Fold:
     """The stream of the rows to keep; where its first row goes, so do those that only cut what is left.
 
-    Args:
-        keep: for each row whether it stays; a row that goes had no effect, or was the first.
+    A row that goes had no effect, or was the first.
     """
     kept: list[Link] = []
     for index, (link, stays) in enumerate(zip(links, keep, strict=True)):

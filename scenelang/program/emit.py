@@ -22,10 +22,7 @@ Rows = list[tuple[Combine, Leaf]]
 
 
 def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
-    """The Program of a stream.
-
-    Args:
-        graph: after all passes, without errors.
+    """The Program of a stream that all passes have left without errors.
 
     Raises:
         ProgramError: the model's lifting is not one of this version.

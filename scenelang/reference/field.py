@@ -42,16 +42,13 @@ def namespace(x: Array) -> Any:
 
 
 def sector_distance(p: Array, n: Array, phase: Array, outer: Array, inner: Array) -> Array:
-    """Signed distance to a shape of dihedral symmetry whose boundary in half a sector is one segment.
+    """Signed distance, negative inside, to a shape of dihedral symmetry: one segment bounds half a sector.
 
     A point is folded into the half sector; by symmetry the nearest boundary point lies in it too.
 
     Args:
         p: points in leaf units, (2, …).
         n, phase, outer, inner: entries of `SECTORS`, numbers or arrays that broadcast against a coordinate.
-
-    Returns:
-        Distance, negative inside, of a coordinate's shape.
     """
     x, y = p
     xp = namespace(x)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from scenelang.measure.choose import UNITS
 from scenelang.measure.frontier import Cost
-from scenelang.program.work import Load
+from scenelang.program.program import Load
 
 
 def fit_cost(loads: Sequence[Load], ms: Sequence[float], skip: bool, *, fixed: bool = False) -> Cost:

@@ -31,7 +31,7 @@ from scenelang.measure.metrics import flip, psnr
 from scenelang.measure.scenes import reference_of, scenes_of
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.program.compile import compile_scene
-from scenelang.program.work import Load, load_of
+from scenelang.program.program import Load, load_of
 from scenelang.scene.schema import Scene
 from scenelang.training.loop import revision
 
