@@ -163,7 +163,7 @@ def _pass_notes(graphs: dict[str, Graph]) -> Iterator[str]:
     """A line for each pass that changed the number of objects, folds or moves."""
     before = None
     for name, graph in graphs.items():
-        found = [node for node, _ in nodes(graph.root)]
+        found = list(nodes(graph.root))
         objects = sum(isinstance(node, Leaf) for node in found)
         counts = (objects, len(found) - objects, sum(len(node.moves) for node in found))
         if counts != before:

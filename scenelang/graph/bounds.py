@@ -69,8 +69,7 @@ _NOWHERE: Box = (inf, inf, -inf, -inf)
 _TESTS = 4096
 """Boxes compared for one question before the answer is "perhaps", so that no scene takes for ever."""
 
-_LEVELS = 40
-"""Boxes wider than 2^40 or thinner than 2^-40 go to the outermost level."""
+_LEVELS = 40  # boxes wider than 2^40 or thinner than 2^-40 go to the outermost level
 
 
 class Grid:

@@ -59,8 +59,7 @@ def _rows(transform: schema.Transform) -> Rows:
 
 
 MAX_OBJECTS = 100_000
-MAX_DEPTH = 1_000
-"""Nested nodes of a Scene. Text cannot come near it; a Scene built in Python can."""
+MAX_DEPTH = 1_000  # nested nodes of a Scene. Text cannot come near it; a Scene built in Python can
 
 
 class Spans(Protocol):

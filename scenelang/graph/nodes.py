@@ -142,19 +142,19 @@ def bottom_up(root: Node, leaf: Callable[[Leaf], T], fold: Callable[[Fold, list[
         open_folds[-1][1].append(value)
 
 
-def nodes(root: Node) -> Iterator[tuple[Node, int]]:
-    """Every node with its depth, parents before children, in file order."""
-    stack: list[tuple[Node, int]] = [(root, 0)]
+def nodes(root: Node) -> Iterator[Node]:
+    """Every node, parents before children, in file order."""
+    stack: list[Node] = [root]
     while stack:
-        node, depth = stack.pop()
-        yield node, depth
+        node = stack.pop()
+        yield node
         if isinstance(node, Fold):
-            stack.extend([(link.node, depth + 1) for link in reversed(node.links)])
+            stack.extend([link.node for link in reversed(node.links)])
 
 
 def leaves(root: Node) -> Iterator[Leaf]:
     """Every leaf, in file order."""
-    return (node for node, _ in nodes(root) if isinstance(node, Leaf))
+    return (node for node in nodes(root) if isinstance(node, Leaf))
 
 
 def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph:

@@ -16,8 +16,7 @@ from scenelang.graph.steps import Rows, Step, Warp
 from scenelang.models.manifest import Outline
 from scenelang.scene import schema
 
-Box = tuple[float, float, float, float]
-"""xmin, ymin, xmax, ymax in the world."""
+Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in the world
 
 EVERYWHERE: Final[Box] = (-inf, -inf, inf, inf)
 

@@ -31,8 +31,7 @@ from scenelang.words import Combine
 
 Row = tuple[Combine, Leaf]
 
-_MOST_CUTS = 64
-"""A stream that subtracts more often than this is not moved behind another one."""
+_MOST_CUTS = 64  # a stream that subtracts more often than this is not moved behind another one
 
 
 class Stream(Record, frozen=False):

@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from scenelang.graph import affine
-from scenelang.graph.plane import flattened
-from scenelang.graph.spaces import SPACES
+from scenelang.graph.spaces import SPACES, flattened
 from scenelang.graph.steps import IDENTITY, Rows
 from scenelang.interchange.gltf_file import Gltf, GltfError, Node, read_gltf
 from scenelang.models.manifest import Manifest, available, load_manifest
@@ -19,18 +18,15 @@ from scenelang.scene import schema
 
 Plane = Literal["xy", "xz"]
 Steps = tuple[schema.Transform, ...]
-MOST_DEPTH: Final = 150
-"""Nodes within nodes; text nests 200 levels."""
+MOST_DEPTH: Final = 150  # nodes within nodes; text nests 200 levels
 
 _ENDING: Final = re.compile(r"[._ -]?(?<!\d)\d+$|[._ -](?:copy|instance|mesh|geo|shape|obj)$")
 """One ending of a node's name; several are taken off one at a time."""
-_MOST_LETTERS: Final = 200
-"""A longer name is not compared with those of geometries."""
+_MOST_LETTERS: Final = 200  # a longer name is not compared with those of geometries
 _FLAT: Final = 1e-6
 """How far the entries of a matrix that mix z with x and y may be from 0: they are written in float32."""
 _MOST_NAME: Final = 40
-DIGITS: Final = 6
-"""Digits of what is written: files hold float32, whose eighth is noise."""
+DIGITS: Final = 6  # digits of what is written: files hold float32, whose eighth is noise
 
 
 @dataclass(slots=True)
@@ -72,10 +68,7 @@ def import_gltf(gltf: Gltf, *, model: str | None = None, plane: Plane = "xy") ->
     Raises:
         GltfError: nodes are no tree, a leaf leaves the plane of a 2D model, or there is no such model.
     """
-    manifest = _manifest(gltf, model)
-    made = _Import(gltf, manifest, plane)
-    nodes = made.run()
-    return Imported(schema.Scene(model=manifest.name, nodes=nodes), made.names, made.left_out, made.objects)
+    return _Import(gltf, _manifest(gltf, model), plane).run()
 
 
 def geometry_of(names: Iterable[str | None], geometries: Iterable[str]) -> str | None:
@@ -131,7 +124,7 @@ class _Import:
     _met: set[int] = field(default_factory=set)
     _looks: dict[int, schema.Material | None] = field(default_factory=dict)
 
-    def run(self) -> tuple[schema.SceneNode, ...]:
+    def run(self) -> Imported:
         if self.gltf.scenes:
             roots = self.gltf.scenes[self.gltf.scene or 0].nodes
         else:
@@ -139,8 +132,10 @@ class _Import:
             roots = tuple(at for at in range(len(self.gltf.nodes)) if at not in inner)
             if self.gltf.nodes and not roots:
                 raise GltfError("the nodes form a cycle")
-        nodes = [self.node(root, IDENTITY, "", 1) for root in roots]
-        return tuple(node for node in nodes if node is not None)
+        made = [self.node(root, IDENTITY, "", 1) for root in roots]
+        nodes = tuple(node for node in made if node is not None)
+        scene = schema.Scene(model=self.manifest.name, nodes=nodes)
+        return Imported(scene, self.names, self.left_out, self.objects)
 
     @property
     def flat(self) -> bool:

@@ -66,10 +66,8 @@ def signature_help(docs: Workspace, document: Document, offset: int) -> types.Si
         label: str | tuple[int, int] = param
         if match is not None:
             # Offsets into a label count UTF-16, whatever positions count.
-            label = (
-                width(callee.head[: match.start()], "utf-16"),
-                width(callee.head[: match.end()], "utf-16"),
-            )
+            start, end = (width(callee.head[:at], "utf-16") for at in match.span())
+            label = start, end
             at = match.end()
         parameters.append(types.ParameterInformation(label, about if about.value else None))
     text = types.MarkupContent(types.MarkupKind.Markdown, callee.text) if callee.text else None

@@ -42,7 +42,7 @@ def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     before: Graph | None = None
     for name, graph in graphs.items():
-        found = [node for node, _ in nodes(graph.root)]
+        found = list(nodes(graph.root))
         folds = [node for node in found if isinstance(node, Fold)]
         steps = [move.step for node in found for move in node.moves]
         affines = sum(isinstance(step, Affine) for step in steps)

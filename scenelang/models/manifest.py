@@ -11,8 +11,7 @@ from typing import Any, Final, NamedTuple
 from scenelang.files import read_json, read_regular
 
 ROOT = Path(__file__).parent
-MOST: Final = 1e300
-"""Bound of the numbers in ranges."""
+MOST: Final = 1e300  # bound of the numbers in ranges
 _MOST_BYTES: Final = 1 << 20
 _LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
 """Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""

@@ -98,11 +98,9 @@ def begun(links: Sequence[Link], keep: Sequence[bool]) -> Fold:
     return Fold("scene", tuple(kept))
 
 
-_MOST = 8
-"""Covers that are tried for each row: the largest ones seen, so that time stays linear."""
+_MOST = 8  # covers that are tried for each row: the largest ones seen, so that time stays linear
 
-_INSIDE = 1.0 - 1e-9
-"""Share of a cover's inner disc that counts, to cover the rounding of float64."""
+_INSIDE = 1.0 - 1e-9  # share of a cover's inner disc that counts, to cover the rounding of float64
 
 Cover = tuple[float, Rows, float]
 """World radius, map from the world to the leaf, radius of the disc inside it."""

@@ -12,12 +12,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-Array = Any
-"""A numpy array, or a torch tensor on any device."""
+Array = Any  # a numpy array, or a torch tensor on any device
 BLOCK = 256
 """Points of a product: larger ones are split among cores by OpenBLAS, whose threads wait for each other."""
-Layers = Sequence[tuple[Array, Array]]
-"""Weights (…, out, in) and biases (…, out)."""
+Layers = Sequence[tuple[Array, Array]]  # weights (…, out, in) and biases (…, out)
 
 
 class Arrays:

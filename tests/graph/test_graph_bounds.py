@@ -14,9 +14,8 @@ from scenelang.graph.bounds import Grid, leaf_box, overlap
 from scenelang.graph.chain import normal
 from scenelang.graph.looks import Look
 from scenelang.graph.nodes import Leaf, Move
-from scenelang.graph.plane import Plane
 from scenelang.graph.space import EVERYWHERE
-from scenelang.graph.spaces import SPACES
+from scenelang.graph.spaces import SPACES, Plane
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.models.manifest import load_manifest
 
