@@ -162,23 +162,11 @@ def _move(move: Move) -> dict[str, Any]:
 
 def program_data(program: Program) -> dict[str, Any]:
     """A Program with its numbers; float32 values are written so that they read back exactly."""
-    rows = [
-        {
-            "object": name,
-            "token": token,
-            "bounds": bounds,
-            "place": None if place is None else place._asdict(),
-            "vector": vector,
-        }
-        for name, token, bounds, place, vector in zip(
-            program.objects,
-            token_names(program),
-            program.bounds.tolist(),
-            program.places,
-            program.vectors.tolist(),
-            strict=True,
-        )
-    ]
+    names = ("object", "token", "bounds", "place", "vector")
+    places = [place and place._asdict() for place in program.places]
+    bounds, vectors = program.bounds.tolist(), program.vectors.tolist()
+    columns = zip(program.objects, token_names(program), bounds, places, vectors, strict=True)
+    rows = [dict(zip(names, row, strict=True)) for row in columns]
     return {
         "canvas": list(program.canvas),
         "background": None if program.background is None else list(program.background),

@@ -110,8 +110,6 @@ def check_evaluated(
         evaluation: has run one frame, the first unless ``frames`` is ``"one"``; None for JSON.
         scene: what came of it, None if it has errors.
         diagnostics: those of the evaluation; receives the others.
-        model: draw with this model instead of the scene's.
-        frames: which are looked at.
 
     Returns:
         How many frames were to be looked at and were not, as they exceed the limits of one scene.
