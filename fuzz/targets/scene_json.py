@@ -15,8 +15,8 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.evaluation import loads
 from scenelang.models.manifest import available, load_manifest
 from scenelang.scene.json import to_readable_json
-from scenelang.scene.python import to_python
 from scenelang.scene.schema import Scene
+from scenelang.scene.text import to_python
 from scenelang.words import OPERATIONS, TRANSFORMS
 
 _PLAIN = (

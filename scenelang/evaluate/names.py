@@ -131,10 +131,6 @@ class Scope(Record, frozen=False):
         """What ``name`` stands for here."""
         return next((scope.names[name] for scope in self.outwards() if name in scope.names), None)
 
-    def defined_later(self, name: str) -> Span | None:
-        """Where a later line of this block, or of one around it, defines ``name``."""
-        return next((scope.later[name] for scope in self.outwards() if name in scope.later), None)
-
     def visible(self) -> Iterator[tuple[str, Binding]]:
         """All names that can be used here, inner ones first."""
         for scope in self.outwards():

@@ -133,7 +133,8 @@ def unknown_member(name: nodes.Name, place: Place, exported: FileContext | None)
 
 def report_early(name: nodes.Name, place: Place) -> bool:
     """Report a name that a later line defines, if one does."""
-    later = place.scope.defined_later(name.text)
+    scopes = place.scope.outwards()
+    later = next((scope.later[name.text] for scope in scopes if name.text in scope.later), None)
     if later is not None:
         message, labels = f"`{name.text}` is used before its line", (Label(later, "defined here"),)
         help = f"move the definition of `{name.text}` above this line"
