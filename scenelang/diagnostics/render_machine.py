@@ -85,12 +85,7 @@ def _escaped(text: str, further: str = "") -> str:
 
 
 def render_sarif(diagnostics: Iterable[Diagnostic], version: str | None = None) -> str:
-    """A SARIF 2.1.0 log with one run, its rules with the pages that explain them.
-
-    Args:
-        diagnostics: in any order.
-        version: the version of scenelang, where it should be stated.
-    """
+    """A SARIF 2.1.0 log with one run, its rules with the pages that explain them; states a ``version``."""
     found = in_order(diagnostics)
     severities = {d.code: d.severity for d in found}
     used = sorted(severities)

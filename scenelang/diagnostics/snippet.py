@@ -55,20 +55,14 @@ class _Note(Record, frozen=False):
 
 
 class Snippet:
-    """The marks of one file, at least one.
-
-    Args:
-        severity: style of the primary mark.
-        gutter: digits of the largest line number.
-        width: cells of the screen.
-    """
+    """The marks of one file, at least one, on a screen of ``width`` cells."""
 
     def __init__(
         self, source: SourceFile, marks: Sequence[Mark], severity: str, gutter: int, width: int
     ) -> None:
         self.source = source
-        self.severity = severity
-        self.gutter = gutter
+        self.severity = severity  # style of the primary mark
+        self.gutter = gutter  # digits of the largest line number
         self.notes: dict[int, list[_Note]] = {}
         self.bars: list[_Bar] = []
         self.laid: dict[int, tuple[Line, int]] = {}

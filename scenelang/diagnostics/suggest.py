@@ -16,13 +16,9 @@ _MOST_SLIPS = 8
 
 
 class Effort(Record, frozen=False):
-    """What looking for similar names may still cost, over all of a scene: it may hold thousands of both.
+    """What looking for similar names may still cost, over all of a scene: it may hold thousands of both."""
 
-    Args:
-        left: pairs of letters that may still be compared.
-    """
-
-    left: int = 500_000
+    left: int = 500_000  # pairs of letters that may still be compared
 
     @property
     def spent(self) -> bool:
@@ -39,8 +35,6 @@ def ranked(
     letter counts a little more, since it seldom is.
 
     Args:
-        name: what was written.
-        known: the names there are.
         slips: how many slips are forgiven; by default one in three letters.
         effort: what this takes its work from; the names that are left when it is spent are not looked at.
     """

@@ -22,16 +22,12 @@ AnyDoc = TypeVar("AnyDoc", bound="Doc")
 
 
 class Doc:
-    """A piece of layout.
-
-    Args:
-        flat: its text on one line; None if it cannot be on one line or is wider than any line.
-    """
+    """A piece of layout."""
 
     __slots__ = ("after", "before", "blank", "flat")
 
     def __init__(self, flat: str | None) -> None:
-        self.flat = flat
+        self.flat = flat  # its text on one line; None if it cannot be on one or is wider than any
         self.before: Sequence[Comment] = ()  # on lines of their own before it
         self.after: Sequence[Comment] = ()  # behind it; the line must end there
         self.blank = False  # a blank line stands before it, after the comments of `before`

@@ -104,6 +104,11 @@ def entries(statements: Sequence[Item], dangling: Sequence[Comment]) -> list[Par
     return [*parts, *comment_lines(dangling, begun=bool(parts))]
 
 
+def _lined(parts: Sequence[Part], flat: str | None) -> Group:
+    """What follows on the same line or, where that is too long, on a line of its own."""
+    return Group(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, *parts])))
+
+
 class Layout(ExpressionLayout):
     """Lays out one file."""
 
@@ -145,9 +150,7 @@ class Layout(ExpressionLayout):
         commented = after_of(sign) or before_of(value)
         if not commented and not isinstance(value, (Operation, Choice)):
             return [" ", sign, " ", value]
-        flat = flat_of(value)
-        lines = Indent(Concat(None, [LINE, *comments_before(value), value]))
-        doc = Group(None if commented or flat is None else " " + flat, lambda: lines)
+        doc = _lined([*comments_before(value), value], None if commented else flat_of(value))
         doc.after = after_of(value)
         return [" ", sign, doc]
 
@@ -161,9 +164,7 @@ class Layout(ExpressionLayout):
         head = [self.word(word), " ", name, *self._assigned(equal, default)]
         if rest[1:]:
             limits = sequence([self.word(rest[0]), " ", rest[1]])
-            flat = flat_of(limits)
-            tail = Group(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, limits])))
-            head.append(ends_of(tail, limits, limits))
+            head.append(ends_of(_lined([limits], flat_of(limits)), limits, limits))
         return self._ended(head, rest[-1])
 
     def let(self, word: int, name: Part, equal: int, value: Part, last: int) -> Part:

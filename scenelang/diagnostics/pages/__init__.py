@@ -81,9 +81,7 @@ class Page(Record):
     def plain(self, width: int = 96, paint: Callable[[str, str], str] = lambda text, style: text) -> str:
         """The page without its Markdown: headings alone, code indented, paragraphs wrapped.
 
-        Args:
-            width: cells of a line.
-            paint: colours a text in one of the styles of `diagnostics.cells`.
+        A text in one of the styles of `diagnostics.cells` is coloured by ``paint``.
         """
         blocks = [paint(f"{self.severity}[{self.code}]", self.severity) + paint(f": {self.title}", "bold")]
         text = re.sub(r"^<!--.*-->\n", "", self.text.partition("\n")[2], flags=re.MULTILINE)
