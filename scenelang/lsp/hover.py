@@ -279,7 +279,7 @@ def _arguments(
     if name in _CLEAR or not args:
         return []
     found = find_symbol(docs, document, document.names, name, call.name.span.start)
-    callee = word_of(found[1]) if found is not None else word_for_call(name, False)
+    callee = word_of(found) if found is not None else word_for_call(name, False)
     if callee is None or callee.variadic or len(callee.params) < 2:
         return []
     hints = []

@@ -55,9 +55,7 @@ class Settings(Record):
     @classmethod
     def read(cls, options: Any) -> Settings:
         """What a client sent; what is missing, of another type or out of range has its default."""
-        if not isinstance(options, dict):
-            return cls()
-        given = options.get("scenelang", options)
+        given = options.get("scenelang", options) if isinstance(options, dict) else None
         if not isinstance(given, dict):
             return cls()
         hints = given.get("inlayHints")

@@ -80,8 +80,7 @@ class Program:
             ("tokens", np.int8, (count,)),
             ("bounds", np.float32, (count, 4)),
         ):
-            array = _frozen(name, getattr(self, name), dtype, shape)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, _frozen(name, getattr(self, name), dtype, shape))
         if len(self.places) != count:
             raise ProgramError(f"{len(self.places)} places for {count} objects")
         _check_rows(self)
@@ -91,10 +90,8 @@ class Program:
         return len(self.objects)
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        count = len(self)
-        return bundle(
-            self, self.canvas, f"Program of {count:,} object{'s' * (count != 1)} for `{self.model}`"
-        )
+        said = f"Program of {len(self):,} object{'s' * (len(self) != 1)} for `{self.model}`"
+        return bundle(self, self.canvas, said)
 
     def digest(self) -> str:
         """SHA-256, hex, of all that decides the picture: not of names or places in source text."""
