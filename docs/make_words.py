@@ -21,6 +21,7 @@ TABLES = {
     "Definitions": {word: words.DECLARING[word] for word in ("let", "param", "fn", "module", "import")},
     "Settings": {**{word: words.DECLARING[word] for word in ("nsg", "model")}, **words.SETTINGS},
     "Transforms": words.TRANSFORMS,
+    "Geometries": {name: words.Word(name, name, text) for name, text in words.GEOMETRIES.items()},
     "Texture": {name: word for name, word in words.OPERATIONS.items() if name not in words.TRANSFORMS},
 }
 KEYWORDS = {

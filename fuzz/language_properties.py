@@ -19,7 +19,7 @@ from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.api import loads
+from scenelang.evaluate.evaluation import loads
 from scenelang.syntax import parse
 from scenelang.syntax.incremental import parse_whole
 

@@ -16,8 +16,7 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.program.compile import compile_scene
-from scenelang.program.program import program_bytes
-from scenelang.program.store import parse_program
+from scenelang.program.program import parse_program, program_bytes
 from scenelang.scene.schema import Scene
 from scenelang.syntax import nodes
 

@@ -17,12 +17,11 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.render_machine import render_github, render_json, render_sarif
 from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.session import Defines
 from scenelang.formatting import format_text
 from scenelang.interchange.gltf import import_gltf
 from scenelang.interchange.gltf_file import GltfError, parse_gltf
-from scenelang.program.program import ProgramError
-from scenelang.program.store import parse_program
+from scenelang.program.program import ProgramError, parse_program
 
 NUMBER: Final = "¤"
 """Stands in a unit for the number of the repetition, so that pieces may differ."""
@@ -104,17 +103,17 @@ def _edit(scene: str) -> None:
     """What an editor asks for when a document is opened, and again when a letter is typed in it."""
     from lsprotocol import types
 
-    from scenelang.lsp import callees, completion, hover, outline, tokens
+    from scenelang.lsp import callees, completion, hover, navigation, tokens
     from scenelang.lsp.workspace import Workspace
 
     docs = Workspace()
     document = docs.put("untitled:pump", scene, 1)
     offset = len(scene) // 2
     middle = document.lines.position(offset)
-    outline.document_symbols(document)
-    outline.folding(document)
-    outline.selection(document, offset)
-    outline.workspace_symbols(docs, "aaaaaaaab")
+    navigation.document_symbols(document)
+    navigation.folding(document)
+    navigation.selection(document, offset)
+    navigation.workspace_symbols(docs, "aaaaaaaab")
     hover.hover(docs, document, offset)
     document.change(types.TextDocumentContentChangePartial(types.Range(middle, middle), "x"))
     for place in (offset, len(document.text)):

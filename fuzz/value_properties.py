@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fuzz.drawn import drawn
 from fuzz.oracles import check_diagnostics
 from fuzz.target import hold, load_target
-from scenelang.backend.errors import RenderError
+from scenelang.backend.options import RenderError
 from scenelang.backend.render import render
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
 from scenelang.diagnostics.pages import CODES
@@ -20,8 +20,7 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.formatting import format_text
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.weights import load_codes
-from scenelang.program.program import WIDTH, Place, Program, ProgramError, program_bytes
-from scenelang.program.store import parse_program
+from scenelang.program.program import WIDTH, Place, Program, ProgramError, parse_program, program_bytes
 from scenelang.scene.schema import Scene
 from tests.strategies import scenes
 

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from scenelang.animation.api import animate as animate
     from scenelang.animation.api import render_frames as render_frames
     from scenelang.animation.timing import FramesError as FramesError
-    from scenelang.backend.errors import RenderError as RenderError
+    from scenelang.backend.options import RenderError as RenderError
     from scenelang.backend.render import render as render
     from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
     from scenelang.diagnostics.diagnostic import Diagnostics as Diagnostics
     from scenelang.diagnostics.error import SceneError as SceneError
-    from scenelang.evaluate.api import load as load
-    from scenelang.evaluate.api import loads as loads
+    from scenelang.evaluate.evaluation import load as load
+    from scenelang.evaluate.evaluation import loads as loads
     from scenelang.formatting.format import format_text as format_text
     from scenelang.image import Image as Image
     from scenelang.measure.metrics import compare as compare
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from scenelang.program.program import Place as Place
     from scenelang.program.program import Program as Program
     from scenelang.program.program import ProgramError as ProgramError
-    from scenelang.program.store import load_program as load_program
+    from scenelang.program.program import load_program as load_program
     from scenelang.scene.schema import Animation as Animation
     from scenelang.scene.schema import Bend as Bend
     from scenelang.scene.schema import Boolean as Boolean
@@ -62,18 +62,17 @@ if TYPE_CHECKING:
 _HOME: Final = {
     "scenelang.animation.api": "animate render_frames",
     "scenelang.animation.timing": "FramesError",
-    "scenelang.backend.errors": "RenderError",
+    "scenelang.backend.options": "RenderError",
     "scenelang.backend.render": "render",
     "scenelang.diagnostics.diagnostic": "Diagnostic Diagnostics",
     "scenelang.diagnostics.error": "SceneError",
-    "scenelang.evaluate.api": "load loads",
+    "scenelang.evaluate.evaluation": "load loads",
     "scenelang.formatting.format": "format_text",
     "scenelang.image": "Image",
     "scenelang.measure.metrics": "compare",
     "scenelang.program.check": "check check_text fix_text",
     "scenelang.program.compile": "compile",
-    "scenelang.program.program": "Place Program ProgramError",
-    "scenelang.program.store": "load_program",
+    "scenelang.program.program": "Place Program ProgramError load_program",
     "scenelang.scene.schema": (
         "Animation Bend Boolean Camera Chain Color Displace Flip Grayscale Ground Group Hue Light Link "
         "Material Matrix Object Rotate Scale Scene Shear Translate Twirl Twist"

@@ -29,13 +29,9 @@ class NotWritten(OSError):
 
 
 def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
-    """The bytes of a regular file, or of a pipe that a shell has opened.
+    """The bytes of a file, or of a pipe that a shell has opened; at most one more than ``most_bytes``.
 
     Opening never waits: a named pipe without a writer, a terminal or ``/dev/zero`` is refused unread.
-
-    Args:
-        path: the file.
-        most_bytes: stop one byte after so many, so that the caller sees that there are more.
 
     Raises:
         OSError: as the system says, or that it is not a regular file.
@@ -141,11 +137,7 @@ def write_output(target: str | os.PathLike[str], data: bytes) -> None:
 
 
 def output_place(target: str | os.PathLike[str]) -> Path:
-    """The file that a user means by the name of an output.
-
-    Raises:
-        NotWritten: it is an input as well.
-    """
+    """The file that a user means by the name of an output; raises `NotWritten` if it is an input as well."""
     inputs = (_INPUTS.get() or set()) if os.path.isfile(target) else set()
     for name in inputs:
         same = False
@@ -162,19 +154,14 @@ def followed(path: str | os.PathLike[str]) -> Path:
 
 
 def open_own(path: Path) -> int:
-    """Open a file to lock, made if it is not there; nothing of it changes, and no link is followed.
-
-    Raises:
-        OSError: it cannot be opened, or is a link.
-    """
+    """Open a file to lock, made if it is not there; nothing of it changes, and a link is an `OSError`."""
     return os.open(path, os.O_RDWR | os.O_CREAT | _FLAGS, 0o666)
 
 
 def lock(handle: int, path: Path) -> bool | None:
     """Lock the open file at ``path``; the lock ends with the process, however that ends.
 
-    Returns:
-        False where another process has it or has put another file there; None where files have no locks.
+    False where another process has it or has put another file there; None where files have no locks.
     """
     if sys.platform == "win32":
         return None

@@ -13,13 +13,7 @@ MOST_PIXELS: Final = 1 << 21  # beyond, drawing takes longer than a look is wort
 
 
 def bundle(value: Any, canvas: tuple[int, int], said: str) -> dict[str, Any]:
-    """What stands for a value, by media type: a picture, or in words why there is none; never an exception.
-
-    Args:
-        value: what `scenelang.render` draws.
-        canvas: its size in pixels.
-        said: the value in a line.
-    """
+    """What stands for a value, by media type: a picture, or words why there is none; never an exception."""
     width, height = canvas
     text = f"{said}, {width} × {height} pixels"
     if width * height > MOST_PIXELS:

@@ -50,14 +50,7 @@ class TensorFile:
     body: memoryview  # the tensors' bytes
 
     def arrays(self, *, finite: bool = True) -> dict[str, npt.NDArray[Any]]:
-        """All tensors, copied.
-
-        Args:
-            finite: refuse numbers that are not.
-
-        Raises:
-            TensorError: a tensor holds such.
-        """
+        """All tensors, copied; raises `TensorError`, where ``finite`` also for numbers that are not."""
         return {name: self._array(name, tensor, finite) for name, tensor in self.tensors.items()}
 
     def _array(self, name: str, tensor: Tensor, finite: bool) -> npt.NDArray[Any]:
@@ -74,14 +67,10 @@ class TensorFile:
 
 
 def read_tensors(data: bytes, most_bytes: int) -> TensorFile:
-    """The tensors and the header in a file's bytes.
-
-    Args:
-        data: the file, or its first ``most_bytes`` + 1 bytes.
-        most_bytes: how large it may be.
+    """The tensors and the header in the bytes of a file, or in its first ``most_bytes`` + 1.
 
     Raises:
-        TensorError: the file is larger, damaged or not one of ours.
+        TensorError: the file is larger than ``most_bytes``, damaged or not one of ours.
     """
     if len(data) > most_bytes:
         raise TensorError(f"more than {most_bytes:,} bytes")

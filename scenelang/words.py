@@ -20,27 +20,16 @@ BLEND: Final = 0.15
 
 
 class Word(Record):
-    """A word of the language.
-
-    Args:
-        name: the word.
-        head: how it is written, as in a reference.
-        text: what it means, in Markdown.
-        params: names of its arguments, in order; several forms of a call have those of the longest.
-        required: how many of them, from the left, have to be given.
-        about: a line for each argument.
-        snippet: what completion inserts, with placeholders; empty for the word itself.
-        variadic: whether its one argument may be repeated.
-    """
+    """A word of the language."""
 
     name: str
-    head: str
-    text: str
-    params: tuple[str, ...] = ()
-    required: int = 0
-    about: tuple[str, ...] = ()
-    snippet: str = ""
-    variadic: bool = False
+    head: str  # how it is written, as in a reference
+    text: str  # what it means, in Markdown
+    params: tuple[str, ...] = ()  # names of its arguments, in order; of several forms those of the longest
+    required: int = 0  # how many of them, from the left, have to be given
+    about: tuple[str, ...] = ()  # a line for each argument
+    snippet: str = ""  # what completion inserts, with placeholders; empty for the word itself
+    variadic: bool = False  # whether its one argument may be repeated
 
     @property
     def notes(self) -> dict[str, str]:

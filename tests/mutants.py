@@ -56,7 +56,6 @@ COMPILING = (
 TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/renderers/draw.py": DRAWING,
     "scenelang/renderers/frame*.py": DRAWING,
-    "scenelang/renderers/kept.py": DRAWING,
     "scenelang/renderers/coverage.py": DRAWING,
     "scenelang/renderers/field.py": DRAWING,
     "scenelang/renderers/network.py": DRAWING,

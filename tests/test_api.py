@@ -10,8 +10,7 @@ import pytest
 
 import scenelang as nsg
 from scenelang.backend import neural
-from scenelang.backend.memory import keep_memory
-from scenelang.backend.options import Device
+from scenelang.backend.options import Device, keep_memory
 from scenelang.models.framed import load_arrays
 from scenelang.renderers.draw import draw
 

@@ -11,7 +11,7 @@ from fuzz import trees
 from fuzz.target import Target, hold
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.api import loads
+from scenelang.evaluate.evaluation import loads
 from scenelang.interchange.gltf import import_gltf
 from scenelang.interchange.gltf_file import GltfError, parse_gltf
 from scenelang.program.compile import compile_scene

@@ -14,8 +14,8 @@ from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.syntax import parse
+from scenelang.syntax.lexer import MAX_MISTAKES
 from scenelang.syntax.tables import grammar_path
-from scenelang.syntax.tokens import MAX_MISTAKES
 
 MOST_FOR_LARK = 400
 """Characters of a text that Lark is asked about, too: it is slow."""

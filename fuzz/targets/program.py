@@ -10,13 +10,12 @@ import numpy as np
 
 from fuzz import tensors, text
 from fuzz.target import Target, hold
-from scenelang.backend.errors import RenderError
+from scenelang.backend.options import RenderError
 from scenelang.backend.render import render
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.api import loads
+from scenelang.evaluate.evaluation import loads
 from scenelang.program.compile import compile_scene
-from scenelang.program.program import Program, ProgramError, program_bytes
-from scenelang.program.store import parse_program
+from scenelang.program.program import Program, ProgramError, parse_program, program_bytes
 
 SIDE_PX = 12
 MOST_DRAWN = 40

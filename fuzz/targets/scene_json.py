@@ -12,11 +12,11 @@ from fuzz.oracles import check_compiling, check_diagnostics
 from fuzz.target import Failure, Target, hold, sampled
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.api import loads
+from scenelang.evaluate.evaluation import loads
 from scenelang.models.manifest import available, load_manifest
 from scenelang.scene.json import to_readable_json
-from scenelang.scene.python import to_python
 from scenelang.scene.schema import Scene
+from scenelang.scene.text import to_python
 from scenelang.words import OPERATIONS, TRANSFORMS
 
 _PLAIN = (

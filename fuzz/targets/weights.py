@@ -19,13 +19,12 @@ from safetensors.torch import save
 from fuzz import tensors, trees
 from fuzz.oracles import check_diagnostics
 from fuzz.target import Target, hold
-from scenelang.backend.errors import RenderError
 from scenelang.backend.neural import draw_program
+from scenelang.backend.options import RenderError
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.api import loads
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import load_source, loads
 from scenelang.models import weights
 from scenelang.models.load import Model, load_network
 from scenelang.models.manifest import ROOT, Manifest, load_manifest

@@ -24,7 +24,7 @@ Source = str | os.PathLike[str] | Scene | Iterable[Scene]
 
 
 def render_frames(
-    source: Source,
+    path: Source,
     *,
     frames: Frames = None,
     fps: float | None = None,
@@ -43,7 +43,7 @@ def render_frames(
     on the same device, bit for bit. A scene without ``animate(…)`` has one frame.
 
     Args:
-        source: the scene file, or a Scene or several, each with its own canvas.
+        path: the scene file, or a Scene or several, each with its own canvas.
         frames: which, as a range or as text (``"0..23"``, ``"12.."``); all by default.
         fps: frames a second instead of those that ``animate`` names; its seconds stay. Scenes are shown at
             those of the first one's animation.
@@ -63,7 +63,7 @@ def render_frames(
         OSError: the file cannot be opened.
         ValueError: an argument is none of the above, or says something of a file where Scenes are given.
     """
-    clip = _opened(source, fps, size, params, model, root)
+    clip = _opened(path, fps, size, params, model, root)
     painter = Painter(clip, backend, device, threads)
     last: tuple[str, Image] | None = None
     for number in _numbers(clip, frames):
@@ -74,7 +74,7 @@ def render_frames(
 
 
 def animate(
-    source: Source,
+    path: Source,
     out: str | os.PathLike[str],
     *,
     frames: Frames = None,
@@ -94,7 +94,7 @@ def animate(
     """Draw a scene file or Scenes to an animation; a call that was interrupted goes on where it stopped.
 
     Args:
-        source: the scene file, or Scenes, one a frame.
+        path: the scene file, or Scenes, one a frame.
         out: a file whose suffix names the format (.gif, .webp, .apng, .mp4, .mov, .mkv, .webm), numbered
             pictures (``frame-%04d.png``), or a folder that ends in a slash or is there.
         frames, fps, size, params, model, root, backend, device, threads: as for `render_frames`.
@@ -110,25 +110,19 @@ def animate(
         ValueError: ``out`` names no format, or nothing says how fast Scenes follow each other.
         SceneError, FramesError, RenderError, OSError: as for `render_frames`; nothing is written then.
     """
-    stem = Path(source).stem if isinstance(source, str | os.PathLike) else "frame"
+    stem = Path(path).stem if isinstance(path, str | os.PathLike) else "frame"
     target = find_target(os.fspath(out), stem)
-    clip = _opened(source, fps, size, params, model, root)
+    clip = _opened(path, fps, size, params, model, root)
     if target.kind != "sequence":
         _ = clip.animation  # what is wrong with it is said before anything is drawn
     painter = Painter(clip, backend, device, threads)
     return make(
-        painter,
-        target,
-        _numbers(clip, frames),
-        jobs=jobs,
-        palette=palette,
-        dither=dither,
-        progress=progress,
+        painter, target, _numbers(clip, frames), jobs=jobs, palette=palette, dither=dither, progress=progress
     )
 
 
 def _opened(
-    source: Source,
+    path: Source,
     fps: float | None,
     size: tuple[int, int] | None,
     params: Mapping[str, Any] | None,
@@ -137,10 +131,10 @@ def _opened(
 ) -> Clip:
     if fps is not None and not 0 < fps < float("inf"):
         raise ValueError(f"{fps} frames a second, where a number above 0 is needed")
-    if isinstance(source, str | os.PathLike):
+    if isinstance(path, str | os.PathLike):
         folder = None if root is None else Path(root)
-        return open_clip(source, defines=params, model=model, root=folder, size=size, fps=fps)
-    scenes = (source,) if isinstance(source, Scene) else tuple(source)
+        return open_clip(path, defines=params, model=model, root=folder, size=size, fps=fps)
+    scenes = (path,) if isinstance(path, Scene) else tuple(path)
     if not scenes or not all(isinstance(scene, Scene) for scene in scenes):
         raise ValueError("neither a path nor Scenes to draw")
     if params is not None or root is not None:

@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from scenelang.animation.pictures import Film, Pixels, changed
+from scenelang.animation.store import Film, Pixels, changed
 from scenelang.animation.timing import runs
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +17,8 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.evaluation import Evaluation
-from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.loader import Unreadable, read_source
+from scenelang.evaluate.session import Defines
 from scenelang.graph.lower import Memory
 from scenelang.scene.schema import Animation, Scene, same_nodes
 from scenelang.scene.spans import SpanMap
@@ -53,11 +54,7 @@ class Given:
 
     @property
     def animation(self) -> Animation:
-        """How long they last.
-
-        Raises:
-            ValueError: nothing says how fast they follow each other, or they differ in their canvas.
-        """
+        """How long they last; raises `ValueError` where nothing says how fast, or their canvases differ."""
         if len({scene.canvas for scene in self.scenes}) > 1:
             raise ValueError("scenes with several canvases, where size says one for all")
         first, count = self.scenes[0].animation, len(self.scenes)
@@ -74,12 +71,9 @@ class Clip:
     """A scene to be evaluated and compiled frame by frame, or Scenes that are its frames.
 
     Args:
-        source: its text, or the Scenes.
-        path: where it was read from.
         diagnostics: collects what is found, in each frame; a mistake in any frame ends the clip.
-        defines: values for params.
         model: name of the model to draw with, instead of the scene's.
-        root: folder that imports cannot leave; by default that of ``path``.
+        root: folder that imports cannot leave; by default that of ``path``, where the text was read from.
         size: canvas in pixels, instead of the scene's.
         fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
             seconds × fps frames, and t and u follow.
@@ -119,18 +113,11 @@ class Clip:
         self._memory = Memory() if reuse else None
         self.wanted = self._evaluation.wanted
         """All files that it imports, also those that are not there."""
-        self._first: Shot | None = None
 
-    @property
+    @cached_property
     def first(self) -> Shot:
-        """The first frame, which every scene has.
-
-        Raises:
-            SceneError: it has errors.
-        """
-        if self._first is None:
-            self._first = self.shot(0)
-        return self._first
+        """The first frame, which every scene has; raises `SceneError` if it has errors."""
+        return self.shot(0)
 
     @property
     def animates(self) -> bool:
@@ -151,11 +138,7 @@ class Clip:
         return len(given.scenes) if isinstance(given, Given) else self.animation.frames
 
     def shot(self, number: int) -> Shot:
-        """Evaluate a frame.
-
-        Raises:
-            SceneError: it has errors.
-        """
+        """Evaluate a frame; raises `SceneError` if it has errors."""
         scene, spans = self._evaluation.run(number)
         if scene is None or self.diagnostics.errors:
             raise SceneError(self.diagnostics)
@@ -167,34 +150,20 @@ class Clip:
         return Shot(number, scene, spans)
 
     def program(self, shot: Shot) -> Program:
-        """Compile a frame.
-
-        Raises:
-            SceneError: it has errors.
-            FileNotFoundError: the model has no weights.
-        """
+        """Compile a frame; raises `SceneError`, or `FileNotFoundError` where the model has no weights."""
         from scenelang.program.compile import compile_scene
 
         if self.reuse and self._last is not None and same_nodes(self._last[0].scene, shot.scene):
             return self._last[1]
         program = compile_scene(
-            shot.scene,
-            spans=shot.spans,
-            diagnostics=self.diagnostics,
-            model=self.model,
-            memory=self._memory,
+            shot.scene, spans=shot.spans, diagnostics=self.diagnostics, model=self.model, memory=self._memory
         )
         self._last = shot, program
         return program
 
 
 def open_clip(path: str | os.PathLike[str], **options: Any) -> Clip:
-    """A clip of a scene file; ``options`` as for `Clip`.
-
-    Raises:
-        SceneError: the file is not text.
-        OSError: the file cannot be opened.
-    """
+    """A clip of a scene file; ``options`` as for `Clip`. Raises `SceneError` where it is not text."""
     where = Path(path)
     name = os.fspath(path)
     try:

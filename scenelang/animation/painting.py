@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
     from scenelang.program.program import Program
-    from scenelang.renderers.kept import Kept
+    from scenelang.renderers.draw import Kept
 
 Progress = Callable[[float], None]
+_version = lru_cache(version)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,15 +46,9 @@ class Painter:
     load_s: float = 0.0  # what loading torch took
 
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
-        """Compile a frame and say what its picture depends on.
+        """Compile a frame and say what its picture depends on; raises as `Clip.program`, or `RenderError`.
 
-        Args:
-            shot: the frame.
-            single: it is a picture by itself, which numpy draws if it is small; torch draws animations.
-
-        Raises:
-            SceneError: it has errors.
-            RenderError: there is no such device.
+        Numpy draws a picture by itself (``single``) if it is small, torch draws animations.
         """
         if self.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})
@@ -90,16 +85,12 @@ class Painter:
         return usable_cores()
 
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
-        """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit.
-
-        Raises:
-            SceneError, RenderError: as for `scenelang.render`.
-        """
+        """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit."""
         if frame.program is None:
-            from scenelang.backend.exact import draw_exact
+            from scenelang.backend.render import draw_exact
 
             return draw_exact(frame.shot.scene, spans=frame.shot.spans, model=self.clip.model)
-        from scenelang.renderers.kept import Kept
+        from scenelang.renderers.draw import Kept
 
         if self.kept is None and self.clip.reuse:
             self.kept = Kept()
@@ -107,19 +98,8 @@ class Painter:
             from scenelang.backend.small import draw_small
 
             return draw_small(frame.program, kept=self.kept, progress=progress).image
-        return paint(
-            frame.program,
-            self.place,
-            threads=self.split,
-            split=self.split,
-            kept=self.kept,
-            progress=progress,
-        )
-
-
-@lru_cache
-def _version(package: str) -> str:
-    return version(package)
+        split = self.split
+        return paint(frame.program, self.place, threads=split, split=split, kept=self.kept, progress=progress)
 
 
 def paint(
@@ -131,19 +111,7 @@ def paint(
     kept: Kept | None,
     progress: Progress | None = None,
 ) -> Image:
-    """Draw a Program.
-
-    Args:
-        program: a compiled frame.
-        place: a torch device.
-        threads: tiles drawn at the same time.
-        split: how many threads the picture is split for.
-        kept: the picture before it.
-        progress: called with the share done, from any thread.
-
-    Raises:
-        RenderError: as for `scenelang.render`.
-    """
+    """Draw a Program on a torch device, split for so many threads, of which so many draw at the same time."""
     from scenelang.backend.neural import draw_program, open_model
 
     model = open_model(program.model, place)

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Final
 from scenelang.animation.apng import write_apng
 from scenelang.animation.gif import write_gif
 from scenelang.animation.painting import Painter
-from scenelang.animation.pictures import Encoder, Film
-from scenelang.animation.store import Store, deliver, put_frame
+from scenelang.animation.store import Encoder, Film, Store, deliver, put_frame
 from scenelang.animation.targets import Target
-from scenelang.animation.video import check_video, write_video
+from scenelang.animation.video import find_codec, write_video
 from scenelang.animation.webp import write_webp
+from scenelang.backend.options import RenderError
 from scenelang.diagnostics.error import SceneError
 from scenelang.files import output_place, write_whole
 
@@ -101,12 +101,8 @@ def make(
     same call goes on with those that are missing.
 
     Args:
-        painter: draws the clip's frames.
-        target: where they go.
-        numbers: which frames.
         jobs: processes that draw; by default this one, and others as soon as they would pay.
-        palette: of a GIF, see `write_gif`.
-        dither: of a GIF.
+        palette, dither: of a GIF, see `write_gif`.
         strict: count warnings as errors.
         progress: called from any thread.
 
@@ -125,12 +121,16 @@ def make(
             made.files = _numbered(store, target, numbers, keys)
         else:
             animation = painter.clip.animation
-            width, height = painter.clip.first.scene.canvas
-            film = Film(
-                [store.file(key) for key in keys], animation.fps, animation.loop, (width, height), alpha
-            )
+            files = [store.file(key) for key in keys]
+            film = Film(files, animation.fps, animation.loop, painter.clip.first.scene.canvas, alpha)
             part = store.folder / f"film{target.path.suffix}"
-            _encode(film, target, part, palette, dither, progress)
+            encoders: dict[str, Encoder] = {
+                "gif": partial(write_gif, palette=palette, dither=dither),
+                "apng": write_apng,
+                "webp": write_webp,
+                "video": partial(write_video, suffix=target.path.suffix.lower()),
+            }
+            encoders[target.kind](film, part, lambda share: progress(Progress("encoding", share, 1.0)))
             deliver(part, target.path)
             made.files = [target.path]
         made.encode_s = time.perf_counter() - started
@@ -170,9 +170,8 @@ def _drawn(
                 if store.has(frame.key, frame.shot.scene.canvas):
                     made.resumed += 1
                 else:
-                    if workers is None and _pays(painter, jobs, made.drawn, spent_s, len(numbers) - index):
-                        workers = _workers(painter, jobs)
-                        made.jobs = workers.count
+                    if workers is None:
+                        workers = _helpers(painter, jobs, made.drawn, spent_s, len(numbers) - index)
                     if workers is not None and frame.program is not None:
                         workers.submit(frame.program, store.file(frame.key))
                     else:
@@ -183,6 +182,7 @@ def _drawn(
             made.draw_s += time.perf_counter() - started
             progress(Progress("drawing", index + 1 - (workers.waiting if workers else 0), len(numbers)))
         if workers is not None:
+            made.jobs = workers.count
             started = time.perf_counter()
             while workers.waiting:
                 workers.take()
@@ -198,23 +198,18 @@ def _part(progress: Callable[[Progress], None], index: int, total: int, share: f
     progress(Progress("drawing", index + share, total))
 
 
-def _pays(painter: Painter, jobs: int | None, drawn: int, spent_s: float, left: int) -> bool:
-    """Whether to draw in other processes from here on."""
+def _helpers(painter: Painter, jobs: int | None, drawn: int, spent_s: float, left: int) -> Workers | None:
+    """Other processes to draw in from here on, if they pay."""
     if painter.backend != "neural" or painter.place != "cpu" or jobs == 1:
-        return False
-    if jobs is not None:
-        return True
-    from scenelang.backend.neural import usable_cores
-
-    if painter.threads is not None or usable_cores() < 2 or drawn < _TRIED:
-        return False
-    return spent_s / drawn * left > WORTH_S
-
-
-def _workers(painter: Painter, jobs: int | None) -> Workers:
+        return None
     from scenelang.animation.workers import Workers
     from scenelang.backend.neural import usable_cores
 
+    if jobs is None:
+        if painter.threads is not None or usable_cores() < 2 or drawn < _TRIED:
+            return None
+        if spent_s / drawn * left <= WORTH_S:
+            return None
     return Workers(jobs or usable_cores(), painter.split)
 
 
@@ -233,37 +228,13 @@ def _numbered(store: Store, target: Target, numbers: range, keys: Sequence[str])
     return files
 
 
-def _encode(
-    film: Film,
-    target: Target,
-    part: Path,
-    palette: Palette,
-    dither: bool,
-    progress: Callable[[Progress], None],
-) -> None:
-    encoders: dict[str, Encoder] = {
-        "gif": partial(write_gif, palette=palette, dither=dither),
-        "apng": write_apng,
-        "webp": write_webp,
-        "video": partial(write_video, suffix=target.path.suffix.lower()),
-    }
-    encoders[target.kind](film, part, lambda share: progress(Progress("encoding", share, 1.0)))
-
-
 def ready(target: Target) -> None:
-    """Find out before any work whether a format can be written, and that no input is lost by it.
-
-    Raises:
-        RenderError: it cannot.
-        NotWritten: the target is an input.
-    """
+    """Raise `RenderError` where a format cannot be written, `NotWritten` where an input would be lost."""
     output_place(target.path)
     if target.kind == "video":
-        check_video(target.path.suffix.lower())
+        find_codec(target.path.suffix.lower())
     elif target.kind == "webp":
         from PIL import features
-
-        from scenelang.backend.errors import RenderError
 
         if not features.check("webp"):
             raise RenderError("this Pillow is built without WebP")

@@ -11,19 +11,27 @@ import contextlib
 import hashlib
 import os
 import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from scenelang.backend.errors import RenderError
+import numpy as np
+import numpy.typing as npt
+from PIL import Image as pillow
+
+from scenelang.animation.timing import runs
+from scenelang.backend.options import RenderError
 from scenelang.files import lock, open_own, output_place, write_whole
-
-if TYPE_CHECKING:
-    from scenelang.image import Image
+from scenelang.image import Image, image_format
 
 _LOCK: Final = "lock"
 _FRAME: Final = re.compile(r"[0-9a-f]{40}\.\w+")
 _PASSING: Final = re.compile(r"film\.\w+|\.[0-9a-f]{40}\.\w+\.[0-9a-z]+\.part")
 """What was half-written when a run was killed."""
+Pixels = npt.NDArray[np.uint8]
+Box = tuple[int, int, int, int]
+"""left, top, right, bottom; the last two exclusive."""
 
 
 class Busy(RenderError):
@@ -36,13 +44,9 @@ def frame_key(*parts: object) -> str:
 
 
 class Store:
-    """A folder of frames; while it is open no other process may use it.
+    """A folder of frames, made if it is not there; while it is open no other process may use it.
 
     The folder may be a stranger's: no link in it is followed, and only files named like our own are removed.
-
-    Args:
-        folder: made if it is not there.
-        suffix: of the frames' files, which names their format.
 
     Raises:
         Busy: another process has it.
@@ -79,7 +83,14 @@ class Store:
     def has(self, key: str, size: tuple[int, int]) -> bool:
         """Whether a frame is there, whole and of a size (width, height)."""
         file = self.file(key)
-        return not file.is_symlink() and file.is_file() and _whole(file, size)
+        if file.is_symlink() or not file.is_file():
+            return False
+        # Pillow has no base class for what its readers raise
+        with contextlib.suppress(Exception), pillow.open(file, formats=[image_format(file)]) as image:
+            if image.size == size:
+                image.load()
+                return True
+        return False
 
     def remove(self) -> None:
         """Take our files away, and where nothing else is there the folder and those that were made for it."""
@@ -97,40 +108,54 @@ class Store:
         return []
 
 
-def _whole(file: Path, size: tuple[int, int]) -> bool:
-    """Whether a file holds a picture of a size, without damage."""
-    from PIL import Image
-
-    from scenelang.image import image_format
-
-    try:
-        with Image.open(file, formats=[image_format(file)]) as image:
-            if image.size != size:
-                return False
-            image.load()
-    except Exception:  # Pillow has no base class for what its readers raise
-        return False
-    return True
-
-
 def put_frame(file: Path, image: Image) -> None:
-    """Write a picture in the format that its file's suffix names; a link in its place is replaced.
-
-    Raises:
-        OSError: it cannot be written.
-    """
-    from scenelang.image import image_format
-
+    """Write a picture in the format that its file's suffix names; a link in its place is replaced."""
     write_whole(file, image.encode(image_format(file)))
 
 
 def deliver(part: Path, target: Path) -> None:
-    """Flush a finished file of the same file system to the disk and rename it over ``target``.
-
-    Raises:
-        OSError: it cannot; ``target`` stays as it was.
-    """
+    """Flush a finished file to the disk and rename it over ``target``, which stays as it was if it cannot."""
     place = output_place(target)
     with part.open("rb") as file:
         os.fsync(file.fileno())
     os.replace(part, place)
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """Finished frames in the order in which they are shown; read from the disk one at a time."""
+
+    files: Sequence[Path]  # one for each frame; equal frames have the same
+    fps: float  # frames a second
+    loop: bool  # whether it starts again at its end
+    size: tuple[int, int]  # width and height in pixels
+    alpha: bool  # whether the pictures are transparent
+
+    def read(self, file: Path) -> Pixels:
+        """The pixels (H, W, 3 or 4) of a frame; raises `OSError` where its file is damaged."""
+        with pillow.open(file) as image:
+            pixels = np.asarray(image.convert("RGBA" if self.alpha else "RGB"))
+        if pixels.shape[:2] != (self.size[1], self.size[0]):
+            raise OSError(f"{file} has another size")
+        return pixels
+
+    def runs(self, lengths: Sequence[int]) -> Iterator[tuple[Pixels, int]]:
+        """Pictures that differ from their neighbours, and how long each is shown."""
+        for file, length in runs(self.files, lengths):
+            yield self.read(file), length
+
+
+def changed(before: Pixels | None, now: Pixels) -> Box:
+    """The smallest box around all pixels that differ; one pixel where none does."""
+    height, width = now.shape[:2]
+    if before is None:
+        return 0, 0, width, height
+    differs = (before != now).any(axis=2)
+    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+    if not len(rows):
+        return 0, 0, 1, 1
+    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+
+
+Encoder = Callable[[Film, Path, Callable[[float], None]], None]
+"""Writes a film to a file in one format, and says which share of it is done."""

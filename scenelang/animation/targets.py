@@ -9,16 +9,8 @@ from typing import Final, Literal
 
 Kind = Literal["sequence", "gif", "webp", "apng", "video"]
 
-ENCODED: Final[dict[str, Kind]] = {
-    ".gif": "gif",
-    ".webp": "webp",
-    ".apng": "apng",
-    ".mp4": "video",
-    ".m4v": "video",
-    ".mov": "video",
-    ".mkv": "video",
-    ".webm": "video",
-}
+_VIDEO: Final[dict[str, Kind]] = dict.fromkeys((".mp4", ".m4v", ".mov", ".mkv", ".webm"), "video")
+ENCODED: Final[dict[str, Kind]] = {".gif": "gif", ".webp": "webp", ".apng": "apng", **_VIDEO}
 PICTURES: Final = frozenset({".gif", ".webp", ".apng"})
 """Suffixes of animations that hold a single picture as well."""
 _NUMBER: Final = re.compile(r"%(0?\d{0,2})d")
@@ -38,7 +30,9 @@ class Target:
 
     def file(self, frame: int) -> Path:
         """The file of a frame of a sequence."""
-        return self.path / _filled(self.pattern, frame)
+        parts = self.pattern.split("%%")
+        filled = [_NUMBER.sub(lambda found: f"{frame:{found[1] or 'd'}}", part) for part in parts]
+        return self.path / "%".join(filled)
 
     @property
     def work(self) -> Path:
@@ -59,14 +53,10 @@ def is_animation(out: str) -> bool:
 
 
 def find_target(out: str, stem: str = "frame") -> Target:
-    """What ``out`` asks for.
+    """What ``out`` asks for: a file with one of the suffixes of `ENCODED`, a pattern, or a folder.
 
-    Args:
-        out: a file with one of the suffixes of `ENCODED`; a pattern; or a folder.
-        stem: what the files in a folder start with.
-
-    Raises:
-        TargetError: the name fits none of these, or its folder is not there.
+    The files in a folder start with ``stem``. Raises `TargetError` where the name fits none of these, or its
+    folder is not there.
     """
     path = Path(out)
     if is_pattern(out):
@@ -89,9 +79,9 @@ def find_target(out: str, stem: str = "frame") -> Target:
         return Target("sequence", path, f"{stem.replace('%', '%%')}-%04d.png")
     kind = ENCODED.get(path.suffix.lower())
     if kind is None:
-        suffixes = ", ".join(ENCODED)
         raise TargetError(
-            f"`{out}` holds one picture; an animation goes to a file with one of the suffixes {suffixes}, to "
+            f"`{out}` holds one picture; an animation goes to a file with one of the suffixes "
+            f"{', '.join(ENCODED)}, to "
             "numbered pictures such as frame-%04d.png, or to a folder, which ends in a slash"
         )
     _check_folder(path.parent, out)
@@ -101,8 +91,3 @@ def find_target(out: str, stem: str = "frame") -> Target:
 def _check_folder(folder: Path, out: str) -> None:
     if not folder.is_dir():
         raise TargetError(f"cannot write `{out}`: there is no folder `{folder}`")
-
-
-def _filled(pattern: str, frame: int) -> str:
-    parts = pattern.split("%%")
-    return "%".join(_NUMBER.sub(lambda found: f"{frame:{found[1] or 'd'}}", part) for part in parts)

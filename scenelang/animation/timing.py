@@ -27,11 +27,7 @@ class FrameRange:
 
     @classmethod
     def parse(cls, text: str) -> FrameRange:
-        """``a..b`` inclusive, ``a..<b`` without b, ``a..`` to the end, or ``a`` alone.
-
-        Raises:
-            FramesError: it has none of these forms, or is empty.
-        """
+        """``a..b`` inclusive, ``a..<b`` without b, ``a..`` to the end, or ``a``; else `FramesError`."""
         found = _RANGE.fullmatch(text)
         if found is None or (found[2] and found[3] is None):
             raise FramesError(f"`{text}` is not a range of frames such as 0..23, 0..<24, 12.. or 7")
@@ -46,11 +42,7 @@ class FrameRange:
         return cls(first, last)
 
     def among(self, frames: int) -> range:
-        """The numbers in an animation of ``frames`` frames.
-
-        Raises:
-            FramesError: some are outside it.
-        """
+        """The numbers in an animation of ``frames`` frames; raises `FramesError` if some are outside it."""
         last = frames - 1 if self.last is None else self.last
         outside = self.first if self.first >= frames else last if last >= frames else None
         if outside is not None:
@@ -62,13 +54,7 @@ def delays(count: int, fps: float, per_second: int, shortest: int = 1) -> list[i
     """Ticks that each frame is shown for; 0 where it is left out, as it would be shorter than ``shortest``.
 
     When a frame starts is rounded by itself, so that errors do not add up and the whole is as long as it
-    should be.
-
-    Args:
-        count: number of frames, at least 1.
-        fps: frames a second.
-        per_second: ticks a second.
-        shortest: ticks a frame is shown for at least; the animation as a whole may not be shorter.
+    should be, but no shorter than ``shortest``.
     """
     step = Fraction(per_second) / Fraction(fps)
     at = [math.floor(i * step + Fraction(1, 2)) for i in range(count + 1)]

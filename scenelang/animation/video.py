@@ -4,31 +4,22 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 from collections.abc import Callable
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen, run
 from typing import Final
 
 import numpy as np
 
-from scenelang.animation.pictures import Film, Pixels
-from scenelang.backend.errors import RenderError
+from scenelang.animation.store import Film, Pixels
+from scenelang.backend.options import RenderError
 
 _H264: Final = ("libx264", "-preset", "medium", "-crf", "16")
 _OTHERS: Final = (("libopenh264", "-b:v", "8M"), ("mpeg4", "-q:v", "2"))
 _VP9: Final = ("libvpx-vp9", "-crf", "18", "-b:v", "0", "-row-mt", "1")
-_BT709: Final = (
-    "-colorspace",
-    "bt709",
-    "-color_primaries",
-    "bt709",
-    "-color_trc",
-    "bt709",
-    "-color_range",
-    "tv",
-)
+_SCALE: Final = "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp"
 _FORMATS: Final = {".mp4": "mp4", ".m4v": "mp4", ".mov": "mov", ".mkv": "matroska", ".webm": "webm"}
 MISSING: Final = "video needs ffmpeg, which is not on the PATH: install it, or pip install 'scenelang[video]'"
 
@@ -39,11 +30,7 @@ class NoFfmpeg(RenderError):
 
 @lru_cache(maxsize=1)
 def find_ffmpeg() -> str:
-    """The ffmpeg on the PATH, or else the one that imageio-ffmpeg brings.
-
-    Raises:
-        NoFfmpeg: there is neither.
-    """
+    """The ffmpeg on the PATH, or the one that imageio-ffmpeg brings; raises `NoFfmpeg` without either."""
     found = shutil.which("ffmpeg")
     if found is not None:
         return found
@@ -57,73 +44,44 @@ def find_ffmpeg() -> str:
 
 @lru_cache(maxsize=1)
 def _encoders(ffmpeg: str) -> frozenset[str]:
-    done = subprocess.run(
-        [ffmpeg, "-hide_banner", "-encoders"],
-        capture_output=True,
-        text=True,
-        errors="replace",
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
-    return frozenset(words[1] for line in done.stdout.splitlines() if len(words := line.split()) > 1)
+    command = [ffmpeg, "-hide_banner", "-encoders"]
+    done = run(command, capture_output=True, check=False, stdin=DEVNULL)
+    lines = done.stdout.decode(errors="replace").splitlines()
+    return frozenset(words[1] for line in lines if len(words := line.split()) > 1)
 
 
-def _codec(ffmpeg: str, suffix: str) -> tuple[str, ...]:
+def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
+    """An ffmpeg that can write files of a suffix, and its options for that; raises `NoFfmpeg` without."""
+    ffmpeg = find_ffmpeg()
     known = _encoders(ffmpeg)
     wanted = (_VP9,) if suffix == ".webm" else (_H264, *_OTHERS)
     for codec in wanted:
         if codec[0] in known:
-            return codec
+            return ffmpeg, codec
     raise NoFfmpeg(f"`{ffmpeg}` has no encoder {' or '.join(c[0] for c in wanted)}, which {suffix} needs")
-
-
-def check_video(suffix: str) -> None:
-    """Find an ffmpeg that can write files of this suffix.
-
-    Raises:
-        NoFfmpeg: there is none.
-    """
-    _codec(find_ffmpeg(), suffix)
 
 
 def write_video(film: Film, part: Path, progress: Callable[[float], None], *, suffix: str) -> None:
     """Encode a film as 4:2:0 video with BT.709 colours; only WebM keeps alpha, the others lie over white.
 
-    A side of odd length gets one more row or column, a copy of its neighbour.
-
-    Args:
-        suffix: ``.mp4``, ``.mov``, ``.mkv`` or ``.webm``.
-
-    Raises:
-        NoFfmpeg: there is none, or it lacks an encoder.
-        RenderError: it fails.
+    A side of odd length gets one more row or column, a copy of its neighbour. Raises `NoFfmpeg`, or
+    `RenderError` where it fails.
     """
-    ffmpeg = find_ffmpeg()
-    codec = _codec(ffmpeg, suffix)
+    ffmpeg, codec = find_codec(suffix)
     keeps = film.alpha and suffix == ".webm"
     width, height = (side + side % 2 for side in film.size)
     command = [
         *(ffmpeg, "-hide_banner", "-loglevel", "error", "-nostdin", "-y"),
         *("-f", "rawvideo", "-pix_fmt", "rgba" if keeps else "rgb24", "-s", f"{width}x{height}"),
         *("-r", str(Fraction(film.fps).limit_denominator(100_000)), "-i", "-"),
-        *(
-            "-vf",
-            "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp",
-        ),
-        *("-c:v", *codec, "-pix_fmt", "yuva420p" if keeps else "yuv420p"),
+        *("-vf", _SCALE, "-c:v", *codec, "-pix_fmt", "yuva420p" if keeps else "yuv420p"),
         *(("-auto-alt-ref", "0") if keeps else ()),
-        *_BT709,
+        *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
         *(("-movflags", "+faststart") if _FORMATS[suffix] in ("mp4", "mov") else ()),
         *("-f", _FORMATS[suffix], os.fspath(part)),
     ]
     # in a session of its own, so that Ctrl-C reaches us alone and we end it
-    with subprocess.Popen(
-        command,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    ) as process:
+    with Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=PIPE, start_new_session=True) as process:
         assert process.stdin is not None
         assert process.stderr is not None
         try:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from scenelang.animation.pictures import Film
+from scenelang.animation.store import Film
 from scenelang.animation.timing import delays, runs
 
 PER_SECOND = 1000

@@ -1,6 +1,6 @@
 """Drawing frames in other processes.
 
-Each is a plain ``python -m scenelang.animation.worker`` that gets compiled Programs through a pipe, and
+Each is a plain ``python -m scenelang.animation.workers`` that gets compiled Programs through a pipe, and
 ends when its pipe does, so that none outlives this process. Processes of `concurrent.futures` would run an
 embedder's main module again, and stay behind where this one is killed.
 """
@@ -8,35 +8,32 @@ embedder's main module again, and stay behind where this one is killed.
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
-from typing import TYPE_CHECKING
+from typing import Any
 
-from scenelang.backend.errors import RenderError
-
-if TYPE_CHECKING:
-    from scenelang.program.program import Program
+from scenelang.animation.painting import paint
+from scenelang.animation.store import put_frame
+from scenelang.backend.options import RenderError
+from scenelang.program.program import Program, parse_program, program_bytes
+from scenelang.renderers.draw import Kept
 
 AHEAD = 2  # frames that wait for each process, so that none is idle and few are held
 
 
 class Workers:
-    """Processes that draw Programs into files.
-
-    Args:
-        count: of processes.
-        split: how many threads a picture is split for; each draws with one, and the same pixels.
-    """
+    """Processes that draw Programs into files, each with one thread and the pixels of ``split`` threads."""
 
     def __init__(self, count: int, split: int) -> None:
         self.count, self.split = count, split
         self._free: SimpleQueue[subprocess.Popen[bytes]] = SimpleQueue()
         # in sessions of their own: Ctrl-C reaches this process alone, which ends the others
-        command, pipe = [sys.executable, "-m", "scenelang.animation.worker"], subprocess.PIPE
+        command, pipe = [sys.executable, "-m", "scenelang.animation.workers"], subprocess.PIPE
         self._all = [
             subprocess.Popen(command, stdin=pipe, stdout=pipe, start_new_session=True) for _ in range(count)
         ]
@@ -53,23 +50,13 @@ class Workers:
         return len(self._waiting)
 
     def submit(self, program: Program, file: Path) -> None:
-        """Have a Program drawn to a picture file; waits while many are under way.
-
-        Raises:
-            RenderError, OSError: an earlier one failed.
-        """
-        from scenelang.program.program import program_bytes
-
+        """Have a Program drawn to a picture file; waits while many are under way. Raises as `take`."""
         while len(self._waiting) >= AHEAD * self.count:
             self.take()
         self._waiting.append(self._pool.submit(self._draw, program_bytes(program), file))
 
     def take(self) -> None:
-        """Wait for the first of those asked for.
-
-        Raises:
-            RenderError, OSError: it failed.
-        """
+        """Wait for the first of those asked for; raises the `RenderError` or `OSError` by which it failed."""
         self._waiting.popleft().result()
 
     def _draw(self, program: bytes, file: Path) -> None:
@@ -104,3 +91,36 @@ class Workers:
         self._pool.shutdown()
         for process in self._all:
             process.communicate()
+
+
+def main() -> None:
+    """Read a line of JSON and a Program, draw, answer in a line, until the input ends."""
+    # Answers go where standard output went; whatever prints goes to standard error.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    kept, source = Kept(), sys.stdin.buffer
+    while line := source.readline():
+        head = json.loads(line)
+        program = source.read(head["bytes"])
+        if len(program) < head["bytes"]:
+            return
+        try:
+            answers.write(json.dumps(_answer(head, program, kept)).encode() + b"\n")
+            answers.flush()
+        except BrokenPipeError:  # whoever asked is gone
+            os._exit(0)
+
+
+def _answer(head: dict[str, Any], data: bytes, kept: Kept) -> dict[str, Any]:
+    file = Path(head["file"])
+    try:
+        put_frame(file, paint(parse_program(data), "cpu", threads=1, split=head["split"], kept=kept))
+    except RenderError as error:
+        return {"error": str(error)}
+    except OSError as error:
+        return {"error": error.strerror or str(error), "errno": error.errno or 5, "file": str(file)}
+    return {}
+
+
+if __name__ == "__main__":
+    main()

@@ -12,20 +12,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 
-from scenelang.backend.errors import RenderError
+from scenelang.backend.options import RenderError
 
 try:
     import torch
 except ModuleNotFoundError as error:
     raise RenderError("this is drawn by torch, which is not installed; pip install torch") from error
-from scenelang.backend.memory import keep_memory
-from scenelang.backend.memory import usable_cores as usable_cores
-from scenelang.backend.options import Samples
+from scenelang.backend.options import Samples, keep_memory
+from scenelang.backend.options import usable_cores as usable_cores
 from scenelang.models.load import Model, ModelError, load_model, place_of
 from scenelang.program.program import Program, ProgramError
-from scenelang.renderers.draw import Drawing, draw_objects
+from scenelang.renderers.draw import Drawing, Kept, draw_objects
 from scenelang.renderers.framed import Framed
-from scenelang.renderers.kept import Kept
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.renderers.whole import draw_whole
 
@@ -104,8 +102,6 @@ def draw_program(
     One drawing runs at a time, on all of ``threads``: torch's number of threads is the process's.
 
     Args:
-        program: compiled for this model's weights.
-        model: from `open_model`.
         threads: tiles drawn at the same time; by default one for each usable core.
         split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.

@@ -1,9 +1,43 @@
-"""How a picture may be drawn."""
+"""How a picture may be drawn, why it cannot be, and how the C library gives memory back."""
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import Literal
 
 Backend = Literal["neural", "reference"]
 Device = Literal["auto", "cpu", "cuda"]
 Samples = Literal["adaptive", "four", "one"]
+
+
+class RenderError(Exception):
+    """Nothing can be drawn: no such device, no fitting weights, or a Program where a Scene is needed."""
+
+
+KEEP_BYTES = 256 << 20
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
+
+
+def keep_memory() -> bool:
+    """Have glibc reuse blocks up to `KEEP_BYTES` instead of giving each back to the kernel.
+
+    Otherwise every operation on a large array pays a page fault for every 4 KB of its result. False where
+    the C library is another or did not take it.
+    """
+    import ctypes
+
+    try:
+        if not sys.platform.startswith("linux") or not (os.confstr("CS_GNU_LIBC_VERSION") or ""):
+            return False
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError, ValueError):
+        return False  # musl has neither the name nor the function
+    return all(mallopt(option, KEEP_BYTES) == 1 for option in (_M_MMAP_THRESHOLD, _M_TRIM_THRESHOLD))
+
+
+def usable_cores() -> int:
+    """Cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

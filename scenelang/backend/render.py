@@ -5,13 +5,40 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, get_args
 
-from scenelang.backend.errors import RenderError
-from scenelang.backend.options import Backend, Device, Samples
+from scenelang.backend.options import Backend, Device, RenderError, Samples
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.scene.schema import Scene
 
 if TYPE_CHECKING:
+    from scenelang.graph.lower import Spans
     from scenelang.image import Image
     from scenelang.program.program import Program
+
+
+def draw_exact(scene: Scene, *, spans: Spans | None = None, model: str | None = None) -> Image:
+    """Draw a scene by the exact definition, from its graph as written, before any pass.
+
+    Args:
+        model: take names from this model instead of the one the scene names.
+
+    Raises:
+        SceneError: the scene uses what its model does not have.
+        RenderError: there is no picture from where the eye is.
+    """
+    from scenelang.graph.lower import lower
+    from scenelang.program.compile import find_model
+    from scenelang.reference.image import reference_image
+
+    found = Diagnostics()
+    manifest = find_model(scene, found, model=model, spans=spans)
+    graph = lower(scene, manifest, spans, found) if manifest is not None else None
+    if graph is None or found.errors:
+        raise SceneError(found)
+    try:
+        return reference_image(graph)
+    except ValueError as error:
+        raise RenderError(str(error)) from None
 
 
 def render(
@@ -61,8 +88,6 @@ def render(
             raise ValueError("a size for a program, which is compiled for its canvas: give it with the scene")
         program_or_scene = program_or_scene.sized(size)
     if backend == "reference":
-        from scenelang.backend.exact import draw_exact
-
         if samples != "adaptive":
             raise RenderError("the reference always takes four samples a pixel")
         if not isinstance(program_or_scene, Scene):

@@ -10,16 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, Literal, NamedTuple
 
-from scenelang.backend.errors import RenderError
-from scenelang.backend.memory import keep_memory, usable_cores
-from scenelang.backend.options import Device, Samples
+from scenelang.backend.options import Device, RenderError, Samples, keep_memory, usable_cores
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError
-from scenelang.program.program import Program, ProgramError
-from scenelang.program.work import load_of
-from scenelang.renderers.draw import Drawing, draw_objects
-from scenelang.renderers.kept import Kept
+from scenelang.program.program import Program, ProgramError, load_of
+from scenelang.renderers.draw import Drawing, Kept, draw_objects
 
 MOST_MS: Final = 250.0
 """Work up to which numpy draws: a quarter of the least that importing torch was seen to take."""
@@ -83,8 +79,6 @@ def draw_small(
         program: of any size, for a model with a framed or a solids' network.
         samples: of a pixel: four near outlines, four everywhere, or one.
         kept: the picture before this one, of which tiles that show the same are taken over.
-        progress: called with the share done, in [0, 1], from any thread.
-        threads: bands of solids drawn at the same time; by default one for each usable core.
 
     Raises:
         RenderError: its model's weights are missing, or it was compiled for others or by no compiler.

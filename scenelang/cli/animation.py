@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from scenelang.animation.run import RenderResult
     from scenelang.backend.options import Backend, Device
 
-SIZES = ("B", "kB", "MB", "GB")
-
 
 @dataclass(frozen=True, slots=True)
 class Requested:
@@ -55,11 +53,7 @@ class Requested:
 
     @property
     def frames(self) -> FrameRange:
-        """Which frames.
-
-        Raises:
-            click.UsageError: the range is not one.
-        """
+        """Which frames; raises `click.UsageError` where the range is not one."""
         try:
             return FrameRange() if self.range is None else FrameRange.parse(self.range)
         except FramesError as error:
@@ -69,8 +63,7 @@ class Requested:
 def wanted_target(name: str, out: str, wanted: Requested) -> Target | None:
     """Where the animation of a scene goes if it has one; None where ``out`` is a single picture.
 
-    Raises:
-        click.UsageError: frames are asked for, and ``out`` holds one picture.
+    Raises `click.UsageError` where frames are asked for all the same.
     """
     folder = out.endswith(("/", "\\")) or Path(out).is_dir()
     if not (is_animation(out) or folder or wanted.certain):
@@ -84,8 +77,7 @@ def wanted_target(name: str, out: str, wanted: Requested) -> Target | None:
 def still_picture(clip: Clip, target: Target, wanted: Requested, out: str) -> bool:
     """Whether a scene without an animation is drawn as one picture; reports where it cannot be.
 
-    Raises:
-        click.UsageError: ``out`` cannot hold one.
+    Raises `click.UsageError` where ``out`` cannot hold one.
     """
     if clip.animates:
         return False
@@ -213,8 +205,8 @@ def strays(target: Target, made: RenderResult) -> str | None:
 
 def readable(size: float) -> str:
     """Human-readable byte count."""
-    for unit in SIZES:
-        if size < 1000 or unit == SIZES[-1]:
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000 or unit == "GB":
             break
         size /= 1000
     return f"{size:.0f} {unit}" if size >= 100 or unit == "B" else f"{size:.1f} {unit}"

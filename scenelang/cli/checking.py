@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
@@ -12,7 +11,7 @@ from scenelang.cli.inputs import STDIN, Request, merged, read_input, read_text, 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import Settled, settle
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.inputs import Defines
+from scenelang.evaluate.session import Defines
 from scenelang.program.check import Frames, check_evaluated
 from scenelang.records import Record
 
@@ -47,11 +46,7 @@ class Scenes(Record, frozen=False):
     """How many frames that were to be looked at were not, as they exceed the limits of one scene."""
 
     def read(self, name: str) -> None:
-        """Take a scene in, once under any name.
-
-        Raises:
-            OSError: it cannot be opened.
-        """
+        """Take a scene in, once under any name; raises `OSError` where it cannot be opened."""
         place = _place(name)
         if place in self.names:
             return
@@ -69,13 +64,14 @@ class Scenes(Record, frozen=False):
         request = replace(self.request, defines=Defines(self.request.defines.values), texts=texts)
         parts, self.unseen = [self.unread.items], 0
         for name, source in sources.items():
-            items, unseen = _find(name, source, request, self.frames)
-            parts.append(items)
-            self.unseen += unseen
+            found = read_input(name, request, source=source)
+            facts = found.tree, found.evaluation, found.scene, found.spans, found.diagnostics
+            self.unseen += check_evaluated(*facts, model=request.model, frames=self.frames)
+            parts.append(found.diagnostics.items)
         parts.append(unused_defines(request))
-        found = merged(parts)
-        found.items[:] = [d for d in found.items if self.selection.keeps(d)]
-        return found
+        every = merged(parts)
+        every.items[:] = [d for d in every.items if self.selection.keeps(d)]
+        return every
 
     def owner(self, diagnostic: Diagnostic) -> str | None:
         """The name of the scene that a diagnostic is in; None for an import that was not named."""
@@ -100,29 +96,3 @@ class Scenes(Record, frozen=False):
 
 def _place(name: str) -> str:
     return name if name == STDIN else os.path.realpath(name)
-
-
-def _find(name: str, source: SourceFile, request: Request, frames: Frames) -> tuple[list[Diagnostic], int]:
-    """What there is to say of one scene, and how many of its frames were to be looked at and were not."""
-    found = read_input(name, request, source=source)
-    left = check_evaluated(
-        found.tree,
-        found.evaluation,
-        found.scene,
-        found.spans,
-        found.diagnostics,
-        model=request.model,
-        frames=frames,
-    )
-    return found.diagnostics.items, left
-
-
-def in_bytes(text: str, path: Path) -> bytes:
-    """What a file holds with a new text; a byte order mark stays.
-
-    Raises:
-        OSError: the file cannot be opened.
-    """
-    with path.open("rb") as file:
-        marked = file.read(3) == codecs.BOM_UTF8
-    return (codecs.BOM_UTF8 if marked else b"") + text.encode("utf-8")

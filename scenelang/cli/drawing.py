@@ -6,58 +6,22 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenelang.cli.clock import Clock
+import click
+
 from scenelang.cli.inputs import Request
-from scenelang.cli.jobs import Job
+from scenelang.cli.jobs import Job, program_notes
+from scenelang.cli.progress import Clock
 from scenelang.cli.say import say_trouble
+from scenelang.diagnostics.error import SceneError
 
 if TYPE_CHECKING:
     from scenelang.backend.options import Device, Samples
     from scenelang.image import Image
-    from scenelang.measure.frontier import Limits
+    from scenelang.measure.choose import Choice
+    from scenelang.measure.frontier import Frontier, Limits, Point
+    from scenelang.program.program import Program
 
 Draw = Callable[[Job, Callable[[float], None]], "Image"]
-
-
-def chosen(
-    limits: Limits,
-    request: Request,
-    clock: Clock,
-    threads: int | None,
-    ready: list[tuple[Job, Path]],
-    code: int,
-) -> tuple[Draw, list[tuple[Job, Path]], int]:
-    """How to draw by the frontier, the scenes that it draws, and the exit code.
-
-    Scenes that nothing on the frontier draws well or fast enough are reported and left out.
-
-    Args:
-        limits: what a picture may take.
-        request: what the command line says about every scene.
-        clock: takes the time.
-        threads: for drawing.
-        ready: compiled scenes and where their pictures go.
-        code: the exit code so far.
-    """
-    from scenelang.cli.choosing import choose_point
-    from scenelang.measure.cost import yardstick
-
-    with clock("choose"):
-        here_ms = yardstick()
-        points = {id(job): choose_point(job, limits, request.model, here_ms) for job, _ in ready}
-    for job, _ in ready:
-        if points[id(job)] is None:
-            say_trouble(f"{job.name}: {job.trouble}")
-            code = 2
-
-    def draw(job: Job, progress: Callable[[float], None]) -> Image:
-        point = points[id(job)]
-        assert point is not None
-        if point.backend == "reference":
-            return exact(request, clock)(job, progress)
-        return neural(clock, "cpu", threads, point.samples)(job, progress)
-
-    return draw, [(job, path) for job, path in ready if points[id(job)] is not None], code
 
 
 def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) -> Draw:
@@ -93,7 +57,7 @@ def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) 
 
 def exact(request: Request, clock: Clock) -> Draw:
     """Draw by the exact definition."""
-    from scenelang.backend.exact import draw_exact
+    from scenelang.backend.render import draw_exact
 
     def draw(job: Job, progress: Callable[[float], None]) -> Image:
         assert job.source is not None
@@ -104,3 +68,137 @@ def exact(request: Request, clock: Clock) -> Draw:
         return image
 
     return draw
+
+
+# ---------------------------------------------------------------- by the frontier
+
+
+def check_options(ctx: click.Context, limits: Limits, device: str) -> None:
+    """Raise `click.UsageError` where an option that the frontier decides is given beside a limit."""
+    from click.core import ParameterSource
+
+    asked = "--max-ms" if limits.ms is not None else "--max-flip"
+    for name in ("backend", "samples"):
+        if limits and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"{asked} chooses the {name} itself; leave out --{name}.")
+    if limits and device == "cuda":
+        raise click.UsageError(f"{asked} knows processors only; leave out --device cuda.")
+
+
+def chosen(
+    limits: Limits,
+    request: Request,
+    clock: Clock,
+    threads: int | None,
+    ready: list[tuple[Job, Path]],
+    code: int,
+) -> tuple[Draw, list[tuple[Job, Path]], int]:
+    """How to draw by the frontier, the scenes that it draws, and the exit code.
+
+    Scenes that nothing on the frontier draws well or fast enough are reported and left out.
+    """
+    from scenelang.measure.choose import NothingFits, yardstick
+
+    points: dict[int, Point] = {}
+    with clock("choose"):
+        here_ms = yardstick()
+        for job, _ in ready:
+            try:
+                points[id(job)] = choose_point(job, limits, request.model, here_ms)
+            except NothingFits as error:
+                say_trouble(f"{job.name}: {error}")
+                code = 2
+
+    def draw(job: Job, progress: Callable[[float], None]) -> Image:
+        point = points[id(job)]
+        if point.backend == "reference":
+            return exact(request, clock)(job, progress)
+        return neural(clock, "cpu", threads, point.samples)(job, progress)
+
+    return draw, [(job, path) for job, path in ready if id(job) in points], code
+
+
+def choose_point(job: Job, limits: Limits, model: str | None, here_ms: float) -> Point:
+    """Choose how to draw a job, and compile it for the model that does; raises `NothingFits`.
+
+    ``model`` is the only one to choose where it is given; ``here_ms`` the yardstick's time on this machine.
+    """
+    from scenelang.measure.choose import NothingFits, machine_scale
+    from scenelang.measure.frontier import load_frontier
+
+    assert job.program is not None
+    name = job.program.model
+    try:
+        frontier = load_frontier(name)
+    except ValueError as error:
+        raise NothingFits(f"the frontier of `{name}` is damaged: {error}") from None
+    if frontier is None:
+        raise NothingFits(f"model `{name}` ships no frontier to choose from")
+    scale = machine_scale(frontier, here_ms)
+    choice, job.program = _chosen(frontier, job, job.program, limits, model, scale)
+    point = choice.offer.point
+    notes = program_notes(job.program, "chosen by the frontier") if point.backend == "neural" else []
+    told = f"this machine takes {scale:.2f} times as long as the one that was measured"
+    refused = [f"not in question: {name}: {why}" for name, why in choice.refused.items()]
+    job.notes = [*choice.notes, f"times are for one thread; {told}", *refused, *notes]
+    return point
+
+
+def _chosen(
+    frontier: Frontier, job: Job, program: Program, limits: Limits, model: str | None, scale: float
+) -> tuple[Choice, Program]:
+    """The best choice whose model draws the scene without further warnings, and its Program."""
+    from scenelang.measure.choose import choose, offers
+    from scenelang.program.program import load_of
+
+    refused: dict[str, str] = {}
+    able = []
+    for point in frontier.points:
+        why = _refusal(point, job, program, model)
+        if why is None:
+            able.append(point)
+        elif point.offered:  # the others are for charts only
+            refused[point.name] = why
+    found = offers(able, load_of(program), program.canvas, scale)
+    while True:
+        choice = choose(found, limits, refused)
+        point = choice.offer.point
+        compiled = _compiled(job, program, point)
+        if not isinstance(compiled, str):
+            return choice, compiled
+        refused |= {o.point.name: compiled for o in found if o.point.model == point.model}
+        found = [offer for offer in found if offer.point.model != point.model]
+
+
+def _refusal(point: Point, job: Job, program: Program, model: str | None) -> str | None:
+    """Why a point is not in question."""
+    from scenelang.measure.choose import refusal
+    from scenelang.models.manifest import available, load_manifest
+
+    if model is not None and point.model != model:
+        return f"--model {model}"
+    if point.model is not None and point.model not in available():
+        return "not installed"
+    manifest = load_manifest(point.model) if point.model is not None else None
+    scene = job.source.scene if job.source is not None else None
+    return refusal(point, manifest, scene, program.model if scene is None else None)
+
+
+def _compiled(job: Job, program: Program, point: Point) -> Program | str:
+    """The Program for a point's model; the reason where it cannot draw the scene as promised."""
+    if point.model in (None, program.model):
+        return program
+    from scenelang.diagnostics.diagnostic import Diagnostics
+    from scenelang.program.compile import compile_scene
+
+    source = job.source
+    assert source is not None
+    assert source.scene is not None
+    found = Diagnostics()
+    try:
+        made = compile_scene(source.scene, spans=source.spans, diagnostics=found, model=point.model)
+    except SceneError:
+        return found.errors[0].message
+    told = {d.code for d in job.diagnostics}
+    # a warning that the scene's own model does not give: this one is outside what it was trained on
+    return next((d.message for d in found.items if d.code not in told), made)

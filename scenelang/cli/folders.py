@@ -10,29 +10,20 @@ SUFFIX: Final = ".nsg"
 
 
 def named(paths: Iterable[str], lost: Callable[[OSError], None]) -> Iterator[str]:
-    """The scenes of a command line; ``lost`` is told of folders that cannot be listed."""
+    """The scenes of a command line: files, ``-`` too, and those in folders by name; no hidden ones or links.
+
+    ``lost`` is told of folders that cannot be listed.
+    """
     for path in paths:
+        if not os.path.isdir(path):
+            yield path
+            continue
         try:
-            yield from scenes(path)
+            with os.scandir(path) as entries:
+                found = sorted(entries, key=lambda entry: entry.name)
         except OSError as error:
             lost(error)
-
-
-def scenes(path: str) -> Iterator[str]:
-    """A file itself, ``-`` too, or the scenes of a folder by name; hidden ones and links are left out.
-
-    Raises:
-        OSError: a folder cannot be listed.
-    """
-    if not os.path.isdir(path):
-        yield path
-        return
-    with os.scandir(path) as entries:
-        found = sorted(entries, key=lambda entry: entry.name)
-    for entry in found:
-        if entry.name.startswith(".") or entry.is_symlink():
             continue
-        if entry.is_dir():
-            yield from scenes(entry.path)
-        elif entry.name.endswith(SUFFIX) and entry.is_file():
-            yield entry.path
+        shown = [entry for entry in found if not (entry.name.startswith(".") or entry.is_symlink())]
+        inside = [e.path for e in shown if e.is_dir() or (e.name.endswith(SUFFIX) and e.is_file())]
+        yield from named(inside, lost)

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 
-from scenelang.cli.clock import Clock
+from scenelang.cli.progress import Clock
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.evaluation import Evaluation
-from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.evaluate.loader import Unreadable, decode_source, read_source
+from scenelang.evaluate.session import Defines
 from scenelang.files import note_input
 from scenelang.records import Record
 from scenelang.scene.schema import Scene
@@ -39,7 +39,6 @@ class Request(Record):
 class Input(Record, frozen=False):
     """A scene as it was read."""
 
-    name: str  # as the user wrote it
     tree: nodes.File | None = None  # None if it is not text
     scene: Scene | None = None  # None if it has errors
     spans: SpanMap = field(default_factory=SpanMap)  # where its nodes were written
@@ -53,11 +52,7 @@ def stem_of(name: str) -> str:
 
 
 def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
-    """The text of a scene; None after a report that it cannot be read as text.
-
-    Raises:
-        OSError: it cannot be opened.
-    """
+    """The text of a scene, None after a report that it is not text; raises `OSError` if it cannot be read."""
     try:
         if name == STDIN:
             note_input("/dev/stdin")  # which may be a file, by `<`
@@ -74,59 +69,40 @@ def read_input(
 ) -> Input:
     """Read one scene: text is evaluated, JSON (by its suffix, or `{` first in standard input) just read.
 
-    Args:
-        name: as the user wrote it.
-        request: what the command line says about every scene.
-        clock: takes the time.
-        source: its text, where it was read before.
-
-    Raises:
-        OSError: it cannot be opened.
+    ``source`` is its text, where it was read before. Raises `OSError` where it cannot be opened.
     """
     clock = clock or Clock()
-    found = Input(name)
+    found = Input()
     path = None if name == STDIN else Path(name)
     if source is None:
         source = read_text(name, found.diagnostics)
     if source is None:
         return found
     if name.endswith(JSON) or (path is None and source.text.lstrip()[:1] == "{"):
+        from scenelang.scene.json import load_json
+
+        if request.frame:
+            fact = f"frame {request.frame} of a scene from JSON, which is one frame"
+            found.diagnostics.add("E0337", fact, None, help="convert that frame of the animation to JSON")
         with clock("read"):
-            scene, spans = _from_json(source, request, found.diagnostics)
-        return _with_scene(found, scene, spans, request)
-    with clock("parse"):
-        found.tree = tree = parse(source, found.diagnostics)
-    folder = request.root if request.root is not None else "." if path is None else None
-    with clock("evaluate"):
-        found.evaluation = evaluation = Evaluation(
-            tree,
-            diagnostics=found.diagnostics,
-            defines=request.defines,
-            model=request.model,
-            root=None if folder is None else Path(folder),
-            path=path,
-            frame=request.frame,
-            replays=True,
-            texts=request.texts,
-        )
-        scene, spans = evaluation.run(request.frame)
-    return _with_scene(found, scene, spans, request)
-
-
-def _from_json(
-    source: SourceFile, request: Request, diagnostics: Diagnostics
-) -> tuple[Scene | None, SpanMap]:
-    """The scene of JSON text, which has one frame and no params."""
-    from scenelang.scene.json import load_json
-
-    if request.frame:
-        fact = f"frame {request.frame} of a scene from JSON, which is one frame"
-        diagnostics.add("E0337", fact, None, help="convert that frame of the animation to JSON")
-    return load_json(source, Scene, diagnostics)
-
-
-def _with_scene(found: Input, scene: Scene | None, spans: SpanMap, request: Request) -> Input:
-    """The input with its scene, in the size that was asked for."""
+            scene, spans = load_json(source, Scene, found.diagnostics)
+    else:
+        with clock("parse"):
+            found.tree = tree = parse(source, found.diagnostics)
+        folder = request.root if request.root is not None else "." if path is None else None
+        with clock("evaluate"):
+            found.evaluation = evaluation = Evaluation(
+                tree,
+                diagnostics=found.diagnostics,
+                defines=request.defines,
+                model=request.model,
+                root=None if folder is None else Path(folder),
+                path=path,
+                frame=request.frame,
+                replays=True,
+                texts=request.texts,
+            )
+            scene, spans = evaluation.run(request.frame)
     if scene is None or found.diagnostics.errors:
         return found
     if request.size is not None:

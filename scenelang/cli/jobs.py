@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,21 +11,34 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli.clock import Clock
 from scenelang.cli.inputs import Input, Request, read_input, unused_defines
+from scenelang.cli.progress import Clock
 from scenelang.cli.say import say_diagnostics
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.graph.nodes import Graph, Leaf
-from scenelang.graph.walk import nodes
+from scenelang.graph.nodes import Graph, Leaf, nodes
 from scenelang.models.choose import why_chosen
+from scenelang.passes import PASSES
 from scenelang.program.compile import compile_scene
 
 if TYPE_CHECKING:
     from scenelang.program.program import Program
 
 PROGRAM = ".safetensors"
+STAGES = ("syntax", "scene", "lower", *(step.name for step in PASSES), "program")
+"""Of the compiler, in order: the syntax tree, the scene, the graph after each pass, the program."""
+
+
+def check_stages(wanted: Collection[str], known: Collection[str] = STAGES) -> None:
+    """Raise `click.UsageError` for names that are none of the stages."""
+    for name in wanted:
+        if name not in known:
+            from difflib import get_close_matches
+
+            near = get_close_matches(name, known, 1)
+            advice = f" Did you mean `{near[0]}`?" if near else ""
+            raise click.UsageError(f"No stage `{name}`.{advice} There are {', '.join(known)}.")
 
 
 @dataclass(slots=True)
@@ -59,12 +72,9 @@ def prepare(
     verbose: bool = False,
     source: SourceFile | None = None,
 ) -> Job:
-    """Read an input and compile it if it is a scene.
+    """Read an input, a scene, ``-`` or a compiled program, and compile it if it is a scene.
 
     Args:
-        name: a scene, ``-``, or a compiled program.
-        request: what the command line says about every scene.
-        clock: takes the time.
         compiled: whether a scene has to be compiled to be drawn.
         verbose: keep the graphs, and make notes of what the passes did.
         source: the scene's text, where it was read before.
@@ -107,8 +117,7 @@ def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> tu
 
 
 def _stored(name: str, request: Request, clock: Clock) -> Job:
-    from scenelang.program.program import ProgramError
-    from scenelang.program.store import load_program
+    from scenelang.program.program import ProgramError, load_program
 
     try:
         with clock("load program"):
@@ -122,10 +131,9 @@ def _stored(name: str, request: Request, clock: Clock) -> Job:
     if request.size is not None:
         (width, height), (old_width, old_height) = request.size, program.canvas
         if width * old_height != height * old_width:
-            aspect = (
-                f"{width}x{height} has another shape than the {old_width}x{old_height} it was compiled for"
-            )
-            return Job(name, trouble=f"{aspect}; objects outside it are gone: compile the scene again")
+            old = f"the {old_width}x{old_height} it was compiled for"
+            advice = "objects outside it are gone: compile the scene again"
+            return Job(name, trouble=f"{width}x{height} has another shape than {old}; {advice}")
         program = replace(program, canvas=request.size)
     return Job(name, program=program, notes=program_notes(program, "named by the program"))
 
@@ -155,7 +163,7 @@ def _pass_notes(graphs: dict[str, Graph]) -> Iterator[str]:
     """A line for each pass that changed the number of objects, folds or moves."""
     before = None
     for name, graph in graphs.items():
-        found = [node for node, _ in nodes(graph.root)]
+        found = list(nodes(graph.root))
         objects = sum(isinstance(node, Leaf) for node in found)
         counts = (objects, len(found) - objects, sum(len(node.moves) for node in found))
         if counts != before:

@@ -8,11 +8,12 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from keyword import iskeyword
+from types import MappingProxyType
 from typing import Any, Final
 
 import click
 
-from scenelang.backend.errors import RenderError
+from scenelang.backend.options import RenderError
 from scenelang.files import NotWritten, inputs_kept
 
 # Command -> what `--help` says. Each is `command` in a file of its name, imported when it is called; the file
@@ -48,27 +49,19 @@ class Trouble(click.ClickException):
 
 
 class Commands(click.Group):
-    """Commands that are imported when they are called.
-
-    Args:
-        package: that their files lie in.
-        table: command -> what `--help` says.
-        elsewhere: modules of commands that do not lie there.
-        moved: what commands of before are called now.
-    """
+    """Commands that are imported when they are called."""
 
     def __init__(
         self,
         *,
-        package: str,
-        table: Mapping[str, str],
-        elsewhere: Mapping[str, str] | None = None,
-        moved: Mapping[str, str] | None = None,
+        package: str,  # that their files lie in
+        table: Mapping[str, str],  # command -> what `--help` says
+        elsewhere: Mapping[str, str] = MappingProxyType({}),  # modules of commands that do not lie there
+        moved: Mapping[str, str] = MappingProxyType({}),  # what commands of before are called now
         **options: Any,
     ) -> None:
         super().__init__(**options)
-        self.package, self.table = package, table
-        self.elsewhere, self.moved = elsewhere or {}, moved or {}
+        self.package, self.table, self.elsewhere, self.moved = package, table, elsewhere, moved
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.table)
@@ -101,11 +94,7 @@ class Commands(click.Group):
 
 class _Commands(Commands):
     def make_context(
-        self,
-        info_name: str | None,
-        args: list[str],
-        parent: click.Context | None = None,
-        **extra: Any,
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
     ) -> click.Context:
         with _reporting():
             return super().make_context(info_name, args, parent, **extra)
@@ -165,11 +154,7 @@ def cli() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run a command and exit.
-
-    Args:
-        arguments: as after ``scenelang``; by default the process's.
-    """
+    """Run a command, by default with the process's arguments, and exit."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a scene's text may not fit the terminal's encoding
             stream.reconfigure(errors="backslashreplace")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 if TYPE_CHECKING:
-    from scenelang.evaluate.inputs import Defines
+    from scenelang.evaluate.session import Defines
 
 Backend = Literal["neural", "reference"]
 Color = Literal["auto", "always", "never"]
@@ -29,7 +29,7 @@ def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tupl
 
 
 def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Defines:
-    from scenelang.evaluate.inputs import Defines
+    from scenelang.evaluate.session import Defines
 
     found: dict[str, str] = {}
     for value in values:
@@ -38,6 +38,12 @@ def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
             raise click.BadParameter(f"`{value}` is not NAME=value", ctx, param)
         found[name.strip()] = text.strip()
     return Defines(found)
+
+
+def choice(*names: str, words: str, help: str | None = None) -> Callable[..., Any]:
+    """An option that takes one of some words, the first of them by default."""
+    known = words.split()
+    return click.option(*names, type=click.Choice(known), default=known[0], show_default=True, help=help)
 
 
 define = click.option(
@@ -75,26 +81,18 @@ fps = click.option(
     help="Frames a second instead of the scene's; its seconds stay.",
 )
 out = click.option("-o", "--out", metavar="OUT", help="A file instead of standard output.")
-color = click.option(
+color = choice(
     "--color",
-    type=click.Choice(["auto", "always", "never"]),
-    default="auto",
-    show_default=True,
+    words="auto always never",
     help="Colour what is printed; auto does so on terminals, unless NO_COLOR is set.",
 )
 strict = click.option("--strict", is_flag=True, help="Count warnings as errors.")
-backend = click.option(
-    "--backend",
-    type=click.Choice(["neural", "reference"]),
-    default="neural",
-    show_default=True,
-    help="Draw with the trained network, or by the exact definition.",
+backend = choice(
+    "--backend", words="neural reference", help="Draw with the trained network, or by the exact definition."
 )
-device = click.option(
+device = choice(
     "--device",
-    type=click.Choice(["auto", "cpu", "cuda"]),
-    default="auto",
-    show_default=True,
+    words="auto cpu cuda",
     help="Where torch draws; auto is CUDA where there is any, and numpy for a small picture.",
 )
 threads = click.option("--threads", type=click.IntRange(1), metavar="N", help="Threads on the CPU.")
@@ -110,17 +108,10 @@ def request(command: Callable[..., Any]) -> Callable[..., Any]:
     @model
     @root
     @wraps(command)
-    def with_request(
-        *arguments: Any,
-        defines: Defines,
-        size: tuple[int, int] | None,
-        frame: int,
-        model: str | None,
-        root: str | None,
-        **others: Any,
-    ) -> Any:
+    def with_request(*arguments: Any, **given: Any) -> Any:
         from scenelang.cli.inputs import Request
 
-        return command(*arguments, request=Request(defines, model, root, frame, size), **others)
+        own = {name: given.pop(name) for name in ("defines", "model", "root", "frame", "size")}
+        return command(*arguments, request=Request(**own), **given)
 
     return with_request

@@ -13,11 +13,9 @@ from scenelang.cli.inputs import stem_of
 
 
 def targets(names: Sequence[str], out: str) -> list[Path]:
-    """The file that each scene is drawn to; a folder for many scenes is made.
+    """The file that each scene is drawn to: ``out`` itself for one scene, else one in the folder ``out``.
 
-    Args:
-        names: of the scenes, as the user wrote them.
-        out: a file for one scene; a folder for many, or where it is there already or ends in a slash.
+    The folder is made if need be; for one scene it is one that is there, or ends in a slash.
 
     Raises:
         click.UsageError: no format has the suffix, two scenes have one name, or a file or link is in the way.
@@ -54,11 +52,7 @@ def targets(names: Sequence[str], out: str) -> list[Path]:
 
 
 def composed(file: Path) -> Path:
-    """A file whose name the user did not write.
-
-    Raises:
-        click.UsageError: it is a link, which may lead anywhere.
-    """
+    """A file whose name no user wrote; raises `click.UsageError` for a link, which may lead anywhere."""
     if file.is_symlink():
         raise click.UsageError(f"`{file}` is a link; it is followed only where -o names it.")
     return file

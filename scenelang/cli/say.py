@@ -13,14 +13,13 @@ import click
 
 from scenelang.diagnostics.diagnostic import Diagnostic
 
+_DIFF_STYLES = {"-": "removed", "+": "added", "@": "frame"}
+
 
 def wants_color(stream: IO[Any], choice: str = "auto") -> bool:
-    """Whether to colour what goes to a stream.
+    """Whether to colour what goes to a stream: ``always``, ``never``, or ``auto``.
 
-    Args:
-        stream: where it goes.
-        choice: ``always``, ``never``, or ``auto``: a terminal that can, whose user has not switched colours
-            off (https://no-color.org).
+    That is on a terminal that can, whose user has not switched colours off (https://no-color.org).
     """
     if choice != "auto":
         return choice == "always"
@@ -51,11 +50,7 @@ def say_trouble(message: str) -> None:
 
 
 def put_out(made: str | bytes, out: str | None) -> None:
-    """Write what a command made to a file, whole or not at all; ``-`` or none is standard output.
-
-    Raises:
-        OSError: the file cannot be written; nothing is left behind.
-    """
+    """Write what a command made to a file, whole or not at all; ``-`` or none is standard output."""
     if out is None or out == "-":
         click.echo(made, nl=False)
         return
@@ -69,3 +64,31 @@ def need_metrics() -> None:
     for name in ("flip_evaluator", "pytorch_msssim"):
         if importlib.util.find_spec(name) is None:
             raise click.UsageError(f"{name} is missing; pip install 'scenelang[eval]'")
+
+
+def difference(name: str, before: str, after: str) -> str:
+    """A unified diff, as `patch -p0` takes it; lines end at line feeds and nowhere else."""
+    from difflib import unified_diff
+
+    return "".join(
+        line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
+        for line in unified_diff(_lines(before), _lines(after), name, name)
+    )
+
+
+def _lines(text: str) -> list[str]:
+    """Lines with their ends; what follows the last line feed is a line only if it holds something."""
+    lines = [f"{line}\n" for line in text.split("\n")]
+    last = lines.pop()[:-1]
+    return [*lines, last] if last else lines
+
+
+def show_difference(name: str, before: str, after: str, color: str = "auto") -> None:
+    """Print a unified diff: exact into files and pipes, coloured, without control characters on terminals."""
+    from scenelang.diagnostics.cells import paint, printable
+
+    painted = wants_color(sys.stdout, color)
+    for line in difference(name, before, after).removesuffix("\n").split("\n"):
+        style = "bold" if line.startswith(("--- ", "+++ ")) else _DIFF_STYLES.get(line[:1], "")
+        safe = printable(line) if painted or sys.stdout.isatty() else line
+        click.echo(paint(style, safe, painted), color=True)

@@ -35,9 +35,7 @@ def printable(text: str) -> str:
     """Text without control characters and invisible ones that reorder it."""
     if text.isprintable():
         return text
-    return "".join(
-        char if char.isprintable() or char == " " else "\N{REPLACEMENT CHARACTER}" for char in text
-    )
+    return "".join(char if char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text)
 
 
 def paint(style: str, text: str, color: bool) -> str:
@@ -46,15 +44,10 @@ def paint(style: str, text: str, color: bool) -> str:
 
 
 class Line(Record):
-    """One source line in cells.
+    """One source line in cells."""
 
-    Args:
-        cells: what stands in each; empty behind a wide character.
-        starts: the cell of each code point, and after the last one where the line ends.
-    """
-
-    cells: Sequence[str]
-    starts: Sequence[int]
+    cells: Sequence[str]  # what stands in each; empty behind a wide character
+    starts: Sequence[int]  # the cell of each code point, and after the last one where the line ends
 
     def cell(self, column: int) -> int:
         """The cell of a column from 1; past the end the line goes on in single cells."""
@@ -92,12 +85,9 @@ def left_out(text: str, at: int) -> int:
 
 
 def window(line: Line, first: int, last: int, width: int) -> tuple[Sequence[str], int]:
-    """The part of a line that is shown, and how far to the left it moves.
+    """The part of a line that is shown in ``width`` cells, and how far to the left it moves.
 
-    Args:
-        line: the whole line.
-        first, last: the cells that should be seen; the first of them are where both do not fit.
-        width: cells at hand.
+    The cells from ``first`` to ``last`` should be seen; where not all fit, the first of them are.
     """
     cells = line.cells
     if len(cells) <= width:

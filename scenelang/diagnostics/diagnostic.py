@@ -69,8 +69,10 @@ def _cut(text: str) -> str:
 class Diagnostics:
     """An ordered collector; the same code at the same place is kept once, and of a file at most `MOST`."""
 
-    def __init__(self) -> None:
-        self.items: list[Diagnostic] = []
+    items: list[Diagnostic]
+
+    def __init__(self, items: Iterable[Diagnostic] = ()) -> None:
+        self.items = list(items)
         self._seen: set[tuple[str, str, int, int]] = set()
         self._counts: dict[tuple[str, str], int] = {}
 

@@ -8,11 +8,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic
 
 
 class SceneError(Exception):
-    """Raised by the library where a scene has errors; carries the diagnostics.
-
-    Args:
-        diagnostics: all that was found, errors and warnings.
-    """
+    """Raised by the library where a scene has errors; ``diagnostics`` is all that was found."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)

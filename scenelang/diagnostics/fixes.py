@@ -96,24 +96,16 @@ def _meets(taken: list[Edit], edit: Edit) -> bool:
 
 
 class Settled(Record, Generic[Key]):
-    """Texts after all their fixes.
+    """Texts after all their fixes."""
 
-    Args:
-        texts: what each file holds now.
-        applied: the diagnostics that were fixed, file by file, in the order of fixing.
-        left: what is still found.
-        stable: False where fixes undid each other and the last good texts are given.
-    """
-
-    texts: dict[Key, str]
-    applied: dict[Key, tuple[Diagnostic, ...]]
-    left: tuple[tuple[Key | None, Diagnostic], ...]
-    stable: bool
+    texts: dict[Key, str]  # what each file holds now
+    applied: dict[Key, tuple[Diagnostic, ...]]  # what was fixed, in the order of fixing
+    left: tuple[tuple[Key | None, Diagnostic], ...]  # what is still found
+    stable: bool  # False where fixes undid each other and the last good texts are given
 
 
 def settle(
-    texts: Mapping[Key, str],
-    check: Callable[[Mapping[Key, str]], Iterable[tuple[Key | None, Diagnostic]]],
+    texts: Mapping[Key, str], check: Callable[[Mapping[Key, str]], Iterable[tuple[Key | None, Diagnostic]]]
 ) -> Settled[Key]:
     """Apply fixes until none is left.
 

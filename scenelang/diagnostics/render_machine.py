@@ -85,15 +85,12 @@ def _escaped(text: str, further: str = "") -> str:
 
 
 def render_sarif(diagnostics: Iterable[Diagnostic], version: str | None = None) -> str:
-    """A SARIF 2.1.0 log with one run, its rules with the pages that explain them.
-
-    Args:
-        diagnostics: in any order.
-        version: the version of scenelang, where it should be stated.
-    """
+    """A SARIF 2.1.0 log with one run, its rules with the pages that explain them; states a ``version``."""
     found = in_order(diagnostics)
-    used = sorted({d.code for d in found})
-    driver: dict[str, Any] = {"name": "scenelang", "rules": [_rule(code) for code in used]}
+    severities = {d.code: d.severity for d in found}
+    used = sorted(severities)
+    rules = [_rule(code, severities[code]) for code in used]
+    driver: dict[str, Any] = {"name": "scenelang", "rules": rules}
     if version is not None:
         driver["version"] = version
     errors = sum(d.severity == "error" for d in found)
@@ -108,11 +105,11 @@ def render_sarif(diagnostics: Iterable[Diagnostic], version: str | None = None) 
     return json.dumps(log, indent=2, ensure_ascii=False) + "\n"
 
 
-def _rule(code: str) -> dict[str, Any]:
+def _rule(code: str, severity: str) -> dict[str, Any]:
     """What viewers show of a code: its title, what it means, its page."""
-    from scenelang.diagnostics.pages import read_page, severity_of
+    from scenelang.diagnostics.pages import read_page
 
-    rule: dict[str, Any] = {"id": code, "defaultConfiguration": {"level": severity_of(code)}}
+    rule: dict[str, Any] = {"id": code, "defaultConfiguration": {"level": severity}}
     try:
         page = read_page(code)
     except KeyError:  # a diagnostic of somebody else's making

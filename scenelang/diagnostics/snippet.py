@@ -25,13 +25,7 @@ _HEAD, _TAIL = 2, 1
 
 
 class Mark(Record):
-    """A place in a text.
-
-    Args:
-        span: where.
-        words: what is said there, or nothing.
-        primary: whether it is the place of the mistake itself.
-    """
+    """A place in a text, and what is said there; the primary one is that of the mistake itself."""
 
     span: Span
     words: str = ""
@@ -61,22 +55,14 @@ class _Note(Record, frozen=False):
 
 
 class Snippet:
-    """The marks of one file.
-
-    Args:
-        source: the file.
-        marks: at least one.
-        severity: style of the primary mark.
-        gutter: digits of the largest line number.
-        width: cells of the screen.
-    """
+    """The marks of one file, at least one, on a screen of ``width`` cells."""
 
     def __init__(
         self, source: SourceFile, marks: Sequence[Mark], severity: str, gutter: int, width: int
     ) -> None:
         self.source = source
-        self.severity = severity
-        self.gutter = gutter
+        self.severity = severity  # style of the primary mark
+        self.gutter = gutter  # digits of the largest line number
         self.notes: dict[int, list[_Note]] = {}
         self.bars: list[_Bar] = []
         self.laid: dict[int, tuple[Line, int]] = {}
@@ -246,26 +232,13 @@ def _beside(notes: Sequence[_Note]) -> _Note | None:
 
 
 def draw(marks: Iterable[Mark], severity: str, gutter: int, width: int, color: bool) -> list[str]:
-    """The marks of one diagnostic, file by file; the file of the primary mark comes first.
-
-    Args:
-        marks: the primary one first.
-        severity: style of the primary mark.
-        gutter: digits of the largest line number.
-        width: cells of the screen.
-        color: with ANSI colours.
-    """
-    files: list[tuple[SourceFile, list[Mark]]] = []
+    """The marks of one diagnostic, the primary one first, file by file; see `Snippet`."""
+    files: dict[SourceFile, list[Mark]] = {}
     for mark in marks:
-        source = mark.span.source
-        own = next((found for known, found in files if known is source), None)
-        if own is None:
-            files.append((source, [mark]))
-        else:
-            own.append(mark)
+        files.setdefault(mark.span.source, []).append(mark)
     blank = paint("frame", " " * gutter + " |", color)
     rows = []
-    for index, (source, own) in enumerate(files):
+    for index, (source, own) in enumerate(files.items()):
         line, column = own[0].span.locate()[0]
         arrow = paint("frame", " " * gutter + (":::" if index else "-->"), color)
         rows += [blank] if index else []

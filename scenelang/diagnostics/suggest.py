@@ -16,13 +16,9 @@ _MOST_SLIPS = 8
 
 
 class Effort(Record, frozen=False):
-    """What looking for similar names may still cost, over all of a scene: it may hold thousands of both.
+    """What looking for similar names may still cost, over all of a scene: it may hold thousands of both."""
 
-    Args:
-        left: pairs of letters that may still be compared.
-    """
-
-    left: int = 500_000
+    left: int = 500_000  # pairs of letters that may still be compared
 
     @property
     def spent(self) -> bool:
@@ -39,8 +35,6 @@ def ranked(
     letter counts a little more, since it seldom is.
 
     Args:
-        name: what was written.
-        known: the names there are.
         slips: how many slips are forgiven; by default one in three letters.
         effort: what this takes its work from; the names that are left when it is spent are not looked at.
     """
@@ -106,6 +100,17 @@ def _slips(a: str, b: str, limit: int) -> float:
     return row[-1]
 
 
+class Suggestion(str):
+    """A help text that suggests one name, with the name."""
+
+    name: str
+
+    def __new__(cls, name: str) -> Suggestion:
+        made = super().__new__(cls, f"did you mean `{name}`?")
+        made.name = name
+        return made
+
+
 def did_you_mean(
     name: str, known: Iterable[str], span: Span, *, slips: int | None = None, effort: Effort | None = None
 ) -> tuple[str | None, Fix | None]:
@@ -122,7 +127,7 @@ def did_you_mean(
         shown = [f"`{candidate}`" for candidate in near[:3]]
         return f"did you mean {', '.join(shown[:-1])} or {shown[-1]}?", None
     fix = Fix(f"rename to `{near[0]}`", (Edit(span, near[0]),)) if is_slip(name, near[0], best) else None
-    return f"did you mean `{near[0]}`?", fix
+    return Suggestion(near[0]), fix
 
 
 def is_slip(name: str, other: str, distance: float) -> bool:

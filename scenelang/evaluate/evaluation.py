@@ -7,26 +7,27 @@ what they find and go on. A Scene comes out only where nothing is wrong.
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Unpack
+from typing import Any, Unpack
 
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.file_context import FileContext
-from scenelang.evaluate.inputs import Defines, Inputs
 from scenelang.evaluate.limits import MAX_OBJECTS, MAX_STEPS, Halt
 from scenelang.evaluate.loader import Loader, Unreadable, read_source
 from scenelang.evaluate.names import UNBOUND
 from scenelang.evaluate.prepare import EXPRESSIONS, STATEMENTS
 from scenelang.evaluate.prepare.blocks import Body
-from scenelang.evaluate.prepare.imports import prepare_file
+from scenelang.evaluate.prepare.settings import prepare_file
 from scenelang.evaluate.report.reporter import Reporter
-from scenelang.evaluate.session import Session
+from scenelang.evaluate.session import Defines, Inputs, Session
 from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap, Written
@@ -216,3 +217,79 @@ def in_file_order(found: list[Diagnostic]) -> list[Diagnostic]:
         return files.setdefault(d.span.source.name, len(files)), d.span.start
 
     return sorted(found, key=key)
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    params: Mapping[str, Any] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    frame: int = 0,
+    size: tuple[int, int] | None = None,
+    diagnostics: Diagnostics | None = None,
+    **values: Any,
+) -> Scene:
+    """Read a scene file: ``load("chain.nsg", k=0.9)``.
+
+    Args:
+        path: the file.
+        params: values for params whose names are not Python identifiers (``lib.k``) or clash with an
+            argument here.
+        model: render with this model instead of the one that the file names.
+        root: folder that imports cannot leave; by default the file's.
+        frame: frame of the animation, from 0.
+        size: canvas in pixels instead of the scene's.
+        diagnostics: collects what is found, warnings too.
+        **values: values for params: numbers, booleans, sequences, or text as after ``-D NAME=``, which
+            is how angles (``"30deg"``) and colours (``"#d33"``) are written.
+
+    Returns:
+        The Scene.
+
+    Raises:
+        SceneError: the scene has errors; it carries all diagnostics.
+        ValueError: ``size`` is not a canvas.
+        OSError: the file cannot be opened.
+    """
+    found = diagnostics if diagnostics is not None else Diagnostics()
+    scene, _ = load_scene(
+        path, diagnostics=found, defines={**(params or {}), **values}, root=root, model=model, frame=frame
+    )
+    return _sound(scene, found, size)
+
+
+def loads(
+    text: str,
+    *,
+    params: Mapping[str, Any] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    frame: int = 0,
+    size: tuple[int, int] | None = None,
+    diagnostics: Diagnostics | None = None,
+    name: str = "<text>",
+    **values: Any,
+) -> Scene:
+    """Read scene text; as `load`. Imports are found in ``root`` and refused without it.
+
+    Args:
+        text: the scene.
+        name: what diagnostics call it.
+    """
+    found = diagnostics if diagnostics is not None else Diagnostics()
+    scene, _ = load_source(
+        SourceFile(name, text),
+        diagnostics=found,
+        defines={**(params or {}), **values},
+        root=root,
+        model=model,
+        frame=frame,
+    )
+    return _sound(scene, found, size)
+
+
+def _sound(scene: Scene | None, found: Diagnostics, size: tuple[int, int] | None) -> Scene:
+    if scene is None:
+        raise SceneError(found)
+    return scene if size is None else scene.sized(size)

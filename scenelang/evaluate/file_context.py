@@ -9,12 +9,11 @@ from typing import Literal, NamedTuple
 
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.builder import Builder
-from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.loader import Loader
 from scenelang.evaluate.names import UNBOUND, Env, Scope, Slots
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.report.suppression import NONE, Damage
-from scenelang.evaluate.session import Session
+from scenelang.evaluate.session import Defines, Session
 from scenelang.syntax import nodes
 
 Kind = Literal["file", "group", "chain", "object", "material", "unknown"]
@@ -28,15 +27,9 @@ class FileContext:
     """The state of one file.
 
     Args:
-        source: its text.
-        session: the evaluation it belongs to.
-        loader: finds what it imports.
-        defines: values for params.
         path: where it was read from, resolved; None for text without a file.
         prefix: how the first file calls its params: empty, or ``lib.``.
-        env: its live slots.
         weight: half evaluation steps of what has been prepared of the block at hand.
-        first: its first statement.
         damage: what syntax mistakes leave unknown of it.
     """
 
@@ -62,8 +55,6 @@ class Place(NamedTuple):
     """Where a statement or an expression stands.
 
     Args:
-        file: its file.
-        scope: the names it sees.
         kind: the kind of block around it.
         nested: whether a ``for`` or ``if`` stands between it and that block's braces.
         repeated: whether a ``for`` stands around it, however far out.

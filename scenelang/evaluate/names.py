@@ -50,10 +50,12 @@ class Slots(Record, frozen=False):
     Args:
         parent: those of where it was defined; None for a file.
         root: a file's live slots, which exist while it is prepared; None for a call.
+        owner: the name of the function or module that is called.
     """
 
     parent: Slots | None = None
     root: Env | None = None
+    owner: Span | None = None
     size: int = 1
 
     def add(self) -> int:
@@ -68,7 +70,6 @@ class Definition(Record, frozen=False):
     """A fn or module: what calls refer to; ``run`` is set once its body is prepared.
 
     Args:
-        node: its statement.
         outer: the slots of where it was defined.
         run: of a fn ``run(env) -> value``; of a module its block's actions.
         defaults: how to get each parameter's default.
@@ -90,10 +91,8 @@ class Binding(Record, frozen=False):
     """What a name stands for.
 
     Args:
-        kind: how it came about.
         span: where; None for the language's own names.
         slots: what holds its slot.
-        slot: its slot.
         value: a `Definition`, an imported file, or the value of a ``let`` that never changes.
         known: whether ``value`` is that of such a ``let``.
         needs: what the value of a ``let`` depends on.
@@ -131,10 +130,6 @@ class Scope(Record, frozen=False):
     def find(self, name: str) -> Binding | None:
         """What ``name`` stands for here."""
         return next((scope.names[name] for scope in self.outwards() if name in scope.names), None)
-
-    def defined_later(self, name: str) -> Span | None:
-        """Where a later line of this block, or of one around it, defines ``name``."""
-        return next((scope.later[name] for scope in self.outwards() if name in scope.later), None)
 
     def visible(self) -> Iterator[tuple[str, Binding]]:
         """All names that can be used here, inner ones first."""

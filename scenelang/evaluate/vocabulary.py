@@ -19,7 +19,6 @@ class Vocabulary:
     """What a scene may name: the chosen model's words, or those of all models.
 
     Args:
-        models: all models that are at hand.
         chosen: the scene's model; None where the compiler picks one later.
         blind: the scene names a model that is not at hand, so nothing is known about its words.
     """
@@ -35,10 +34,7 @@ class Vocabulary:
 
     def choose(self, name: str) -> Vocabulary | None:
         """The same with model ``name`` chosen; None if there is no such model."""
-        for manifest in self.models:
-            if manifest.name == name:
-                return Vocabulary(self.models, manifest)
-        return None
+        return next((Vocabulary(self.models, m) for m in self.models if m.name == name), None)
 
     geometries = _offered("geometries")
     materials = _offered("materials")

@@ -1,6 +1,6 @@
 """Callbacks of the grammar that lay out names, lists and expressions; statements are in `layout`.
 
-They take the place of those that build the tree (`scenelang.syntax.expressions`): a token comes as its index,
+They take the place of those that build the tree (`scenelang.syntax.build`): a token comes as its index,
 everything else as the part that another callback has made.
 """
 
@@ -20,7 +20,6 @@ from scenelang.formatting.documents import (
     Word,
     after_of,
     before_of,
-    blank_of,
     ends_of,
     flat_of,
     joined,
@@ -30,7 +29,7 @@ from scenelang.formatting.documents import (
 )
 from scenelang.formatting.lists import Bracketed, Item, broken, inline
 from scenelang.formatting.trivia import Notes, texts_of
-from scenelang.syntax.tokens import Tokens
+from scenelang.syntax.lexer import Tokens
 
 _PATH = re.compile(r"\w+(\.\w+)*")
 _NUMBER_LAST = re.compile(r"(?:^|\s)\.?[0-9][\w.+-]*$")  # comments may stand before it
@@ -43,13 +42,7 @@ _LEVELS |= {"&&": 1, "||": 0}
 
 
 class Operation(Group):
-    """Operands of one level with the operators between them.
-
-    Args:
-        operands: from left to right.
-        operators: one less.
-        level: how tight they bind; operands of the same level on the left are taken in.
-    """
+    """Operands with operators of one level between them; those of the same level on the left are taken in."""
 
     __slots__ = ("level", "operands", "operators")
 
@@ -104,11 +97,7 @@ class Choice(Group):
 
 
 class ExpressionLayout:
-    """Lays out the expressions of one file.
-
-    Args:
-        tokens: what was read, without mistakes.
-        notes: the comments and blank lines around them.
+    """Lays out the expressions of one file, which was read without mistakes.
 
     `doubtful` becomes true at what only the builder of the tree can refuse: an escape in a string, a number
     that may be too large, a call of what may not be a name.
@@ -173,7 +162,7 @@ class ExpressionLayout:
 
     # ------------------------------------------------------------ names
 
-    name = word
+    name = keyword = word
 
     def path(self, left: Part, dot: int, right: Part) -> Part:
         return self._glued(left, self.word(dot), right)
@@ -189,7 +178,7 @@ class ExpressionLayout:
             else:
                 return sequence(parts)
         word = Word(text)
-        word.blank = blank_of(parts[0])
+        word.blank = not isinstance(parts[0], str) and parts[0].blank
         return word if word.blank else text
 
     # ------------------------------------------------------------ expressions

@@ -38,13 +38,7 @@ from scenelang.syntax.tables import tables
 
 
 class Statement(Group):
-    """A statement.
-
-    Args:
-        flat, maker: see `Group`.
-        depth: how many blocks it has within each other.
-        simple: it may stand in a block that is on one line.
-    """
+    """A statement with ``depth`` blocks within each other; a simple one may stand in a block on one line."""
 
     __slots__ = ("depth", "simple")
 
@@ -55,13 +49,7 @@ class Statement(Group):
 
 
 class Block:
-    """``{ … }``, whose place in a line is for the statement around it to say.
-
-    Args:
-        opening: its first brace.
-        statements: what it holds.
-        closing: its last brace.
-    """
+    """``{ … }``, whose place in a line is for the statement around it to say."""
 
     __slots__ = ("closing", "depth", "flat", "opening", "statements")
 
@@ -116,6 +104,11 @@ def entries(statements: Sequence[Item], dangling: Sequence[Comment]) -> list[Par
     return [*parts, *comment_lines(dangling, begun=bool(parts))]
 
 
+def _lined(parts: Sequence[Part], flat: str | None) -> Group:
+    """What follows on the same line or, where that is too long, on a line of its own."""
+    return Group(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, *parts])))
+
+
 class Layout(ExpressionLayout):
     """Lays out one file."""
 
@@ -135,9 +128,6 @@ class Layout(ExpressionLayout):
     def following(self, items: list[Item], item: Part) -> list[Item]:
         items.append(Item(item))
         return items
-
-    def keyword(self, token: int) -> Part:
-        return self.word(token)
 
     # ------------------------------------------------------------ statements without a block
 
@@ -160,9 +150,7 @@ class Layout(ExpressionLayout):
         commented = after_of(sign) or before_of(value)
         if not commented and not isinstance(value, (Operation, Choice)):
             return [" ", sign, " ", value]
-        flat = flat_of(value)
-        lines = Indent(Concat(None, [LINE, *comments_before(value), value]))
-        doc = Group(None if commented or flat is None else " " + flat, lambda: lines)
+        doc = _lined([*comments_before(value), value], None if commented else flat_of(value))
         doc.after = after_of(value)
         return [" ", sign, doc]
 
@@ -176,9 +164,7 @@ class Layout(ExpressionLayout):
         head = [self.word(word), " ", name, *self._assigned(equal, default)]
         if rest[1:]:
             limits = sequence([self.word(rest[0]), " ", rest[1]])
-            flat = flat_of(limits)
-            tail = Group(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, limits])))
-            head.append(ends_of(tail, limits, limits))
+            head.append(ends_of(_lined([limits], flat_of(limits)), limits, limits))
         return self._ended(head, rest[-1])
 
     def let(self, word: int, name: Part, equal: int, value: Part, last: int) -> Part:
@@ -197,11 +183,9 @@ class Layout(ExpressionLayout):
         return self._use([name, *rest[:-1]], rest[-1])
 
     def _use(self, head: list[Part], last: int | Block) -> Part:
-        return (
-            self._blocked(head, last, structure=False)
-            if isinstance(last, Block)
-            else self._ended(head, last, simple=True)
-        )
+        if isinstance(last, Block):
+            return self._blocked(head, last, structure=False)
+        return self._ended(head, last, simple=True)
 
     def parameter(self, name: Part, *default: Any) -> Part:
         return sequence([name, " ", self.word(default[0]), " ", default[1]]) if default else name

@@ -28,17 +28,11 @@ _NUMBER = re.compile(r"[-+]?\.?[0-9]")
 
 
 class Item(NamedTuple):
-    """An item of a list, and what stands around the comma after it.
-
-    Args:
-        part: the item.
-        behind: block comments after the comma, each with a space before it.
-        after: comments behind the comma after which the line ends, those of the item not among them.
-    """
+    """An item of a list, and what stands around the comma after it."""
 
     part: Part
-    behind: str = ""
-    after: Sequence[Comment] = ()
+    behind: str = ""  # block comments after the comma, each with a space before it
+    after: Sequence[Comment] = ()  # comments behind the comma, less the item's own, that end the line
 
 
 class Bracketed(Group):

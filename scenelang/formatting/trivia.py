@@ -12,28 +12,20 @@ from dataclasses import field
 from typing import NamedTuple
 
 from scenelang.records import Record
+from scenelang.syntax.lexer import Tokens
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Tokens
 
 _COMMENT = re.compile(r"//[^\n]*|/\*(?:[\s\S]*?\*/|[\s\S]*)")
 
 
 class Comment(NamedTuple):
-    """One comment.
+    """One comment."""
 
-    Args:
-        text: from its first sign to its last, trailing white space of its lines taken off.
-        column: code points before it on its line, if it has several; None where tabs make that meaningless.
-        ends_line: nothing may follow it on its last line: it is a line comment or has several lines.
-        own_line: it stands on lines of its own.
-        blank: a blank line stands before it.
-    """
-
-    text: str
-    column: int | None
-    ends_line: bool
-    own_line: bool = False
-    blank: bool = False
+    text: str  # from its first sign to its last, trailing white space of its lines taken off
+    column: int | None  # code points before it on its line, if it has several lines and no tabs stand there
+    ends_line: bool  # nothing may follow it on its last line: it is a line comment or has several lines
+    own_line: bool = False  # it stands on lines of its own
+    blank: bool = False  # a blank line stands before it
 
 
 def texts_of(comments: Iterable[Comment]) -> list[str]:
@@ -41,21 +33,13 @@ def texts_of(comments: Iterable[Comment]) -> list[str]:
 
 
 class Notes(Record, frozen=False):
-    """What stands around one token.
+    """What stands around one token."""
 
-    Args:
-        before: comments on lines of their own before it.
-        leading: block comments before it on its line.
-        trailing: block comments after it on its line, which need not end there.
-        after: comments behind it after which its line must end.
-        blank: a blank line stands right before it, or before its leading comments.
-    """
-
-    before: list[Comment] = field(default_factory=list)
-    leading: Sequence[Comment] = ()
-    trailing: Sequence[Comment] = ()
-    after: list[Comment] = field(default_factory=list)
-    blank: bool = False
+    before: list[Comment] = field(default_factory=list)  # comments on lines of their own before it
+    leading: Sequence[Comment] = ()  # block comments before it on its line
+    trailing: Sequence[Comment] = ()  # block comments after it on its line, which need not end there
+    after: list[Comment] = field(default_factory=list)  # comments behind it after which its line must end
+    blank: bool = False  # a blank line stands right before it, or before its leading comments
 
 
 def attach(tokens: Tokens) -> dict[int, Notes]:

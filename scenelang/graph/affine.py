@@ -80,10 +80,7 @@ def shearing(axes: str, k: float) -> Rows:
     """``xy``: x += k y, and so on for the other pairs."""
     rows = list(IDENTITY)
     rows["xyz".index(axes[0]) * 4 + "xyz".index(axes[1])] = k
-    return (
-        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5],
-        rows[6], rows[7], rows[8], rows[9], rows[10], rows[11],
-    )  # fmt: skip
+    return tuple(rows)  # type: ignore[return-value]
 
 
 def turn(i: float, j: float, k: float, w: float) -> tuple[float, tuple[float, float, float]]:

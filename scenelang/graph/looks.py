@@ -7,7 +7,8 @@ in the space it was written in: such a look folds to a colour.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import floor, tau
+from colorsys import hsv_to_rgb, rgb_to_hsv
+from math import tau
 from typing import Final
 
 from scenelang.records import Record
@@ -28,7 +29,6 @@ class Look(Record):
     """A material as an object wears it.
 
     Args:
-        material: name in the model's manifest.
         texture: moves of its texture, the first written first.
         colours: operations on its colour, the first written first.
         rgb: what the operations start from, in [0, 1], as written (sRGB in 2D): white, or what they came to
@@ -68,36 +68,10 @@ def coloured(ops: Iterable[MaterialOp], rgb: Triple = WHITE) -> Triple:
             a = op.amount
             rgb = _clamped(*(v + a * (y - v) for v in rgb))
         elif isinstance(op, Hue):
-            rgb = _clamped(*_shifted(rgb, op.angle / tau))
+            h, s, v = rgb_to_hsv(*rgb)
+            rgb = _clamped(*hsv_to_rgb((h + op.angle / tau) % 1.0, s, v))
     return rgb
 
 
 def _clamped(r: float, g: float, b: float) -> Triple:
     return min(max(r, 0.0), 1.0), min(max(g, 0.0), 1.0), min(max(b, 0.0), 1.0)
-
-
-def _shifted(rgb: Triple, turns: float) -> Triple:
-    """Shift H of HSV by ``turns``, keep S and V."""
-    value, low = max(rgb), min(rgb)
-    chroma = value - low
-    if chroma == 0.0:
-        return rgb
-    r, g, b = rgb
-    if value == r:
-        sixth = (g - b) / chroma
-    elif value == g:
-        sixth = 2.0 + (b - r) / chroma
-    else:
-        sixth = 4.0 + (r - g) / chroma
-    sixth += 6.0 * turns
-    # Each channel is the value less chroma times a trapezoid of the hue, shifted by 5, 3 and 1 sixths.
-    return (
-        value - chroma * _trapezoid(sixth + 5.0),
-        value - chroma * _trapezoid(sixth + 3.0),
-        value - chroma * _trapezoid(sixth + 1.0),
-    )
-
-
-def _trapezoid(sixth: float) -> float:
-    k = sixth - 6.0 * floor(sixth / 6.0)
-    return max(0.0, min(k, 4.0 - k, 1.0))

@@ -11,18 +11,60 @@ from scenelang.diagnostics.span import Span
 from scenelang.graph import affine
 from scenelang.graph.looks import WHITE, Look
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
-from scenelang.graph.space import Refusal, Space
+from scenelang.graph.space import REACH, SINGULAR, Refusal, Space
 from scenelang.graph.spaces import PLANE, SPACES
 from scenelang.graph.stage import stage_of
-from scenelang.graph.steps import Step
-from scenelang.graph.transforms import step_of
+from scenelang.graph.steps import Affine, Displace, Rows, Step, Twist, Warp
 from scenelang.models.manifest import Manifest
 from scenelang.scene import schema
 from scenelang.words import BLEND, STAGE, Combine
 
+
+def step_of(transform: schema.Transform, space: Space) -> Step | Refusal:
+    """The step that a transform stands for, or why there is none.
+
+    In the plane nothing may leave it, and scales along z drop out.
+    """
+    if isinstance(transform, schema.Twirl):
+        return Warp(transform.k, (0.0, 0.0))
+    if isinstance(transform, schema.Bend):
+        return Warp(0.0, (transform.k, 0.0))
+    if isinstance(transform, (schema.Twist, schema.Displace)):
+        if space.dimension == 2:
+            fact = f"`{transform.kind}` leaves the plane"
+            return Refusal("E0505", fact, "bend the shape with `twirl` or `bend` instead")
+        if isinstance(transform, schema.Twist):
+            return Twist(transform.k)
+        return Displace(transform.amount, transform.frequency)
+    fitted = space.fitted(transform, _rows(transform))
+    if isinstance(fitted, Refusal):
+        return fitted
+    if space.usable(fitted):
+        return Affine(fitted)
+    (smallest, largest), singular = space.stretches(fitted), f"`{transform.kind}` is singular"
+    if smallest <= SINGULAR * largest:
+        fact = f"{singular}: it flattens everything to {space.thinner}"
+        return Refusal("E0312", fact, "use factors other than 0")
+    fact = f"{singular} in float32: it stretches by {smallest:.3g} to {largest:.3g}"
+    return Refusal("E0312", fact, f"stretches between {1 / REACH:g} and {REACH:g} can be undone")
+
+
+def _rows(transform: schema.Transform) -> Rows:
+    if isinstance(transform, schema.Translate):
+        return affine.translation(transform.x, transform.y, transform.z)
+    if isinstance(transform, schema.Scale):
+        return affine.scaling(transform.x, transform.y, transform.z)
+    if isinstance(transform, schema.Rotate):
+        return affine.rotation(transform.angle, transform.axis)
+    if isinstance(transform, schema.Shear):
+        return affine.shearing(transform.axes, transform.k)
+    assert isinstance(transform, schema.Matrix)
+    first, second, third, _ = transform.rows
+    return (*first, *second, *third)
+
+
 MAX_OBJECTS = 100_000
-MAX_DEPTH = 1_000
-"""Nested nodes of a Scene. Text cannot come near it; a Scene built in Python can."""
+MAX_DEPTH = 1_000  # nested nodes of a Scene. Text cannot come near it; a Scene built in Python can
 
 
 class Spans(Protocol):
@@ -57,8 +99,6 @@ def lower(
     without it, so that everything else is checked too.
 
     Args:
-        scene: a concrete scene.
-        manifest: the model's.
         spans: where nodes were written; None for a scene that did not come from text.
         diagnostics: receives E03xx and E05xx.
         memory: of the frame before; holds this one afterwards.

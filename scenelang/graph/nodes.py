@@ -2,12 +2,12 @@
 
 A leaf is one object. A fold is a boolean node, a group or a chain: its links are joined from the left,
 ``(first op second) op third …``. Moves are nearest the leaf first. Everything is frozen; a pass builds a
-new graph.
+new graph. Walks are without recursion, so that depth costs memory and never the interpreter's stack.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import inf
 from operator import attrgetter
 from typing import Any, TypeVar, cast
@@ -36,10 +36,7 @@ class Leaf(Record):
     """One object: a leaf geometry of a model, its look and its moves.
 
     Args:
-        geometry: name in the model's manifest.
-        look: material and what is done to its texture and colour.
         moves: steps into the parent's space, nearest the leaf first.
-        span: where the object was written.
         notes: what was worked out about a leaf that stays from frame to frame of an animation, by what it
             is; None for a leaf that is used once. It is not part of the value.
     """
@@ -86,9 +83,7 @@ class Fold(Record):
 
     Args:
         kind: the word it was written with: ``scene``, ``group``, ``chain`` or a boolean.
-        links: children in order.
         moves: steps that apply to all children, nearest the leaf first.
-        span: where it was written.
     """
 
     kind: str
@@ -105,9 +100,7 @@ class Graph(Record):
 
     Args:
         root: the top level, a fold of kind ``scene``; after `linearise` all its children are leaves.
-        canvas: width and height in pixels.
         background: colour in [0, 1] as written, or None for transparency.
-        space: the model's.
         stage: of a scene of solids, None in the plane.
     """
 
@@ -138,3 +131,57 @@ class Graph(Record):
         width, height = self.canvas
         side = min(width, height)
         return -width / side, -height / side, width / side, height / side, 0.0, 0.0
+
+
+def bottom_up(root: Node, leaf: Callable[[Leaf], T], fold: Callable[[Fold, list[T]], T]) -> T:
+    """The value of ``root``: a leaf is worth ``leaf(it)``, a fold ``fold(it, its children's values)``."""
+    if isinstance(root, Leaf):
+        return leaf(root)
+    open_folds: list[tuple[Fold, list[T]]] = [(root, [])]
+    while True:
+        node, done = open_folds[-1]
+        if len(done) < len(node.links):
+            child = node.links[len(done)].node
+            if isinstance(child, Leaf):
+                done.append(leaf(child))
+            else:
+                open_folds.append((child, []))
+            continue
+        value = fold(node, done)
+        open_folds.pop()
+        if not open_folds:
+            return value
+        open_folds[-1][1].append(value)
+
+
+def nodes(root: Node) -> Iterator[Node]:
+    """Every node, parents before children, in file order."""
+    stack: list[Node] = [root]
+    while stack:
+        node = stack.pop()
+        yield node
+        if isinstance(node, Fold):
+            stack.extend([link.node for link in reversed(node.links)])
+
+
+def leaves(root: Node) -> Iterator[Leaf]:
+    """Every leaf, in file order."""
+    return (node for node in nodes(root) if isinstance(node, Leaf))
+
+
+def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph:
+    """The graph with ``change`` applied to every leaf.
+
+    Args:
+        change: depends on nothing but the leaf and the graph's space; gives the leaf itself where it stays.
+        name: of the change, under which leaves that stay from frame to frame note what became of them.
+    """
+
+    def leaf(node: Leaf) -> Node:
+        return change(node) if node.notes is None else node.noted(name, change)
+
+    def fold(node: Fold, children: list[Node]) -> Fold:
+        links = [Link(link.op, child, link.k) for link, child in zip(node.links, children, strict=True)]
+        return Fold(node.kind, tuple(links), node.moves, node.span)
+
+    return graph.rooted(fold(graph.root, [bottom_up(link.node, leaf, fold) for link in graph.root.links]))

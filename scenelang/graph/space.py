@@ -105,10 +105,9 @@ class Space(ABC):
 
     @abstractmethod
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
-        """A disc, or ball, that a leaf certainly fills, where one is known.
+        """A disc, or ball, about a leaf's own origin that it certainly fills, where one is known.
 
-        Returns:
-            Its radius in the leaf's own space, about the origin, and the map from the world to there.
+        It is given by its radius and the map from the world to there.
         """
 
     def usable(self, rows: Rows) -> bool:

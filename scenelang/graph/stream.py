@@ -23,8 +23,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import field
 
-from scenelang.graph.bounds import leaf_box
-from scenelang.graph.grid import Grid
+from scenelang.graph.bounds import Grid, leaf_box
 from scenelang.graph.nodes import BLEND, Leaf
 from scenelang.graph.space import Space
 from scenelang.records import Record
@@ -33,8 +32,7 @@ from scenelang.words import Combine
 Row = tuple[Combine, Leaf, float]
 """An operator, its leaf, and the width of its blend."""
 
-_MOST_CUTS = 64
-"""A stream that subtracts more often than this is not moved behind another one."""
+_MOST_CUTS = 64  # a stream that subtracts more often than this is not moved behind another one
 
 
 class Stream(Record, frozen=False):
@@ -86,11 +84,9 @@ class Stream(Record, frozen=False):
             grid.add(leaf_box(leaf, level, self.space), leaf)
 
     def attach(self, other: Stream) -> tuple[Leaf, Leaf] | None:
-        """Join a composite by union, after this stream or before it.
+        """Join a composite by union, after this stream or before it, or leave both as they are.
 
-        Returns:
-            None when done; else nothing is changed and the pair of leaves that stands in the way, one of
-            this stream and one of ``other``.
+        Then it gives the pair of leaves that stands in the way, one of this stream and one of ``other``.
         """
         if not self.rows:
             self.append(other)
@@ -99,13 +95,13 @@ class Stream(Record, frozen=False):
         if apart is not None:
             return apart
         if len(self.rows) == 1 and self._swaps(other):
-            self._prepend(other)
+            self.append(other, before=True)
             return None
         reached = self._followed(other)
         if reached is None:
             self.append(other)
         elif self._swaps(other):
-            self._prepend(other)
+            self.append(other, before=True)
         else:
             return reached
         return None
@@ -133,31 +129,17 @@ class Stream(Record, frozen=False):
         solid = other.grid(0.0)
         return all(solid.touched(leaf_box(leaf, 0.0, self.space)) is None for leaf in self.cuts)
 
-    def append(self, other: Stream) -> None:
-        """Join a composite by union after this stream, unproved."""
-        self._absorb(other)
-        if len(other.rows) > len(self.rows):
-            other.rows.extendleft(reversed(self.rows))
-            self.rows = other.rows
-        else:
-            self.rows.extend(other.rows)
-        self._count(other)
-
-    def _prepend(self, other: Stream) -> None:
-        self._absorb(other)
-        if len(other.rows) > len(self.rows):
-            other.rows.extend(self.rows)
-            self.rows = other.rows
-        else:
-            self.rows.extendleft(reversed(other.rows))
-        self._count(other)
-
-    def _absorb(self, other: Stream) -> None:
+    def append(self, other: Stream, before: bool = False) -> None:
+        """Join a composite by union after this stream, or before it, unproved."""
         for level, grid in self._grids.items():
             for box, leaf in other.grid(level).entries:
                 grid.add(box, leaf)
-
-    def _count(self, other: Stream) -> None:
+        few, many = sorted((self.rows, other.rows), key=len)
+        if (many is self.rows) is before:
+            many.extendleft(reversed(few))
+        else:
+            many.extend(few)
+        self.rows = many
         self.cuts.extend(other.cuts)
         self.smooths += other.smooths
         self.slack = max(self.slack, other.slack)

@@ -24,8 +24,7 @@ class Invariant(Enum):
 Checked = tuple[Space, bool, bool, bool]
 """What must hold of each leaf: its maps are the space's; NO_IDENTITIES, MERGED and LOOKS or not."""
 
-Sound = dict[Checked, dict[int, Leaf]]
-"""Leaves by identity, by what was checked of them."""
+Sound = dict[Checked, dict[int, Leaf]]  # leaves by identity, by what was checked of them
 
 
 class InternalError(RuntimeError):
@@ -33,16 +32,11 @@ class InternalError(RuntimeError):
 
 
 def verify(graph: Graph, stage: str, holds: Collection[Invariant] = (), sound: Sound | None = None) -> Graph:
-    """Check a graph after ``stage``, the name of a pass or ``lower``.
+    """Check a graph after ``stage``, the name of a pass or ``lower``, and give it back.
 
     Args:
-        graph: any graph.
-        stage: whom to name.
         holds: what this stage and those before it established.
         sound: leaves that an earlier stage left sound and this one may have kept; takes those of this graph.
-
-    Returns:
-        The graph itself.
 
     Raises:
         InternalError: an invariant is broken.

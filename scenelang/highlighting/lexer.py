@@ -17,6 +17,19 @@ from scenelang.syntax.tables import tables
 
 _NAME, _STRING = tables().patterns["NAME"], tables().patterns["STRING"]
 OPERATORS = [text for text in tables().literals if not text[0].isalpha() and text not in "()[]{},;"]
+WORDS = (
+    (nsg.DECLARING, "", Keyword.Declaration, "keyword.declaration"),
+    (nsg.CONTROL, "", Keyword, "keyword.control"),
+    (nsg.NODES, "", Keyword.Reserved, "storage.type.node"),
+    (nsg.MATERIAL, "", Keyword.Type, "storage.type.material"),
+    (nsg.TRUTH, "", Keyword.Constant, "constant.language.boolean"),
+    (nsg.CONSTANTS, "", Name.Constant, "constant.language"),
+    (nsg.ANIMATED, r"(?!\s*[({])", Name.Variable.Magic, "variable.language"),
+    (nsg.SETTINGS, r"(?=\s*\()", Name.Builtin, "support.function.setting"),
+    (nsg.TRANSFORMS | nsg.OPERATIONS, r"(?=\s*\()", Name.Builtin, "support.function.transform"),
+    (nsg.FUNCTIONS, r"(?=\s*\()", Name.Builtin.Pseudo, "support.function"),
+)
+"""Words, what follows them, how Pygments calls them, and TextMate."""
 _FREE = rf"(?!(?:{'|'.join(nsg.KEYWORDS)})\b){_NAME}"
 
 
@@ -39,15 +52,7 @@ class NsgLexer(RegexLexer):  # type: ignore[misc]  # Pygments has no types
             (rf"(fn)(\s+)({_FREE})", bygroups(Keyword.Declaration, Whitespace, Name.Function)),
             (rf"(module)(\s+)({_FREE})", bygroups(Keyword.Declaration, Whitespace, Name.Class)),
             (rf"(import)(\s+)({_STRING})", bygroups(Keyword.Namespace, Whitespace, String.Double)),
-            (words(nsg.DECLARING, r"\b", r"\b"), Keyword.Declaration),
-            (words(nsg.CONTROL, r"\b", r"\b"), Keyword),
-            (words(nsg.NODES, r"\b", r"\b"), Keyword.Reserved),
-            (words(nsg.MATERIAL, r"\b", r"\b"), Keyword.Type),
-            (words(nsg.TRUTH, r"\b", r"\b"), Keyword.Constant),
-            (words(nsg.CONSTANTS, r"\b", r"\b"), Name.Constant),
-            (words(nsg.ANIMATED, r"\b", r"\b(?!\s*[({])"), Name.Variable.Magic),
-            (words((*nsg.LANGUAGE, *nsg.STAGE), r"\b", r"\b(?=\s*\()"), Name.Builtin),
-            (words(nsg.FUNCTIONS, r"\b", r"\b(?=\s*\()"), Name.Builtin.Pseudo),
+            *((words(texts, r"\b", rf"\b{after}"), kind) for texts, after, kind, _ in WORDS),
             (rf"{_NAME}(?=\s*\{{)", Name.Class),
             (rf"{_NAME}(?=\s*\()", Name.Function),
             (_NAME, Name),

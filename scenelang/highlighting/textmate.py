@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 from scenelang import words
-from scenelang.highlighting.lexer import OPERATORS
+from scenelang.highlighting.lexer import OPERATORS, WORDS
 from scenelang.syntax.tables import tables
 
 SCOPE: Final = "source.nsg"
@@ -46,7 +46,7 @@ def _named(word: str, scope: str, what: str = NAME) -> dict[str, Any]:
     return {"match": rf"\b({word})\s+({what})", "captures": captures}
 
 
-_UNITS: Final = "|".join(words.UNITS)
+_UNITS: Final = _any(words.UNITS)
 _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
     "comments": [
         {
@@ -81,19 +81,8 @@ _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
         _named("let", "variable.other.constant"),
         _named("param", "variable.parameter"),
     ],
-    "keywords": [
-        _words(words.DECLARING, "keyword.declaration"),
-        _words(words.CONTROL, "keyword.control"),
-        _words(words.NODES, "storage.type.node"),
-        _words(words.MATERIAL, "storage.type.material"),
-        _words(words.TRUTH, "constant.language.boolean"),
-    ],
+    "keywords": [_words(texts, scope, after) for texts, after, _, scope in WORDS],
     "names": [
-        _words(words.CONSTANTS, "constant.language"),
-        _words(words.ANIMATED, "variable.language", r"(?!\s*[({])"),
-        _words(words.SETTINGS, "support.function.setting", r"(?=\s*\()"),
-        _words(words.TRANSFORMS | words.OPERATIONS, "support.function.transform", r"(?=\s*\()"),
-        _words(words.FUNCTIONS, "support.function", r"(?=\s*\()"),
         {"match": rf"{NAME}(?=\s*\{{)", "name": "entity.name.type.nsg"},
         {"match": rf"{NAME}(?=\s*\()", "name": "entity.name.function.call.nsg"},
         {"match": rf"{NAME}(?=\s*=(?!=))", "name": "variable.parameter.nsg"},
@@ -101,9 +90,7 @@ _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
     ],
     "numbers": [
         {
-            "match": tables()
-            .patterns["NUMBER"]
-            .replace(f"(?:{_any(words.UNITS)})", f"({_any(words.UNITS)})"),
+            "match": tables().patterns["NUMBER"].replace(f"(?:{_UNITS})", f"({_UNITS})"),
             "name": "constant.numeric.nsg",
             "captures": {"1": {"name": "keyword.other.unit.nsg"}},
         },

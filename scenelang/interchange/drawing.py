@@ -10,10 +10,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from scenelang.graph.dump import hex_text, move_text, op_text, stage_text
 from scenelang.graph.looks import coloured
 from scenelang.graph.nodes import Fold, Graph, Leaf, Node
 from scenelang.graph.space import Space
+from scenelang.interchange.dumps import hex_text, move_text, op_text, stage_text, token_names
 from scenelang.scene import schema
 from scenelang.scene.text import material, transform
 
@@ -78,9 +78,7 @@ def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Drawing:
     return drawn
 
 
-def _children(
-    node: schema.Group | schema.Boolean | schema.Chain,
-) -> Iterable[tuple[str, schema.SceneNode]]:
+def _children(node: schema.Group | schema.Boolean | schema.Chain) -> Iterable[tuple[str, schema.SceneNode]]:
     if isinstance(node, schema.Chain):
         return [("" if at == 0 else link.op, link.node) for at, link in enumerate(node.children)]
     return [("", child) for child in node.children]
@@ -122,18 +120,15 @@ def _graph_box(node: Node, space: Space) -> Box:
 
 def draw_program(program: Program, most: int = MOST_BOXES) -> Drawing:
     """The stream of a Program: each object and the token that joins it to what came before."""
-    from scenelang.words import TOKENS
-
     drawn = Drawing(sideways=True)
     width, height = program.canvas
     stage = () if program.stage is None else stage_text(program.stage)
     last = drawn.add(Box((f"program {width} x {height}", f"model {program.model}", *stage)))
-    names = {value: word for word, value in TOKENS.items()}
-    tokens = program.tokens.tolist()
+    tokens = token_names(program)
     for at, name in enumerate(program.objects[:most]):
         place = program.places[at]
         where = () if place is None else (f"line {place.line}",)
-        last = drawn.add(Box((name, f"row {at}", *where), leaf=True), last, names[tokens[at]])
+        last = drawn.add(Box((name, f"row {at}", *where), leaf=True), last, tokens[at])
     if len(program) > most:
         drawn.add(Box((f"{len(program) - most:,} more",)), last)
     return drawn

@@ -10,26 +10,23 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from scenelang.graph import affine
-from scenelang.graph.plane import flattened
-from scenelang.graph.spaces import SPACES
+from scenelang.graph.spaces import SPACES, flattened
 from scenelang.graph.steps import IDENTITY, Rows
 from scenelang.interchange.gltf_file import Gltf, GltfError, Node, read_gltf
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.scene import schema
 
 Plane = Literal["xy", "xz"]
-MOST_DEPTH: Final = 150
-"""Nodes within nodes; text nests 200 levels."""
+Steps = tuple[schema.Transform, ...]
+MOST_DEPTH: Final = 150  # nodes within nodes; text nests 200 levels
 
 _ENDING: Final = re.compile(r"[._ -]?(?<!\d)\d+$|[._ -](?:copy|instance|mesh|geo|shape|obj)$")
 """One ending of a node's name; several are taken off one at a time."""
-_MOST_LETTERS: Final = 200
-"""A longer name is not compared with those of geometries."""
+_MOST_LETTERS: Final = 200  # a longer name is not compared with those of geometries
 _FLAT: Final = 1e-6
 """How far the entries of a matrix that mix z with x and y may be from 0: they are written in float32."""
 _MOST_NAME: Final = 40
-DIGITS: Final = 6
-"""Digits of what is written: files hold float32, whose eighth is noise."""
+DIGITS: Final = 6  # digits of what is written: files hold float32, whose eighth is noise
 
 
 @dataclass(slots=True)
@@ -71,10 +68,7 @@ def import_gltf(gltf: Gltf, *, model: str | None = None, plane: Plane = "xy") ->
     Raises:
         GltfError: nodes are no tree, a leaf leaves the plane of a 2D model, or there is no such model.
     """
-    manifest = _manifest(gltf, model)
-    made = _Import(gltf, manifest, plane)
-    nodes = made.run()
-    return Imported(schema.Scene(model=manifest.name, nodes=nodes), made.names, made.left_out, made.objects)
+    return _Import(gltf, _manifest(gltf, model), plane).run()
 
 
 def geometry_of(names: Iterable[str | None], geometries: Iterable[str]) -> str | None:
@@ -120,14 +114,6 @@ def _names(gltf: Gltf, node: Node) -> tuple[str | None, ...]:
 
 
 @dataclass(slots=True)
-class _Local:
-    """A node's own transform: as it was written, and as a matrix."""
-
-    rows: Rows
-    steps: tuple[schema.Transform, ...]
-
-
-@dataclass(slots=True)
 class _Import:
     gltf: Gltf
     manifest: Manifest
@@ -138,7 +124,7 @@ class _Import:
     _met: set[int] = field(default_factory=set)
     _looks: dict[int, schema.Material | None] = field(default_factory=dict)
 
-    def run(self) -> tuple[schema.SceneNode, ...]:
+    def run(self) -> Imported:
         if self.gltf.scenes:
             roots = self.gltf.scenes[self.gltf.scene or 0].nodes
         else:
@@ -146,8 +132,10 @@ class _Import:
             roots = tuple(at for at in range(len(self.gltf.nodes)) if at not in inner)
             if self.gltf.nodes and not roots:
                 raise GltfError("the nodes form a cycle")
-        nodes = [self.node(root, IDENTITY, "", 1) for root in roots]
-        return tuple(node for node in nodes if node is not None)
+        made = [self.node(root, IDENTITY, "", 1) for root in roots]
+        nodes = tuple(node for node in made if node is not None)
+        scene = schema.Scene(model=self.manifest.name, nodes=nodes)
+        return Imported(scene, self.names, self.left_out, self.objects)
 
     @property
     def flat(self) -> bool:
@@ -162,15 +150,14 @@ class _Import:
         self._met.add(index)
         if depth > MOST_DEPTH:
             raise GltfError(f"{path[:200]}: nodes nested deeper than {MOST_DEPTH}")
-        local = self.local(node, path)
-        if not SPACES[2 if self.flat and _keeps_plane(local.rows) else 3].usable(local.rows):
+        own_rows, own_steps = self.local(node, path)
+        if not SPACES[2 if self.flat and _keeps_plane(own_rows) else 3].usable(own_rows):
             self.left_out.append(f"{path}: a scale of 0, or one that float32 cannot undo")
             self._met.update(self.below(index))
             return None
-        rows = local.rows if waiting is IDENTITY else affine.compose(waiting, local.rows)
-        steps: tuple[schema.Transform, ...]
+        rows = own_rows if waiting is IDENTITY else affine.compose(waiting, own_rows)
         if not self.flat or _keeps_plane(rows):
-            steps = local.steps if waiting is IDENTITY else self.matrix(rows)
+            steps = own_steps if waiting is IDENTITY else self.matrix(rows)
             below = IDENTITY
         else:  # what turns out of the plane here may be turned back below
             steps, below = (), rows
@@ -185,9 +172,7 @@ class _Import:
         self.names[id(group)] = path
         return group
 
-    def with_steps(
-        self, node: schema.SceneNode, steps: tuple[schema.Transform, ...], path: str
-    ) -> schema.SceneNode:
+    def with_steps(self, node: schema.SceneNode, steps: Steps, path: str) -> schema.SceneNode:
         """A single child needs no group: the maps above it come after its own."""
         moved = node.model_copy(update={"transforms": (*node.transforms, *steps)}) if steps else node
         self.names[id(moved)] = self.names.pop(id(node), path)
@@ -215,10 +200,12 @@ class _Import:
         geometry = geometry_of(names, self.manifest.geometries)
         if geometry is None:
             mesh = f" with mesh `{_clean(names[1])}`" if len(names) > 1 and names[1] else ""
-            kind = "a camera" if node.camera is not None else "a light" if _is_light(node) else None
-            what = kind or (
-                "empty" if node.mesh is None else f"no geometry of {self.manifest.name} is named so"
-            )
+            if node.camera is not None:
+                what = "a camera"
+            elif "KHR_lights_punctual" in node.extensions:
+                what = "a light"
+            else:
+                what = "empty" if node.mesh is None else f"no geometry of {self.manifest.name} is named so"
             self.left_out.append(f"{path}{mesh}: {what}")
             return None
         if below is not IDENTITY:
@@ -258,8 +245,8 @@ class _Import:
         paint = schema.Color(rgb=(srgb(red), srgb(green), srgb(blue)))
         return schema.Material(self.manifest.default_material, ops=(paint,))
 
-    def local(self, node: Node, path: str) -> _Local:
-        """A node's transform in the axes of the scene."""
+    def local(self, node: Node, path: str) -> tuple[Rows, Steps]:
+        """A node's transform in the axes of the scene, as a matrix and as it was written."""
         if node.matrix is not None:
             if any(abs(node.matrix[at] - want) > _FLAT for at, want in ((3, 0), (7, 0), (11, 0), (15, 1))):
                 raise GltfError(f"{path}: a matrix whose last row is not 0, 0, 0, 1")
@@ -267,7 +254,7 @@ class _Import:
             rows: Rows = tuple(columns[4 * c + r] for r in range(3) for c in range(4))  # type: ignore[assignment]
             if self.plane == "xz":
                 rows = affine.compose(_UP, affine.compose(rows, _DOWN))
-            return _Local(rows, self.matrix(rows))
+            return rows, self.matrix(rows)
         (x, y, z), (i, j, k, w), (u, v, s) = node.translation, node.rotation, node.scale
         if self.plane == "xz":  # (x, y, z) becomes (x, -z, y)
             (x, y, z), (i, j, k), (u, v, s) = (x, -z, y), (i, -k, j), (u, s, v)
@@ -280,7 +267,7 @@ class _Import:
         rows = affine.compose(affine.rotation(angle, axis), affine.scaling(u, v, s))
         rows = affine.compose(affine.translation(x, y, z), rows)
         if self.flat and any(axis[:2]):
-            return _Local(rows, self.matrix(rows))
+            return rows, self.matrix(rows)
         steps: list[schema.Transform] = []
         if (u, v, s) != (1.0, 1.0, 1.0) and all((u, v, s)):
             steps.append(_scale(u, v, 1.0 if self.flat else s, self.flat))
@@ -288,9 +275,9 @@ class _Import:
             turn = math.radians(_short(math.degrees(angle)))
             steps.append(schema.Rotate(angle=turn, axis=(_short(axis[0]), _short(axis[1]), _short(axis[2]))))
         steps += self.shift(x, y, z)
-        return _Local(rows, tuple(steps))
+        return rows, tuple(steps)
 
-    def matrix(self, rows: Rows) -> tuple[schema.Transform, ...]:
+    def matrix(self, rows: Rows) -> Steps:
         """A map as the simplest transforms that are it, in the plane for a 2D model."""
         if self.flat:
             rows = flattened(rows)
@@ -307,7 +294,7 @@ class _Import:
             *self.shift(rows[3], rows[7], rows[11]),
         )
 
-    def shift(self, x: float, y: float, z: float) -> tuple[schema.Transform, ...]:
+    def shift(self, x: float, y: float, z: float) -> Steps:
         z = 0.0 if self.flat else z
         return (schema.Translate(x=_short(x), y=_short(y), z=_short(z)),) if x or y or z else ()
 
@@ -331,10 +318,6 @@ def _keeps_plane(rows: Rows) -> bool:
     """Whether a map neither mixes z into x and y nor tilts the plane."""
     size = max(map(abs, (rows[0], rows[1], rows[4], rows[5])))
     return all(abs(rows[at]) <= _FLAT * size for at in (2, 6, 8, 9))
-
-
-def _is_light(node: Node) -> bool:
-    return "KHR_lights_punctual" in node.extensions
 
 
 def _shown(name: str | None, index: int) -> str:

@@ -17,8 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scenelang.files import read_json, read_regular
 from scenelang.scene.fields import Finite
 
-MOST_BYTES: Final = 10_000_000
-"""Of the JSON; buffers do not count where they lie in a .glb or beside a .gltf."""
+MOST_BYTES: Final = 10_000_000  # of the JSON; buffers do not count where they lie in a .glb or beside a .gltf
 MOST_NODES: Final = 100_000
 _HEADER: Final = 20  # of a .glb and its first chunk
 

@@ -11,9 +11,8 @@ import numpy.typing as npt
 
 from scenelang.image import Image
 from scenelang.lab.about import Report, about, silent
-from scenelang.measure.metrics import MOST_DB, compare
+from scenelang.measure.metrics import MOST_DB, compare, contact_sheet, side_by_side
 from scenelang.measure.scenes import draw_scene, reference_of, scenes_of, summarise
-from scenelang.measure.sheet import contact_sheet, side_by_side
 from scenelang.models.load import Model
 from scenelang.words import TOKENS
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import torch
 
 from scenelang.backend.neural import open_model
-from scenelang.evaluate.api import load
+from scenelang.evaluate.evaluation import load
 from scenelang.graph.nodes import Graph
 from scenelang.lab.about import about
 from scenelang.lab.charts import FAINT, INK, LINE, WARN, figure_png, pyplot

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenelang.graph.levels import Levels, slots
+from scenelang.graph.chain import Levels, slots
 from scenelang.graph.steps import Rows, Turn
 from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH, Layout
 
@@ -73,11 +73,6 @@ def lift_many(
 ) -> np.ndarray:
     """Geometry vectors (N, layout.geometry) in float64: the products of their matrices and the leaf, at once.
 
-    Args:
-        levels: one chain an object.
-        codes: the leaf's code of each object.
-        layout: the model's.
-
     Raises:
         ZeroDivisionError: an affine map is singular.
     """
@@ -105,8 +100,6 @@ def lift_colours(
 
     Args:
         colours: what multiplies the albedo, (r, g, b) in [0, 1].
-        codes: the material's code of each object.
-        layout: the model's.
     """
     out = np.zeros((len(colours), WIDTH - layout.geometry))
     out[:, :6] = PLANE_LAYOUT.identity  # textures lie in a plane

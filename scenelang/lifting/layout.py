@@ -21,8 +21,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-WIDTH: Final = 64
-"""Numbers of an object."""
+WIDTH: Final = 64  # numbers of an object
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,5 +109,4 @@ PLANE_LAYOUT: Final = Layout(dimension=2, code=4, strengths=3, outer=3, inner=2,
 SOLID_LAYOUT: Final = Layout(
     dimension=3, code=4, strengths=3, outer=2, inner=2, texture=6, material=2, extras=3
 )
-LAYOUTS: Final = {"plane": PLANE_LAYOUT, "solid": SOLID_LAYOUT}
-"""Layouts by the names that manifests use."""
+LAYOUTS: Final = {"plane": PLANE_LAYOUT, "solid": SOLID_LAYOUT}  # layouts by the names that manifests use

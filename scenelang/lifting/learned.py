@@ -46,10 +46,6 @@ class Lifting:
 def read_lifting(tensors: Mapping[str, npt.NDArray[Any]], prefix: str = "lifting.") -> Lifting:
     """The lifting in a weights file.
 
-    Args:
-        tensors: by name, as `safetensors.numpy.load` returns them.
-        prefix: of the lifting's names.
-
     Raises:
         KeyError: something is missing.
         ValueError: shapes do not fit each other, or numbers are not finite.
@@ -98,13 +94,7 @@ def step_numbers(step: Step) -> tuple[str, list[float]]:
 
 
 def lift_geometry(lifting: Lifting, chains: Sequence[Sequence[Step]], leaves: Sequence[int]) -> Array:
-    """Geometry vectors (N, d_g): T_n … T_1 g of each chain, nearest the leaf first.
-
-    Args:
-        lifting: of the model.
-        chains: steps of each object.
-        leaves: geometry of each object, a row of the codes.
-    """
+    """Geometry vectors (N, d_g): T_n … T_1 g of each chain, nearest the leaf first; leaves are rows."""
     out: Array = lifting.codes[np.asarray(leaves, int)].copy()
     for at in range(max(map(len, chains), default=0)):
         groups: dict[str, list[tuple[int, list[float]]]] = {}

@@ -1,17 +1,91 @@
-"""Changes of the text: fixes of diagnostics, and formatting."""
+"""Diagnostics of ours as those of the protocol, and changes of the text: their fixes, and formatting."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from difflib import SequenceMatcher
-from typing import Final
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 from lsprotocol import types
 
+from scenelang.diagnostics import pages
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.fixes import apply_fixes
-from scenelang.lsp.convert import to_diagnostic
-from scenelang.lsp.workspace import Document
+from scenelang.diagnostics.pages import CODES
+from scenelang.diagnostics.span import Span
+from scenelang.lsp.text import Lines
+from scenelang.lsp.workspace import Document, uri_of
+from scenelang.syntax.incremental import difference
+
+if TYPE_CHECKING:
+    from scenelang.lsp.workspace import Document
+
+
+def to_location(span: Span, document: Document) -> types.Location:
+    """A span of any file as a place for the client."""
+    name = span.source.name
+    if name == document.source.name:
+        return types.Location(document.uri, document.lines.span(span))
+    uri = uri_of(Path(name)) if Path(name).is_absolute() else name
+    return types.Location(uri, Lines(span.source.text, document.encoding).span(span))
+
+
+def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnostic | None:
+    """A diagnostic for the client; one of an imported file stands at what led there, if this file did."""
+    d, name = diagnostic, document.source.name
+    message = d.message if d.help is None else f"{d.message}\nhelp: {d.help}"
+    related = [
+        types.DiagnosticRelatedInformation(to_location(label.span, document), label.message)
+        for label in d.labels
+        if label.span.source.name == name or Path(label.span.source.name).is_absolute()
+    ]
+    if d.span is None:
+        place = document.lines.range(0, 0)
+    elif d.span.source.name == name:
+        place = document.lines.span(d.span)
+    else:
+        here = next((label.span for label in d.labels if label.span.source.name == name), None)
+        where = here or _import_of(d.span.source.name, document)
+        if where is None:
+            return None
+        place = document.lines.span(where)
+        message = f"in `{Path(d.span.source.name).name}`: {message}"
+        related.insert(0, types.DiagnosticRelatedInformation(to_location(d.span, document), d.message))
+    return types.Diagnostic(
+        range=place,
+        message=message,
+        severity=types.DiagnosticSeverity.Error
+        if d.severity == "error"
+        else types.DiagnosticSeverity.Warning,
+        code=d.code,
+        code_description=_description(d.code),
+        source="scenelang",
+        tags=[types.DiagnosticTag.Unnecessary] if d.code == "W0201" else None,
+        related_information=related or None,
+    )
+
+
+def _import_of(name: str, document: Document) -> Span | None:
+    """The import statement that brings a file, or the first one where it is brought by another."""
+    from scenelang.syntax import nodes
+
+    imports = [stmt for stmt in document.parsed.file.statements if isinstance(stmt, nodes.Import)]
+    for stmt in imports:
+        if name.endswith(Path(stmt.path.value).name):
+            return stmt.path.span
+    return imports[0].path.span if imports else None
+
+
+@cache
+def _description(code: str) -> types.CodeDescription | None:
+    """The page that explains a code; it ships with the package, so it needs no network."""
+    if code not in CODES:
+        return None
+    page = Path(pages.__file__).with_name(f"{code}.md")
+    return types.CodeDescription(uri_of(page)) if page.is_file() else None
+
 
 FIX_ALL: Final = "source.fixAll.scenelang"
 _MOST_LINES: Final = 4000  # of a difference that is looked at line by line
@@ -20,13 +94,7 @@ _MOST_LINES: Final = 4000  # of a difference that is looked at line by line
 def code_actions(
     document: Document, place: types.Range, only: Sequence[str] | None
 ) -> list[types.CodeAction]:
-    """What may be done about the mistakes in a range.
-
-    Args:
-        document: the text.
-        place: where the cursor or the selection is.
-        only: the kinds that the client asks for; None for all.
-    """
+    """What may be done about the mistakes in a range: of the kinds asked for, or of all."""
     lines = document.lines
     start, end = lines.offset(place.start), lines.offset(place.end)
     found = [*document.parsed.diagnostics, *document.semantic]
@@ -35,21 +103,16 @@ def code_actions(
         for d in found
         if d.span is not None
         and d.span.source.name == document.source.name
-        and _line(document, d.span.start) <= _line(document, end)
-        and _line(document, d.span.end) >= _line(document, start)
+        and lines.position(d.span.start).line <= lines.position(end).line
+        and lines.position(d.span.end).line >= lines.position(start).line
     ]
     actions = []
     if _wants(only, types.CodeActionKind.QuickFix):
         near = [d for d in here if d.span is not None and d.span.start <= end and d.span.end >= start]
         actions += [_quick(document, d, d in near) for d in here if _is_ours(document, d)]
-    whole = _fix_all(document, found) if _wants(only, FIX_ALL) else None
-    if whole is not None:
-        actions.append(whole)
+    if _wants(only, FIX_ALL):
+        actions += _fix_all(document, found)
     return actions
-
-
-def _line(document: Document, offset: int) -> int:
-    return document.lines.position(offset).line
 
 
 def _wants(only: Sequence[str] | None, kind: str) -> bool:
@@ -72,23 +135,17 @@ def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeActi
         kind=types.CodeActionKind.QuickFix,
         diagnostics=[shown] if shown is not None else None,
         is_preferred=preferred,
-        edit=_edit(document, edits),
+        edit=types.WorkspaceEdit(changes={document.uri: edits}),
     )
 
 
-def _edit(document: Document, edits: list[types.TextEdit]) -> types.WorkspaceEdit:
-    return types.WorkspaceEdit(changes={document.uri: edits})
-
-
-def _fix_all(document: Document, found: Sequence[Diagnostic]) -> types.CodeAction | None:
+def _fix_all(document: Document, found: Sequence[Diagnostic]) -> list[types.CodeAction]:
     text, done = apply_fixes(document.text, [d for d in found if _is_ours(document, d)])
     if not done or text == document.text:
-        return None
-    return types.CodeAction(
-        title=f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake",
-        kind=FIX_ALL,
-        edit=_edit(document, text_edits(document, text)),
-    )
+        return []
+    title = f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake"
+    edit = types.WorkspaceEdit(changes={document.uri: text_edits(document, text)})
+    return [types.CodeAction(title, kind=FIX_ALL, edit=edit)]
 
 
 # ---------------------------------------------------------------- formatting
@@ -116,15 +173,8 @@ def text_edits(document: Document, text: str) -> list[types.TextEdit]:
     starts = [0]
     for line in old:
         starts.append(starts[-1] + len(line))
-    head = 0
-    while head < min(len(old), len(new)) and old[head] == new[head]:
-        head += 1
-    tail = 0
-    while tail < min(len(old), len(new)) - head and old[-1 - tail] == new[-1 - tail]:
-        tail += 1
-    inner_old, inner_new = old[head : len(old) - tail], new[head : len(new) - tail]
-    if not inner_old and not inner_new:
-        return []
+    edit = difference(old, new)
+    head, inner_old, inner_new = edit.start, old[edit.start : edit.old_end], new[edit.start : edit.new_end]
     if len(inner_old) + len(inner_new) > _MOST_LINES:
         blocks = [(0, len(inner_old), 0, len(inner_new))]
     else:

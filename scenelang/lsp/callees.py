@@ -7,12 +7,10 @@ from typing import Final
 
 from lsprotocol import types
 
-from scenelang.lsp.context import Cursor, cursor_at
+from scenelang.lsp.context import Cursor, cursor_at, sight_at
 from scenelang.lsp.text import width
-from scenelang.lsp.tree import sight_at
 from scenelang.lsp.workspace import Document, Workspace
-from scenelang.resolve.names import Names
-from scenelang.resolve.symbols import Symbol
+from scenelang.resolve.names import Names, Symbol
 from scenelang.syntax import nodes
 from scenelang.words import Word, word_for_call
 
@@ -26,14 +24,10 @@ def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Word | N
     if call is None:
         return None
     found = find_symbol(docs, document, sight_at(document.parsed, call.start), call.name, call.start)
-    if found is not None:
-        return word_of(found[1])
-    return word_for_call(call.name, cursor.block.kind == "material")
+    return word_of(found) if found is not None else word_for_call(call.name, cursor.block.kind == "material")
 
 
-def find_symbol(
-    docs: Workspace, document: Document, names: Names, name: str, offset: int
-) -> tuple[Document, Symbol] | None:
+def find_symbol(docs: Workspace, document: Document, names: Names, name: str, offset: int) -> Symbol | None:
     """The fn or module that a plain or dotted name stands for at an offset; ``names`` are in sight there."""
     alias, _, rest = name.partition(".")
     symbol = names.scope_at(offset).find(alias)
@@ -41,11 +35,10 @@ def find_symbol(
         return None
     if rest and symbol.kind == "import" and isinstance(symbol.node, nodes.Import):
         library = docs.imported(document, symbol.node.path.value)
-        member = library.names.top.symbols.get(rest) if library is not None else None
-        if library is None or member is None or not member.is_exported:
+        symbol = library.names.top.symbols.get(rest) if library is not None else None
+        if symbol is None or not symbol.is_exported:
             return None
-        document, symbol = library, member
-    return (document, symbol) if symbol.kind in ("fn", "module") else None
+    return symbol if symbol.kind in ("fn", "module") else None
 
 
 def signature_help(docs: Workspace, document: Document, offset: int) -> types.SignatureHelp | None:
@@ -68,10 +61,8 @@ def signature_help(docs: Workspace, document: Document, offset: int) -> types.Si
         label: str | tuple[int, int] = param
         if match is not None:
             # Offsets into a label count UTF-16, whatever positions count.
-            label = (
-                width(callee.head[: match.start()], "utf-16"),
-                width(callee.head[: match.end()], "utf-16"),
-            )
+            start, end = (width(callee.head[:at], "utf-16") for at in match.span())
+            label = start, end
             at = match.end()
         parameters.append(types.ParameterInformation(label, about if about.value else None))
     text = types.MarkupContent(types.MarkupKind.Markdown, callee.text) if callee.text else None

@@ -20,7 +20,6 @@ from scenelang.graph.nodes import Graph
 from scenelang.models.manifest import Manifest
 from scenelang.program.check import check_compiles, check_frames
 from scenelang.resolve.unused import find_unused
-from scenelang.scene.schema import Scene
 from scenelang.syntax import nodes
 
 MAX_SEEN: Final = 4  # values and nodes kept of one place
@@ -48,11 +47,9 @@ class Checked:
     """What a check found.
 
     Args:
-        source: the text that was checked.
         diagnostics: mistakes and warnings of evaluation and compiler, without those of syntax.
         wanted: the files that it imports, also those that are not there.
         seen: by file name, start and end: values of names, nodes of statements.
-        scene: the scene, None if it has errors.
         manifest: the model that draws it, where that is known.
     """
 
@@ -60,17 +57,19 @@ class Checked:
     diagnostics: list[Diagnostic]
     wanted: frozenset[Path]
     seen: dict[tuple[str, int, int], Seen]
-    scene: Scene | None = None
     manifest: Manifest | None = None
 
-    def at(self, name: str, start: int, end: int) -> Seen | None:
-        """What a place of a file had."""
-        return self.seen.get((name, start, end))
 
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """What to check.
+def check(
+    file: nodes.File,
+    path: Path | None,
+    root: Path | None,
+    texts: Mapping[Path, str],
+    model: str | None,
+    parsed: bool,
+    stop: threading.Event,
+) -> Checked:
+    """Evaluate a scene and run the compiler's checks.
 
     Args:
         file: the tree.
@@ -78,19 +77,8 @@ class Task:
         root: the folder that imports cannot leave; by default the file's.
         texts: what open files hold.
         model: draw with this model instead of the scene's.
-        syntax: how many syntax mistakes the text has.
-    """
-
-    file: nodes.File
-    path: Path | None
-    root: Path | None
-    texts: Mapping[Path, str]
-    model: str | None = None
-    syntax: int = 0
-
-
-def check(task: Task, stop: threading.Event) -> Checked:
-    """Evaluate a scene and run the compiler's checks.
+        parsed: the text has no syntax mistakes.
+        stop: asks it to give up.
 
     Raises:
         Superseded: ``stop`` was set meanwhile.
@@ -113,25 +101,17 @@ def check(task: Task, stop: threading.Event) -> Checked:
             raise Superseded
 
     evaluation = Evaluation(
-        task.file,
-        diagnostics=found,
-        model=task.model,
-        root=task.root,
-        path=task.path,
-        texts=task.texts,
-        replays=True,
-        watch=watch,
+        file, diagnostics=found, model=model, root=root, path=path, texts=texts, replays=True, watch=watch
     )
     scene, spans = evaluation.run(0)
     after("evaluate")
-    if not task.syntax:
-        find_unused(task.file, found)
     manifest = None
-    if scene is not None and not task.syntax:
-        manifest = check_compiles(scene, spans, found, model=task.model, after=after)
-    if not task.syntax:
+    if parsed:
+        find_unused(file, found)
+        if scene is not None:
+            manifest = check_compiles(scene, spans, found, model=model, after=after)
         frame = 1
-        check_frames(evaluation, found, first=scene, model=task.model, after=after)
+        check_frames(evaluation, found, first=scene, model=model, after=after)
         after("frames")
     wanted = frozenset(evaluation.wanted)
-    return Checked(task.file.span.source, in_file_order(found.items), wanted, seen, scene, manifest)
+    return Checked(file.span.source, in_file_order(found.items), wanted, seen, manifest)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator
+from itertools import islice
 from typing import Final
 
 from lsprotocol import types
@@ -11,18 +13,66 @@ from lsprotocol import types
 from scenelang import words
 from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.lsp.callees import find_callee, word_of
-from scenelang.lsp.colours import COLOURED
-from scenelang.lsp.completion_items import Item, strings, units
-from scenelang.lsp.context import Cursor, cursor_at
-from scenelang.lsp.tree import sight_at
+from scenelang.lsp.context import Cursor, cursor_at, sight_at
+from scenelang.lsp.tokens import COLOURED
 from scenelang.lsp.values import vocabulary_of
-from scenelang.lsp.workspace import Document, Workspace
-from scenelang.resolve.names import Names
-from scenelang.resolve.symbols import Symbol
+from scenelang.lsp.workspace import Document, Workspace, scenes_below
+from scenelang.records import Record
+from scenelang.resolve.names import Names, Symbol
+from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import COMBINE
+from scenelang.words import COMBINE, UNITS
 
 Kind = types.CompletionItemKind
+_MOST_PATHS: Final = 200
+_MOST_FILES: Final = 2000
+
+
+class Item(Record):
+    """A proposal.
+
+    Args:
+        text: what is inserted; the label without it.
+        rank: one letter; what is likelier comes first.
+        about: Markdown.
+        snippet: whether ``text`` has placeholders.
+    """
+
+    label: str
+    kind: Kind
+    text: str = ""
+    rank: str = "m"
+    detail: str = ""
+    about: str = ""
+    snippet: bool = False
+
+
+def units(typed: str) -> Iterator[Item]:
+    """Units that a number may be getting."""
+    number = re.match(r"[0-9]*\.?[0-9]*", typed)
+    if number is None or not number[0] or number[0] == ".":
+        return
+    rest = typed[number.end() :]
+    for unit in UNITS:
+        if rest and unit.startswith(rest):
+            yield Item(f"{number[0]}{unit}", Kind.Unit)
+
+
+def strings(
+    docs: Workspace, document: Document, words: Vocabulary, before: tuple[str, ...]
+) -> Iterator[Item]:
+    """What a string may say: a model's name, a file to import."""
+    if before == ("model",):
+        for manifest in words.models:
+            yield Item(manifest.name, Kind.Module, about=manifest.summary)
+    elif before == ("import",):
+        yield from (Item(name, Kind.File, rank="a") for name in library.names())
+        folder = document.path.parent if document.path is not None else next(iter(docs.folders), None)
+        for path in islice(scenes_below(folder, _MOST_FILES), _MOST_PATHS) if folder is not None else ():
+            if path != document.path:
+                yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
+
+
 _HEADS: Final = ("let", "fn", "module", "for", "if", *words.NODES)
 _SYMBOLS: Final = {
     "let": Kind.Variable,
@@ -36,48 +86,34 @@ _SYMBOLS: Final = {
 
 
 def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
-    """What may stand at an offset.
-
-    Args:
-        docs: all documents.
-        document: the text.
-        offset: where the cursor is.
-        snippets: whether the client fills in placeholders.
-    """
+    """What may stand at an offset."""
     names = sight_at(document.parsed, offset)
-    values = frozenset(
-        s.name for s in names.visible(offset) if s.kind in ("let", "argument", "loop", "param")
-    )
+    holders = ("let", "argument", "loop", "param")
+    values = frozenset(s.name for s in names.visible(offset) if s.kind in holders)
     cursor = cursor_at(document.parsed, offset, values)
     start, end = cursor.start, cursor.end
     if cursor.inside == "string":
-        start, end = (
-            start + 1,
-            max(end - (document.text[end - 1 : end] == '"' and end - 1 > start), start + 1),
-        )
-    maker = _Maker(docs, document, cursor, names)
-    lines = document.lines
-    place = lines.range(start, max(end, start))
+        start += 1
+        end = max(end - (end > start and document.text[end - 1] == '"'), start)
+    place = document.lines.range(start, end)
     items = []
     seen = set()
-    for item in maker.items():
+    for item in _Maker(docs, document, cursor, names).items():
         if item.label in seen:
             continue
         seen.add(item.label)
-        text = item.text or item.label
-        if item.snippet and not snippets:
-            text = item.label
+        filled = item.snippet and snippets
+        text = item.text if item.text and (filled or not item.snippet) else item.label
+        about = types.MarkupContent(types.MarkupKind.Markdown, item.about) if item.about else None
         items.append(
             types.CompletionItem(
                 label=item.label,
                 kind=item.kind,
                 detail=item.detail or None,
-                documentation=types.MarkupContent(types.MarkupKind.Markdown, item.about)
-                if item.about
-                else None,
+                documentation=about,
                 sort_text=f"{item.rank}{item.label}",
                 filter_text=item.label,
-                insert_text_format=types.InsertTextFormat.Snippet if item.snippet and snippets else None,
+                insert_text_format=types.InsertTextFormat.Snippet if filled else None,
                 text_edit=types.TextEdit(place, text),
             )
         )
@@ -120,8 +156,10 @@ class _Maker:
             yield from (self._keyword(word) for word in ("group", *COMBINE, "chain"))
         elif before[0] == "param" and len(before) > 3 and "in" not in before and _ends_operand(last):
             yield Item("in", Kind.Keyword, "in ", "a", about=words.KEYWORDS["in"].text)
-        elif (last == ")" and before[0] == "if") or _in_parameters(before):
+        elif last == ")" and before[0] == "if":
             return
+        elif before[0] in ("fn", "module") and ")" not in before and last in ("(", ","):
+            return  # the name of a parameter
         elif not _ends_operand(last):
             yield from self._expressions()
         elif ".." in before or "..<" in before:
@@ -158,9 +196,8 @@ class _Maker:
             return
         yield from self._children("a")
         if kind == "chain":
-            yield from (
-                Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text) for word in COMBINE
-            )
+            for word in COMBINE:
+                yield Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text)
         yield from (self._keyword(word) for word in _HEADS if kind != "chain" or word not in COMBINE)
         if kind in ("group", "chain"):
             yield from self._calls(words.TRANSFORMS, self.words.transforms, "n")
@@ -183,13 +220,11 @@ class _Maker:
                 yield self._symbol(symbol)
 
     def _material_values(self, rank: str) -> Iterator[Item]:
+        may_be = nodes.MaterialExpr | nodes.NameRef | nodes.Member
         for symbol in self.names.visible(self.cursor.offset):
-            if symbol.kind in ("let", "argument", "loop"):
-                value = getattr(symbol.node, "value", None)
-                if symbol.kind != "let" or isinstance(
-                    value, nodes.MaterialExpr | nodes.NameRef | nodes.Member
-                ):
-                    yield Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
+            fits = symbol.kind != "let" or isinstance(getattr(symbol.node, "value", None), may_be)
+            if fits and symbol.kind in ("let", "argument", "loop"):
+                yield Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
 
     def _materials(self) -> Iterator[Item]:
         for name in sorted(self.words.materials):
@@ -285,10 +320,3 @@ def _ends_operand(text: str) -> bool:
     return text in (")", "]", "}", "true", "false") or (
         (text[:1].isalnum() or text[:1] in '_#"') and text not in words.KEYWORDS
     )
-
-
-def _in_parameters(before: tuple[str, ...]) -> bool:
-    """Whether the cursor is where a fn or module names its parameters."""
-    if before[0] not in ("fn", "module") or ")" in before:
-        return False
-    return before[-1] in ("(", ",")

@@ -1,18 +1,72 @@
-"""Where the cursor is: in which word, statement, call and block.
+"""Where a place is: in which nodes, word, statement, call and block, and which names are in sight of it.
 
-This looks at tokens alone, which are there however broken the text is.
+A `Cursor` is of tokens alone, which are there however broken the text is.
 """
 
 from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
+from scenelang.diagnostics.span import Span
 from scenelang.records import Record
+from scenelang.resolve.names import Kind, Names, Symbol
+from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Parsed
+from scenelang.syntax.nodes import children
 from scenelang.syntax.tables import tables
 from scenelang.words import COMBINE, NODES
+
+
+def path_to(parsed: Parsed, offset: int) -> list[Any]:
+    """The nodes that hold an offset, outermost first; empty between statements."""
+    index = parsed.at(offset)
+    if index is None:
+        return []
+    path: list[Any] = [parsed.statement(index)]
+    while True:
+        inner = [n for n in children(path[-1]) if n.span.start <= offset <= n.span.end]
+        if not inner:
+            return path
+        # Where two touch at the offset, the one that begins there is meant.
+        path.append(max(inner, key=lambda n: (n.span.start, -n.span.end)))
+
+
+_Defining = nodes.Param | nodes.Let | nodes.Fn | nodes.Module | nodes.Import
+_TOP: Final[dict[type, Kind]] = {
+    nodes.Param: "param",
+    nodes.Let: "let",
+    nodes.Fn: "fn",
+    nodes.Module: "module",
+    nodes.Import: "import",
+}
+
+
+def sight_at(parsed: Parsed, offset: int) -> Names:
+    """The names in sight of an offset: those of its statement, and what the others define at top level.
+
+    This is what a keystroke asks for. It takes the other statements' trees where they stand, moved or not,
+    so that the nodes of their symbols are good for text and not for places.
+    """
+    index = parsed.at(offset)
+    whole = Span(parsed.source, 0, len(parsed.source.text))
+    names = Names(nodes.File(whole, () if index is None else (parsed.statement(index),)))
+    top = names.top
+    for at, stmt in enumerate(parsed.heads()):
+        kind = _TOP.get(stmt.__class__)
+        if kind is None or at == index or not isinstance(stmt, _Defining):
+            continue
+        name = stmt.alias if isinstance(stmt, nodes.Import) else stmt.name
+        symbol = Symbol(name.text, kind, name.span, stmt, top, parsed.ends[at])
+        if isinstance(stmt, nodes.Fn | nodes.Module):
+            symbol.since = 0
+            symbol.params = [
+                Symbol(p.name.text, "argument", p.name.span, p, top, 0, symbol) for p in stmt.params
+            ]
+        top.symbols.setdefault(symbol.name, symbol)
+    return names
+
 
 BlockKind = Literal["file", "group", "chain", "object", "material"]
 _HOLDERS: Final = {*NODES, "module"}
@@ -55,12 +109,9 @@ class Cursor(Record):
     """What is around an offset.
 
     Args:
-        offset: the place.
         start, end: the word that the cursor is in or behind; equal to ``offset`` where there is none.
         inside: ``comment``, ``string``, ``number``, ``colour`` or ``code``.
         before: the tokens of the statement before that word, as text.
-        call: the innermost call.
-        block: the innermost block.
     """
 
     offset: int
@@ -109,13 +160,7 @@ class _Reader:
 
 
 def cursor_at(parsed: Parsed, offset: int, values: frozenset[str] = frozenset()) -> Cursor:
-    """What is around an offset.
-
-    Args:
-        parsed: the text.
-        offset: the place.
-        values: names in sight that may be materials.
-    """
+    """What is around an offset; ``values`` are names in sight that may be materials."""
     read = _Reader(parsed)
     count = len(read.kinds) - 1
     index = min(bisect_left(read.starts, offset), count)  # tokens before this one begin before the cursor

@@ -10,7 +10,7 @@ from lsprotocol import types
 from pygls.exceptions import JsonRpcException
 
 from scenelang.diagnostics.error import SceneError
-from scenelang.lsp import actions, callees, colours, completion, hints, hover, navigation, outline, tokens
+from scenelang.lsp import actions, callees, completion, hover, navigation, tokens
 from scenelang.lsp.server import Server, Settings
 from scenelang.lsp.workspace import Document, path_of
 
@@ -104,11 +104,10 @@ def _completion(server: Server, document: Document, offset: int) -> types.Comple
 
 def _rename(server: Server, document: Document, params: types.RenameParams) -> types.WorkspaceEdit | None:
     offset = document.lines.offset(params.position)
-    edit = navigation.rename(server.docs, document, offset, params.new_name)
     workspace = server.client_capabilities.workspace
     known = workspace.workspace_edit if workspace is not None else None
-    versioned = known is not None and known.document_changes
-    return edit if edit is None or versioned else navigation.plain_edit(edit)
+    versioned = known is not None and bool(known.document_changes)
+    return navigation.rename(server.docs, document, offset, params.new_name, versioned)
 
 
 def _formatted(server: Server, document: Document, place: types.Range | None) -> list[types.TextEdit] | None:
@@ -135,7 +134,7 @@ _SESSION: Final[dict[str, Callable[..., Any]]] = {
     types.WORKSPACE_DID_CHANGE_WATCHED_FILES: _files_changed,
     types.WORKSPACE_DID_CHANGE_CONFIGURATION: _configured,
     types.WORKSPACE_DID_CHANGE_WORKSPACE_FOLDERS: _folders_changed,
-    types.WORKSPACE_SYMBOL: lambda server, params: outline.workspace_symbols(server.docs, params.query),
+    types.WORKSPACE_SYMBOL: lambda server, params: navigation.workspace_symbols(server.docs, params.query),
 }
 _AT_PLACE: Final[dict[str, Callable[[Server, Document, int], Any]]] = {
     types.TEXT_DOCUMENT_COMPLETION: _completion,
@@ -159,14 +158,14 @@ _LISTS: Final[dict[str, Callable[[Server, Document, Any], list[Any]]]] = {
         s.docs, d, d.lines.offset(p.position)
     ),
     types.TEXT_DOCUMENT_SELECTION_RANGE: lambda s, d, p: [
-        outline.selection(d, d.lines.offset(place)) for place in p.positions
+        navigation.selection(d, d.lines.offset(place)) for place in p.positions
     ],
-    types.TEXT_DOCUMENT_DOCUMENT_SYMBOL: lambda s, d, p: outline.document_symbols(d),
-    types.TEXT_DOCUMENT_FOLDING_RANGE: lambda s, d, p: outline.folding(d),
-    types.TEXT_DOCUMENT_DOCUMENT_COLOR: lambda s, d, p: colours.colours(d),
-    types.TEXT_DOCUMENT_COLOR_PRESENTATION: lambda s, d, p: colours.presentations(d, p.color, p.range),
+    types.TEXT_DOCUMENT_DOCUMENT_SYMBOL: lambda s, d, p: navigation.document_symbols(d),
+    types.TEXT_DOCUMENT_FOLDING_RANGE: lambda s, d, p: navigation.folding(d),
+    types.TEXT_DOCUMENT_DOCUMENT_COLOR: lambda s, d, p: tokens.colours(d),
+    types.TEXT_DOCUMENT_COLOR_PRESENTATION: lambda s, d, p: tokens.presentations(d, p.color, p.range),
     types.TEXT_DOCUMENT_CODE_ACTION: lambda s, d, p: actions.code_actions(d, p.range, p.context.only),
-    types.TEXT_DOCUMENT_INLAY_HINT: lambda s, d, p: hints.inlay_hints(s.docs, d, p.range, s.settings),
+    types.TEXT_DOCUMENT_INLAY_HINT: lambda s, d, p: hover.inlay_hints(s.docs, d, p.range, s.settings),
     types.TEXT_DOCUMENT_DOCUMENT_LINK: lambda s, d, p: navigation.links(s.docs, d),
 }
 _OPTIONS: Final = {

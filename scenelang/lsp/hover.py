@@ -1,24 +1,27 @@
-"""Hover: what the word under the cursor means, and what it came to when the scene was evaluated."""
+"""Hover and inlay hints: what a word means, and what it came to when the scene was evaluated."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from lsprotocol import types
 
 from scenelang import words
 from scenelang.lsp import values
-from scenelang.lsp.callees import word_of
+from scenelang.lsp.callees import find_symbol, word_of
 from scenelang.lsp.check import Seen
-from scenelang.lsp.tree import path_to
+from scenelang.lsp.context import path_to
+from scenelang.lsp.server import Settings
 from scenelang.lsp.values import space_of, vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.models.manifest import Manifest
-from scenelang.resolve.symbols import Symbol, Use
+from scenelang.resolve.names import Symbol, Use
 from scenelang.scene import text as to_nsg
 from scenelang.syntax import nodes
+from scenelang.syntax.nodes import walk
+from scenelang.words import word_for_call
 
 _TABLES: Final = {
     "function": words.FUNCTIONS,
@@ -81,9 +84,11 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             table = words.OPERATIONS if use.role == "operation" else words.TRANSFORMS
             return (_word(table[text]) + _transform_facts(document, use)) if text in table else None
         case "geometry":
-            return _geometry(docs, document, use)
+            about = _offered(document, text, "geometries", text, words.GEOMETRIES)
+            node = next((n for n in _calls(document, use) if n.name.text == text), None)
+            return about and about + _node_facts(document, node)
         case "material":
-            return _material(document, text)
+            return _offered(document, f"material {text}", "materials", text, words.MATERIALS)
         case "model":
             return next((_model(m) for m in vocabulary_of(document).models if m.name == text), None)
         case "argument":
@@ -108,17 +113,13 @@ def _definition(document: Document, where: Document, symbol: Symbol) -> str:
     parts = [_code(word.head), *([word.text] if word.text else [])]
     seen = seen_at(document, where, symbol.span.start, symbol.span.end)
     line = describe_values(seen)
-    if line and not (isinstance(symbol.node, nodes.Let | nodes.Param) and _says_it(symbol.node, line)):
+    node = symbol.node
+    value = node.value if isinstance(node, nodes.Let) else getattr(node, "default", None)
+    if line and not (value is not None and line == f"= `{value.span.text}`"):  # it stands there
         parts.append(line)
     if where is not document and where.path is not None:
         parts.append(f"in `{where.path.name}`")
     return "\n\n".join(parts)
-
-
-def _says_it(node: nodes.Let | nodes.Param, line: str) -> bool:
-    """Whether a definition shows its value already."""
-    value = node.value if isinstance(node, nodes.Let) else node.default
-    return line == f"= `{value.span.text}`"
 
 
 def seen_at(document: Document, where: Document, start: int, end: int) -> Seen | None:
@@ -131,7 +132,7 @@ def seen_at(document: Document, where: Document, start: int, end: int) -> Seen |
         if old_start is None or old_end is None:
             return None
         start, end = old_start, old_end
-    return checked.at(where.source.name, start, end)
+    return checked.seen.get((where.source.name, start, end))
 
 
 def describe_values(seen: Seen | None) -> str:
@@ -148,28 +149,13 @@ def describe_values(seen: Seen | None) -> str:
 # ---------------------------------------------------------------- what the model offers
 
 
-def _geometry(docs: Workspace, document: Document, use: Use) -> str | None:
-    text = use.text
-    owners = [m.name for m in vocabulary_of(document).models if text in m.geometries]
+def _offered(document: Document, head: str, field: str, text: str, about: Mapping[str, str]) -> str | None:
+    """A geometry or a material, where a model has it: ``field`` of manifests lists such."""
+    owners = [f"model `{m.name}`" for m in vocabulary_of(document).models if text in getattr(m, field)]
     if not owners:
         return None
-    parts = [_code(f"{text} {{ … }}"), words.GEOMETRIES.get(text, ""), "of " + _listed(owners)]
-    path = path_to(document.parsed, use.start)
-    node = next((n for n in reversed(path) if isinstance(n, nodes.Call) and n.name.text == text), None)
-    return "\n\n".join(part for part in parts if part) + (_node_facts(document, node) if node else "")
-
-
-def _listed(names: Iterable[str]) -> str:
-    return ", ".join(f"model `{name}`" for name in names)
-
-
-def _material(document: Document, text: str) -> str | None:
-    owners = [m.name for m in vocabulary_of(document).models if text in m.materials]
-    if not owners:
-        return None
-    return "\n\n".join(
-        [_code(f"material {text} {{ … }}"), words.MATERIALS.get(text, ""), "of " + _listed(owners)]
-    )
+    parts = [_code(f"{head} {{ … }}"), about.get(text, ""), "of " + ", ".join(owners)]
+    return "\n\n".join(part for part in parts if part)
 
 
 def _model(manifest: Manifest) -> str:
@@ -190,25 +176,22 @@ def _model(manifest: Manifest) -> str:
 # ---------------------------------------------------------------- transforms and objects
 
 
-def _nodes_of(document: Document, node: Any) -> list[Any]:
-    """Scene nodes that a statement made."""
-    seen = seen_at(document, document, node.span.start, node.span.end)
-    return list(seen.values) if seen is not None else []
+def _calls(document: Document, use: Use) -> Iterator[nodes.Call]:
+    """The calls around a name, the innermost first."""
+    path = path_to(document.parsed, use.start)
+    return (node for node in reversed(path) if isinstance(node, nodes.Call))
 
 
 def _transform_facts(document: Document, use: Use) -> str:
     """The matrix or the formula that a transform came to."""
-    path = path_to(document.parsed, use.start)
-    node = next((n for n in reversed(path) if isinstance(n, nodes.Call)), None)
-    if node is None:
-        return ""
-    made = _nodes_of(document, node)
+    node = next(_calls(document, use), None)
+    seen = seen_at(document, document, node.span.start, node.span.end) if node is not None else None
+    made = seen.values if seen is not None else []
     parts = []
     for item in made[:2]:
         shown = values.show_transform(item, space_of(document))
         if shown is not None:
-            called = to_nsg.transform(item)
-            parts.append(f"`{called}`\n\n```text\n{shown}\n```")
+            parts.append(f"`{to_nsg.transform(item)}`\n\n```text\n{shown}\n```")
     more = "\n\n…" if len(made) > 2 else ""
     return "\n\n---\n\n" + "\n\n".join(parts) + more if parts else ""
 
@@ -229,3 +212,84 @@ def _node_facts(document: Document, node: Any) -> str:
     composed = "\n\nthen\n\n".join(f"```text\n{step}\n```" for step in steps)
     stretch = values.show_stretch(item.transforms, space)
     return f"\n\n---\n\ntransforms{times}:\n{_code(chain)}\ncomposed:\n\n{composed}\n\nscales by {stretch}"
+
+
+_LONGEST: Final = 28
+_PLAIN: Final = (nodes.Number, nodes.String, nodes.Bool, nodes.Color)
+_CLEAR: Final = frozenset(
+    {"translate", "rotate", "scale", "canvas", "color", "min", "max", "rgb", "hsv", "animate"}
+)
+
+
+def inlay_hints(
+    docs: Workspace, document: Document, place: types.Range, settings: Settings
+) -> list[types.InlayHint]:
+    """The hints of a range."""
+    low, high = document.lines.offset(place.start), document.lines.offset(place.end)
+    found: list[types.InlayHint] = []
+    parsed = document.parsed
+    for index, (start, end) in enumerate(zip(parsed.starts, parsed.ends, strict=True)):
+        if end < low or start > high:
+            continue
+        for node in walk(parsed.statement(index)):
+            if node.span.end < low or node.span.start > high:
+                continue
+            if isinstance(node, nodes.Let) and settings.value_hints:
+                hint = _value(document, node)
+                if hint is not None:
+                    found.append(hint)
+            elif isinstance(node, nodes.Call | nodes.CallExpr) and settings.argument_hints:
+                found += _arguments(docs, document, node)
+    found.sort(key=lambda hint: (hint.position.line, hint.position.character))
+    return found
+
+
+def _value(document: Document, let: nodes.Let) -> types.InlayHint | None:
+    """What a let came to, unless it is written there or differs from pass to pass."""
+    if _is_plain(let.value):
+        return None
+    seen = seen_at(document, document, let.name.span.start, let.name.span.end)
+    if seen is None or not seen.values:
+        return None
+    shown = {values.show_value(value) for value in seen.values}
+    text = shown.pop()
+    if shown or text is None or len(text) > _LONGEST or text == let.value.span.text:
+        return None
+    return types.InlayHint(
+        document.lines.position(let.value.span.end),
+        f" = {text}",
+        padding_left=False,
+        tooltip="the value that this scene gives it",
+    )
+
+
+def _is_plain(expr: nodes.Expr) -> bool:
+    if isinstance(expr, nodes.Unary):
+        return _is_plain(expr.operand)
+    if isinstance(expr, nodes.Vector):
+        return all(_is_plain(item) for item in expr.items)
+    return isinstance(expr, _PLAIN)
+
+
+def _arguments(
+    docs: Workspace, document: Document, call: nodes.Call | nodes.CallExpr
+) -> list[types.InlayHint]:
+    name = call.name.text
+    args = call.args or ()
+    if name in _CLEAR or not args:
+        return []
+    found = find_symbol(docs, document, document.names, name, call.name.span.start)
+    callee = word_of(found) if found is not None else word_for_call(name, False)
+    if callee is None or callee.variadic or len(callee.params) < 2:
+        return []
+    hints = []
+    for arg, param in zip(args, callee.params, strict=False):
+        value = arg.value
+        alike = isinstance(value, nodes.NameRef) and value.name.text == param
+        if arg.name is not None or alike or isinstance(value, nodes.BadExpr):
+            continue
+        if found is None and len(param) == 1:
+            continue  # x, y, t: shorter than any help
+        place = document.lines.position(arg.span.start)
+        hints.append(types.InlayHint(place, f"{param}:", types.InlayHintKind.Parameter, padding_right=True))
+    return hints

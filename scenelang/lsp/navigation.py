@@ -1,17 +1,21 @@
-"""Going about: definition, references, highlights, rename."""
+"""Going about: definition, references, highlights, rename, links; symbols, folding, growing selections."""
 
 from __future__ import annotations
 
 import re
-from typing import Final
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+from typing import Any, Final
 
 from lsprotocol import types
 
+from scenelang.lsp.context import path_to
 from scenelang.lsp.workspace import Document, Workspace, uri_of
-from scenelang.resolve.symbols import Scope, Symbol, Use
+from scenelang.resolve.names import Scope, Symbol, Use
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import LANGUAGE, RESERVED
+from scenelang.syntax.nodes import walk
+from scenelang.words import LANGUAGE, RESERVED, STAGE
 
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -88,8 +92,13 @@ def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.Pr
     return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
 
 
-def rename(docs: Workspace, document: Document, offset: int, new: str) -> types.WorkspaceEdit | None:
+def rename(
+    docs: Workspace, document: Document, offset: int, new: str, versioned: bool
+) -> types.WorkspaceEdit | None:
     """Change a name wherever it is meant, in all files.
+
+    Args:
+        versioned: whether the client knows edits of a version of a document.
 
     Raises:
         Refused: the new name is none, or would mean something else somewhere.
@@ -107,26 +116,15 @@ def rename(docs: Workspace, document: Document, offset: int, new: str) -> types.
     for other, place in places:
         _check_place(other, place, symbol, new)
     _check_captures(docs, where, symbol, new)
-    edits: dict[str, tuple[Document, list[types.TextEdit]]] = {}
+    edits: dict[str, list[types.TextEdit]] = {}
     for other, place in places:
-        text_edit = types.TextEdit(other.lines.range(place.start, place.end), new)
-        edits.setdefault(other.uri, (other, []))[1].append(text_edit)
+        edits.setdefault(other.uri, []).append(types.TextEdit(other.lines.range(place.start, place.end), new))
+    if not versioned:
+        return types.WorkspaceEdit(changes=edits)
+    name, versions = types.OptionalVersionedTextDocumentIdentifier, {d.uri: d.version for d, _ in places}
     return types.WorkspaceEdit(
-        document_changes=[
-            types.TextDocumentEdit(types.OptionalVersionedTextDocumentIdentifier(uri, other.version), changes)
-            for uri, (other, changes) in edits.items()
-        ],
+        document_changes=[types.TextDocumentEdit(name(uri, versions[uri]), edits[uri]) for uri in edits]
     )
-
-
-def plain_edit(edit: types.WorkspaceEdit) -> types.WorkspaceEdit:
-    """The same for clients that know no versioned edits."""
-    changes = {
-        item.text_document.uri: [e for e in item.edits if isinstance(e, types.TextEdit)]
-        for item in edit.document_changes or ()
-        if isinstance(item, types.TextDocumentEdit)
-    }
-    return types.WorkspaceEdit(changes=changes)
 
 
 def _check_owner(where: Document, use: Use) -> None:
@@ -153,7 +151,7 @@ def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
         taken = inner.symbols.get(new)
         if taken is not None:
             line = taken.span.locate()[0][0]
-            raise Refused(f"`{new}` is already defined in line {line} of {_called(other)}")
+            raise Refused(f"`{new}` is already defined in line {line} of {other.name}")
         inner = None if inner is symbol.scope else inner.parent
 
 
@@ -171,11 +169,7 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
         meant = inner.find(new)
         if meant is None or not (scope.start <= meant.scope.start and meant.scope.end <= scope.end):
             line = where.lines.position(use.start).line + 1
-            raise Refused(f"`{new}` in line {line} of {_called(where)} would mean this")
-
-
-def _called(document: Document) -> str:
-    return document.path.name if document.path is not None else document.uri
+            raise Refused(f"`{new}` in line {line} of {where.name} would mean this")
 
 
 # ---------------------------------------------------------------- links
@@ -190,4 +184,140 @@ def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:
             if library is not None and library.path is not None:
                 place = document.lines.range(stmt.path.span.start + 1, max(stmt.path.span.end - 1, 0))
                 found.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
+    return found
+
+
+Kind = types.SymbolKind
+_DEFINES: Final = {
+    nodes.Param: Kind.Property,
+    nodes.Let: Kind.Variable,
+    nodes.Fn: Kind.Function,
+    nodes.Module: Kind.Module,
+}
+# Possessive: a string or comment without end is read once, not once for each of its characters.
+_COMMENT: Final = re.compile(
+    r'"(?:[^"\\\n]|\\[^\n])*+"?|/\*(?:[\s\S]*?\*/|[\s\S]*)|(?:^[ \t]*+//[^\n]*+\n?)++', re.MULTILINE
+)
+
+
+def document_symbols(document: Document) -> list[types.DocumentSymbol]:
+    """The file's definitions and objects as a tree."""
+    return list(_symbols(document.file.statements, document))
+
+
+def _symbols(statements: Iterable[nodes.Stmt], document: Document) -> Iterator[types.DocumentSymbol]:
+    for stmt in statements:
+        word = ""
+        if isinstance(stmt, nodes.Combined):
+            word, stmt = f"{stmt.op} ", stmt.child
+        entry = _entry(stmt)
+        if entry is None:
+            continue
+        name, kind, selection, inner, detail = entry
+        yield types.DocumentSymbol(
+            name=word + name,
+            kind=kind,
+            range=document.lines.span(stmt.span),
+            selection_range=document.lines.span(selection),
+            detail=detail or None,
+            children=list(_symbols(inner, document)),
+        )
+
+
+def _entry(stmt: nodes.Stmt) -> tuple[str, types.SymbolKind, Any, tuple[nodes.Stmt, ...], str] | None:
+    match stmt:
+        case nodes.Param() | nodes.Let():
+            value = stmt.default if isinstance(stmt, nodes.Param) else stmt.value
+            shown = " ".join(value.span.text.split())[:60]
+            return stmt.name.text, _DEFINES[type(stmt)], stmt.name.span, (), shown
+        case nodes.Fn() | nodes.Module():
+            inner = stmt.body.statements if isinstance(stmt, nodes.Module) else ()
+            params = ", ".join(p.name.text for p in stmt.params)
+            return stmt.name.text, _DEFINES[type(stmt)], stmt.name.span, inner, f"({params})"
+        case nodes.Import():
+            return stmt.alias.text, Kind.File, stmt.alias.span, (), stmt.path.value
+        case nodes.Node():
+            detail = f"({', '.join(arg.span.text for arg in stmt.args)})" if stmt.args else ""
+            return stmt.kind, Kind.Struct, stmt.keyword, stmt.body.statements, detail
+        case nodes.Call() if stmt.name.text in STAGE and stmt.args is not None and stmt.body is None:
+            return (
+                stmt.name.text,
+                Kind.Field,
+                stmt.name.span,
+                (),
+                f"({', '.join(a.span.text for a in stmt.args)})",
+            )
+        case nodes.For():
+            return f"for {stmt.variable.text}", Kind.Array, stmt.variable.span, stmt.body.statements, ""
+        case nodes.If():
+            inner = stmt.then.statements
+            other = stmt.otherwise
+            inner += (other,) if isinstance(other, nodes.If) else other.statements if other else ()
+            return "if", Kind.Boolean, stmt.condition.span, inner, ""
+        case nodes.Call() if stmt.body is not None or stmt.args is None:
+            within = stmt.body.statements if stmt.body else ()
+            nested = tuple(s for s in within if isinstance(s, nodes.Let | nodes.For | nodes.If))
+            return stmt.name.text, Kind.Object, stmt.name.span, nested, ""
+        case _:
+            return None
+
+
+def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol]:
+    """Definitions at the top of all files whose names have the letters of a query, in order."""
+    query, found = query.lower(), []
+    for document in docs.known():
+        for stmt in document.parsed.file.statements:
+            if isinstance(stmt, nodes.Param | nodes.Let | nodes.Fn | nodes.Module):
+                letters = iter(stmt.name.text.lower())
+                if not all(letter in letters for letter in query):
+                    continue
+                place = types.Location(document.uri, document.lines.span(stmt.name.span))
+                kind = _DEFINES[type(stmt)]
+                found.append(types.WorkspaceSymbol(place, stmt.name.text, kind, container_name=document.name))
+                if len(found) >= 500:
+                    return found
+    return found
+
+
+# ---------------------------------------------------------------- folding
+
+
+def folding(document: Document) -> list[types.FoldingRange]:
+    """Blocks, brackets, comments and runs of imports that take more than a line."""
+    found: dict[int, types.FoldingRange] = {}
+    lines = document.lines
+
+    def add(start: int, end: int, kind: types.FoldingRangeKind | None = None, tail: int = 0) -> None:
+        first, last = lines.position(start).line, lines.position(end).line - tail
+        if last > first:
+            found.setdefault(first, types.FoldingRange(first, last, kind=kind))
+
+    for stmt in document.file.statements:
+        for node in walk(stmt):
+            if isinstance(node, nodes.Block | nodes.Vector):
+                closes = document.text[node.span.end - 1 : node.span.end] in ("}", "]")
+                add(node.span.start, node.span.end, None, int(closes))
+    for group, run in groupby(document.file.statements, lambda stmt: isinstance(stmt, nodes.Import)):
+        if group:
+            imports = list(run)
+            add(imports[0].span.start, imports[-1].span.end, types.FoldingRangeKind.Imports)
+    for match in _COMMENT.finditer(document.text):
+        if not match[0].startswith('"'):
+            add(match.start(), match.end() - match[0].endswith("\n"), types.FoldingRangeKind.Comment)
+    return [found[line] for line in sorted(found)]
+
+
+def selection(document: Document, offset: int) -> types.SelectionRange:
+    """The nodes around an offset, innermost first, each within the next."""
+    spans = [(0, len(document.text)), *((n.span.start, n.span.end) for n in path_to(document.parsed, offset))]
+    use = document.names.at(offset)
+    if use is not None:
+        spans.append((use.start, use.end))
+    found: types.SelectionRange | None = None
+    last = (-1, -1)
+    for start, end in spans:
+        if (start, end) != last and (last == (-1, -1) or (last[0] <= start and end <= last[1])):
+            found = types.SelectionRange(document.lines.range(start, end), found)
+            last = (start, end)
+    assert found is not None
     return found

@@ -23,15 +23,13 @@ from pygls.lsp.server import LanguageServer
 from pygls.protocol import LanguageServerProtocol
 from pygls.protocol.language_server import lsp_method
 
-from scenelang.lsp.check import Checked, Superseded, Task, check
-from scenelang.lsp.convert import to_diagnostic
+from scenelang.lsp.actions import to_diagnostic
+from scenelang.lsp.check import Checked, Superseded, check
 from scenelang.lsp.workspace import Document, Workspace, path_of
 from scenelang.records import Record
 
 log = logging.getLogger("scenelang.lsp")
 _DEEP: Final = 10_000  # trees are up to 200 levels deep, walks take a few calls a level
-
-
 MAX_PAUSE_MS: Final = 60_000
 _LENGTH: Final = re.compile(rb"Content-Length: *(\d+)\r\n\Z")
 _MOST_DIGITS: Final = 8  # below 100 MB: the largest text there may be, each character escaped
@@ -46,8 +44,6 @@ class Settings(Record):
         debounce_ms: how long typing has to pause before a scene is evaluated.
         model: draw with this model instead of the scene's.
         root: the folder that imports cannot leave, instead of the scene's.
-        value_hints: show values behind lets.
-        argument_hints: show parameter names in calls.
     """
 
     debounce_ms: float = 200.0
@@ -59,9 +55,7 @@ class Settings(Record):
     @classmethod
     def read(cls, options: Any) -> Settings:
         """What a client sent; what is missing, of another type or out of range has its default."""
-        if not isinstance(options, dict):
-            return cls()
-        given = options.get("scenelang", options)
+        given = options.get("scenelang", options) if isinstance(options, dict) else None
         if not isinstance(given, dict):
             return cls()
         hints = given.get("inlayHints")
@@ -81,11 +75,8 @@ class Settings(Record):
 class Incoming:
     """A stream whose messages of 100 MB and more are passed over, up to the next one's header.
 
-    No JSON holds a line that ends like a header, as newlines in strings are escaped.
-
-    Args:
-        stream: the client's.
-        refuse: called for each message that is passed over, from the thread that reads.
+    No JSON holds a line that ends like a header, as newlines in strings are escaped. For each message that is
+    passed over, ``refuse`` is called from the thread that reads.
     """
 
     def __init__(self, stream: BinaryIO, refuse: Callable[[], None]) -> None:
@@ -214,8 +205,8 @@ class Server(LanguageServer):
             if stop.is_set():
                 return
             try:
-                task = Task(parsed.file, document.path, root, texts, model, len(parsed.diagnostics))
-                checked = check(task, stop)
+                whole = not parsed.diagnostics
+                checked = check(parsed.file, document.path, root, texts, model, whole, stop)
             except Superseded:
                 return
             except Exception:
@@ -232,13 +223,10 @@ class Server(LanguageServer):
         document.checked, document.edits = checked, []
         document.semantic = checked.diagnostics
         self.publish(document)
-        if self.settings.value_hints and self._refreshes():
-            self.workspace_inlay_hint_refresh(None)
-
-    def _refreshes(self) -> bool:
         workspace = self.client_capabilities.workspace
         hint = workspace.inlay_hint if workspace is not None else None
-        return bool(hint is not None and hint.refresh_support)
+        if self.settings.value_hints and hint is not None and hint.refresh_support:
+            self.workspace_inlay_hint_refresh(None)
 
     def changed(self, path: Path | None, but: str = "") -> None:
         """Check again what imports a file."""

@@ -13,19 +13,14 @@ from typing import Final, Literal
 from lsprotocol import types
 
 from scenelang.diagnostics.span import Span
-from scenelang.syntax.incremental import Edit
+from scenelang.syntax.incremental import Edit, difference
 
 Encoding = Literal["utf-8", "utf-16", "utf-32"]
 _NEWLINE: Final = re.compile(r"\r\n|\n|\r")
 
 
 class Lines:
-    """The lines of one text.
-
-    Args:
-        text: the text.
-        encoding: what columns count.
-    """
+    """The lines of one text."""
 
     def __init__(self, text: str, encoding: Encoding = "utf-16") -> None:
         self.text = text
@@ -53,7 +48,7 @@ class Lines:
         for at in range(start, end):
             if units >= wanted:
                 return at
-            units += _units(self.text[at], self.encoding)
+            units += width(self.text[at], self.encoding)
             if units > wanted:
                 return at  # inside a character: before it
         return end
@@ -76,12 +71,6 @@ class Lines:
         return self.range(span.start, span.end)
 
 
-def _units(character: str, encoding: Encoding) -> int:
-    if encoding == "utf-16":
-        return 2 if character > "\uffff" else 1
-    return len(character.encode("utf-8", "surrogatepass"))
-
-
 def width(text: str, encoding: Encoding) -> int:
     """How many code units a text has."""
     if encoding == "utf-32" or text.isascii():
@@ -98,16 +87,3 @@ def applied(lines: Lines, change: types.TextDocumentContentChangeEvent) -> tuple
         return change.text, difference(text, change.text)
     start, end = sorted((lines.offset(change.range.start), lines.offset(change.range.end)))
     return text[:start] + change.text + text[end:], Edit(start, end, start + len(change.text))
-
-
-def difference(old: str, new: str) -> Edit:
-    """The shortest single edit from one text to another."""
-    start = _common(old, new)
-    end = _common(old[start:][::-1], new[start:][::-1])
-    return Edit(start, len(old) - end, len(new) - end)
-
-
-def _common(left: str, right: str) -> int:
-    """How many characters two texts begin with alike."""
-    pairs = enumerate(zip(left, right, strict=False))
-    return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))

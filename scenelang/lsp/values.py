@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from functools import cache
 from typing import Any
 
@@ -10,11 +11,11 @@ from scenelang.evaluate.values.value import POISON, Angle, MaterialValue, RangeV
 from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.graph import affine
 from scenelang.graph.chain import merged
+from scenelang.graph.lower import step_of
 from scenelang.graph.nodes import Move
-from scenelang.graph.space import Space
+from scenelang.graph.space import Refusal, Space
 from scenelang.graph.spaces import SPACES
-from scenelang.graph.steps import Affine, Rows, Warp
-from scenelang.graph.transforms import step_of
+from scenelang.graph.steps import Affine, Rows, Step, Warp
 from scenelang.lsp.workspace import Document
 from scenelang.scene import text as to_nsg
 from scenelang.syntax import nodes
@@ -56,7 +57,7 @@ def show_value(value: Any) -> str | None:
         short: str = value if len(value) <= 60 else value[:57] + "…"
         return '"' + short.replace("\\", "\\\\").replace('"', '\\"') + '"'
     if cls is Angle:
-        return _angle(value.size)
+        return f"{show(round(math.degrees(value.size), 6))}deg"
     if cls is Time:
         return f"{show(value.size)}s"
     if cls is Vec:
@@ -70,10 +71,6 @@ def show_value(value: Any) -> str | None:
     if cls is MaterialValue:
         return to_nsg.material(value.material).rstrip(";")
     return "none" if value is None else None
-
-
-def _angle(rad: float) -> str:
-    return f"{show(round(math.degrees(rad), 6))}deg"
 
 
 def show_matrix(rows: Rows, space: Space) -> str:
@@ -101,33 +98,29 @@ def show_transform(node: Any, space: Space) -> str | None:
     """The matrix or the formula of a geometry transform; None for what is neither."""
     if node.kind not in TRANSFORMS:
         return None
-    step = step_of(node, space)
-    if isinstance(step, Affine):
-        return show_matrix(step.rows, space)
-    return show_warp(step) if isinstance(step, Warp) else None
+    return next(_shown(_steps((node,), space), space), None)
 
 
 def show_chain(transforms: tuple[Any, ...], space: Space) -> list[str]:
     """A chain of transforms after composing its neighbouring affine maps: matrices and formulas in order."""
-    moves = []
-    for transform in transforms:
-        step = step_of(transform, space)
-        if isinstance(step, Affine | Warp):
-            moves.append(Move(step))
-    steps = [move.step for move in merged(moves)]
-    return [
-        show_matrix(step.rows, space) if isinstance(step, Affine) else show_warp(step)
-        for step in steps
-        if isinstance(step, Affine | Warp)
-    ]
+    return list(_shown([move.step for move in merged(map(Move, _steps(transforms, space)))], space))
 
 
 def show_stretch(transforms: tuple[Any, ...], space: Space) -> str:
     """How much the affine maps of a chain scale, at least and at most."""
-    rows = affine.translation(0.0, 0.0)
-    for transform in transforms:
-        step = step_of(transform, space)
-        if isinstance(step, Affine):
-            rows = affine.compose(step.rows, rows)
-    low, high = space.stretches(rows)
+    low, high = space.stretches(affine.composed(_steps(transforms, space)))
     return show(low) if abs(low - high) < 1e-9 * max(high, 1.0) else f"{show(low)} to {show(high)}"
+
+
+def _steps(transforms: Iterable[Any], space: Space) -> list[Step]:
+    """The steps of transforms, without those that have none."""
+    found = [step_of(transform, space) for transform in transforms]
+    return [step for step in found if not isinstance(step, Refusal)]
+
+
+def _shown(steps: Iterable[Step], space: Space) -> Iterator[str]:
+    for step in steps:
+        if isinstance(step, Affine):
+            yield show_matrix(step.rows, space)
+        elif isinstance(step, Warp):
+            yield show_warp(step)

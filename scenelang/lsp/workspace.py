@@ -20,13 +20,12 @@ from scenelang.diagnostics.diagnostic import Edit as Change
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.loader import Unreadable, read_source
 from scenelang.lsp.text import Encoding, Lines, applied
-from scenelang.resolve.names import Names
-from scenelang.resolve.symbols import Symbol, Use
+from scenelang.resolve.names import Names, Symbol, Use
 from scenelang.scene import library
 from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Edit, Parsed, parse_edited, parse_whole
+from scenelang.syntax.lexer import Tokens
 from scenelang.syntax.tables import END
-from scenelang.syntax.tokens import Tokens
 
 if TYPE_CHECKING:
     from lsprotocol import types
@@ -45,9 +44,7 @@ class Document:
     Args:
         uri: what the client calls it.
         path: its resolved file; None for a buffer that has none.
-        parsed: text and tree.
         version: the client's number of this text; None for a file that is not open.
-        encoding: what the client's columns count.
         checked: the last evaluation that ended, perhaps of an older text.
         edits: what has been edited since that.
         semantic: what it found, at the places of now.
@@ -61,6 +58,11 @@ class Document:
     checked: Checked | None = None
     edits: list[Edit] = field(default_factory=list)
     semantic: list[Diagnostic] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return self.path.name if self.path is not None else self.uri
 
     @property
     def source(self) -> SourceFile:
@@ -126,12 +128,7 @@ def _carried(diagnostic: Diagnostic, edit: Edit, source: SourceFile) -> Diagnost
 
 
 class Workspace:
-    """All documents.
-
-    Args:
-        encoding: what the client's columns count.
-        folders: the client's folders.
-    """
+    """All documents."""
 
     def __init__(self, encoding: Encoding = "utf-16", folders: list[Path] | None = None) -> None:
         self.encoding = encoding
@@ -148,10 +145,6 @@ class Workspace:
         document = Document(uri, _resolved(path), _parsed(source), version, self.encoding)
         self.open[uri] = document
         return document
-
-    def close(self, uri: str) -> None:
-        """Forget a buffer; its file counts again."""
-        self.open.pop(uri, None)
 
     def get(self, uri: str) -> Document | None:
         """An open buffer, or the file that the address means."""
@@ -191,17 +184,14 @@ class Workspace:
         """Every document: open ones, then the scenes in the client's folders."""
         yield from list(self.open.values())
         seen = {d.path for d in self.open.values()}
-        for path in self._scenes():
-            if path not in seen:
-                seen.add(path)
-                document = self.by_path(path)
-                if document is not None:
-                    yield document
-
-    def _scenes(self) -> Iterator[Path]:
         folders = self.folders or sorted({d.path.parent for d in self.open.values() if d.path is not None})
         for folder in folders:
-            yield from (path.resolve() for path in scenes_below(folder, MAX_FILES * 10))
+            for path in map(Path.resolve, scenes_below(folder, MAX_FILES * 10)):
+                if path not in seen:
+                    seen.add(path)
+                    document = self.by_path(path)
+                    if document is not None:
+                        yield document
 
     # ------------------------------------------------------------ names across files
 
@@ -242,9 +232,7 @@ class Workspace:
         if not (symbol.is_exported or (symbol.owner is not None and symbol.owner.is_exported)):
             return
         for other in self.known():
-            if other is document or other.uri == document.uri:
-                continue
-            if symbol.name not in other.text:
+            if other.uri == document.uri or symbol.name not in other.text:
                 continue
             for use in other.names.uses:
                 if use.text != symbol.name or use.role not in ("member", "argument"):

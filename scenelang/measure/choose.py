@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import statistics
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from scenelang.measure.cost import predicted_ms
-from scenelang.measure.frontier import Frontier, Limits, Point
+import numpy as np
+import torch
+
+from scenelang.measure.frontier import Cost, Frontier, Limits, Point
 from scenelang.models.choose import lacking, paints, uses
 from scenelang.models.manifest import Manifest
-from scenelang.program.work import Load
+from scenelang.program.program import Load
 from scenelang.scene.schema import Scene
 
+UNITS: Final = (1.0, 1e3, 1e6, 1e6, 1e3)  # of the terms of a `Cost`
+_ROUNDS: Final = 15  # of the yardstick
 OBJECTS: Final = 4
 """Objects of the largest scenes whose errors were measured; more have more outlines to be wrong at."""
 
@@ -55,13 +61,9 @@ def error_scale(canvas: tuple[int, int], objects: int) -> float:
 
 
 def refusal(point: Point, manifest: Manifest | None, scene: Scene | None, compiled: str | None) -> str | None:
-    """Why a point cannot draw a scene, None if it can.
+    """Why a point cannot draw a scene, or what was compiled for a model; None if it can.
 
-    Args:
-        point: from the frontier.
-        manifest: of the point's model; None for the reference.
-        scene: the scene; None for a compiled program.
-        compiled: the model that the program was compiled for.
+    The reference has no manifest, and a compiled program no scene.
     """
     if not point.offered:
         return point.why_not or "not offered"
@@ -82,14 +84,7 @@ def refusal(point: Point, manifest: Manifest | None, scene: Scene | None, compil
 
 
 def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: float) -> list[Offer]:
-    """What points promise for a scene, the fastest first.
-
-    Args:
-        points: that can draw it.
-        load: of the scene.
-        canvas: its pixels.
-        scale: how much slower this machine is than the one that was measured.
-    """
+    """What points that can draw a scene promise for it, the fastest first; ``scale`` from `machine_scale`."""
     found = []
     for point in points:
         if point.cost is None or point.flip is None:
@@ -102,18 +97,12 @@ def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: 
 def choose(found: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> Choice:
     """The fastest offer that keeps the error, or the one of least error that keeps the time.
 
-    Of offers that promise nearly the same error, within 2 %, the faster one is better.
-
-    Args:
-        found: from `offers`.
-        limits: at least one. With both the fastest that keeps both is taken.
-        refused: why other points cannot draw the scene, to be told.
-
-    Raises:
-        NothingFits: no offer keeps the limits.
+    Of offers that promise nearly the same error, within 2 %, the faster one is better. With both limits the
+    fastest that keeps both is taken. Raises `NothingFits` where no offer keeps them.
     """
     if not found:
-        raise NothingFits("nothing on the frontier draws this scene" + _because(refused))
+        told = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
+        raise NothingFits("nothing on the frontier draws this scene" + (f" ({told})" if told else ""))
     good = [offer for offer in found if not _lacks(offer, limits)]
     if not good:
         raise NothingFits(_nearest(found, limits))
@@ -155,9 +144,40 @@ def _nearest(found: Sequence[Offer], limits: Limits) -> str:
     return f"nothing draws this scene within {' and '.join(asked)}; {told}"
 
 
-def _because(refused: dict[str, str]) -> str:
-    told = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
-    return f" ({told})" if told else ""
+# ---------------------------------------------------------------- what a frame will take
+
+
+def predicted_ms(cost: Cost, load: Load, skip: bool) -> float:
+    """Milliseconds of a frame on the machine that was measured, most likely; times `Cost.spread` at most."""
+    terms = (cost.frame, cost.thousand_objects, cost.megapixel, cost.megameeting, cost.outline)
+    return sum(t * v / unit for t, v, unit in zip(terms, load.row(skip), UNITS, strict=True))
+
+
+@torch.no_grad()
+def yardstick() -> float:
+    """Milliseconds of a fixed piece of work like that of a frame, on one core: small products, cosines, sums.
+
+    The ratio of two machines' yardsticks is what times are scaled by. Takes about 50 ms.
+    """
+    g = torch.Generator().manual_seed(1)
+    x, w = torch.randn(32, 4096, generator=g), torch.randn(32, 32, generator=g) / 6
+    b = torch.zeros(32, 1)
+    plain = np.linspace(-1, 1, 1 << 15)
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    times = []
+    try:
+        for _ in range(_ROUNDS):
+            started = time.thread_time()
+            y = x
+            for _ in range(4):
+                y = torch.addmm(b, w, y).relu_()
+            _ = y[:8].cos().mul_(y[8:16]).sum()
+            _ = np.cos(np.hypot(plain, 0.5)) * plain
+            times.append(1000 * (time.thread_time() - started))
+    finally:
+        torch.set_num_threads(before)
+    return statistics.median(times[_ROUNDS // 3 :])
 
 
 def machine_scale(frontier: Frontier, here_ms: float) -> float:

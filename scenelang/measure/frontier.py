@@ -138,7 +138,7 @@ class Frontier:
     machine: str
     revision: str
     torch: str
-    yardstick_ms: Amount  # what `scenelang.measure.cost.yardstick` took there
+    yardstick_ms: Amount  # what `scenelang.measure.choose.yardstick` took there
     streaming_ms: Amount  # a frame of the paper's streaming renderer at its full size, in the same run
     # mean FLIP of some points against 64 samples a pixel, by name: how near the definition is
     converged: dict[str, Amount]
@@ -150,11 +150,7 @@ class Frontier:
 
     @staticmethod
     def from_json(data: bytes) -> Frontier:
-        """Read a file as if a stranger had written it.
-
-        Raises:
-            ValueError: it is none, or holds what it cannot.
-        """
+        """Read a file as if a stranger had written it; raises `ValueError` where it is none."""
         found = read_json(data)
         if not isinstance(found, dict) or found.pop("format", None) != FORMAT:
             raise ValueError(f"not a frontier of format {FORMAT}")
@@ -203,9 +199,7 @@ def frontier_path(model: str) -> Path:
 def load_frontier(model: str) -> Frontier | None:
     """The shipped frontier of the set that a model belongs to, None where there is none.
 
-    Raises:
-        ValueError: it is damaged.
-        KeyError: there is no such model.
+    Raises `ValueError` where it is damaged, `KeyError` where there is no such model.
     """
     if model not in available():
         raise KeyError(model)

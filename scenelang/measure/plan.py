@@ -10,9 +10,8 @@ import numpy as np
 
 from scenelang.backend.neural import draw_program
 from scenelang.graph.lower import Spans
-from scenelang.graph.nodes import Fold, Graph
+from scenelang.graph.nodes import Fold, Graph, nodes
 from scenelang.graph.steps import Affine
-from scenelang.graph.walk import nodes
 from scenelang.measure.metrics import MOST_DB, flip, over_white, psnr
 from scenelang.measure.scenes import reference_of
 from scenelang.models.choose import WHITE, choose_model, lacking, uses, why_chosen
@@ -43,7 +42,7 @@ def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     before: Graph | None = None
     for name, graph in graphs.items():
-        found = [node for node, _ in nodes(graph.root)]
+        found = list(nodes(graph.root))
         folds = [node for node in found if isinstance(node, Fold)]
         steps = [move.step for node in found for move in node.moves]
         affines = sum(isinstance(step, Affine) for step in steps)
@@ -84,13 +83,7 @@ def plan_of(
 
 
 def choice(scene: Scene, chosen: str, asked: bool) -> dict[str, Any]:
-    """Which model draws a scene, why, and what would have been next.
-
-    Args:
-        scene: what is drawn.
-        chosen: the model that draws it.
-        asked: whether the command line named it.
-    """
+    """Which model draws a scene, why (the command line ``asked`` for it), and what would have been next."""
     others = [load_manifest(name) for name in available() if name != chosen]
     free = scene.model_copy(update={"model": None})
     runner_up = choose_model(free, others)
@@ -116,14 +109,7 @@ def missing(scene: Scene, manifest: Manifest) -> list[str]:
 def drawing_cost(
     scene: Scene, program: Program, model: Model, spans: Spans | None = None, threads: int = 1
 ) -> dict[str, Any]:
-    """Draw a Program and say what it took and how far it is off.
-
-    Args:
-        scene: what the Program was compiled of.
-        program: its Program.
-        model: what draws it.
-        spans: where the scene was written.
-        threads: for drawing.
+    """Draw a Program of a scene and say what it took and how far it is off.
 
     Returns:
         ``pixels`` of the canvas, ``evaluated`` (pixels that an object reached; the network saw no other),

@@ -157,10 +157,9 @@ def random_scene(rng: Rng, config: SetConfig) -> Scene:
 
 
 def scenes(name: str, seed: int, covers: Callable[[Scene], float]) -> Callable[[int], Scene]:
-    """A function from index to scene; scenes that cover under 2 % of the canvas are drawn again.
+    """A function from index to scene of a set; scenes that cover under 2 % of the canvas are drawn again.
 
     Args:
-        name: of a set in `SETS`.
         seed: of the set; training uses other streams of random numbers.
         covers: share of the canvas that a scene covers.
     """

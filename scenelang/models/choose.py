@@ -12,16 +12,11 @@ WHITE = (1.0, 1.0, 1.0)
 
 
 def choose_model(scene: Scene, models: Iterable[Manifest], *, lenient: bool = False) -> Manifest | None:
-    """The smallest of ``models`` that has every name the scene uses and draws its canvas.
+    """The smallest of ``models`` that has every name the scene uses and draws its canvas; None if none fits.
 
-    Args:
-        scene: a scene; if it names a model, only that one fits.
-        models: manifests to choose from.
-        lenient: leave its settings out, and names that none of them has.
-
-    Returns:
-        The fitting manifest with the fewest dimensions, then the fewest geometries, then the fewest other
-        words, then the least measured error, then the first by name; None if none fits.
+    It has the fewest dimensions, then the fewest geometries, then the fewest other words, then the least
+    measured error, then the first name. Of a scene that names a model, only that one fits. ``lenient`` leaves
+    its settings out, and names that none of them has.
     """
     models, used = list(models), list(uses(scene))
     if lenient:
@@ -50,9 +45,8 @@ def best_of_sets(models: Iterable[Manifest]) -> list[Manifest]:
 
 def paints(model: Manifest, scene: Scene) -> bool:
     """Whether a model draws a scene's canvas and background."""
-    return not (model.sizes and scene.canvas not in model.sizes) and not (
-        model.white and scene.background not in (WHITE, "default")
-    )
+    sized = not model.sizes or scene.canvas in model.sizes
+    return sized and not (model.white and scene.background not in (WHITE, "default"))
 
 
 def _size(model: Manifest) -> tuple[int, int, int, float, str]:

@@ -33,7 +33,6 @@ class Model:
     """What draws programs.
 
     Args:
-        manifest: what the model states about itself.
         network: the trained network, in evaluation mode, without gradients.
         codes: of its weights, as `compile_scene` takes them.
         header: how the weights were trained (config, seed, revision, budget).

@@ -12,8 +12,7 @@ from scenelang.files import read_json, read_regular
 from scenelang.words import STAGE
 
 ROOT = Path(__file__).parent
-MOST: Final = 1e300
-"""Bound of the numbers in ranges."""
+MOST: Final = 1e300  # bound of the numbers in ranges
 _MOST_BYTES: Final = 1 << 20
 _LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
 """Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""
@@ -157,17 +156,18 @@ def _are_words(value: Any) -> bool:
     return isinstance(value, list) and all(map(_is_word, value)) and len(set(value)) == len(value)
 
 
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(type(v) in (int, float) for v in value)
+
+
 def _is_range(value: Any) -> bool:
     """Two numbers that float64 holds, the lower first."""
-    if not isinstance(value, list) or not all(type(v) in (int, float) for v in value):
-        return False
-    return len(value) == 2 and bool(-MOST <= value[0] <= value[1] <= MOST)
+    return _is_pair(value) and bool(-MOST <= value[0] <= value[1] <= MOST)
 
 
 def _is_size(value: Any) -> bool:
     """Two sides in pixels."""
-    sides = isinstance(value, list) and len(value) == 2
-    return sides and all(type(v) is int and 1 <= v <= 8192 for v in value)
+    return _is_pair(value) and all(type(v) is int and 1 <= v <= 8192 for v in value)
 
 
 def _are(holds: Callable[[Any, Any], bool]) -> Callable[[Any], bool]:
@@ -177,12 +177,7 @@ def _are(holds: Callable[[Any, Any], bool]) -> Callable[[Any], bool]:
 
 def _is_corner(value: Any) -> bool:
     """A point of the unit disc, but for rounding."""
-    fits = isinstance(value, list) and len(value) == 2
-    return (
-        fits
-        and all(_is_range([-1, v]) and _is_range([v, 1]) for v in value)
-        and math.hypot(*value) < 1.000001
-    )
+    return _is_pair(value) and all(-1 <= v <= 1 for v in value) and math.hypot(*value) < 1.000001
 
 
 def _is_outline(value: Any) -> bool:

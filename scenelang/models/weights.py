@@ -50,8 +50,6 @@ class Facts:
 
     Args:
         digest: SHA-256 of the file, hex.
-        bytes: its size.
-        parameters: numbers in it.
         training: its header: config, seed, iterations, seconds, device, revision.
     """
 

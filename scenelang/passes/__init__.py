@@ -16,16 +16,11 @@ from scenelang.graph.nodes import Graph
 from scenelang.graph.verify import Invariant, Sound, verify
 from scenelang.models.manifest import Manifest
 from scenelang.passes.check_eye import check_eye
-from scenelang.passes.check_levels import check_levels
-from scenelang.passes.check_trained import check_trained
+from scenelang.passes.checks import check_levels, check_trained
 from scenelang.passes.context import Context
-from scenelang.passes.drop_empty import drop_empty
-from scenelang.passes.drop_hidden import drop_hidden
-from scenelang.passes.drop_unseen import drop_unseen
-from scenelang.passes.fold_looks import fold_looks
-from scenelang.passes.fold_warps import fold_warps
+from scenelang.passes.drop import drop_empty, drop_hidden, drop_unseen
+from scenelang.passes.leaves import fold_looks, fold_warps, push_transforms
 from scenelang.passes.linearise import linearise
-from scenelang.passes.push_transforms import push_transforms
 from scenelang.scene.schema import Scene
 
 
@@ -37,7 +32,7 @@ class Pass(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The name of its function, its file and its tests."""
+        """The name of its function and of its tests."""
         return self.run.__name__
 
 
@@ -73,10 +68,7 @@ def check_scene(
     The graph is verified after each. No numpy is imported.
 
     Args:
-        scene: a concrete scene.
         spans: where its nodes were written, None if it did not come from text.
-        diagnostics: receives errors and warnings.
-        manifest: of the model to draw with.
         after: called with ``"lower"`` and each pass's name and the graph it left.
         without: names of `OPTIONAL` passes to leave out.
         memory: as for `lower`.

@@ -11,7 +11,6 @@ class Context(Record):
     """The model a graph is compiled for and where its mistakes go.
 
     Args:
-        manifest: the model's.
         diagnostics: receives E04xx, E05xx and warnings.
         whole: False after an earlier error, when leaves may lack moves and no bound means anything.
     """

@@ -30,8 +30,6 @@ class _Frame(Record, frozen=False):
     """One fold being streamed.
 
     Args:
-        fold: the composite.
-        stream: what it has given so far.
         refused: it is only read for its mistakes.
         todo: links still to come, the next one last, each with the operand it was written after.
         smooths: how many of those are `smooth`.

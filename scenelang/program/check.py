@@ -39,17 +39,12 @@ def check_compiles(
     after: After | None = None,
     memory: Memory | None = None,
 ) -> Manifest | None:
-    """Run the compiler's checks.
+    """Run the compiler's checks; the manifest of the model that draws the scene, None where there is none.
 
     Args:
-        scene: a concrete scene.
         spans: where its nodes were written, None if it did not come from text.
-        diagnostics: receives errors and warnings.
         model: draw with this model instead of the scene's.
         after, memory: as for `check_scene`.
-
-    Returns:
-        The manifest of the model that draws it; None where there is none.
     """
     manifest = find_model(scene, diagnostics, model=model, spans=spans)
     if manifest is not None:
@@ -68,7 +63,8 @@ def check_frames(
 ) -> tuple[int, int]:
     """Look at further frames of an animation whose first frame has been run.
 
-    They share the limits of one frame: where these are met, the rest is left out.
+    They share the limits of one frame: where these are met, the rest is left out. Gives how many frames have
+    been looked at, and how many were to be.
 
     Args:
         evaluation: has run frame 0.
@@ -76,9 +72,6 @@ def check_frames(
         first: the scene of frame 0, None if it has errors.
         model, after: as for `check_compiles`.
         every: look at all frames, instead of the second, the middle and the last one.
-
-    Returns:
-        How many frames have been looked at, and how many were to be.
     """
     count, looked, last, memory = evaluation.frames, 1, first, Memory()
     chosen = range(1, count) if every else sorted({1, count // 2, count - 1} - {0, count})
@@ -116,10 +109,7 @@ def check_evaluated(
         tree: its text's; None for JSON.
         evaluation: has run one frame, the first unless ``frames`` is ``"one"``; None for JSON.
         scene: what came of it, None if it has errors.
-        spans: where that was written.
         diagnostics: those of the evaluation; receives the others.
-        model: draw with this model instead of the scene's.
-        frames: which are looked at.
 
     Returns:
         How many frames were to be looked at and were not, as they exceed the limits of one scene.

@@ -68,11 +68,7 @@ def find_model(
 ) -> Manifest | None:
     """The manifest a scene is compiled for: the one asked for, the one it names, or the smallest that fits.
 
-    Args:
-        scene: a concrete scene.
-        diagnostics: receives E0210 or E0508 where there is none.
-        model: overrides the scene's.
-        spans: where the scene was written.
+    Where there is none, ``diagnostics`` receives E0210 or E0508.
     """
     name = model if model is not None else scene.model
     known = available()

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from scenelang.diagnostics.span import Span
 from scenelang.graph.bounds import felt_level, leaf_box
-from scenelang.graph.levels import split_levels
+from scenelang.graph.chain import split_levels
 from scenelang.graph.nodes import BLEND, Graph, Leaf
 from scenelang.graph.space import Space
 from scenelang.graph.spaces import SPACES
@@ -25,12 +25,7 @@ Bound = tuple[float, float, float, float]
 
 
 def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
-    """The Program of a stream.
-
-    Args:
-        graph: after all passes, without errors.
-        manifest: of the model it was made for.
-        codes: that model's learned codes.
+    """The Program of a stream that all passes have left without errors.
 
     Raises:
         ProgramError: the model's lifting is not one of this version.

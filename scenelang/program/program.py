@@ -1,4 +1,10 @@
-"""The Program: what a compiled scene is to a renderer, and what embedders take away."""
+"""The Program: what a compiled scene is to a renderer, and what embedders take away.
+
+Its file is safetensors with a JSON header, read as if a stranger had written it. Tensors: ``vectors`` F32
+(N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the header's ``geometries``,
+``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line, end column), all -1 where
+unknown. The header is the metadata entry ``scenelang``, where solids have a ``stage``.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +17,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import write_output
-from scenelang.graph.stage import Stage, stage_data
+from scenelang.files import read_regular, write_output
+from scenelang.graph.stage import Stage, read_stage, stage_data
 from scenelang.notebook import bundle
-from scenelang.tensors import FORMAT
+from scenelang.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
 from scenelang.words import TOKENS
 
 MOST_OBJECTS = 100_000
@@ -78,8 +84,7 @@ class Program:
             ("tokens", np.int8, (count,)),
             ("bounds", np.float32, (count, 4)),
         ):
-            array = _frozen(name, getattr(self, name), dtype, shape)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, _frozen(name, getattr(self, name), dtype, shape))
         if len(self.places) != count:
             raise ProgramError(f"{len(self.places)} places for {count} objects")
         _check_rows(self)
@@ -89,10 +94,8 @@ class Program:
         return len(self.objects)
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        count = len(self)
-        return bundle(
-            self, self.canvas, f"Program of {count:,} object{'s' * (count != 1)} for `{self.model}`"
-        )
+        said = f"Program of {len(self):,} object{'s' * (len(self) != 1)} for `{self.model}`"
+        return bundle(self, self.canvas, said)
 
     def digest(self) -> str:
         """SHA-256, hex, of all that decides the picture: not of names or places in source text."""
@@ -195,3 +198,144 @@ def _check_settings(program: Program) -> None:
         raise ProgramError("no model is named")
     if len(program.weights) != 64 or not set(program.weights) <= set("0123456789abcdef"):
         raise ProgramError("the digest of the weights is not 64 hexadecimal digits")
+
+
+MOST_BYTES = MOST_HEADER + 8 + MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20)
+
+_LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
+    "vectors": ("F32", (WIDTH,)),
+    "tokens": ("I8", ()),
+    "bounds": ("F32", (4,)),
+    "objects": ("I32", ()),
+    "places": ("I32", (5,)),
+}
+_HEADER: dict[str, Any] = {
+    "background": list | None,
+    "canvas": list,
+    "files": list,
+    "format": int,
+    "geometries": list,
+    "model": str,
+    "weights": str,
+}
+
+
+def load_program(path: str | Path, *, weights: str | None = None) -> Program:
+    """Read a Program that was saved.
+
+    Args:
+        path: the file.
+        weights: SHA-256 of the weights it is to be drawn with, hex; by default those shipped for its model.
+
+    Raises:
+        ProgramError: the file is damaged, foreign or hostile, or was compiled for other weights.
+        OSError: the file cannot be read.
+    """
+    program = parse_program(read_regular(path, MOST_BYTES))
+    program.check_weights(weights if weights is not None else _shipped(program.model))
+    return program
+
+
+def parse_program(data: bytes) -> Program:
+    """The Program that a file's bytes hold; everything in them is checked but the weights' digest.
+
+    Raises:
+        ProgramError: they hold none.
+    """
+    try:
+        file = read_tensors(data, MOST_BYTES)
+        count = _count(file)
+        tensors = file.arrays()
+    except TensorError as error:
+        raise ProgramError(f"not a program: {error}") from None
+    header = file.header
+    if header.keys() - {"stage"} != _HEADER.keys() or not all(
+        isinstance(header[k], _HEADER[k]) for k in _HEADER
+    ):
+        raise ProgramError("the header has missing, unknown or damaged fields")
+    geometries, files = header["geometries"], header["files"]
+    if not all(isinstance(name, str) for name in (*geometries, *files)):
+        raise ProgramError("names in the header that are not text")
+    objects, places = tensors["objects"], tensors["places"]
+    known = places[:, 0] >= 0
+    if count and not 0 <= objects.min() <= objects.max() < len(geometries):
+        raise ProgramError("`objects` name what the header does not list")
+    if (places[known, 0] >= len(files)).any() or (places[known, 1:] < 1).any():
+        raise ProgramError("places that no file has")
+    background, stage = header["background"], header.get("stage")
+    try:
+        staged = None if stage is None else read_stage(stage)
+    except ValueError as error:
+        raise ProgramError(f"a damaged stage: {error}") from None
+    return Program(
+        vectors=tensors["vectors"],
+        tokens=tensors["tokens"],
+        bounds=tensors["bounds"],
+        canvas=tuple(header["canvas"]),
+        background=None if background is None else tuple(background),
+        model=header["model"],
+        weights=header["weights"],
+        objects=tuple(geometries[index] for index in objects.tolist()),
+        places=tuple(Place(files[at], *rest) if at >= 0 else None for at, *rest in places.tolist()),
+        stage=staged,
+    )
+
+
+def _count(file: TensorFile) -> int:
+    """Objects of a file whose tensors are those of a Program."""
+    if file.tensors.keys() != _LAYOUT.keys():
+        raise TensorError("it holds other tensors")
+    count = (*file.tensors["vectors"].shape, 0)[0]
+    if count > MOST_OBJECTS:
+        raise TensorError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
+    for name, (kind, rest) in _LAYOUT.items():
+        tensor = file.tensors[name]
+        if tensor.type != kind or tensor.shape != (count, *rest):
+            raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")
+    return count
+
+
+def _shipped(model: str) -> str:
+    """Digest of the weights shipped for a model."""
+    from scenelang.models.manifest import available
+    from scenelang.models.weights import load_codes
+
+    if model not in available():
+        raise ProgramError(f"unknown model `{model}`; the models are {', '.join(available())}")
+    try:
+        return load_codes(model).digest
+    except FileNotFoundError:
+        raise ProgramError(f"model `{model}` has no weights here") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What a frame's time depends on.
+
+    Args:
+        objects: rows of the Program.
+        pixels: of the canvas.
+        meetings: pixels within objects' bounds, summed over objects.
+        outline: pixels around those bounds, summed likewise.
+    """
+
+    objects: int
+    pixels: int
+    meetings: float
+    outline: float
+
+    def row(self, skip: bool) -> tuple[float, float, float, float, float]:
+        """The terms of the sum; without skipping every object meets every pixel."""
+        meetings = self.meetings if skip else float(self.objects * self.pixels)
+        return 1.0, float(self.objects), float(self.pixels), meetings, self.outline
+
+
+def load_of(program: Program) -> Load:
+    """The load of a compiled scene."""
+    width, height = program.canvas
+    unit = min(width, height) / 2  # pixels of a world unit
+    half = np.array([width, height], np.float64) / 2
+    corners = np.clip(program.bounds.astype(np.float64).reshape(-1, 2, 2) * unit, -half, half)
+    size = corners[:, 1] - corners[:, 0]  # (N, 2)
+    outline = np.minimum(2 * size.sum(1), 2 * half.sum())
+    return Load(len(program), width * height, float(size.prod(1).sum()), float(outline.sum()))

@@ -1,8 +1,15 @@
-"""The exact field: points of the world to distance and colour, through the chains and folds of a graph."""
+"""The exact field: points of the world to distance and colour, through the chains and folds of a graph.
+
+Works on numpy arrays and torch tensors alike: only names that both offer are used, so that training makes its
+data on any device by the formulas of the reference image. Points are one array (d, …), or a sequence of its d
+coordinates.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import sys
+from collections.abc import Iterable, Iterator, Sequence
 from functools import reduce
 from operator import add, mul
 from typing import Any
@@ -10,11 +17,127 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.graph.nodes import Fold, Leaf, Node
+from scenelang.graph.nodes import BLEND, Fold, Leaf, Node
 from scenelang.graph.steps import Affine, Step, Warp
-from scenelang.reference.fold import combine
-from scenelang.reference.leaves import Array, leaf_distance, namespace
 from scenelang.words import TOKENS
+
+Array = Any  # numpy array or torch tensor
+
+# Dihedral symmetry of each leaf: order n, direction of a vertex, outer radius, and the radius at half a
+# sector, where the edge from the vertex ends (an edge midpoint, for the star an inner vertex).
+SECTORS: dict[str, tuple[int, float, float, float]] = {
+    "square": (4, math.pi / 4, 1.0, math.cos(math.pi / 4)),
+    "triangle": (3, math.pi / 2, 1.0, math.cos(math.pi / 3)),
+    "star": (5, math.pi / 2, 1.0, 0.381966),
+    "pentagon": (5, math.pi / 2, 1.0, math.cos(math.pi / 5)),
+}
+
+TORUS = (0.7, 0.3)  # radii of the circle about y and of the tube
+
+
+def namespace(x: Array) -> Any:
+    """numpy, or torch where ``x`` is a tensor (without importing torch)."""
+    torch = sys.modules.get("torch")
+    return torch if torch is not None and isinstance(x, torch.Tensor) else np
+
+
+def sector_distance(p: Array, n: Array, phase: Array, outer: Array, inner: Array) -> Array:
+    """Signed distance, negative inside, to a shape of dihedral symmetry: one segment bounds half a sector.
+
+    A point is folded into the half sector; by symmetry the nearest boundary point lies in it too.
+
+    Args:
+        p: points in leaf units, (2, …).
+        n, phase, outer, inner: entries of `SECTORS`, numbers or arrays that broadcast against a coordinate.
+    """
+    x, y = p
+    xp = namespace(x)
+    half = math.pi / n
+    theta = xp.atan2(y, x) - phase + half
+    theta = abs(theta - xp.floor(theta / (2 * half)) * (2 * half) - half)
+    radius = xp.sqrt(x * x + y * y)
+    u, v = radius * xp.cos(theta), radius * xp.sin(theta)
+    cos, sin = (math.cos(half), math.sin(half)) if isinstance(half, float) else (xp.cos(half), xp.sin(half))
+    edge_u, edge_v = inner * cos - outer, inner * sin
+    u = u - outer
+    along = xp.clip((u * edge_u + v * edge_v) / (edge_u * edge_u + edge_v * edge_v), 0.0, 1.0)
+    gap_u, gap_v = u - along * edge_u, v - along * edge_v
+    distance = xp.sqrt(gap_u * gap_u + gap_v * gap_v)
+    return xp.where(edge_u * v - edge_v * u < 0, distance, -distance)
+
+
+def leaf_distance(geometry: str, p: Array) -> Array:
+    """Exact Euclidean signed distance of a leaf in its own space; raises KeyError if unknown.
+
+    Args:
+        p: points in leaf units, (2, …), or (3, …) for the sphere and the torus.
+    """
+    if geometry in ("sphere", "torus"):
+        x, y, z = p
+        xp = namespace(x)
+        if geometry == "sphere":
+            return xp.sqrt(x * x + y * y + z * z) - 1.0
+        ring = xp.sqrt(x * x + z * z) - TORUS[0]
+        return xp.sqrt(ring * ring + y * y) - TORUS[1]
+    return sector_distance(p, *SECTORS[geometry])
+
+
+def fold(
+    distances: Iterable[Array], colours: Iterable[Array], tokens: Iterable[Array]
+) -> Iterator[tuple[Array, Array]]:
+    """Yield (D, C) after each object.
+
+    Args:
+        distances: world distances d of the objects, each of shape S.
+        colours: colours c, each of a shape that broadcasts against (*S, 3).
+        tokens: each a number, or an array that broadcasts against S.
+    """
+    big_d = c_now = None
+    for d, c, token in zip(distances, colours, tokens, strict=True):
+        if big_d is None:
+            big_d, c_now = d, c
+        else:
+            big_d, c_now = combine(big_d, c_now, d, c, token)
+        yield big_d, c_now
+
+
+def combine(
+    big_d: Array, big_c: Array, d: Array, c: Array, token: Array, k: float = BLEND
+) -> tuple[Array, Array]:
+    """One step of the fold; see `fold` for shapes. k is the width of a blend."""
+    xp = namespace(d)
+    if isinstance(token, int):
+        return _STEPS[token](xp, big_d, big_c, d, c, k)
+    out_d, out_c = big_d, big_c
+    for value, step in enumerate(_STEPS):
+        new_d, new_c = step(xp, big_d, big_c, d, c, k)
+        chosen = token == value
+        out_d = xp.where(chosen, new_d, out_d)
+        out_c = xp.where(chosen[..., None], new_c, out_c)
+    return out_d, out_c
+
+
+def _union(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
+    over = d < xp.clip(big_d, 0.0, None)
+    return xp.minimum(big_d, d), xp.where(over[..., None], c, big_c)
+
+
+def _smooth(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
+    h = xp.clip(0.5 + 0.5 * (big_d - d) / k, 0.0, 1.0)
+    mixed = big_c + (c - big_c) * h[..., None]
+    return big_d + (d - big_d) * h - k * h * (1 - h), mixed
+
+
+def _subtract(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
+    return xp.maximum(big_d, -d), big_c
+
+
+def _intersect(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
+    return xp.maximum(big_d, d), big_c
+
+
+_STEPS = (_union, _smooth, _subtract, _intersect)
+
 
 Floats = npt.NDArray[np.float64]
 
@@ -62,7 +185,6 @@ def evaluate(node: Node, p: Array, outer: tuple[Step, ...] = ()) -> tuple[Any, A
     """Distance D (M,) and colour C (M, 3) of a node at world points.
 
     Args:
-        node: a leaf or a fold.
         p: world points (d, M), float64.
         outer: steps of the folds around it, nearest first.
     """

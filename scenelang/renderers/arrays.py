@@ -12,12 +12,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-Array = Any
-"""A numpy array, or a torch tensor on any device."""
+Array = Any  # a numpy array, or a torch tensor on any device
 BLOCK = 256
 """Points of a product: larger ones are split among cores by OpenBLAS, whose threads wait for each other."""
-Layers = Sequence[tuple[Array, Array]]
-"""Weights (…, out, in) and biases (…, out)."""
+Layers = Sequence[tuple[Array, Array]]  # weights (…, out, in) and biases (…, out)
 
 
 class Arrays:
@@ -57,6 +55,14 @@ class Arrays:
         """The largest over rows: (…, 1, M) of (…, R, M)."""
         return x.max(-2, keepdims=True)
 
+    def least(self, x: Array) -> Array:
+        """The least of the first axis: (M,) of (R, M)."""
+        return x.min(0)
+
+    def unit(self, x: Array) -> Array:
+        """Clamped to [0, 1], in place."""
+        return np.minimum(np.maximum(x, 0.0, out=x), 1.0, out=x)
+
     def length(self, p: Sequence[Array]) -> Array:
         """Euclidean lengths of points, by their coordinates."""
         return np.sqrt(sum(coordinate * coordinate for coordinate in p))
@@ -92,7 +98,8 @@ class Arrays:
 
     def silu(self, x: Array) -> Array:
         """``x sigmoid(x)``, in place."""
-        found = np.exp(-x)
+        found = np.negative(x)
+        np.exp(found, out=found)
         found += 1.0
         return np.divide(x, found, out=x)
 

@@ -46,6 +46,12 @@ class Torch(Arrays):
     def largest(self, x: Tensor) -> Tensor:
         return x.amax(-2, keepdim=True)
 
+    def least(self, x: Tensor) -> Tensor:
+        return x.amin(0)
+
+    def unit(self, x: Tensor) -> Tensor:
+        return x.clamp(0.0, 1.0)
+
     def length(self, p: Sequence[Tensor]) -> Tensor:
         first, *rest = p
         if first.requires_grad:  # at the origin the gradient of a norm is 0, that of `hypot` is none

@@ -81,7 +81,6 @@ class Coverage:
     """Asks a field for pixels.
 
     Args:
-        field: answers points of the plane.
         skip: leave out the points that an object cannot reach.
     """
 

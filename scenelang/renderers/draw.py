@@ -1,22 +1,74 @@
-"""Programs to pictures: tiles and threads around `Coverage`, whichever library the network is in."""
+"""Programs to pictures: tiles and threads around `Coverage`, whichever library the network is in.
+
+A tile's pixels depend on the objects that reach the tile, on nothing else, and in no way on how fast or
+where they are computed. Where all of those are, bit for bit, as in the picture before, so are the pixels.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from scenelang.image import Image, from_samples
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.coverage import Coverage, Tile
 from scenelang.renderers.field import Field
-from scenelang.renderers.kept import Kept
+from scenelang.renderers.frames import ObjectFrame
 from scenelang.renderers.network import FramedNetwork
 
 if TYPE_CHECKING:
     from scenelang.renderers.solid.network import SolidNetwork
+
+_ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
+
+
+@dataclass(slots=True)
+class Kept:
+    """The last picture of a sequence.
+
+    Args:
+        frames: of its objects, by their geometry vectors.
+        keys: what each of its tiles showed, a digest.
+        picture: premultiplied (H, W, 4).
+    """
+
+    frames: dict[bytes, ObjectFrame] = field(default_factory=dict)
+    keys: list[bytes] = field(default_factory=list)
+    picture: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 4), np.float32))
+
+    def shows(self, index: int, keys: list[bytes], shape: tuple[int, ...]) -> bool:
+        """Whether a tile of a picture with such keys shows what it did before."""
+        return self.picture.shape == shape and len(self.keys) == len(keys) and self.keys[index] == keys[index]
+
+    def look(self, coverage: Coverage, canvas: tuple[int, int], tiles: Sequence[range]) -> list[bytes]:
+        """A digest of what each tile of a new picture will show."""
+        width, height = canvas
+        px = 2 / min(width, height)  # world units
+        scene = coverage.field
+        codes = scene.codes.tobytes()  # decoders are computed together: one for all of a scene's leaves
+        found, spans = [], []
+        for row, vector in zip(scene.rows, scene.vectors, strict=True):
+            box = row.frame.box(row.reach + _ROOM_PX * px * row.frame.growth)
+            spans.append((-np.inf, np.inf) if row.reach == float("inf") else box[1::2])
+            colour = scene.xp.to_numpy(row.colour).tobytes()
+            rest = repr((row.token, row.reach)).encode()
+            found.append(hashlib.sha256(codes + vector.tobytes() + colour + rest).digest())
+        rows = np.frombuffer(b"".join(found), np.uint8).reshape(len(found), 32)
+        low, high = np.array(spans, np.float64).reshape(-1, 2).T
+        common = repr((type(scene.xp).__name__, canvas, list(tiles))).encode()
+        keys = []
+        for tile in tiles:
+            top = (height / 2 - tile.start + _ROOM_PX) * px
+            bottom = (height / 2 - tile.stop - _ROOM_PX) * px
+            reaching = rows[(low <= top) & (high >= bottom)]
+            keys.append(hashlib.sha256(common + reaching.tobytes()).digest())
+        return keys
+
 
 TILE = 1 << 15  # pixels that are drawn at a time
 
@@ -95,11 +147,9 @@ def draw(
 
     Args:
         network: trained parameters; the picture is computed on their device.
-        program: compiled for them.
         threads: tiles drawn at the same time.
         split: tiles are as high as for so many threads; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
-        skip: leave out points that an object cannot reach.
         samples: of a pixel: ``"adaptive"``, four near outlines and one elsewhere, ``"four"`` or ``"one"``.
         tile: pixels at a time, at least one row.
         progress: called with the share done, from any thread.

@@ -26,10 +26,8 @@ class Row:
     """One object, ready to be met.
 
     Args:
-        frame: where it lies.
         token: how it joins what came before.
         colour: (R, 1).
-        decoder: its own.
         reach: leaf units from its origin beyond which it changes nothing; inf where it concerns every point.
         cell: the weights of its token and of the width of its blend.
     """
@@ -53,7 +51,6 @@ class Field:
     Args:
         network: trained parameters, on any device.
         vectors: (N, 64) float32, geometry and material vectors.
-        tokens: (N,) boolean tokens 0 to 3.
         frames: of geometry vectors that were read before, by their bytes.
 
     Raises:
@@ -137,7 +134,6 @@ class Field:
         """Let points meet an object.
 
         Args:
-            row: the object.
             q: their leaf coordinates (d, M).
             radius: the lengths of those (M,); None where none is beyond `RADIUS`.
             memory: state and register (S + 3, M).

@@ -17,13 +17,7 @@ from scenelang.renderers.network import EMPTY, TOKENS, FramedConfig, FramedNetwo
 
 
 class Framed(nn.Module, FramedNetwork):
-    """Parameters of the framed renderer.
-
-    Args:
-        config: sizes.
-        geometries: number of geometry codes.
-        materials: number of material codes.
-    """
+    """Parameters of the framed renderer."""
 
     xp = TORCH
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenelang.graph.plane import stretches
+from scenelang.graph.spaces import stretches
 from scenelang.lifting.layout import PLANE_LAYOUT, Layout
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
@@ -25,8 +25,7 @@ MOST = 1e31  # the compiler keeps maps and deformations below this
 
 Number = Array | float
 """A number, or one for each of many objects: an array (…, 1), which goes beside coordinates (…, M)."""
-Point = Sequence[Array]
-"""The d coordinates, each (…, M), of points."""
+Point = Sequence[Array]  # the d coordinates, each (…, M), of points
 
 
 class Affine(NamedTuple):

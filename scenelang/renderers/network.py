@@ -125,7 +125,6 @@ class FramedNetwork:
             q: leaf coordinates (…, d, M).
             radius: their lengths (…, 1, M), or (M,); None where none lies beyond `RADIUS`.
             scale: world distance per leaf distance, a number or (…, 1, 1).
-            decoder: from `decoder_weights`.
         """
         if radius is None:
             return self.xp.perceptron(q, decoder.layers) * scale  # (…, F, M)
@@ -149,13 +148,7 @@ class FramedNetwork:
         return self.update(levels, candidate @ features, bump, state, colour, object_colour)
 
     def update(
-        self,
-        levels: Array,
-        candidate: Array,
-        bump: Array,
-        state: Array,
-        colour: Array,
-        object_colour: Array,
+        self, levels: Array, candidate: Array, bump: Array, state: Array, colour: Array, object_colour: Array
     ) -> tuple[Array, Array]:
         """State and register behind the gates.
 
@@ -176,7 +169,6 @@ class FramedArrays(FramedNetwork):
     """A trained network as numpy arrays.
 
     Args:
-        config: sizes.
         arrays: parameters by the names of `parameter_shapes`.
     """
 

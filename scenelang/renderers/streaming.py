@@ -104,7 +104,6 @@ class Streaming(nn.Module):
     """Parameters and forward pass of the streaming renderer.
 
     Args:
-        config: sizes.
         grown: build the levels of growing too, from 4 x 4; else the last alone.
     """
 
@@ -123,13 +122,7 @@ class Streaming(nn.Module):
         """Let a level of growing begin as the one below it, enlarged, instead of as noise.
 
         The new deconvolution becomes a bilinear enlargement of each channel, and the new cell and pixel
-        generator copies of the old ones, as far as both levels have as many filters.
-
-        Args:
-            resolution: of the level, above the smallest.
-
-        Returns:
-            Whether they have.
+        generator copies of the old ones, if both levels have as many filters. Gives whether they have.
         """
         f, at = self.config.filters(resolution), int(math.log2(resolution)) - 1
         if self.config.filters(resolution // 2) != f:

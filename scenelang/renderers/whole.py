@@ -27,11 +27,6 @@ def draw_whole(
 ) -> Drawing:
     """Draw a Program's objects in stream order.
 
-    Args:
-        network: trained, in evaluation mode.
-        program: compiled for it.
-        progress: called with the share done, in [0, 1].
-
     Raises:
         ProgramError: the canvas or the background is one that the network was not trained for.
     """

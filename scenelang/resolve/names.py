@@ -9,20 +9,102 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
-from typing import Any
+from dataclasses import field
+from typing import Any, Final, Literal
 
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.resolve.symbols import Kind, Role, Scope, Symbol, Use
+from scenelang.records import Record
 from scenelang.syntax import nodes
 from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, OPERATIONS, SETTINGS, STAGE, TRANSFORMS
 
+Kind = Literal["let", "param", "fn", "module", "import", "argument", "loop"]
+Role = Literal[
+    "name",  # of a definition in sight, or of nothing known
+    "member",  # of an imported file: `lib.name`
+    "argument",  # the name of an argument in a call
+    "function",
+    "constant",
+    "animated",
+    "geometry",
+    "transform",
+    "operation",
+    "setting",
+    "material",
+    "property",  # `v.x`
+    "model",
+    "path",
+]
 
-class Names:
-    """All names of a file.
+
+_OWN: Final[dict[str, Role]] = {**dict.fromkeys(CONSTANTS, "constant"), **dict.fromkeys(ANIMATED, "animated")}
+"""What words of the language are in an expression."""
+
+
+class Symbol(Record, frozen=False):
+    """A definition.
 
     Args:
-        file: its tree.
+        node: its statement or formal parameter.
+        since: the offset from which on it is in sight.
+        owner: the fn or module that it is a parameter of.
     """
+
+    name: str
+    kind: Kind
+    span: Span
+    node: nodes.Stmt | nodes.Parameter
+    scope: Scope
+    since: int
+    owner: Symbol | None = None
+    params: list[Symbol] = field(default_factory=list)
+
+    @property
+    def is_exported(self) -> bool:
+        """Whether files that import this one see it."""
+        return self.scope.parent is None and self.kind in ("let", "param", "fn", "module")
+
+
+class Scope(Record, frozen=False):
+    """A block, a function or a loop: its names, where it reaches, and what is around it."""
+
+    start: int
+    end: int
+    parent: Scope | None = None
+    symbols: dict[str, Symbol] = field(default_factory=dict)
+
+    def outwards(self) -> Iterator[Scope]:
+        """This scope, and those around it."""
+        scope: Scope | None = self
+        while scope is not None:
+            yield scope
+            scope = scope.parent
+
+    def find(self, name: str) -> Symbol | None:
+        """What a name stands for here."""
+        return next((scope.symbols[name] for scope in self.outwards() if name in scope.symbols), None)
+
+
+class Use(Record, frozen=False):
+    """A place where a name stands.
+
+    Args:
+        start, end: the place.
+        symbol: its definition in this file, or that of the import a member belongs to.
+        callee: for an argument, the use of what is called.
+        defines: whether this is the definition itself.
+    """
+
+    start: int
+    end: int
+    text: str
+    role: Role
+    symbol: Symbol | None = None
+    callee: Use | None = None
+    defines: bool = False
+
+
+class Names:
+    """All names of a file."""
 
     def __init__(self, file: nodes.File) -> None:
         self.source: SourceFile = file.span.source
@@ -158,8 +240,8 @@ class Names:
                 self._call(node, scope, kind)
             case nodes.NameRef():
                 text = node.name.text
-                own = self._own(text) if scope.find(text) is None else None
-                if own is None:
+                own = _OWN.get(text)
+                if own is None or scope.find(text) is not None:
                     self._reference(node.name, scope, "name")
                 else:
                     self._add(node.name.span, text, own)
@@ -199,11 +281,6 @@ class Names:
     @staticmethod
     def _blend(node: nodes.Node | nodes.Combined) -> Use:
         return Use(node.keyword.start, node.keyword.end, node.keyword.text, "setting")
-
-    @staticmethod
-    def _own(text: str) -> Role | None:
-        """What a word of the language is in an expression."""
-        return "constant" if text in CONSTANTS else "animated" if text in ANIMATED else None
 
     def _add(self, span: Span, text: str, role: Role, symbol: Symbol | None = None) -> Use:
         use = Use(span.start, span.end, text, role, symbol)

@@ -6,8 +6,7 @@ from typing import Final
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix
 from scenelang.diagnostics.fixes import removal
-from scenelang.resolve.names import Names
-from scenelang.resolve.symbols import Symbol, Use
+from scenelang.resolve.names import Names, Symbol, Use
 from scenelang.syntax import nodes
 
 _DRAWING: Final = (nodes.Call, nodes.Node, nodes.For, nodes.If, nodes.Combined)
@@ -18,11 +17,7 @@ def find_unused(file: nodes.File, diagnostics: Diagnostics) -> None:
     """Warn of definitions and imports that nothing uses.
 
     Names that begin with ``_`` are left out, and so is what a file without objects defines at top level: it
-    is a library.
-
-    Args:
-        file: a tree without syntax errors.
-        diagnostics: receives W0201.
+    is a library. The tree is one without syntax errors.
     """
     names = Names(file)
     used = {use.symbol for use in names.uses if not _is_inside_its_definition(use)}

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
 
 from scenelang.words import RESERVED
 
@@ -137,8 +138,6 @@ class Frozen(BaseModel):
         try:
             super().__init__(**given)
         except ValidationError as error:
-            from scenelang.scene.wording import refusal  # only mistakes need it
-
             raise refusal(type(self).__name__, error, self._names()) from None
 
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # data is validated without it
@@ -176,3 +175,65 @@ class Frozen(BaseModel):
             return super().__repr__()
         except RecursionError:  # nested deeper than Python likes to recurse
             return f"{type(self).__name__}(…)"
+
+
+TAGS: Final = frozenset(("stated", "unsaid", "object", "group", "boolean", "chain"))
+"""What pydantic names in the place of a mistake and text does not nest by."""
+_MOST: Final = 3  # mistakes that one exception tells
+_WIDTH: Final = 40  # characters of a value that are shown
+_KINDS: Final = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "tuple_type": "a sequence",
+    "model_attributes_type": "what stands there",
+    "model_type": "what stands there",
+}
+
+
+def said(item: ErrorDetails) -> str:
+    """A mistake's message as it stands after the name of its place and a colon."""
+    match item["type"]:
+        case "string_pattern_mismatch":
+            return "not a possible name"
+        case "missing":
+            return "is missing"
+    words = item["msg"].removeprefix("Value error, ")
+    return (words[:1].lower() + words[1:]).removeprefix("input ")
+
+
+def refusal(name: str, error: ValidationError, known: list[str]) -> ValueError:
+    """What the constructor of class ``name`` raises; ``known`` are the names of its arguments."""
+    found = error.errors(include_url=False)
+    lines = [_line(item, known) for item in found[:_MOST]]
+    more = f"; and {len(found) - _MOST} more" if len(found) > _MOST else ""
+    return ValueError(f"{name}: {'; '.join(lines)}{more}")
+
+
+def _line(item: ErrorDetails, known: list[str]) -> str:
+    parts = [part for part in item["loc"] if part not in TAGS]
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
+    kind, value = item["type"], item["input"]
+    if kind == "extra_forbidden":
+        from difflib import get_close_matches  # only mistakes need it
+
+        near = get_close_matches(path, known, 1)
+        return f"there is no `{path}`, " + (
+            f"did you mean `{near[0]}`?" if near else f"only {', '.join(known)}"
+        )
+    if kind == "missing":
+        return f"`{path}` is missing"
+    if kind == "union_tag_invalid":
+        wanted = item["ctx"]["expected_tags"].replace("'", "")
+        return f"`{path}` is a {_shown(value)}; it may be {wanted}"
+    if kind in _KINDS:
+        return f"`{path}` is {_shown(value)}, not {_KINDS[kind]}"
+    return f"`{path}`: {said(item)}" if path else said(item)
+
+
+def _shown(value: Any) -> str:
+    if hasattr(value, "kind"):
+        return type(value).__name__
+    text = repr(value)
+    return text if len(text) <= _WIDTH else f"{text[: _WIDTH - 1]}…"

@@ -11,7 +11,6 @@ from difflib import get_close_matches
 from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
-from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticSerializationError
 
 from scenelang.deep import deep_stack
@@ -19,7 +18,8 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.files import depth_of_json
-from scenelang.scene import modifiers, nodes, wording
+from scenelang.scene import modifiers, nodes
+from scenelang.scene.fields import said
 from scenelang.scene.json_places import Key, Value, deeper_than, follow, read_places, record_places
 from scenelang.scene.nodes import MAX_NODE_DEPTH, Link, Object, SceneData, SceneNode
 from scenelang.scene.spans import SpanMap
@@ -55,14 +55,14 @@ def _plain(value: Any, *, brief: bool = False) -> Any:
         return {
             name: _plain(item, brief=brief)
             for name, item in value.__dict__.items()
-            if not brief or name in ("kind", "version") or not _is_default(item, fields[name])
+            if not brief or name in ("kind", "version") or not _same(item, fields[name].default)
         }
     return [_plain(item, brief=brief) for item in value] if isinstance(value, tuple) else value
 
 
-def _is_default(item: Any, field: FieldInfo) -> bool:
+def _same(item: Any, default: Any) -> bool:
     """Whether a value is the default, bit for bit: -0.0 is not 0.0."""
-    return not field.is_required() and item == field.default and repr(item) == repr(field.default)
+    return bool(item == default) and repr(item) == repr(default)
 
 
 def _laid_out(value: Any, margin: str) -> str:
@@ -81,11 +81,7 @@ def _laid_out(value: Any, margin: str) -> str:
 
 
 def from_json(text: str | bytes, kind: type[S]) -> S:
-    """A Scene from JSON.
-
-    Args:
-        text: the JSON.
-        kind: the class of the Scene.
+    """A Scene of class ``kind`` from JSON.
 
     Raises:
         SceneError: text that is not JSON, or not a Scene.
@@ -99,16 +95,7 @@ def from_json(text: str | bytes, kind: type[S]) -> S:
 
 
 def load_json(source: SourceFile, kind: type[S], diagnostics: Diagnostics) -> tuple[S | None, SpanMap]:
-    """A Scene from JSON text, and where its nodes are written there.
-
-    Args:
-        source: the text.
-        kind: the class of the Scene.
-        diagnostics: receives E0313.
-
-    Returns:
-        The Scene, or None if anything is wrong.
-    """
+    """A Scene from JSON text, or None after reports of E0313, and where its nodes are written there."""
     spans = SpanMap()
     try:
         scene = _read(source, kind)
@@ -232,23 +219,23 @@ def _problems(error: ValidationError, source: SourceFile, path: tuple[Key, ...] 
 
 def _problem(item: ErrorDetails, location: tuple[Key, ...], root: Value, source: SourceFile) -> Diagnostic:
     value, path = follow(root, location)
-    said, help = wording.said(item), None
+    message, help = said(item), None
     match item["type"]:
         case "union_tag_not_found":
-            said, path = "is missing", f"{path}.kind" if path else "kind"
+            message, path = "is missing", f"{path}.kind" if path else "kind"
         case "union_tag_invalid":
             context = item["ctx"]
             words = context["expected_tags"].replace("'", "")
             near = get_close_matches(str(context["tag"]), words.split(", "), 1)
-            said, path = f"no such kind, `{str(context['tag'])[:40]}`", f"{path}.kind" if path else "kind"
+            message, path = f"no such kind, `{str(context['tag'])[:40]}`", f"{path}.kind" if path else "kind"
             help = f"did you mean `{near[0]}`? there are {words}" if near else f"there are {words}"
             value = value.get("kind")
         case "extra_forbidden":
-            said = "unknown key"
+            message = "unknown key"
             near = get_close_matches(str(location[-1]), _FIELDS, 1)
             help = f"did you mean `{near[0]}`?" if near else None
     path = path if len(path) <= _MAX_PATH else f"…{path[-_MAX_PATH:]}"
-    return Diagnostic("E0313", f"{path}: {said}" if path else said, value.span(source), help=help)
+    return Diagnostic("E0313", f"{path}: {message}" if path else message, value.span(source), help=help)
 
 
 _FIELDS: Final = sorted(

@@ -8,16 +8,17 @@ from collections.abc import Sequence
 from dataclasses import field
 from typing import Final
 
+from pydantic import BaseModel
+
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.records import Record
-from scenelang.scene.fields import Frozen
-from scenelang.scene.modifiers import Transform
-from scenelang.scene.nodes import Chain, Object, SceneData, SceneNode
+from scenelang.scene.fields import TAGS
+from scenelang.scene.nodes import SceneData
 from scenelang.scene.spans import SpanMap, Written
-from scenelang.scene.wording import TAGS
-from scenelang.words import STAGE
 
 Key = str | int
+_HEADINGS: Final = ("model", "geometry", "op", "name", "kind")
+"""Keys that tell what a node is, the most telling first."""
 
 # Possessive: text without end is read once, not once for each of its characters.
 _TOKENS: Final = re.compile(r'"(?:[^"\\]++|\\.)*+"?|[\[\]{},:]|[^\s\[\]{},:"]++', re.DOTALL)
@@ -104,40 +105,15 @@ def follow(root: Value, location: Sequence[Key]) -> tuple[Value, str]:
 
 def record_places(scene: SceneData, root: Value, source: SourceFile, spans: SpanMap) -> None:
     """Put the places of a scene and all its nodes, transforms and materials into ``spans``."""
-    named = root.items.get("model")
-    if named is not None:
-        spans.record(scene, _written(named, root, source))
-    for word in STAGE:
-        if (value := root.items.get(word)) is not None and isinstance(getattr(scene, word), Frozen):
-            spans.record(getattr(scene, word), _written(value, value, source))
-    todo: list[tuple[SceneNode, Value]] = _pairs(scene.nodes, root.get("nodes"))
+    todo: list[tuple[BaseModel, Value]] = [(scene, root)]
     while todo:
         node, value = todo.pop()
-        heading = "geometry" if isinstance(node, Object) else "op" if node.kind == "boolean" else "kind"
-        spans.record(node, _written(value.get(heading), value, source))
-        _record_steps(node.transforms, value.get("transforms"), source, spans)
-        if node.material is not None:
-            material = value.get("material")
-            spans.record(node.material, _written(material.get("name"), material, source))
-            _record_steps(node.material.ops, material.get("ops"), source, spans)
-        if isinstance(node, Chain):
-            links = value.get("children")
-            todo += [(link.node, links.get(at).get("node")) for at, link in enumerate(node.children)]
-        elif not isinstance(node, Object):
-            todo += _pairs(node.children, value.get("children"))
-
-
-def _pairs(nodes: Sequence[SceneNode], values: Value) -> list[tuple[SceneNode, Value]]:
-    return [(node, values.get(at)) for at, node in enumerate(nodes)]
-
-
-def _record_steps(
-    steps: Sequence[Transform | object], values: Value, source: SourceFile, spans: SpanMap
-) -> None:
-    for at, step in enumerate(steps):
-        value = values.get(at)
-        spans.record(step, _written(value.get("kind"), value, source))
-
-
-def _written(name: Value, statement: Value, source: SourceFile) -> Written:
-    return Written(name.span(source), statement.span(source))
+        heading = next((name for name in _HEADINGS if name in type(node).model_fields), "")
+        if heading in value.items or node is not scene:
+            spans.record(node, Written(value.get(heading).span(source), value.span(source)))
+        for name, item in node:
+            here = value.get(name)
+            items = enumerate(item) if isinstance(item, tuple) else ()
+            todo += [(part, here.get(at)) for at, part in items if isinstance(part, BaseModel)]
+            if isinstance(item, BaseModel):
+                todo.append((item, here))

@@ -57,7 +57,7 @@ class Scene(SceneData):
 
     def to_python(self) -> str:
         """Python code that makes an equal Scene and calls it ``scene``."""
-        from scenelang.scene.python import to_python
+        from scenelang.scene.text import to_python
 
         return to_python(self)
 

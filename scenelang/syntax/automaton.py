@@ -37,9 +37,7 @@ def run(kinds: list[int], callbacks: Iterable[Callable[..., Any] | None], mend: 
     """
     language = tables()
     actions, gotos, final = language.actions, language.gotos, language.final
-    rules = [
-        (length, origin, call) for (length, origin, _), call in zip(language.rules, callbacks, strict=True)
-    ]
+    rules = [(*rule[:2], call) for rule, call in zip(language.rules, callbacks, strict=True)]
     states = [language.start]
     values: list[Any] = []
     state = language.start
@@ -129,14 +127,11 @@ def statement_depth(stack: list[int]) -> int:
 
 
 def completion(stack: Sequence[int], goal: int) -> tuple[int, ...] | None:
-    """The tokens after which ``goal`` fits; None where no few do.
+    """Kinds of the missing tokens, after which ``goal`` fits; None where no few do.
 
     Args:
         stack: states of the parser; they are not changed.
         goal: kind of the token that should follow: a `;` or a brace.
-
-    Returns:
-        Kinds of the missing tokens, without the goal; empty where it fits already.
     """
     kind = tables().kind
     trial = list(stack)

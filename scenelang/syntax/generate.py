@@ -82,13 +82,7 @@ def _rule(rule: Rule, origins: list[str]) -> tuple[int, int, str]:
 
 
 def make(grammar: Path, place: Path, mark: int) -> dict[str, Any]:
-    """Make the tables and write them to a file; where that cannot be written, they are made all the same.
-
-    Args:
-        grammar: the grammar's file.
-        place: of `tables.json`.
-        mark: a checksum that tells when to make them again.
-    """
+    """Make the tables and write them to ``place`` if possible; ``mark`` tells when to make them again."""
     data = {"source": mark, **generate(grammar.read_text("utf-8"))}
     with contextlib.suppress(OSError):
         write_whole(place, json.dumps(data, separators=(",", ":")).encode())

@@ -17,19 +17,18 @@ moves everything after it and costs nothing where nobody looks.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.syntax import nodes
-from scenelang.syntax.lexer import scan
-from scenelang.syntax.move import move
+from scenelang.syntax.lexer import Report, Tokens, scan
 from scenelang.syntax.parser import parse, parse_tokens
 from scenelang.syntax.recovery.repairs import FOLLOWED
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report, Tokens
 
 _REACH: Final = 3 * FOLLOWED
 _MOST_MISTAKES: Final = 50  # with more of them the whole text is read: some limit may be near
@@ -58,37 +57,39 @@ class Edit:
         return self.new_end - self.old_end
 
 
+def difference(old: Sequence[str], new: Sequence[str]) -> Edit:
+    """The shortest single edit from one text, or list of lines, to another."""
+    start = _common(old, new)
+    end = _common(old[start:][::-1], new[start:][::-1])
+    return Edit(start, len(old) - end, len(new) - end)
+
+
+def _common(left: Sequence[str], right: Sequence[str]) -> int:
+    """How many items two sequences begin with alike."""
+    pairs = enumerate(zip(left, right, strict=False))
+    return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))
+
+
 @dataclass
 class Parsed:
-    """A text and its tree, ready to be edited.
-
-    Args:
-        source: the text.
-        starts: where each top-level statement begins.
-        ends: where it ends.
-        tokens: the text's tokens, as they were before recovery.
-        diagnostics: all syntax mistakes, in the order of the text.
-        pieces: the statements, perhaps at older places.
-        reparsed: how many statements were read to get here.
-        version: the number of edits so far.
-    """
+    """A text and its tree, ready to be edited."""
 
     source: SourceFile
-    starts: list[int]
-    ends: list[int]
-    tokens: Tokens
-    diagnostics: tuple[Diagnostic, ...]
-    pieces: list[_Piece] = field(repr=False)
-    reparsed: int = 0
-    version: int = 0
+    starts: list[int]  # where each top-level statement begins
+    ends: list[int]  # and where it ends
+    tokens: Tokens  # the text's tokens, as they were before recovery
+    diagnostics: tuple[Diagnostic, ...]  # all syntax mistakes, in the order of the text
+    pieces: list[_Piece] = field(repr=False)  # the statements, perhaps at older places
+    reparsed: int = 0  # how many statements were read to get here
+    version: int = 0  # the number of edits so far
 
     def statement(self, index: int) -> nodes.Stmt:
         """Top-level statement number ``index``, at its place in this text."""
         piece = self.pieces[index]
-        delta = self.starts[index] - piece.node.span.start
         if piece.version != self.version:
             # A new piece: the old one may belong to an older text that somebody still reads.
-            piece = _Piece(move(piece.node, delta, self.source), self.version)
+            delta = self.starts[index] - piece.node.span.start
+            piece = _Piece(_moved(piece.node, delta, self.source), self.version)
             self.pieces[index] = piece
         return piece.node
 
@@ -105,7 +106,7 @@ class Parsed:
     def file(self) -> nodes.File:
         """The whole tree."""
         statements = tuple(self.statement(index) for index in range(len(self.pieces)))
-        return nodes.File(statements, Span(self.source, 0, len(self.source.text)))
+        return nodes.File(Span(self.source, 0, len(self.source.text)), statements)
 
     @cached_property
     def is_local(self) -> bool:
@@ -135,11 +136,6 @@ def parse_whole(source: SourceFile) -> Parsed:
 def parse_edited(old: Parsed, source: SourceFile, edit: Edit) -> Parsed:
     """Parse a text of which an older version is known.
 
-    Args:
-        old: the older version.
-        source: the new text.
-        edit: the one difference between the two.
-
     Returns:
         What `parse_whole` gives, for less work.
     """
@@ -152,14 +148,7 @@ def parse_edited(old: Parsed, source: SourceFile, edit: Edit) -> Parsed:
 
 
 def _spliced(old: Parsed, source: SourceFile, edit: Edit, reach: int) -> Parsed | None:
-    """The new version, or None where reading so little does not tell.
-
-    Args:
-        old: the older version.
-        source: the new text.
-        edit: the difference.
-        reach: how many unchanged tokens to read after the edit; `_REACH` allows for mistakes.
-    """
+    """The new version, or None where reading ``reach`` unchanged tokens after the edit does not tell."""
     delta = edit.delta
     first, last = _first(old, edit.start), _last(old, edit.old_end, reach)
     to_end = last == len(old.pieces)
@@ -169,7 +158,7 @@ def _spliced(old: Parsed, source: SourceFile, edit: Edit, reach: int) -> Parsed 
     tokens = scan(source, report, begin, end)
     if tokens.cut or not _settled(tokens.kinds):
         return None
-    pristine = _copy(tokens)
+    pristine = scan(source, Report(source), begin, end)  # recovery edits the others
     fresh = parse_tokens(tokens, report).statements
     found = Diagnostics()
     report.flush(found)
@@ -181,11 +170,11 @@ def _spliced(old: Parsed, source: SourceFile, edit: Edit, reach: int) -> Parsed 
         before = old.pieces[last].node
         if not fresh or fresh[-1].span.end != end:
             return None
-        if fresh[-1] != move(before, fresh[-1].span.start - before.span.start, source):
+        if fresh[-1] != _moved(before, fresh[-1].span.start - before.span.start, source):
             return None
     placed = [(d, d.span.start) for d in old.diagnostics if d.span is not None]
-    before_it = [move(d, 0, source) for d, start in placed if start < begin]
-    after_it = [move(d, delta, source) for d, start in placed if not to_end and start > end - delta]
+    before_it = [_moved(d, 0, source) for d, start in placed if start < begin]
+    after_it = [_moved(d, delta, source) for d, start in placed if not to_end and start > end - delta]
     rest = slice(last + 1, None)
     version = old.version + 1
     return Parsed(
@@ -249,11 +238,15 @@ def _is_sound(
     return behind >= _REACH and "\n" in text[furthest - begin :]
 
 
-def _copy(tokens: Tokens) -> Tokens:
-    copy = Tokens(tokens.source)
-    copy.kinds, copy.starts, copy.ends = tokens.kinds.copy(), tokens.starts.copy(), tokens.ends.copy()
-    copy.reported, copy.cut = tokens.reported.copy(), tokens.cut
-    return copy
+def _moved(value: Any, delta: int, source: SourceFile) -> Any:
+    """A tree or a diagnostic with its spans ``delta`` further on, in ``source``."""
+    cls = value.__class__
+    if cls is Span:
+        return Span(source, value.start + delta, value.end + delta)
+    if cls is tuple:
+        return tuple([_moved(item, delta, source) for item in value])
+    names = getattr(cls, "__match_args__", ())
+    return cls(*[_moved(getattr(value, name), delta, source) for name in names]) if names else value
 
 
 def _joined(old: Tokens, new: Tokens, source: SourceFile, begin: int, old_end: int, delta: int) -> Tokens:

@@ -14,225 +14,192 @@ from scenelang.records import Record
 from scenelang.words import Combine
 
 
-class Name(Record):
+class Spanned(Record):
+    """What stands at a place of the text."""
+
+    span: Span
+
+
+class Expr(Spanned):
+    """An expression."""
+
+
+class Stmt(Spanned):
+    """A statement."""
+
+
+class Name(Spanned):
     """An identifier with its place; dotted for imported ones (``lib.name``)."""
 
     text: str
-    span: Span
 
 
 # ---------------------------------------------------------------- expressions
 
 
-class Number(Record):
+class Number(Expr):
     """A literal number with its unit glued on: '', 'deg', 'rad', 'turn', 's', 'ms'."""
 
     value: float
     unit: str
-    span: Span
     is_integer: bool = False
 
 
-class String(Record):
+class String(Expr):
     value: str
-    span: Span
 
 
-class Bool(Record):
+class Bool(Expr):
     value: bool
-    span: Span
 
 
-class Color(Record):
+class Color(Expr):
     """A ``#rgb`` or ``#rrggbb`` literal, as three numbers in [0, 1]."""
 
     rgb: tuple[float, float, float]
-    span: Span
 
 
-class Vector(Record):
+class Vector(Expr):
     items: tuple[Expr, ...]
-    span: Span
 
 
-class Range(Record):
+class Range(Expr):
     """``a..b`` (inclusive), ``a..<b`` (exclusive), with an optional step."""
 
     start: Expr
     stop: Expr
     exclusive: bool
     step: Expr | None
-    span: Span
 
 
-class NameRef(Record):
+class NameRef(Expr):
     name: Name
-    span: Span
 
 
-class Unary(Record):
+class Unary(Expr):
     op: Literal["-", "+", "!"]
     operand: Expr
-    span: Span
 
 
-class Binary(Record):
+class Binary(Expr):
     op: str  # + - * / % ^ < <= > >= == != && ||
     left: Expr
     right: Expr
     op_span: Span
-    span: Span
 
 
-class Conditional(Record):
+class Conditional(Expr):
     condition: Expr
     then: Expr
     otherwise: Expr
-    span: Span
 
 
-class Argument(Record):
+class Argument(Spanned):
     """A call's argument; ``name`` is None for a positional one."""
 
     name: Name | None
     value: Expr
-    span: Span
 
 
-class CallExpr(Record):
+class CallExpr(Expr):
     """A function call inside an expression."""
 
     name: Name
     args: tuple[Argument, ...]
-    span: Span
 
 
-class Member(Record):
+class Member(Expr):
     """``v.x``; on a module alias ``lib.name`` it is a qualified name (the evaluator decides)."""
 
     value: Expr
     name: Name
-    span: Span
 
 
-class Index(Record):
+class Index(Expr):
     value: Expr
     index: Expr
-    span: Span
 
 
-class MaterialExpr(Record):
+class MaterialExpr(Expr):
     """``material NAME`` or ``material NAME { … }`` used as a value."""
 
     name: Name
     body: Block | None
-    span: Span
 
 
-class BadExpr(Record):
+class BadExpr(Expr):
     """What recovery could not read as an expression."""
 
-    span: Span
-
-
-Expr = (
-    Number
-    | String
-    | Bool
-    | Color
-    | Vector
-    | Range
-    | NameRef
-    | Unary
-    | Binary
-    | Conditional
-    | CallExpr
-    | Member
-    | Index
-    | MaterialExpr
-    | BadExpr
-)
 
 # ---------------------------------------------------------------- statements
 
 
-class Block(Record):
+class Block(Spanned):
     """``{ … }``; the span includes the braces."""
 
     statements: tuple[Stmt, ...]
-    span: Span
 
 
-class Parameter(Record):
+class Parameter(Spanned):
     """A formal parameter of a fn or module."""
 
     name: Name
     default: Expr | None
-    span: Span
 
 
-class Version(Record):
+class Version(Stmt):
     """``nsg 1;``"""
 
     number: Number
-    span: Span
 
 
-class Model(Record):
+class Model(Stmt):
     """``model "name";``"""
 
     name: Expr
-    span: Span
 
 
-class Param(Record):
+class Param(Stmt):
     name: Name
     default: Expr
     range: Expr | None
-    span: Span
 
 
-class Let(Record):
+class Let(Stmt):
     name: Name
     value: Expr
-    span: Span
 
 
-class Fn(Record):
+class Fn(Stmt):
     name: Name
     params: tuple[Parameter, ...]
     body: Expr
-    span: Span
 
 
-class Module(Record):
+class Module(Stmt):
     name: Name
     params: tuple[Parameter, ...]
     body: Block
-    span: Span
 
 
-class Import(Record):
+class Import(Stmt):
     path: String
     alias: Name
-    span: Span
 
 
-class For(Record):
+class For(Stmt):
     variable: Name
     iterable: Expr
     body: Block
-    span: Span
 
 
-class If(Record):
+class If(Stmt):
     condition: Expr
     then: Block
     otherwise: Block | If | None
-    span: Span
 
 
-class Call(Record):
+class Call(Stmt):
     """Any statement headed by a name, with arguments, a block, both, or neither.
 
     Geometries (``square { … }``), transforms (``scale(2);``), settings (``canvas(w, h);``,
@@ -244,10 +211,9 @@ class Call(Record):
     name: Name
     args: tuple[Argument, ...] | None
     body: Block | None
-    span: Span
 
 
-class Node(Record):
+class Node(Stmt):
     """``group``, ``union``, ``smooth``, ``subtract``, ``intersect`` or ``chain`` with its block.
 
     Only ``smooth`` may have arguments, here and as the word of a chain's child.
@@ -255,58 +221,34 @@ class Node(Record):
 
     kind: Literal["group", "union", "smooth", "subtract", "intersect", "chain"]
     body: Block
-    span: Span
     keyword: Span
     args: tuple[Argument, ...] | None = None
 
 
-class Combined(Record):
+class Combined(Stmt):
     """A chain child with its word: ``subtract star { … }``, ``smooth dot(1);``."""
 
     op: Combine
     child: Stmt
-    span: Span
     keyword: Span
     args: tuple[Argument, ...] | None = None
 
 
-class MaterialUse(Record):
+class MaterialUse(Stmt):
     """``material NAME;`` or ``material NAME { … }`` as a statement."""
 
     name: Name
     body: Block | None
-    span: Span
 
 
-class BadStmt(Record):
+class BadStmt(Stmt):
     """What recovery could not read as a statement."""
 
-    span: Span
 
-
-Stmt = (
-    Version
-    | Model
-    | Param
-    | Let
-    | Fn
-    | Module
-    | Import
-    | For
-    | If
-    | Call
-    | Node
-    | Combined
-    | MaterialUse
-    | BadStmt
-)
-
-
-class File(Record):
+class File(Spanned):
     """A whole file."""
 
     statements: tuple[Stmt, ...]
-    span: Span
 
 
 # ---------------------------------------------------------------- walking

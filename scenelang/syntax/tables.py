@@ -25,28 +25,18 @@ END = 0
 class Tables(Record):
     """The LALR automaton and the terminals of the language.
 
-    Token kinds are small integers, indices into ``kinds``.
-
-    Args:
-        kinds: a name for each kind: the text itself for a literal, else the terminal's name.
-        literals: text of a keyword or of punctuation to its kind.
-        patterns: name of any other terminal to its regular expression.
-        start: the first state.
-        final: the state in which the whole text has been read.
-        actions: per state, token kind to what to do: ``s >= 0`` goes to state s after taking the token,
-            ``r < 0`` applies rule ``~r``.
-        gotos: per state, index of a nonterminal to the next state.
-        rules: length, nonterminal, callback; an empty callback passes the only value on.
+    Token kinds are small integers, indices into ``kinds``. An action ``s >= 0`` goes to state s after taking
+    the token, ``r < 0`` applies rule ``~r``.
     """
 
-    kinds: tuple[str, ...]
-    literals: dict[str, int]
-    patterns: dict[str, str]
+    kinds: tuple[str, ...]  # a name for each kind: the text itself for a literal, else the terminal's name
+    literals: dict[str, int]  # text of a keyword or of punctuation to its kind
+    patterns: dict[str, str]  # name of any other terminal to its regular expression
     start: int
-    final: int
-    actions: tuple[dict[int, int], ...]
-    gotos: tuple[dict[int, int], ...]
-    rules: tuple[tuple[int, int, str], ...]
+    final: int  # the state in which the whole text has been read
+    actions: tuple[dict[int, int], ...]  # per state, token kind to what to do
+    gotos: tuple[dict[int, int], ...]  # per state, index of a nonterminal to the next state
+    rules: tuple[tuple[int, int, str], ...]  # length, nonterminal, callback; empty, it passes the only value
 
     def kind(self, name: str) -> int:
         """The kind with a name: ``kind("NUMBER")``, ``kind(";")``."""
@@ -85,12 +75,9 @@ def source_mark(grammar: Path) -> int:
 
 
 def current(grammar: Path, place: Path, *, shipped: bool) -> dict[str, Any]:
-    """The plain data of `tables.json`, made anew where it is missing, damaged or of another grammar.
+    """The plain data of `tables.json` at ``place``, made anew where missing, damaged or of another grammar.
 
-    Args:
-        grammar: the grammar's file.
-        place: of `tables.json`.
-        shipped: whether both came in a wheel, where they belong together.
+    What was ``shipped`` in a wheel belongs together.
     """
     with contextlib.suppress(OSError, ValueError):
         found = json.loads(place.read_text("utf-8"))

@@ -26,9 +26,7 @@ def save_tensors(path: Path, tensors: dict[str, Tensor], header: dict[str, Any])
 def load_tensors(path: Path, device: str = "cpu") -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Tensors and header of a file that `save_tensors` wrote.
 
-    Raises:
-        OSError: it cannot be read.
-        ModelError: it is not such a file, or a damaged one.
+    Raises `OSError` where it cannot be read, `ModelError` where it is damaged or not such a file.
     """
     data = read_regular(path, _MOST_BYTES)
     try:
@@ -53,11 +51,7 @@ def pack_training(
 def unpack_training(
     tensors: dict[str, Tensor], network: nn.Module, optimiser: torch.optim.Adam, scenes: torch.Generator
 ) -> None:
-    """The inverse of `pack_training`, in place.
-
-    Raises:
-        ModelError: the tensors are those of another training.
-    """
+    """The inverse of `pack_training`, in place; raises `ModelError` for the tensors of another training."""
     try:
         network.load_state_dict(
             {k.removeprefix("network."): v for k, v in tensors.items() if k.startswith("network.")}

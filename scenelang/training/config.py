@@ -68,20 +68,11 @@ class SolidsConfig:
 
 
 def config_data(name: str) -> bytes:
-    """The text of a configuration, by path or by the name of a shipped one.
-
-    Raises:
-        OSError: there is no such file, or it cannot be read.
-    """
+    """The text of a configuration, by path or by the name of a shipped one."""
     path = Path(name)
     if not path.suffix and (CONFIGS / f"{name}.json").exists():
         path = CONFIGS / f"{name}.json"
     return read_regular(path, _MOST_BYTES)
-
-
-def is_study(data: bytes) -> bool:
-    """Whether a configuration is one of a study, which the laboratory trains."""
-    return b'"study"' in data
 
 
 def is_solids(data: bytes) -> bool:
@@ -97,8 +88,6 @@ def read_solids_config(name: str) -> SolidsConfig:
 def read_config(name: str) -> TrainConfig:
     """Read a configuration by path or by the name of a shipped one.
 
-    Raises:
-        OSError: there is no such file, or it cannot be read.
-        pydantic.ValidationError: a key is unknown or a value has the wrong type.
+    Raises `OSError`, or `pydantic.ValidationError` where a key is unknown or a value has the wrong type.
     """
     return TypeAdapter[TrainConfig](TrainConfig).validate_json(config_data(name))

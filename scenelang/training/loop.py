@@ -32,23 +32,21 @@ def train(
     *,
     budget_s: float = math.inf,
     device: str = "cpu",
-    report: Report | None = None,
+    report: Report = lambda *_: None,
     save_every_s: float = 60.0,
     report_every: int = 500,
 ) -> bool:
     """Train, or go on from the checkpoint in ``folder``.
 
     Args:
-        config: what to train; must equal the checkpoint's.
+        config: must equal the checkpoint's.
         folder: gets ``checkpoint.safetensors``, ``log.jsonl`` and, at the end, ``weights.safetensors``. What
             the log tells of steps after the checkpoint, which are done again, is cut off.
         budget_s: stop after so many seconds of this call, with a checkpoint.
-        device: torch device; scenes are made there.
         report: called with iteration, iterations, seconds spent and mean loss parts, of which there are none
             at the start.
         save_every_s: most seconds between checkpoints. The first comes after the first step, and each
             later one at most when the time since the start has doubled.
-        report_every: iterations between reports.
 
     Returns:
         True when all iterations are done.
@@ -74,12 +72,22 @@ def train(
         unpack_training(tensors, network, optimiser, scenes)
         done, spent_s, sums = header["iteration"], header["seconds"], header.get("sums", {})
     _cut(folder / "log.jsonl", done)
-    if report:
-        report(done, config.iterations, spent_s, {})
+    report(done, config.iterations, spent_s, {})
 
     def save(name: str, tensors: dict[str, torch.Tensor], **more: Any) -> None:
         seconds = spent_s + time.perf_counter() - started
-        save_tensors(folder / name, tensors, _header(config, done, seconds, device) | more)
+        header = {
+            "format": 1,
+            "model": config.model,
+            "config": config.to_json(),
+            "iteration": done,
+            "seconds": round(seconds, 1),
+            "device": device,
+            "threads": torch.get_num_threads(),
+            "torch": torch.__version__.split("+")[0],
+            "revision": revision(),
+        }
+        save_tensors(folder / name, tensors, header | more)
 
     started = saved = time.perf_counter()
     while done < config.iterations:
@@ -105,8 +113,7 @@ def train(
         if done % report_every == 0:
             with (folder / "log.jsonl").open("a") as log:
                 log.write(json.dumps({"iteration": done, "seconds": spent_s + now - started, **sums}) + "\n")
-            if report:
-                report(done, config.iterations, spent_s + now - started, sums)
+            report(done, config.iterations, spent_s + now - started, sums)
             sums = {}
         out_of_time = now - started > budget_s
         due = now - saved > min(save_every_s, saved - started)
@@ -140,9 +147,7 @@ def _cut(log: Path, done: int) -> None:
 def take_cell(network: Framed, model: str) -> None:
     """Give a network the cell, the materials and the slopes of a shipped framed model.
 
-    Raises:
-        ModelError: its weights are missing, damaged or of another renderer.
-        RuntimeError: its cell has other sizes.
+    Raises `ModelError` where its weights cannot be had, `RuntimeError` where its cell has other sizes.
     """
     given = load_model(model).framed.state_dict()
     decoder, _ = network.parts()
@@ -165,30 +170,11 @@ def _schedule(iteration: int, iterations: int) -> float:
     return warm * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * iteration / iterations)))
 
 
-def _header(config: TrainConfig, iteration: int, seconds: float, device: str) -> dict[str, Any]:
-    return {
-        "format": 1,
-        "model": config.model,
-        "config": config.to_json(),
-        "iteration": iteration,
-        "seconds": round(seconds, 1),
-        "device": device,
-        "threads": torch.get_num_threads(),
-        "torch": torch.__version__.split("+")[0],
-        "revision": revision(),
-    }
-
-
 def revision() -> str:
     """The git revision of the source, or 'unknown' outside a checkout."""
     try:
-        out = subprocess.run(
-            ["git", "rev-parse", "HEAD"],
-            cwd=Path(__file__).parent,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+        command, here = ["git", "rev-parse", "HEAD"], Path(__file__).parent
+        out = subprocess.run(command, cwd=here, capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
     return out.stdout.strip()

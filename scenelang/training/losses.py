@@ -19,19 +19,11 @@ FAR_LEAF, FAR_WORLD = 2.0, 0.4  # leaf and world units: farther outside, a dista
 
 
 def image_loss(network: Framed, batch: Batch, *, forced: bool = False) -> tuple[Tensor, dict[str, float]]:
-    """Loss of a batch of streams at points.
+    """Loss of a batch of streams at points, and its parts as numbers by name.
 
     Coverage by cross-entropy and distance by relative absolute error, of each object alone and of each
     prefix; colour where the prefix covers the point by squared and absolute error. Padding counts for
-    nothing.
-
-    Args:
-        network: answers.
-        batch: what is asked.
-        forced: let every step start from the exact state before it.
-
-    Returns:
-        The loss, and its parts as numbers by name.
+    nothing. If ``forced``, every step starts from the exact state before it.
     """
     material = network.material_codes[torch.zeros_like(batch.leaf).flatten()]
     colours = batch.rgb * network.object_albedo(material).view(*batch.leaf.shape, 3)
@@ -41,13 +33,7 @@ def image_loss(network: Framed, batch: Batch, *, forced: bool = False) -> tuple[
 
 
 def trace_loss(trace: Trace, batch: Batch, unasked: Collection[str] = ()) -> tuple[Tensor, dict[str, float]]:
-    """Loss of what a network answered along the streams of a batch; see `image_loss`.
-
-    Args:
-        trace: the answers.
-        batch: what they should be.
-        unasked: names of terms to leave out.
-    """
+    """Loss of what a network answered along the streams of a batch, but for the terms ``unasked``."""
     n = batch.leaf.shape[1]
     used = (torch.arange(n, device=batch.leaf.device) < batch.count[:, None]).float()[..., None]  # (B, N, 1)
     entries = used.sum() * batch.distance.shape[2]
@@ -74,11 +60,7 @@ def leaf_loss(
 ) -> tuple[Tensor, dict[str, float]]:
     """Loss of the leaves alone, in their own frames: coverage and distance, as in `image_loss`.
 
-    Args:
-        network: its decoder is what is trained.
-        batch: points.
-        codes: of the leaves (G, C), if they are not the network's own.
-        unasked: names of terms to leave out.
+    ``codes`` are those of the leaves (G, C), if they are not the network's own.
     """
     codes = network.codes if codes is None else codes
     radius = torch.linalg.vector_norm(batch.q, dim=1, keepdim=True)

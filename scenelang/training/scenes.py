@@ -14,9 +14,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from scenelang.reference.field import map_back, warp_back
-from scenelang.reference.fold import fold
-from scenelang.reference.leaves import SECTORS, sector_distance
+from scenelang.reference.field import SECTORS, fold, map_back, sector_distance, warp_back
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")
 FAR = 1e3  # translation of the objects that pad a stream: off every point
@@ -56,13 +54,17 @@ class Batch:
     colour: Tensor  # exact colour after the object (B, N, P, 3)
 
 
+def _rand(shape: tuple[int, ...], g: torch.Generator) -> Tensor:
+    return torch.rand(shape, generator=g, device=g.device)
+
+
 def _uniform(shape: tuple[int, ...], low: float, high: float, g: torch.Generator) -> Tensor:
-    return torch.rand(shape, generator=g, device=g.device) * (high - low) + low
+    return _rand(shape, g) * (high - low) + low
 
 
 def _affine(shape: tuple[int, ...], config: SceneConfig, g: torch.Generator) -> Tensor:
     """World-from-leaf maps (…, 2, 3): any rotation, scale per axis, shear, translation."""
-    kind = torch.rand(shape, generator=g, device=g.device)
+    kind = _rand(shape, g)
     size = torch.exp(_uniform(shape, math.log(0.15), math.log(0.8), g))
     tiny = torch.exp(_uniform(shape, math.log(0.02), math.log(0.12), g))
     size = torch.where(kind < config.tiny, tiny, size)
@@ -74,7 +76,7 @@ def _affine(shape: tuple[int, ...], config: SceneConfig, g: torch.Generator) -> 
     ca, sa, cb, sb = a.cos(), a.sin(), b.cos(), b.sin()
     u, v = size, size / ratio
     # R(a) diag(u, v) R(b), mirrored half of the time through the sign of v
-    v = torch.where(torch.rand(shape, generator=g, device=g.device) < 0.25, -v, v)
+    v = torch.where(_rand(shape, g) < 0.25, -v, v)
     linear = torch.stack(
         [
             torch.stack([ca * u * cb - sa * v * sb, -ca * u * sb - sa * v * cb], -1),
@@ -95,9 +97,9 @@ def _boundary(leaf: Tensor, g: torch.Generator) -> Tensor:
     """Points (B, P, 2) on the boundaries of leaves (B, P)."""
     n, phase, outer, inner = sectors(g.device)[leaf].unbind(-1)
     half = math.pi / n
-    t = torch.rand(leaf.shape, generator=g, device=g.device)
-    side = torch.where(torch.rand(leaf.shape, generator=g, device=g.device) < 0.5, 1.0, -1.0)
-    turn = phase + 2 * half * torch.floor(torch.rand(leaf.shape, generator=g, device=g.device) * n)
+    t = _rand(leaf.shape, g)
+    side = torch.where(_rand(leaf.shape, g) < 0.5, 1.0, -1.0)
+    turn = phase + 2 * half * torch.floor(_rand(leaf.shape, g) * n)
     u, v = outer + t * (inner * half.cos() - outer), side * t * inner * half.sin()
     return torch.stack([turn.cos() * u - turn.sin() * v, turn.sin() * u + turn.cos() * v], -1)
 
@@ -121,11 +123,6 @@ def sectors(device: torch.device) -> Tensor:
     return torch.tensor([SECTORS[name] for name in GEOMETRIES], device=device)
 
 
-def _edges(config: SceneConfig) -> int:
-    """How many points of a stream lie on the edge of one object."""
-    return int(config.points * config.edge)
-
-
 def points_of(
     world: Tensor,
     leaf: Tensor,
@@ -144,25 +141,23 @@ def points_of(
         count: (B,) objects in use.
         twirl, bend: (B, N).
         singular: smallest singular value (B, N) of the maps.
-        config: how many, and which share on edges.
-        g: random numbers.
     """
-    b, edges = leaf.shape[0], _edges(config)
+    b, edges = leaf.shape[0], int(config.points * config.edge)
     pool = edges + 3 * (config.points - edges)
-    pick = (torch.rand((b, pool), generator=g, device=g.device) * count[:, None]).long()
+    pick = (_rand((b, pool), g) * count[:, None]).long()
     edge = _boundary(leaf.gather(1, pick[:, :edges]), g)
     offset = 10 ** _uniform((b, edges, 1), -3.7, -0.3, g)
     edge = edge + torch.randn((b, edges, 2), generator=g, device=g.device) * offset
     reach = 1 + 0.25 / singular.gather(1, pick[:, edges:])[..., None]
     around = torch.randn((b, pool - edges, 2), generator=g, device=g.device)
     around = around / torch.linalg.vector_norm(around, dim=-1, keepdim=True) * reach
-    around = around * torch.rand((b, pool - edges, 1), generator=g, device=g.device).sqrt()
+    around = around * _rand((b, pool - edges, 1), g).sqrt()
     local = torch.cat([edge, around], 1)
     local = _forward_warp(local, twirl.gather(1, pick), bend.gather(1, pick))
     place = world[torch.arange(b, device=g.device)[:, None], pick]  # (B, pool, 2, 3)
     points = (place[..., :2] @ local[..., None])[..., 0] + place[..., 2]
     even = _uniform((b, pool, 2), -config.extent, config.extent, g)
-    chosen = torch.rand((b, pool, 1), generator=g, device=g.device) < 0.3
+    chosen = _rand((b, pool, 1), g) < 0.3
     chosen[:, :edges] = False
     return torch.where(chosen, even, points)
 
@@ -196,13 +191,13 @@ def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Bat
     leaf = torch.randint(0, 4, (b, n), generator=g, device=device)
     count = torch.randint(1, n + 1, (b,), generator=g, device=device)
     tokens = torch.randint(0, 4, (b, n), generator=g, device=device)
-    style = torch.rand(b, generator=g, device=device)
+    style = _rand((b,), g)
     tokens = torch.where((style > 1 - config.smooth)[:, None], tokens % 2, tokens)
     tokens[style < config.union] = 0
     tokens[:, 0] = 0
-    rgb = torch.rand((b, n, 3), generator=g, device=device)
+    rgb = _rand((b, n, 3), g)
     world = _affine((b, n), config, g)
-    gather = torch.rand((b, 1), generator=g, device=device) < 0.3  # some streams stand close together
+    gather = _rand((b, 1), g) < 0.3  # some streams stand close together
     size = world[..., :2].flatten(-2).abs().amax(-1, keepdim=True)
     near = world[:, :1, :, 2] + _uniform((b, n, 2), -1.0, 1.0, g) * size
     world[..., 2] = torch.where(gather[..., None], near, world[..., 2])
@@ -221,11 +216,9 @@ def random_batch(b: int, n: int, config: SceneConfig, g: torch.Generator) -> Bat
     d = sector_distance(q, *(v[..., None] for v in shape.unbind(-1))) * singular[..., None]
     steps = list(fold(d.unbind(1), rgb[:, :, None].unbind(1), tokens.T[..., None]))
     # of the points that are not on an edge keep those near the boundary of the whole stream
-    gumbel = -torch.log(
-        -torch.log(torch.rand(steps[-1][0].shape, generator=g, device=device).clamp(1e-9, 1 - 1e-7))
-    )
+    gumbel = -torch.log(-torch.log(_rand(steps[-1][0].shape, g).clamp(1e-9, 1 - 1e-7)))
     order = gumbel - torch.log(steps[-1][0].abs() + config.blend_focus)
-    order[:, : _edges(config)] = math.inf
+    order[:, : int(config.points * config.edge)] = math.inf
     keep = order.topk(p, dim=1).indices  # (B, P)
     keep_n = keep[:, None].expand(b, n, p)
     chosen = torch.stack(q, 2).gather(3, keep_n[:, :, None].expand(b, n, 2, p))

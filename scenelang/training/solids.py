@@ -20,8 +20,7 @@ from torch import Tensor
 from torch.func import grad_and_value, jacrev, vmap
 
 from scenelang.files import write_whole
-from scenelang.reference.fold import combine
-from scenelang.reference.leaves import TORUS, leaf_distance
+from scenelang.reference.field import TORUS, combine, leaf_distance
 from scenelang.renderers.solid.network import BLEND, RADIUS, Wanted
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.training.checkpoint import load_tensors, save_tensors
@@ -31,6 +30,7 @@ from scenelang.words import TOKENS
 
 LEAVES = ("sphere", "torus")
 MATERIALS = {"diffuse": (1.0, 1.0, 1.0, 0.0), "volumetric": (1.0, 1.0, 1.0, 1.0)}  # albedo and medium
+BEGINNINGS = 6  # of the cell
 ROUND = 20  # Gauss-Newton steps between checkpoints
 
 
@@ -174,37 +174,66 @@ def _gauss_newton(
     return weights, best
 
 
-def fit_cell(network: Solids, steps: int, g: torch.Generator, rate: float = 0.01, points: int = 512) -> float:
-    """Fit the cell, and what materials look like, by single steps of the fold; returns the last loss."""
-    mine = [network.cell_lines, network.cell_gain, network.cell_bias, network.candidate, network.bump]
-    looks = [network.albedo, network.material_codes]
-    optimiser = torch.optim.Adam([*mine, *looks], lr=rate, betas=(0.9, 0.99), fused=True)
-    known = torch.tensor(list(MATERIALS.values()))
+def fit_cell(network: Solids, steps: int, g: torch.Generator) -> float:
+    """Fit the cell, and what materials look like, by single steps of the fold; returns the last loss.
+
+    Some beginnings end with a gate shut or with two lines that do the same. So each token goes on from the
+    best of several short fits.
+    """
+    cell = [network.cell_lines, network.cell_gain, network.cell_bias, network.candidate, network.bump]
+    best, kept = torch.full((len(TOKENS),), math.inf), [part.detach().clone() for part in cell]
+    for _ in range(BEGINNINGS):
+        with torch.no_grad():
+            for part, spread, centre in zip(
+                cell, (0.3, 0.0, 0.0, 0.3, 0.0), (0.0, 0.0, 0.5, 0.0, 0.0), strict=True
+            ):
+                part.copy_(centre + spread * torch.randn(part.shape, generator=g))
+        losses = _fit_cell(network, cell, max(1, steps // 8), g)
+        for token in torch.nonzero(losses < best)[:, 0].tolist():
+            best[token] = losses[token]
+            for part, good in zip(cell, kept, strict=True):
+                good[token] = part[token].detach()
+    with torch.no_grad():
+        for part, good in zip(cell, kept, strict=True):
+            part.copy_(good)
+    return float(_fit_cell(network, [*cell, network.albedo, network.material_codes], steps, g).sum())
+
+
+def _fit_cell(
+    network: Solids, parts: list[torch.nn.Parameter], steps: int, g: torch.Generator, points: int = 512
+) -> Tensor:
+    """Fit some of the parameters; returns the mean loss of each token over the last tenth of the steps."""
+    optimiser = torch.optim.Adam(parts, lr=0.01, betas=(0.9, 0.99), fused=True)
+    known, told = torch.tensor(list(MATERIALS.values())), torch.zeros(len(TOKENS))
+    last = max(1, steps // 10)
     for step in range(steps):
-        optimiser.param_groups[0]["lr"] = rate * _schedule(step, steps)
-        past = torch.randn(points, generator=g) * 10 ** (3 * torch.rand(points, generator=g) - 2.5)
-        own = torch.randn(points, generator=g) * 10 ** (3 * torch.rand(points, generator=g) - 2.5)
+        optimiser.param_groups[0]["lr"] = 0.01 * _schedule(step, steps)
+        past, own = torch.randn((2, points), generator=g) * 10 ** (
+            3 * torch.rand((2, points), generator=g) - 2.5
+        )
         close = torch.randn(points, generator=g) * 10 ** (5 * torch.rand(points, generator=g) - 5.5)
         which = torch.randint(0, 4, (points,), generator=g)
         own = torch.where(which == 0, past + close, torch.where(which == 1, close, own))
         own = torch.where(which == 2, close - past, own)
-        loss = (network.look(network.material_codes) - known).square().sum()
         memory = torch.cat([past[None], torch.zeros(4, points)])
+        blank, losses = torch.zeros(points, 1), []
         for token in TOKENS.values():
             cell = network.cell(token, BLEND)[Wanted.ALL]
             found, _ = network.join(own, memory, torch.ones(4, 1), cell, Wanted.ALL)
-            blank = torch.zeros(points, 1)
             depth, paint = combine(past, blank, own, blank + 1, token)
             kind = paint.round()  # of a blend the nearer one's
-            loss = loss + (
+            losses.append(
                 ((found[0] - depth).abs() / (depth.abs() + 0.02)).mean()
                 + (found[1] - paint[:, 0]).abs().mean()
                 + (found[4] - kind[:, 0]).abs().mean()
             )
+        looks = (network.look(network.material_codes) - known).square().sum()
         optimiser.zero_grad()
-        loss.backward()
+        (torch.stack(losses).sum() + looks).backward()
         optimiser.step()
-    return float(loss.detach())
+        if step >= steps - last:
+            told += torch.stack(losses).detach() / last
+    return told
 
 
 def _schedule(step: int, steps: int) -> float:

@@ -1,4 +1,9 @@
-"""One drawing of a watched scene."""
+"""One drawing of a watched scene, and waiting until its files change.
+
+They are looked at often, by size, time and identity, which takes microseconds a file. So nothing is lost
+when an editor renames a new file over the old one, when a folder comes into being, between two waits, or on
+network folders, of whose changes the system gives no notice.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +13,10 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from scenelang.animation.clip import Clip, open_clip
 from scenelang.animation.painting import Painter
@@ -19,15 +24,20 @@ from scenelang.animation.run import make
 from scenelang.animation.timing import FrameRange, FramesError
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.inputs import Defines
-from scenelang.watching.changes import Stamps, stamps
+from scenelang.evaluate.session import Defines
 
 if TYPE_CHECKING:
     from scenelang.animation.run import Progress
     from scenelang.animation.targets import Target
     from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
-    from scenelang.renderers.kept import Kept
+    from scenelang.renderers.draw import Kept
+
+Stamps = dict[Path, tuple[int, int, int] | None]
+
+LOOK_S: Final = 0.03  # between two looks
+SETTLE_S: Final = 0.02  # files must have been still for so long
+PATIENCE_S: Final = 0.3  # a file that is gone, or empty, may be in the middle of being written
 
 
 class Outdated(Exception):
@@ -74,20 +84,11 @@ class Easel:
     def __post_init__(self) -> None:
         self.paths = (Path(os.path.abspath(self.file)),)
 
-    def _warm(self) -> None:
-        """Load torch in the background, so that a scene that is mended need not wait for it."""
-        name = "scenelang.backend.neural"
-        if self.backend == "neural" and name not in sys.modules:
-            threading.Thread(target=importlib.import_module, args=(name,), daemon=True).start()
-
     def draw(self, before: Stamps) -> Outcome:
         """Read, compile, draw and save.
 
-        Args:
-            before: the files as they were; where they change meanwhile, the drawing of an animation ends.
-
         Raises:
-            Outdated: they did.
+            Outdated: files are not as they were ``before``, which ends the drawing of an animation.
             RenderError: there is no such device, or no weights.
             OSError: the picture cannot be written, or the scene not be read.
         """
@@ -96,8 +97,10 @@ class Easel:
         with contextlib.suppress(SceneError):  # its diagnostics are `found`
             self._draw(found, outcome, before)
         outcome.diagnostics = found.items
-        if not outcome.good:
-            self._warm()
+        torch = "scenelang.backend.neural"
+        if not outcome.good and self.backend == "neural" and torch not in sys.modules:
+            # loaded in the background, so that a scene that is mended need not wait for it
+            threading.Thread(target=importlib.import_module, args=(torch,), daemon=True).start()
         return outcome
 
     def _draw(self, found: Diagnostics, outcome: Outcome, before: Stamps) -> None:
@@ -156,3 +159,40 @@ class Easel:
         made = make(painter, target, numbers, progress=check)
         outcome.good, outcome.files = True, made.files
         outcome.compile_s, outcome.draw_s, outcome.save_s = made.compile_s, made.draw_s, made.encode_s
+
+
+# ---------------------------------------------------------------- waiting for changes
+
+
+def stamps(paths: Collection[Path]) -> Stamps:
+    """What tells each file's contents apart without reading them; None where there is no file."""
+    found: Stamps = dict.fromkeys(paths)
+    for path in paths:
+        with contextlib.suppress(OSError):
+            stat = path.stat()
+            found[path] = stat.st_mtime_ns, stat.st_size, stat.st_ino
+    return found
+
+
+def wait(before: Stamps) -> None:
+    """Return as soon as any file is not as it was before it was read, and has come to rest."""
+    while stamps(before) == before:
+        time.sleep(LOOK_S)
+    settle(before)
+
+
+def settle(paths: Collection[Path]) -> None:
+    """Wait until files have stopped changing; longer for one that is gone or empty, but not for ever."""
+    started = time.monotonic()
+    last = stamps(paths)
+    while True:
+        time.sleep(SETTLE_S)
+        now = stamps(paths)
+        if now == last:
+            first = next(iter(now.values()), None)
+            whole = first is not None and first[1] > 0
+            if whole or time.monotonic() - started > PATIENCE_S:
+                return
+        last = now
+        if time.monotonic() - started > 10 * PATIENCE_S:
+            return  # something writes all the time

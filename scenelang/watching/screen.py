@@ -8,25 +8,20 @@ import sys
 import warnings
 from typing import TYPE_CHECKING, Any, Literal
 
+from scenelang.backend.options import RenderError
 from scenelang.diagnostics.diagnostic import Diagnostic
 
 if TYPE_CHECKING:
     import PIL.Image
 
 Show = Literal["auto", "never", "always"]
-Protocol = Literal["pixels", "cells"]
 
 _CLEAR = "\x1b[2J\x1b[H"  # the screen, not what was scrolled off it
 _LINES = 5  # of text, beside the picture
 
 
 class Screen:
-    """Standard output.
-
-    Args:
-        show: whether to show pictures: in terminals that can, never, or as coloured characters at least.
-        colour: whether to colour text.
-    """
+    """Standard output; pictures are shown if it can, never, or always: as coloured characters at least."""
 
     def __init__(self, show: Show, colour: bool) -> None:
         self.colour = colour
@@ -67,13 +62,7 @@ class Screen:
         from rich.console import Console
 
         columns, lines = shutil.get_terminal_size()
-        console = Console(
-            file=sys.stdout,
-            force_terminal=True,
-            width=columns,
-            color_system="truecolor",
-            legacy_windows=False,
-        )
+        console = Console(force_terminal=True, width=columns, color_system="truecolor", legacy_windows=False)
         room = max(4, lines - _LINES)
         cell_width, cell_height = _cell()
         wide, high = picture.width / cell_width, picture.height / cell_height
@@ -101,13 +90,9 @@ def _find(show: Show) -> Any:
             return Cells if show == "always" else None
         from textual_image.renderable import HalfcellImage, Image, UnicodeImage
     except ImportError:
-        if show == "always":
-            from scenelang.backend.errors import RenderError
-
-            raise RenderError(
-                "showing pictures needs textual-image: pip install 'scenelang[watch]'"
-            ) from None
-        return None
+        if show != "always":
+            return None
+        raise RenderError("showing pictures needs textual-image: pip install 'scenelang[watch]'") from None
     except Exception:  # whatever a terminal answers
         return None
     if Image in (HalfcellImage, UnicodeImage):

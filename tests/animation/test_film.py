@@ -14,9 +14,8 @@ import pytest
 from PIL import Image
 
 from scenelang.animation.apng import write_apng
-from scenelang.animation.gif import Palette, write_gif
-from scenelang.animation.palette import Census, Mapper
-from scenelang.animation.pictures import Film, Pixels
+from scenelang.animation.gif import Census, Mapper, Palette, write_gif
+from scenelang.animation.store import Film, Pixels
 from scenelang.animation.video import NoFfmpeg, find_ffmpeg, write_video
 from scenelang.animation.webp import write_webp
 

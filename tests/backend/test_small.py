@@ -12,8 +12,8 @@ import pytest
 import scenelang as nsg
 from scenelang.animation.clip import open_clip
 from scenelang.animation.painting import Painter
-from scenelang.backend.errors import RenderError
 from scenelang.backend.neural import draw_program, open_model
+from scenelang.backend.options import RenderError
 from scenelang.backend.small import MOST_MS, choose_drawer, draw_small, work_ms
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.backend.errors import RenderError
 from scenelang.backend.neural import draw_program, open_model
+from scenelang.backend.options import RenderError
 from scenelang.backend.small import choose_drawer, draw_small
 from scenelang.measure.plan import plan_of
 from scenelang.program.program import Program

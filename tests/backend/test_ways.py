@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import scenelang
-from scenelang.backend.errors import RenderError
 from scenelang.backend.neural import draw_program, open_model
+from scenelang.backend.options import RenderError
 from scenelang.measure.metrics import psnr
 from scenelang.models.load import Model
 from scenelang.models.manifest import load_manifest

@@ -96,7 +96,7 @@ def tiny_config(folder: Folder, **changes: object) -> str:
 @pytest.fixture
 def one_scene(monkeypatch: pytest.MonkeyPatch) -> None:
     """What was trained is measured on one scene of each set, not on many."""
-    monkeypatch.setattr("scenelang.measure.record.SCENES", 1)
+    monkeypatch.setattr("scenelang.measure.scenes.RECORDED", 1)
 
 
 @pytest.mark.usefixtures("one_scene")

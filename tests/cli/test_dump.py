@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.interchange.changes import changes
+from scenelang.interchange.dumps import changes
 from scenelang.passes import PASSES
 from tests.cli.conftest import Folder
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -34,6 +36,25 @@ def test_check_names_files_and_writes_nothing(folder: Folder) -> None:
     assert (done.exit_code, done.stdout) == (1, "would format rough.nsg\n")
     assert (folder.path / rough).read_text("utf-8") == ROUGH
     assert folder.run("fmt", "--check", neat).exit_code == 0
+
+
+def test_a_folder_that_cannot_be_listed_hides_no_other(
+    folder: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "b"):
+        (folder.path / name).mkdir()
+        folder.write(f"{name}/rough.nsg", ROUGH)
+    listed = os.scandir
+
+    def scandir(path: str) -> object:
+        if path.endswith("a"):
+            raise PermissionError(errno.EACCES, "Permission denied", path)
+        return listed(path)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    done = folder.run("fmt", "--check", ".")
+    assert (done.exit_code, done.stdout) == (2, f"would format {os.path.join('.', 'b', 'rough.nsg')}\n")
+    assert "permission denied" in done.stderr
 
 
 def test_diff_is_a_patch(folder: Folder) -> None:

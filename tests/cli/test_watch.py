@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scenelang.watching.changes import settle, stamps
+from scenelang.watching.picture import settle, stamps
 from tests.cli.conftest import Folder
 
 LONG_S = 120  # on a busy machine

@@ -15,8 +15,7 @@ from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import load_source
 from scenelang.resolve.unused import find_unused
 from scenelang.syntax import parse
-from scenelang.syntax.lexer import scan
-from scenelang.syntax.tokens import Report, Tokens
+from scenelang.syntax.lexer import Report, Tokens, scan
 from tests.diagnostics.test_pages import MODELS
 
 TESTS = Path(__file__).parents[1]

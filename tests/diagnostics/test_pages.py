@@ -14,8 +14,8 @@ from scenelang.diagnostics.pages import AREAS, CODES, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate import limits, loader
 from scenelang.evaluate.evaluation import Evaluation, load_source
-from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.prepare import settings
+from scenelang.evaluate.session import Defines
 from scenelang.evaluate.values import functions
 from scenelang.evaluate.values import value as values
 from scenelang.graph import lower
@@ -24,7 +24,7 @@ from scenelang.program.check import check_compiles, check_frames
 from scenelang.resolve.unused import find_unused
 from scenelang.scene import schema
 from scenelang.scene.schema import Scene
-from scenelang.syntax import nesting, parse, tokens
+from scenelang.syntax import lexer, parse, parser
 from scenelang.syntax.tables import tables
 from tests.models import SOLIDS, STUDIO
 
@@ -143,8 +143,8 @@ def test_pages_state_the_lists_and_limits_of_the_code() -> None:
     assert listed is not None
     assert set(listed[1].split()) == set(functions.FUNCTIONS)
     for code, number in {
-        "E0120": f"{nesting.MAX_DEPTH} levels",
-        "E0121": f"more than {tokens.MAX_MISTAKES} syntax",
+        "E0120": f"{parser.MAX_DEPTH} levels",
+        "E0121": f"more than {lexer.MAX_MISTAKES} syntax",
         "E0311": f"above {settings.MAX_SIDE_PX}",
         "E0320": f"{limits.MAX_OBJECTS:,} objects",
         "E0321": f"{limits.MAX_DEPTH} deep, or groups more than {schema.MAX_NODE_DEPTH}",

@@ -11,8 +11,7 @@ from scenelang.diagnostics.fixes import apply_fixes, settle
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import load_source
 from scenelang.scene.schema import Scene
-from scenelang.syntax.lexer import scan
-from scenelang.syntax.tokens import Report
+from scenelang.syntax.lexer import Report, scan
 from tests.diagnostics.test_every_fix import EXAMPLES, MODELS, TESTS, check, place
 
 ROOT = TESTS.parent / "examples"

@@ -16,7 +16,7 @@ import scenelang as nsg
 from scenelang.diagnostics.fixes import apply_fixes
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import load_source
-from scenelang.evaluate.report.shapes import SHAPES
+from scenelang.evaluate.report.habits import SHAPES
 from scenelang.program.compile import compile_scene
 from scenelang.scene import library
 from tests.reference import oracle

@@ -158,10 +158,10 @@ def test_trees_made_by_hand_can_be_too_deep() -> None:
     """Text is cut off by the parser; a tree from elsewhere meets a limit of its own."""
     source = SourceFile("made.nsg", "")
     span = Span(source, 0, 0)
-    expr: nodes.Expr = nodes.Number(1.0, "", span)
+    expr: nodes.Expr = nodes.Number(span, 1.0, "")
     for _ in range(5000):
-        expr = nodes.Unary("-", expr, span)
-    file = nodes.File((nodes.Let(nodes.Name("a", span), expr, span),), span)
+        expr = nodes.Unary(span, "-", expr)
+    file = nodes.File(span, (nodes.Let(span, nodes.Name(span, "a"), expr),))
     found = Diagnostics()
     assert evaluate(file, diagnostics=found)[0] is None
     assert [d.code for d in found] == ["E0324"]

@@ -18,6 +18,14 @@ SPREAD = {
     "some fit": ("fn f(a) = a;\nlet x = f(1);\nsquare { scale(f(x, 2), f(x, 3)); }", "E0308", 3, 2),
     "vector": ("let a = [1, 2, 3];\nsquare { scale(a, 1); scale(1, a); rotate(a); }", "E0301", 2, 3),
     "boolean": ("let k = 1 < 2;\nsquare { scale(k + 1, 2 - k); }", "E0303", 2, 2),
+    "function": ("fn f(i) = i < 1;\nsquare { scale(f(1) + f(2), 2 * f(3)); }", "E0303", 2, 2),
+    "lost before": ("fn f(a) = a + b;\nsquare { scale(f(1, 2), f(1, 3)); }", "E0201", 1, 0),
+    "lost after": (
+        "fn f(a) = a + b;\nfn g() = f(1, 2) + f(a = 1, b = 3);\nsquare { scale(g()); }",
+        "E0201",
+        1,
+        0,
+    ),
     "geometry": ("fn square(i) = i;\nsquare;\nsquare { scale(2); }", "E0213", 2, 2),
     "misplaced": ("square { star; star; }", "E0330", 1, 1),
     "chain": ("chain { subtract square; intersect star; }", "E0335", 1, 0),
@@ -50,6 +58,7 @@ def test_the_places_beyond_a_few_are_counted() -> None:
     [
         "fn f(a) = a;\nfn g(a) = a;\nsquare { scale(f(1, 2), g(1, 2)); }",
         "fn f(a) = a;\nlet x = f(1);\nsquare { scale(f(x, 2), f(z = 1)); }",
+        "fn f(a) = a + b;\nfn g(a) = a;\nsquare { scale(f(1), g(1, 2)); }",
         "fn f(a, b) = a * b;\nsquare { scale(f(1), f(1, 2, 3)); }",
         "let a = [1, 2, 3];\nlet b = [1, 2, 3];\nsquare { scale(1, 1 + a); scale(1, 1 + b); }",
         "let v = [1, 2];\nsquare { scale(v[2], v[3]); }",

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.formatting import format_text
-from scenelang.syntax.lexer import scan
+from scenelang.syntax.lexer import Report, scan
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report
 from tests.formatting.programs import laid_out
 from tests.formatting.sameness import comments, tree_of
 from tests.syntax.reading import SCENES, read

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from scenelang.graph import affine
-from scenelang.graph.plane import Plane, flattened
-from scenelang.graph.spaces import PLANE, SPACES
+from scenelang.graph.spaces import PLANE, SPACES, Plane, flattened
 from scenelang.graph.steps import Affine, Rows, Warp
 from scenelang.models.manifest import load_manifest
 

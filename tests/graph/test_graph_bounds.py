@@ -10,14 +10,12 @@ from test_graph_chain import random_step
 
 from scenelang.graph import affine
 from scenelang.graph.affine import composed
-from scenelang.graph.bounds import leaf_box, overlap
+from scenelang.graph.bounds import Grid, leaf_box, overlap
 from scenelang.graph.chain import normal
-from scenelang.graph.grid import Grid
 from scenelang.graph.looks import Look
 from scenelang.graph.nodes import Leaf, Move
-from scenelang.graph.plane import Plane
 from scenelang.graph.space import EVERYWHERE
-from scenelang.graph.spaces import SPACES
+from scenelang.graph.spaces import SPACES, Plane
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.models.manifest import load_manifest
 

@@ -9,8 +9,7 @@ from math import cos, hypot, sin
 import pytest
 
 from scenelang.graph import affine
-from scenelang.graph.chain import merged, normal
-from scenelang.graph.levels import Levels, LevelsError, split_levels
+from scenelang.graph.chain import Levels, LevelsError, merged, normal, split_levels
 from scenelang.graph.nodes import Move
 from scenelang.graph.spaces import PLANE, SPACES
 from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Warp

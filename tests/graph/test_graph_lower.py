@@ -10,12 +10,12 @@ from math import pi
 import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.dump import dump
 from scenelang.graph.looks import Look, coloured
 from scenelang.graph.lower import Memory, lower
 from scenelang.graph.nodes import Fold, Leaf, Link, Move
 from scenelang.graph.steps import Affine, Warp
 from scenelang.graph.verify import InternalError, Invariant, verify
+from scenelang.interchange.dumps import dump
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.scene import schema
 

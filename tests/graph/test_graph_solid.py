@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from scenelang.graph import affine
-from scenelang.graph.chain import merged, normal
-from scenelang.graph.levels import LevelsError, slots, split_levels
+from scenelang.graph.chain import LevelsError, merged, normal, slots, split_levels
 from scenelang.graph.looks import Look
 from scenelang.graph.nodes import Leaf, Move
 from scenelang.graph.spaces import SPACES

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from scenelang.animation.store import Store
+from scenelang.animation.store import Store, put_frame
 from tests.cli.conftest import Folder
 from tests.hardening.processes import leavings, one_line, run
 from tests.hardening.test_writing import WRITERS, scenes
@@ -67,7 +67,7 @@ def test_a_kept_frame_that_is_a_link(tmp_path: Path, outside: Path) -> None:
     key = "a" * 40
     with Store(tmp_path / "work") as store:
         store.file(key).symlink_to(outside / f"{key}.png")
-        store.put(key, np.zeros((2, 3, 3), np.float32).view(Image))
+        put_frame(store.file(key), np.zeros((2, 3, 3), np.float32).view(Image))
         assert store.has(key, (3, 2))
     assert unharmed(outside)
 

@@ -23,9 +23,8 @@ from pygments.token import (
 
 from scenelang.diagnostics.span import SourceFile
 from scenelang.highlighting.lexer import NsgLexer
-from scenelang.syntax.lexer import scan
+from scenelang.syntax.lexer import Report, scan
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report
 from tests.syntax.reading import SCENES
 
 ROOT = Path(__file__).parents[2]

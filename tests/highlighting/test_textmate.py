@@ -14,9 +14,8 @@ import pytest
 from scenelang import words
 from scenelang.diagnostics.span import SourceFile
 from scenelang.highlighting import textmate
-from scenelang.syntax.lexer import scan
+from scenelang.syntax.lexer import Report, scan
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report
 from tests.syntax.reading import SCENES
 
 ROOT = Path(__file__).parents[2]

@@ -11,9 +11,9 @@ import numpy as np
 
 import scenelang as nsg
 from scenelang.graph.affine import compose
+from scenelang.graph.lower import step_of
 from scenelang.graph.spaces import SPACES
 from scenelang.graph.steps import IDENTITY, Affine, Rows
-from scenelang.graph.transforms import step_of
 from scenelang.interchange.gltf import Imported, import_gltf
 from scenelang.interchange.gltf_file import parse_gltf
 

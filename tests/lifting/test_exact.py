@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from scenelang.graph.levels import Levels
+from scenelang.graph.chain import Levels
 from scenelang.graph.steps import Affine, Rows, Step, Warp
 from scenelang.lifting.exact import affine_matrix, leaf_vector, lift_colours, lift_many, warp_matrix
 from scenelang.lifting.layout import PLANE_LAYOUT, Layout

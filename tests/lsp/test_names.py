@@ -12,8 +12,7 @@ from scenelang.evaluate.evaluation import evaluate
 from scenelang.evaluate.file_context import Place
 from scenelang.evaluate.names import Binding
 from scenelang.evaluate.prepare import references
-from scenelang.lsp.context import cursor_at
-from scenelang.lsp.tree import sight_at
+from scenelang.lsp.context import cursor_at, sight_at
 from scenelang.resolve.names import Names
 from scenelang.syntax import nodes, parse
 from scenelang.syntax.incremental import parse_whole

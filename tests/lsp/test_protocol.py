@@ -178,11 +178,11 @@ from pathlib import Path
 from scenelang.cli.main import main
 from scenelang.lsp import server
 check, begun, gate = server.check, Path(sys.argv[1]), Path(sys.argv[2])
-def held(task, stop):
+def held(*given):
     begun.touch()
     while not gate.exists():
         time.sleep(0.005)
-    return check(task, stop)
+    return check(*given)
 server.check = held
 main(["lsp"])
 """

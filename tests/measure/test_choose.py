@@ -33,7 +33,7 @@ from scenelang.measure.frontier import (
     front,
 )
 from scenelang.models.manifest import load_manifest
-from scenelang.program.work import Load
+from scenelang.program.program import Load
 from scenelang.scene.schema import Object, Scale, Scene, Twist
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from scenelang.lab.frontier.fit import fit_cost
-from scenelang.measure.cost import predicted_ms, yardstick
+from scenelang.measure.choose import predicted_ms, yardstick
 from scenelang.measure.frontier import Cost
 from scenelang.program.compile import compile_scene
-from scenelang.program.work import Load, load_of
+from scenelang.program.program import Load, load_of
 from scenelang.scene.schema import Object, Scale, Scene, Translate
 
 

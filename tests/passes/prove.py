@@ -28,8 +28,7 @@ from scenelang.measure.plan import stages as sizes
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
 from scenelang.passes.context import Context
-from scenelang.reference.field import carry_back, distance_scale, evaluate
-from scenelang.reference.leaves import leaf_distance
+from scenelang.reference.field import carry_back, distance_scale, evaluate, leaf_distance
 from scenelang.reference.samples import sample_points
 from scenelang.scene.schema import Scene
 from scenelang.words import TOKENS

@@ -9,7 +9,7 @@ import pytest
 import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.api import load_source
+from scenelang.evaluate.evaluation import load_source
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.passes import check_scene
 

@@ -6,11 +6,11 @@ import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.looks import Look, coloured
 from scenelang.graph.lower import lower
+from scenelang.graph.nodes import leaves
 from scenelang.graph.verify import Invariant, verify
-from scenelang.graph.walk import leaves
 from scenelang.models.manifest import load_manifest
 from scenelang.passes.context import Context
-from scenelang.passes.fold_looks import fold_looks
+from scenelang.passes.leaves import fold_looks
 
 SCENE = """
 let red = material flat { rotate(30deg); color(#d33); hue(0.1turn); };

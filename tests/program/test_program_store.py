@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from test_program_compile import CHAIN, compiled
 
-from scenelang.program.program import ProgramError, program_bytes
-from scenelang.program.store import load_program, parse_program
+from scenelang.program.program import ProgramError, load_program, parse_program, program_bytes
 
 
 @pytest.fixture(scope="module")

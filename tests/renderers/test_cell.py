@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from scenelang.graph.nodes import BLEND
-from scenelang.reference.fold import fold
+from scenelang.reference.field import fold
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.network import TOKENS, FramedConfig
 

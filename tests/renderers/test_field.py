@@ -13,8 +13,7 @@ from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program, ProgramError
-from scenelang.renderers.draw import Drawing, draw
-from scenelang.renderers.kept import Kept
+from scenelang.renderers.draw import Drawing, Kept, draw
 from tests.passes.random_scenes import blob_scene, random_scene
 from tests.pictures import Array, premultiplied
 from tests.renderers.slow import Slow, sample_points, scale, way_back

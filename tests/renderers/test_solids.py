@@ -8,8 +8,7 @@ import torch
 
 from scenelang.graph.stage import Light, Stage
 from scenelang.graph.steps import Displace, Twist, Warp
-from scenelang.reference.fold import combine
-from scenelang.reference.leaves import leaf_distance
+from scenelang.reference.field import combine, leaf_distance
 from scenelang.reference.solid.image import solid_image
 from scenelang.renderers.solid import draw
 from scenelang.renderers.solid.draw import draw_solids
@@ -26,7 +25,7 @@ rng = np.random.default_rng(7)
 def everywhere(solids: SolidField, p: np.ndarray, gradient: bool = False) -> Meeting:
     """What a field answers where every object is met."""
     with solids.xp.inference():
-        return solids.meet(p, [np.ones(p.shape[1], bool)] * len(solids.solids), Wanted.ALL, gradient)
+        return solids.meet(p, np.ones((len(solids.solids), p.shape[1]), bool), Wanted.ALL, gradient)
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:
@@ -111,7 +110,7 @@ def test_objects_change_nothing_out_of_their_reach() -> None:
     p = rng.uniform(-1.5, 1.5, (3, 20000)).astype(np.float32)
     t = np.linalg.norm(p - origin[:, None], axis=0)
     begin, end, _ = solids.spans(origin, (p - origin[:, None]) / t, t + 10)
-    near = solids.meet(p, list((begin <= t) & (t <= end)), Wanted.ALL)
+    near = solids.meet(p, (begin <= t) & (t <= end), Wanted.ALL)
     whole = everywhere(solids, p)
     inside = whole.distance < -1e-4
     assert ((near.distance < 0) == inside)[abs(whole.distance) > 1e-4].all()
@@ -221,7 +220,7 @@ def test_both_libraries_draw_the_same() -> None:
 def test_tiles_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     whole, _ = draw_solids(field(MIXED), Stage(), (48, 40))
     monkeypatch.setattr(draw, "TILE", 48 * 7)
-    assert psnr(draw_solids(field(MIXED), Stage(), (48, 40))[0], whole) > 100
+    assert psnr(draw_solids(field(MIXED), Stage(), (48, 40), threads=3)[0], whole) > 100
 
 
 def test_what_is_drawn_is_in_codes_and_cell() -> None:

@@ -23,9 +23,8 @@ from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import evaluate
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.syntax import nodes, parse
-from scenelang.syntax.lexer import scan
+from scenelang.syntax.lexer import Report, scan
 from scenelang.syntax.tables import grammar_path, tables
-from scenelang.syntax.tokens import Report
 from tests.models import SOLIDS
 
 REPOSITORY = Path(__file__).resolve().parents[2]

@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenelang.diagnostics.span import SourceFile
-from scenelang.syntax.lexer import scan
+from scenelang.syntax.lexer import Report, scan
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report
 from tests.syntax.reading import SCENES, read
 from tests.syntax.test_tree import check_spans
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from scenelang.syntax.nesting import MAX_DEPTH
+from scenelang.syntax.parser import MAX_DEPTH
 from tests.syntax.reading import read, read_well
 from tests.work import ends, lines_run
 
@@ -138,7 +138,7 @@ def test_no_text_takes_long_to_split_into_tokens() -> None:
         f"""
 from scenelang.diagnostics.span import SourceFile
 from scenelang.syntax.lexer import scan
-from scenelang.syntax.tokens import Report
+from scenelang.syntax.lexer import Report
 for start, text in {STRETCHES}:
     source = SourceFile("", start + text * {10 * MANY} + " ;")
     scan(source, Report(source))

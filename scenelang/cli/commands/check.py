@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import sys
+from codecs import BOM_UTF8
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from scenelang.cli import options
-from scenelang.cli.diffs import show_difference
 from scenelang.cli.main import describe
-from scenelang.cli.say import say_trouble, wants_color, width_of
+from scenelang.cli.say import say_trouble, show_difference, wants_color, width_of
 from scenelang.diagnostics.cells import printable
 from scenelang.files import followed, write_whole
 
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from scenelang.cli.checking import Scenes
     from scenelang.diagnostics.diagnostic import Diagnostic
     from scenelang.diagnostics.fixes import Settled
-    from scenelang.evaluate.inputs import Defines
+    from scenelang.evaluate.session import Defines
     from scenelang.program.check import Frames
 
 Format = Literal["human", "json", "sarif", "github", "concise"]
@@ -54,13 +53,8 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
     "--select", multiple=True, metavar="CODES", callback=_codes, help="Of warnings report only these."
 )
 @click.option("--ignore", multiple=True, metavar="CODES", callback=_codes, help="Leave these warnings out.")
-@click.option(
-    "--format",
-    "kind",
-    type=click.Choice(["human", "json", "sarif", "github", "concise"]),
-    default="human",
-    show_default=True,
-    help="How diagnostics are written.",
+@options.choice(
+    "--format", "kind", words="human json sarif github concise", help="How diagnostics are written."
 )
 @click.option(
     "--max-diagnostics", "most", type=click.IntRange(0), metavar="N", help="Write so many; count them all."
@@ -158,7 +152,6 @@ def _wrong(left: Sequence[Diagnostic], strict: bool) -> bool:
 
 def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> set[str]:
     """Write what changed, and standard input to standard output; returns what cannot be written."""
-    from scenelang.cli.checking import in_bytes
     from scenelang.cli.inputs import STDIN
 
     lost = set()
@@ -166,7 +159,9 @@ def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> se
         if name == STDIN:
             continue
         try:
-            write_whole(followed(name), in_bytes(text, Path(name)))
+            with open(name, "rb") as file:
+                mark = BOM_UTF8 if file.read(3) == BOM_UTF8 else b""
+            write_whole(followed(name), mark + text.encode("utf-8"))
         except OSError as error:
             say_trouble(describe(error))
             lost.add(name)

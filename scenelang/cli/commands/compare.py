@@ -22,12 +22,7 @@ if TYPE_CHECKING:
 @options.threads
 @click.pass_context
 def command(
-    ctx: click.Context,
-    scene: str,
-    out: Path | None,
-    request: Request,
-    device: str,
-    threads: int | None,
+    ctx: click.Context, scene: str, out: Path | None, request: Request, device: str, threads: int | None
 ) -> None:
     """Draw SCENE with the network and exactly, and show where they differ.
 
@@ -42,10 +37,9 @@ def command(
     job, found = prepare_scene(scene, request)
     if job.program is None or found.scene is None or job.failed():
         ctx.exit(1)
-    from scenelang.backend.exact import draw_exact
     from scenelang.backend.neural import choose_device, draw_program, open_model
-    from scenelang.measure.metrics import compare, over_white
-    from scenelang.measure.sheet import side_by_side
+    from scenelang.backend.render import draw_exact
+    from scenelang.measure.metrics import compare, over_white, side_by_side
 
     opened = open_model(job.program.model, choose_device(device))
     picture = over_white(draw_program(job.program, opened, threads=threads).image)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from scenelang.cli import options
-from scenelang.cli.clock import Clock
+from scenelang.cli.progress import Clock
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
@@ -20,14 +20,7 @@ if TYPE_CHECKING:
 @options.strict
 @options.verbose
 @click.pass_context
-def command(
-    ctx: click.Context,
-    file: str,
-    out: str,
-    request: Request,
-    strict: bool,
-    verbose: bool,
-) -> None:
+def command(ctx: click.Context, file: str, out: str, request: Request, strict: bool, verbose: bool) -> None:
     """Compile a scene to a program that `scenelang render` draws and other software can read.
 
     FILE is a scene, or - for standard input. `scenelang dump` shows what the compiler made of it.

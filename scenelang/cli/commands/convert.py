@@ -28,13 +28,7 @@ SUFFIXES: Final[dict[str, Kind]] = {".nsg": "nsg", ".json": "json", ".py": "pyth
 )
 @options.request
 @click.pass_context
-def command(
-    ctx: click.Context,
-    file: str,
-    out: str | None,
-    kind: Kind | None,
-    request: Request,
-) -> None:
+def command(ctx: click.Context, file: str, out: str | None, kind: Kind | None, request: Request) -> None:
     """Write a scene as text, JSON or Python code.
 
     FILE is a scene, as text or JSON (.json), or - for standard input. What is written has no params,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     help="A stage or pass; may be given several times. Default: program, with --diff all.",
 )
 @click.option("--diff", is_flag=True, help="Only what each pass changed.")
-@click.option("--format", "kind", type=click.Choice(["text", "json"]), default="text", show_default=True)
+@options.choice("--format", "kind", words="text json")
 @options.out
 @options.request
 @click.pass_context
@@ -45,8 +45,7 @@ def command(
     written), the passes in their order (`--after help` lists them) and program. A scene with mistakes is
     shown as far as it goes; then the exit code is 1.
     """
-    from scenelang.cli.jobs import prepare_scene
-    from scenelang.cli.stages import STAGES, check_stages
+    from scenelang.cli.jobs import STAGES, check_stages, prepare_scene
 
     if stages == ("help",):
         click.echo("\n".join(STAGES))
@@ -65,8 +64,7 @@ def command(
 
 def _changes(job: Job, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
     """The differences that the passes made, of those that made any; all passes, or the wanted."""
-    from scenelang.graph.dump import dump
-    from scenelang.interchange.changes import changes
+    from scenelang.interchange.dumps import changes, dump
 
     before, old = "", "nothing"
     for name, graph in job.graphs.items():
@@ -80,9 +78,14 @@ def _changes(job: Job, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
 
 def _whole(job: Job, source: Input, wanted: tuple[str, ...], kind: str) -> Iterator[dict[str, Any]]:
     """The stages that were reached, as text or as data."""
-    from scenelang.graph.dump import dump
-    from scenelang.interchange.graph_data import graph_data, program_data, program_table
-    from scenelang.interchange.tree import tree_data, tree_text
+    from scenelang.interchange.dumps import (
+        dump,
+        graph_data,
+        program_data,
+        program_table,
+        tree_data,
+        tree_text,
+    )
 
     known: dict[str, tuple[str, Any, Callable[[Any], Any], Callable[[Any], str]]] = {
         name: ("graph", graph, graph_data, dump) for name, graph in job.graphs.items()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @options.request
 @options.device
 @options.threads
-@click.option("--format", "kind", type=click.Choice(["text", "json"]), default="text", show_default=True)
+@options.choice("--format", "kind", words="text json")
 @click.pass_context
 def command(
     ctx: click.Context,

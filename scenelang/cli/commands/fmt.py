@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import click
 
-from scenelang.cli.diffs import show_difference
 from scenelang.cli.folders import SUFFIX, named
 from scenelang.cli.main import describe
-from scenelang.cli.say import say_diagnostics, say_trouble
+from scenelang.cli.say import say_diagnostics, say_trouble, show_difference
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.files import followed, read_regular, write_whole
-
-if TYPE_CHECKING:
-    from scenelang.diagnostics.diagnostic import Diagnostic
 
 STDIN: Final = "-"
 
@@ -50,16 +45,10 @@ def command(ctx: click.Context, paths: tuple[str, ...], check: bool, diff: bool)
 
 
 class _Run:
-    """One run over any number of files.
-
-    Args:
-        check: only name what would change.
-        diff: only show what would change.
-    """
+    """One run over any number of files; ``check`` and ``diff`` only name or show what would change."""
 
     def __init__(self, check: bool, diff: bool) -> None:
-        self.check = check
-        self.diff = diff
+        self.check, self.diff = check, diff
         self.writes = not (check or diff)
         self.changed = self.same = self.mistaken = self.unreadable = 0
         self.stdin = False
@@ -80,7 +69,10 @@ class _Run:
             result = format_text(text, name=_shown(name))
         except SceneError as error:
             if self.check:
-                _say_briefly(error.diagnostics)
+                from scenelang.diagnostics.render_machine import render_concise
+
+                more = f", and {len(error.diagnostics) - 1:,} more" if error.diagnostics[1:] else ""
+                click.echo(f"{render_concise(error.diagnostics[:1]).rstrip()}{more}", err=True)
             else:
                 say_diagnostics(error.diagnostics)
             self.mistaken += 1
@@ -144,14 +136,6 @@ class _Run:
         parts = [f"{n} scene{'s' * (n != 1)} {what}" for n, what in counts if n]
         if parts:
             click.echo(", ".join(parts), err=True)
-
-
-def _say_briefly(found: Sequence[Diagnostic]) -> None:
-    """Print the first mistake of a file and the number of the others, on one line."""
-    from scenelang.diagnostics.render_machine import render_concise
-
-    more = f", and {len(found) - 1:,} more" if found[1:] else ""
-    click.echo(f"{render_concise(found[:1]).rstrip()}{more}", err=True)
 
 
 def _shown(name: str) -> str:

@@ -43,21 +43,14 @@ _SUFFIXES: Final = (".mmd", ".dot", ".svg", ".png")
 @options.request
 @click.pass_context
 def command(
-    ctx: click.Context,
-    file: str,
-    out: str | None,
-    kind: str | None,
-    stage: str,
-    most: int,
-    request: Request,
+    ctx: click.Context, file: str, out: str | None, kind: str | None, stage: str, most: int, request: Request
 ) -> None:
     """Draw the graph of a scene: its tree with transforms, materials and booleans.
 
     FILE is a scene, or - for standard input. Mermaid and DOT are text; .svg and .png need the program `dot`
     of Graphviz. Large scenes are cut, and a box says how many nodes are left out.
     """
-    from scenelang.cli.jobs import prepare_scene
-    from scenelang.cli.stages import STAGES, check_stages
+    from scenelang.cli.jobs import STAGES, check_stages, prepare_scene
     from scenelang.interchange.drawing import draw_graph, draw_program, draw_scene, to_dot, to_mermaid
 
     wanted = _kind(out, kind)
@@ -80,12 +73,11 @@ def command(
 
 
 def _kind(out: str | None, kind: str | None) -> str:
-    suffix = Path(out or "").suffix.lower()
     if kind is not None:
         return kind
-    if out in (None, "-"):
+    if out is None or out == "-":
         return "mmd"
-    if suffix not in _SUFFIXES:
+    if (suffix := Path(out).suffix.lower()) not in _SUFFIXES:
         raise click.UsageError(f"`{out}` has none of the suffixes {', '.join(_SUFFIXES)}; say one with --to.")
     return suffix[1:]
 

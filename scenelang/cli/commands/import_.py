@@ -20,11 +20,9 @@ _SUFFIXES: Final = (".gltf", ".glb")
 @click.command("import")
 @click.argument("file", metavar="FILE")
 @click.option("-o", "--out", metavar="OUT", help="A file instead of standard output, .nsg or .json.")
-@click.option(
+@options.choice(
     "--plane",
-    type=click.Choice(["xy", "xz"]),
-    default="xy",
-    show_default=True,
+    words="xy xz",
     help="What a 2D model sees of 3D: xy from the front, or xz, the ground, from above.",
 )
 @options.model
@@ -56,7 +54,9 @@ def command(
         made = load_gltf(file, model=model, plane=plane)
     except GltfError as error:
         raise Trouble(f"{file}: {error}") from None
-    _say_left_out(made)
+    more = len(made.left_out) - _MOST_SHOWN
+    for line in (*made.left_out[:_MOST_SHOWN], *([f"{more:,} more"] if more > 0 else ())):
+        click.echo(f"left out: {line}", err=True)
     if not made.objects:
         raise Trouble(f"{file}: no node is named like a geometry of {made.scene.model}")
     if strict and made.left_out:
@@ -75,11 +75,3 @@ def _written(made: Imported, out: str | None) -> str:
     if out is not None and out.endswith(".json"):
         return to_readable_json(made.scene)
     return to_nsg(made.scene, {key: path.rpartition("/")[2] for key, path in made.names.items()})
-
-
-def _say_left_out(made: Imported) -> None:
-    for line in made.left_out[:_MOST_SHOWN]:
-        click.echo(f"left out: {line}", err=True)
-    more = len(made.left_out) - _MOST_SHOWN
-    if more > 0:
-        click.echo(f"left out: {more:,} more", err=True)

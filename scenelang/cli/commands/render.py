@@ -8,19 +8,16 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from scenelang.cli import options
-from scenelang.cli.clock import Clock
 from scenelang.cli.main import describe
-from scenelang.cli.progress import Bar
+from scenelang.cli.progress import Bar, Clock
 from scenelang.cli.say import say_diagnostics, say_trouble
 
 if TYPE_CHECKING:
     from scenelang.backend.options import Samples
-    from scenelang.cli.clock import Clock
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import Job
-    from scenelang.cli.progress import Bar
     from scenelang.diagnostics.span import SourceFile
-    from scenelang.evaluate.inputs import Defines
+    from scenelang.evaluate.session import Defines
     from scenelang.measure.frontier import Limits
 
 
@@ -44,21 +41,15 @@ if TYPE_CHECKING:
     metavar="N",
     help="Processes that draw frames; by default one, and more where that is faster.",
 )
-@click.option(
-    "--palette",
-    type=click.Choice(["auto", "global", "frame"]),
-    default="auto",
-    show_default=True,
-    help="Colours of a GIF: 255 for all frames or for each.",
+@options.choice(
+    "--palette", words="auto global frame", help="Colours of a GIF: 255 for all frames or for each."
 )
 @click.option("--dither", is_flag=True, help="Dither what a GIF's palette lacks.")
 @options.model
 @options.backend
-@click.option(
+@options.choice(
     "--samples",
-    type=click.Choice(["adaptive", "four", "one"]),
-    default="adaptive",
-    show_default=True,
+    words="adaptive four one",
     help="Samples of a pixel: four near outlines, four everywhere, or one, with hard edges.",
 )
 @click.option(
@@ -121,8 +112,7 @@ def command(
     says which, why, and what was next.
     """
     from scenelang.cli.animation import Requested, animate, wanted_target
-    from scenelang.cli.choosing import check_options
-    from scenelang.cli.drawing import chosen, exact, neural
+    from scenelang.cli.drawing import check_options, chosen, exact, neural
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import PROGRAM
     from scenelang.cli.outputs import targets

@@ -11,11 +11,9 @@ from scenelang.cli.say import put_out
 
 
 @click.command("schema")
-@click.option(
+@options.choice(
     "--kind",
-    type=click.Choice(["scene", "diagnostics", "manifest"]),
-    default="scene",
-    show_default=True,
+    words="scene diagnostics manifest",
     help="Scenes as JSON, what `check --format json` prints, or a model's manifest.",
 )
 @options.out

@@ -55,13 +55,7 @@ def training(made: Callable[..., None]) -> Callable[..., None]:
 @click.command("train")
 @training
 def command(
-    config: str,
-    out: Path,
-    budget_s: float,
-    device: str,
-    threads: int | None,
-    every: int,
-    save_every: float,
+    config: str, out: Path, budget_s: float, device: str, threads: int | None, every: int, save_every: float
 ) -> None:
     """Train, or go on where the checkpoint in FOLDER was saved.
 
@@ -72,14 +66,13 @@ def command(
         SolidsConfig,
         config_data,
         is_solids,
-        is_study,
         read_config,
         read_solids_config,
     )
     from scenelang.training.loop import train
     from scenelang.training.solids import train_solids
 
-    if is_study(config_data(config)):
+    if b'"study"' in config_data(config):
         raise click.UsageError(f"`{config}` configures a study; scenelang lab train trains it.")
     last: dict[str, float] = {}
     with reporting_mistakes(config, out), Bar() as bar:
@@ -116,7 +109,7 @@ def command(
     elif isinstance(wanted, SolidsConfig):
         click.echo(f"done{reached}: {weights}")
     else:
-        from scenelang.measure.record import record_measured
+        from scenelang.measure.scenes import record_measured
 
         figures = record_measured(weights, wanted.cell or wanted.model)
         means = ", ".join(f"{k[5:]} {v['mean']:.1f}" for k, v in figures.items() if k.startswith("psnr_"))
@@ -146,8 +139,8 @@ def prepare_torch(device: str, threads: int | None) -> str:
     """Set torch up for a long computation; returns the device."""
     import torch
 
-    from scenelang.backend.memory import keep_memory
     from scenelang.backend.neural import choose_device
+    from scenelang.backend.options import keep_memory
 
     keep_memory()
     torch.set_num_threads(threads or 1)

@@ -15,7 +15,7 @@ from scenelang.cli.say import wants_color
 if TYPE_CHECKING:
     import PIL.Image
 
-    from scenelang.evaluate.inputs import Defines
+    from scenelang.evaluate.session import Defines
     from scenelang.watching.picture import Easel, Outcome
     from scenelang.watching.screen import Screen
 
@@ -29,11 +29,9 @@ if TYPE_CHECKING:
 @options.frames
 @options.fps
 @options.model
-@click.option(
+@options.choice(
     "--show",
-    type=click.Choice(["auto", "never", "always"]),
-    default="auto",
-    show_default=True,
+    words="auto never always",
     help="Show the picture in the terminal; always does with coloured characters if need be.",
 )
 @options.backend
@@ -65,8 +63,7 @@ def command(
     from scenelang.animation.targets import is_animation
     from scenelang.cli.animation import Requested, wanted_target
     from scenelang.cli.outputs import composed, targets
-    from scenelang.watching.changes import stamps, wait
-    from scenelang.watching.picture import Easel, Outdated
+    from scenelang.watching.picture import Easel, Outdated, stamps, wait
     from scenelang.watching.screen import Screen
 
     out = str(composed(Path(f"{file.stem}.png"))) if out is None else out
@@ -81,16 +78,7 @@ def command(
     options = {"model": model, "root": folder, "size": size, "fps": fps}
     screen = Screen(show, wants_color(sys.stdout))
     easel = Easel(
-        file,
-        path,
-        target,
-        wanted.frames,
-        frame or 0,
-        defines.values,
-        options,
-        backend,
-        device,
-        threads,
+        file, path, target, wanted.frames, frame or 0, defines.values, options, backend, device, threads
     )
     while True:
         before = stamps(easel.paths)
@@ -103,7 +91,7 @@ def command(
 
 
 def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] | None]) -> None:
-    from scenelang.backend.errors import RenderError
+    from scenelang.backend.options import RenderError
     from scenelang.diagnostics.render_text import plural
 
     clock = time.strftime("%H:%M:%S")

@@ -44,37 +44,22 @@ _FENCE: Final = re.compile(
 
 
 class Example(Record):
-    """A scene of a page.
+    """A scene of a page."""
 
-    Args:
-        kind: ``bad`` gives the page's code and nothing else, ``good`` nothing.
-        language: ``nsg``, ``json`` or ``python``.
-        text: the scene.
-        options: what `scenelang check` is told besides, as words.
-        limits: limits that are lowered for it, by their dotted names.
-    """
-
-    kind: Literal["bad", "good"]
-    language: str
+    kind: Literal["bad", "good"]  # ``bad`` gives the page's code and nothing else, ``good`` nothing
+    language: str  # ``nsg``, ``json`` or ``python``
     text: str
-    options: tuple[str, ...] = ()
-    limits: tuple[tuple[str, int], ...] = ()
+    options: tuple[str, ...] = ()  # what `scenelang check` is told besides, as words
+    limits: tuple[tuple[str, int], ...] = ()  # limits that are lowered for it, by their dotted names
 
 
 class Page(Record):
-    """What there is to know about a code.
+    """What there is to know about a code."""
 
-    Args:
-        code: such as ``E0302``.
-        text: the Markdown, with its first line.
-        examples: in the order of the page.
-        files: names and texts of files beside the examples.
-    """
-
-    code: str
-    text: str
-    examples: tuple[Example, ...]
-    files: tuple[tuple[str, str], ...]
+    code: str  # such as ``E0302``
+    text: str  # the Markdown, with its first line
+    examples: tuple[Example, ...]  # in the order of the page
+    files: tuple[tuple[str, str], ...]  # names and texts of files beside the examples
 
     @property
     def title(self) -> str:
@@ -82,7 +67,7 @@ class Page(Record):
 
     @property
     def severity(self) -> str:
-        return severity_of(self.code)
+        return "warning" if self.code.startswith("W") else "error"
 
     @property
     def area(self) -> str:
@@ -96,9 +81,7 @@ class Page(Record):
     def plain(self, width: int = 96, paint: Callable[[str, str], str] = lambda text, style: text) -> str:
         """The page without its Markdown: headings alone, code indented, paragraphs wrapped.
 
-        Args:
-            width: cells of a line.
-            paint: colours a text in one of the styles of `diagnostics.cells`.
+        A text in one of the styles of `diagnostics.cells` is coloured by ``paint``.
         """
         blocks = [paint(f"{self.severity}[{self.code}]", self.severity) + paint(f": {self.title}", "bold")]
         text = re.sub(r"^<!--.*-->\n", "", self.text.partition("\n")[2], flags=re.MULTILINE)
@@ -119,11 +102,6 @@ class Page(Record):
         return "\n\n".join(blocks) + "\n"
 
 
-def severity_of(code: str) -> str:
-    """``error`` or ``warning``."""
-    return "warning" if code.startswith("W") else "error"
-
-
 @cache
 def read_page(code: str) -> Page:
     """The page of a code.
@@ -142,15 +120,9 @@ def read_page(code: str) -> Page:
             beside.append((title[1], fence["text"]))
         elif info in ("{.bad}", "{.good}"):
             limits = [item.split("=") for item in (fence["limits"] or "").split(",") if item]
-            examples.append(
-                Example(
-                    "bad" if info == "{.bad}" else "good",
-                    language,
-                    fence["text"],
-                    (),
-                    tuple((name.strip(), int(value)) for name, value in limits),
-                )
-            )
+            lowered = tuple((name.strip(), int(value)) for name, value in limits)
+            kind: Literal["bad", "good"] = "bad" if info == "{.bad}" else "good"
+            examples.append(Example(kind, language, fence["text"], (), lowered))
         elif language == "sh" and examples:
             last = examples[-1]
             options = tuple(shlex.split(fence["text"])[3:])

@@ -14,10 +14,11 @@ from scenelang.evaluate.limits import MAX_NESTING
 from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Needs, Scope, Slots
 from scenelang.evaluate.prepare.expressions import VARIES, guarded, prepare
 from scenelang.evaluate.prepare.operations import condition
-from scenelang.evaluate.replay import Replayed
 from scenelang.evaluate.report.undefined import report_rebound
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.value import POISON, Problem, RangeValue, Vec, unexpected
+from scenelang.records import Record
+from scenelang.scene.spans import SpanMap
 from scenelang.syntax import nodes
 from scenelang.words import LANGUAGE, SETTINGS
 
@@ -113,10 +114,8 @@ def misplaced(
 ) -> None:
     """Report a statement in the wrong place, unless nothing is known about the place.
 
-    Several of a sort in one block are one report: it is the block that is of the wrong kind.
-
-    Args:
-        fact: the message, with ``{}`` for the name: those with the same fact are of a sort.
+    Several in one block with the same ``fact``, a message with ``{}`` for the name, are one report: it is the
+    block that is of the wrong kind.
     """
     if place.kind != "unknown":
         key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, fact)
@@ -179,7 +178,7 @@ def _declare(stmt: nodes.Fn | nodes.Module, place: Place) -> Callable[[], None] 
 
 def _prepare_body(stmt: nodes.Fn | nodes.Module, definition: Definition, place: Place) -> None:
     file, report, session = place.file, place.report, place.session
-    slots = Slots(definition.outer)
+    slots = Slots(definition.outer, owner=stmt.name.span)
     inside = Place(file, Scope(slots, place.scope), "group")
     defaults: list[Callable[[Env], Any]] = []
     places = [slots.add() for _ in stmt.params]
@@ -277,3 +276,51 @@ def prepare_if(stmt: nodes.If, place: Place) -> Action | None:
             chosen.run(env, out, session, span)
 
     return action
+
+
+class Replayed(Record, frozen=False):
+    """The action of a statement of a file or a group that runs at most once in a frame.
+
+    Args:
+        varies: whether frames change it, once that was asked.
+        kept: what it put into its block, the places of that, and the steps, objects and parts it counted.
+    """
+
+    action: Callable[[Any, Builder], None]
+    needs: Needs
+    session: Session
+    span: Span
+    varies: bool | None = None
+    kept: tuple[Builder, SpanMap, int, int, int] | None = None
+
+    def __call__(self, env: Any, out: Builder) -> None:
+        """Run the statement, or replay what it did."""
+        if self.varies is None:
+            self.varies = self.needs.varies()
+        session = self.session
+        if self.varies:
+            self.action(env, out)
+        elif self.kept is None:
+            own = Builder(out.material, out.material_span, out.moved)
+            steps, objects, parts = session.steps, session.objects, session.parts
+            around, session.spans = session.spans, SpanMap()
+            try:
+                self.action(env, own)
+            finally:
+                around.add(session.spans)
+                spans, session.spans = session.spans, around
+            own.material = own.material if out.material is None else None
+            own.moved = own.moved if own.transforms else None
+            counted = session.steps - steps, session.objects - objects, session.parts - parts
+            self.kept = (own, spans, *counted)
+            out.extend(own)
+        else:
+            own, spans, steps, objects, parts = self.kept
+            if (own.children and out.moved) or (own.material and out.material):
+                self.action(env, out)  # an error that needs the place it stands in
+                return
+            session.tick(steps, self.span)
+            session.count_parts(parts, self.span)
+            session.count_objects(objects, self.span)
+            session.spans.add(spans)
+            out.extend(own)

@@ -16,7 +16,6 @@ from scenelang.evaluate.prepare.settings import prepare_setting
 from scenelang.evaluate.prepare.transforms import prepare_move
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice
-from scenelang.evaluate.report.shapes import in_library
 from scenelang.evaluate.report.undefined import (
     VALUES,
     report_early,
@@ -126,6 +125,8 @@ def _advice(stmt: nodes.Call, place: Place) -> Advice:
     candidates = _candidates(stmt, place)
     help, fix = did_you_mean(text, candidates, name.span, effort=place.report.effort)
     if help is None and place.kind in HOLDERS:
+        from scenelang.evaluate.report.habits import in_library  # only mistakes need it
+
         help, fix = in_library(stmt, place)
     if fix is None:
         known, fix = instead(text, foreign_words.WORDS, candidates, name.span)

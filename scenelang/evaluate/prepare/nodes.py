@@ -11,9 +11,8 @@ from scenelang.evaluate.builder import Builder, ChainBuilder, make
 from scenelang.evaluate.costs import MODULE_CALL, OBJECT
 from scenelang.evaluate.file_context import Action, Place
 from scenelang.evaluate.names import Definition, Env
-from scenelang.evaluate.prepare.arguments import bind
 from scenelang.evaluate.prepare.blocks import Body, misplaced, prepare_inner, prepare_statement
-from scenelang.evaluate.prepare.calls import entering
+from scenelang.evaluate.prepare.calls import bind, entering
 from scenelang.evaluate.prepare.expressions import guarded, prepare_arguments
 from scenelang.evaluate.prepare.references import lookup
 from scenelang.evaluate.report.undefined import VALUES
@@ -130,7 +129,7 @@ def _run_nested(body: Body, env: Env, inside: Builder, session: Session, span: S
 def _width(stmt: nodes.Node | nodes.Combined, place: Place) -> Callable[[Env], float]:
     """The k of `smooth`, or the default's."""
     word, given = KEYWORDS["smooth"], prepare_arguments(stmt.args, place)
-    bound = bind(place.report, nodes.Name(word.name, stmt.keyword), word.params, word.required, given)
+    bound = bind(place.report, nodes.Name(stmt.keyword, word.name), word.params, word.required, given)
     if bound is None or bound[0] is None:
         return lambda env: BLEND
     get, operand = bound[0].code.run, bound[0].arg.value

@@ -1,18 +1,157 @@
-"""Operators in expressions: arithmetic, comparisons, logic, choice."""
+"""Literals, operators, vectors and ranges, and the parts of vectors."""
 
 from __future__ import annotations
 
 import math
 import operator
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
+from scenelang.diagnostics.suggest import did_you_mean
 from scenelang.evaluate.file_context import Place
 from scenelang.evaluate.names import Env
-from scenelang.evaluate.prepare.expressions import POISONED, Code, computed, folded, guarded, prepare
+from scenelang.evaluate.prepare.expressions import (
+    POISONED,
+    Code,
+    computed,
+    constant,
+    folded,
+    guarded,
+    prepare,
+)
 from scenelang.evaluate.values import operators
-from scenelang.evaluate.values.value import POISON, unexpected
+from scenelang.evaluate.values.functions import number
+from scenelang.evaluate.values.value import (
+    COMPONENTS,
+    POISON,
+    UNITS,
+    Angle,
+    Problem,
+    RangeValue,
+    Time,
+    Vec,
+    describe,
+    unexpected,
+    unpack,
+)
 from scenelang.syntax import nodes
+
+_LITERALS: Final[dict[str, Callable[[float], Any]]] = {
+    "deg": lambda value: Angle(math.radians(value)),
+    "rad": Angle,
+    "turn": lambda value: Angle(value * math.tau),
+    "s": Time,
+    "ms": lambda value: Time(value / 1000.0),
+}
+
+
+def prepare_number(expr: nodes.Number, place: Place) -> Code:
+    value = float(expr.value)
+    if not math.isfinite(value * math.tau if expr.unit == "turn" else value):
+        place.report.error("E0306", "the number is too large", expr.span)
+        return POISONED
+    return constant(_LITERALS[expr.unit](value) if expr.unit else value)
+
+
+def prepare_literal(expr: nodes.String | nodes.Bool, place: Place) -> Code:
+    return constant(expr.value)
+
+
+def prepare_color(expr: nodes.Color, place: Place) -> Code:
+    return constant(Vec(tuple([float(c) for c in expr.rgb])))
+
+
+def skip_bad(expr: nodes.BadExpr, place: Place) -> Code:
+    return POISONED
+
+
+def _vector(*items: Any) -> Vec:
+    for index, item in enumerate(items):
+        if item.__class__ is RangeValue:
+            raise Problem("E0301", "a range inside a vector", "write it without brackets", index)
+    return Vec(items)
+
+
+def prepare_vector(expr: nodes.Vector, place: Place) -> Code:
+    return computed(place, _vector, expr.span, expr.items, item_steps=0)
+
+
+def prepare_range(expr: nodes.Range, place: Place) -> Code:
+    def make(start: Any, stop: Any, step: Any = 1.0) -> RangeValue:
+        for index, value in enumerate((start, stop, step)):
+            if value.__class__ not in UNITS:
+                raise unexpected("a number", value, operand=index)
+        (a, ua), (b, ub), (s, us) = unpack(start), unpack(stop), unpack(step)
+        kind = operators.same_unit(a, ua, b, ub)
+        if expr.step is None:
+            return RangeValue(a, b, expr.exclusive, None, kind)
+        if kind == "angle" and us != "angle":
+            raise Problem("E0302", "a bare number as the step of angles", operand=2, fix="angle")
+        kind = operators.same_unit(b, kind, s, us) if us != kind else kind
+        if s == 0.0:
+            raise Problem("E0311", "a step of 0", operand=2)
+        return RangeValue(a, b, expr.exclusive, s, kind)
+
+    parts = [part for part in (expr.start, expr.stop, expr.step) if part is not None]
+    return computed(place, make, expr.span, parts)
+
+
+# ---------------------------------------------------------------- parts of values
+
+
+def member(code: Code, name: nodes.Name, place: Place, of: nodes.Expr) -> Code:
+    """``code.name``, a component of a vector."""
+    index = COMPONENTS.get(name.text)
+    if index is None:
+        from scenelang.evaluate.report.habits import member_advice  # only mistakes need it
+
+        help, fix = member_advice(of, name)
+        if help is None:
+            help, fix = did_you_mean(name.text, COMPONENTS, name.span)
+        help = help or "vectors have .x .y .z, or .r .g .b, or [i]"
+        place.report.error("E0212", f"no value has a member `{name.text}`", name.span, help=help, fix=fix)
+        return POISONED
+    at = index
+
+    def pick(value: Any) -> Any:
+        if value.__class__ is not Vec:
+            kind = describe(value)
+            message = f"`.{name.text}` of {kind}, which is not a vector"
+            raise Problem("E0301", message, found=kind)
+        if at >= len(value.items):
+            raise Problem("E0307", f"`.{name.text}` of {describe(value)}")
+        return value.items[at]
+
+    def run(env: Env) -> Any:
+        value = get(env)
+        return value.items[at] if value.__class__ is Vec and len(value.items) > at else slow(value)
+
+    get = code.run
+    slow = guarded(place, pick, name.span, (of,), item_steps=0)
+    return folded([code], pick, run)
+
+
+def _item(value: Any, index: Any) -> Any:
+    at = number(index, 1)
+    if value.__class__ is Vec:
+        length = len(value.items)
+    elif value.__class__ is RangeValue:
+        length = value.count()
+    else:
+        raise unexpected("a vector or a range", value, operand=0)
+    if not at.is_integer():
+        raise Problem("E0307", f"index {at:.6g} is not a whole number", "round it with floor(…)", 1)
+    if not 0 <= at < length:
+        where = f"outside 0..{length - 1}" if length else "into an empty vector"
+        help = "items are counted from 0; the last is v[len(v) - 1]" if at < 0 else None
+        raise Problem("E0307", f"index {at:.0f} is {where}", help, operand=1)
+    return value.items[int(at)] if value.__class__ is Vec else value.item(int(at))
+
+
+def prepare_index(expr: nodes.Index, place: Place) -> Code:
+    return computed(place, _item, expr.span, (expr.value, expr.index), item_steps=0)
+
 
 _FAST: Final[dict[str, Callable[[Any, Any], Any]]] = {
     **operators.ARITHMETIC,
@@ -24,14 +163,12 @@ _FAST: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "!=": operator.ne,
 }
 """What operators mean on two numbers, unless that is an error or not finite."""
-
-
-def _meaning(op: str, a: Any, b: Any) -> Any:
-    if op in operators.ARITHMETIC:
-        return operators.binary(op, a, b)
-    if op in operators.COMPARE:
-        return operators.compare(op, a, b)
-    return operators.equal(a, b) is (op == "==")
+_MEANINGS: Final[dict[str, Callable[[Any, Any], Any]]] = {
+    **{op: partial(operators.binary, op) for op in operators.ARITHMETIC},
+    **{op: partial(operators.compare, op) for op in operators.COMPARE},
+    "==": operators.equal,
+    "!=": lambda a, b: not operators.equal(a, b),
+}
 
 
 def prepare_binary(expr: nodes.Binary, place: Place) -> Code:
@@ -41,12 +178,9 @@ def prepare_binary(expr: nodes.Binary, place: Place) -> Code:
     codes = [prepare(expr.left, place), prepare(expr.right, place)]
     if op not in _FAST:
         return POISONED  # recovery kept what was written, and reported it
-
-    def meaning(a: Any, b: Any) -> Any:
-        return _meaning(op, a, b)
-
+    fast, meaning = _FAST[op], _MEANINGS[op]
     slow = guarded(place, meaning, expr.op_span, (expr.left, expr.right))
-    left, right, fast = codes[0].run, codes[1].run, _FAST[op]
+    left, right = codes[0].run, codes[1].run
 
     def arithmetic(env: Env) -> Any:
         a, b = left(env), right(env)

@@ -10,7 +10,6 @@ from scenelang.diagnostics.diagnostic import Diagnostics, Edit, Fix, Label
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.file_context import Action, FileContext, Place
-from scenelang.evaluate.inputs import Defines
 from scenelang.evaluate.names import Binding, Env
 from scenelang.evaluate.prepare.blocks import define
 from scenelang.evaluate.prepare.expressions import VARIES, prepare
@@ -18,7 +17,7 @@ from scenelang.evaluate.prepare.settings import at_top_level
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.report.type_errors import report_problem
-from scenelang.evaluate.session import Session
+from scenelang.evaluate.session import Defines, Session
 from scenelang.evaluate.values.operators import equal, same_unit
 from scenelang.evaluate.values.value import (
     POISON,

@@ -7,7 +7,7 @@ from typing import Any
 from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.names import UNBOUND, Binding, Env
 from scenelang.evaluate.prepare.expressions import POISONED, Code, constant, prepare
-from scenelang.evaluate.prepare.literals import member
+from scenelang.evaluate.prepare.operations import member
 from scenelang.evaluate.report.undefined import VALUES, unknown, unknown_member
 from scenelang.evaluate.values.functions import CONSTANTS, FUNCTIONS
 from scenelang.evaluate.values.value import POISON
@@ -115,7 +115,7 @@ def prepare_member(expr: nodes.Member, place: Place) -> Code:
     if binding is None or binding.kind != "import":
         code = prepare(value, place)
         return POISONED if code.value is POISON else member(code, expr.name, place, value)
-    name = nodes.Name(f"{value.span.text}.{expr.name.text}", expr.span)
+    name = nodes.Name(expr.span, f"{value.span.text}.{expr.name.text}")
     found = lookup(name, place)
     if found is not None:
         return _as_value(name, found, place)

@@ -11,13 +11,14 @@ from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.costs import MATRIX, MOVE, SAME_MOVE
 from scenelang.evaluate.file_context import Action, Place
 from scenelang.evaluate.names import Env
-from scenelang.evaluate.prepare.arguments import bind
 from scenelang.evaluate.prepare.blocks import misplaced, prepare_inner
+from scenelang.evaluate.prepare.calls import bind
 from scenelang.evaluate.prepare.expressions import VARIES, Given, prepare_arguments
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.report.type_errors import report_problem
-from scenelang.evaluate.values.transforms import EVEN_SCALE, GEOMETRY, TEXTURE, Spec, outside_unit, spread
+from scenelang.evaluate.values.transforms import EVEN_SCALE, GEOMETRY, TEXTURE, Spec, spread
 from scenelang.evaluate.values.value import POISON, Problem
+from scenelang.scene.modifiers import Color, Grayscale
 from scenelang.scene.spans import Written
 from scenelang.syntax import nodes
 
@@ -107,7 +108,8 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: nodes.Call, place: 
         except Problem as problem:
             report_problem(session.report, problem, span, operands)
             return None
-        _warn(node, session.report, first.span if first else span)
+        if node.__class__ is Color or node.__class__ is Grayscale:
+            _warn(node, session.report, first.span if first else span)
         return node
 
     def append(node: Any, out: Builder) -> None:
@@ -141,8 +143,10 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: nodes.Call, place: 
     return action
 
 
-def _warn(node: Any, report: Reporter, span: Span) -> None:
-    outside = outside_unit(node)
+def _warn(node: Color | Grayscale, report: Reporter, span: Span) -> None:
+    """Warn of a component of a colour, or an amount of grey, outside 0 to 1."""
+    components = node.rgb if isinstance(node, Color) else (node.amount,)
+    outside = next((component for component in components if not 0.0 <= component <= 1.0), None)
     if outside is not None:
         help = "components run from 0 to 1; the result is clamped to that"
         if outside > 1 and outside.is_integer():

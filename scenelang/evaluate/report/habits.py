@@ -1,20 +1,92 @@
-"""Habits of other languages that parse here and mean nothing: what to write, and a fix where that is sure."""
+"""Habits of other languages, angles without a unit, shapes of the library: what to write instead."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Container, Iterable
 from typing import Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.report import foreign_words
-from scenelang.evaluate.report.angles import angle_advice
 from scenelang.evaluate.report.reporter import Advice
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.value import COMPONENTS, Problem
+from scenelang.records import Record
+from scenelang.scene import library
 from scenelang.syntax import nodes
 from scenelang.words import TRANSFORMS
+
+_GLUED: Final = "give it a unit: deg, rad or turn"
+_RADIANS: Final = "a multiple of PI or TAU is in radians: multiply by 1rad"
+_COMPUTED: Final = "multiply by the unit it is in: 1deg, 1rad or 1turn"
+_OPENS: Final = ("(", "[", ",", "=", "")
+"""What an expression stands behind that may grow by a factor without parentheses."""
+
+
+def angle_advice(
+    expr: nodes.Expr | None, variables: Container[tuple[SourceFile, int]], *, hue: bool = False
+) -> tuple[str, Fix | None]:
+    """Help and fix for a bare number where an angle is wanted.
+
+    A literal gets the unit that such numbers have elsewhere. A multiple of PI or TAU is in radians. Of other
+    computed numbers nobody can tell the unit, so they get no fix.
+
+    Args:
+        expr: the number; None where it has no place of its own.
+        variables: the names that the file defines, by their file and place.
+        hue: the angle shifts a hue, whose fractions are turns, as those of ``hsv`` are.
+    """
+    inner = expr.operand if isinstance(expr, nodes.Unary) else expr
+    if isinstance(inner, nodes.Number):
+        unit = _unit(abs(inner.value), hue)
+        return _GLUED, Fix(f"add `{unit}`", (Edit(_at(inner, inner.span.end), unit),))
+    if expr is None:
+        return _GLUED, None
+    if _power_of_pi(expr, variables) != 1:
+        return _COMPUTED, None
+    if expr.span.text.count("(") != expr.span.text.count(")"):
+        return _RADIANS, None  # literals keep their place inside their parentheses, and so do sums of them
+    loose = isinstance(expr, nodes.Conditional) or (isinstance(expr, nodes.Binary) and expr.op in "+-")
+    head, tail = ("(", ") * 1rad") if loose else ("", " * 1rad")
+    before = expr.span.source.text[max(0, expr.span.start - 100) : expr.span.start].rstrip()
+    if before[-1:] not in _OPENS:
+        head, tail = f"({head}", f"{tail})"
+    edits = (Edit(_at(expr, expr.span.start), head),) if head else ()
+    return _RADIANS, Fix("multiply by `1rad`", (*edits, Edit(_at(expr, expr.span.end), tail)))
+
+
+def _unit(size: float, hue: bool) -> str:
+    """The unit that a literal most likely has."""
+    if size > math.tau or float(size).is_integer():
+        return "deg"
+    return "turn" if hue and size < 1 else "rad"
+
+
+def _at(expr: nodes.Expr, place: int) -> Span:
+    return Span(expr.span.source, place, place)
+
+
+def _power_of_pi(expr: nodes.Expr, variables: Container[tuple[SourceFile, int]]) -> int:
+    """To which power PI or TAU is a factor of a number: 1 where it is in radians, -1 in ``180 / PI``."""
+    match expr:
+        case nodes.NameRef(name=name):
+            own = (name.span.source, name.span.start) not in variables
+            return int(own and name.text in ("PI", "TAU"))
+        case nodes.Unary():
+            return _power_of_pi(expr.operand, variables)
+        case nodes.Binary(op="*" | "/" | "+" | "-" | "%" as op):
+            left, right = _power_of_pi(expr.left, variables), _power_of_pi(expr.right, variables)
+            if op in "*/":
+                return left + right if op == "*" else left - right
+            return left if op == "%" else max(left, right)
+        case nodes.Conditional():
+            return max(_power_of_pi(expr.then, variables), _power_of_pi(expr.otherwise, variables))
+        case _:
+            return 0
+
 
 _SIMPLE: Final = re.compile(r"[\w.#]+(?:\([^()]*\)|\[[^\[\]]*\])?|\([^()]*\)|\[[^\[\]]*\]")
 _NEAR: Final = 500
@@ -136,3 +208,95 @@ def as_group(stmt: nodes.Call, session: Session) -> Fix | None:
             return None
         moved = f"material {material} {{ {moved} }}"
     return Fix("write it as a group", (Edit(head, "group "), Edit(Span(source, last, last), f" {moved}")))
+
+
+_LEAVES: Final = frozenset(("square", "triangle", "pentagon"))  # what the library is made of
+
+
+class Shape(Record):
+    """A module of ``std/shapes``.
+
+    Args:
+        call: how it is called, for people.
+        least, most: how many arguments without a name it takes; of others nothing is known.
+        bare: what stands for a call without any, if that means something.
+    """
+
+    call: str
+    least: int = 0
+    most: int = 0
+    bare: str = ""
+
+    @property
+    def module(self) -> str:
+        return self.call.partition("(")[0]
+
+
+SHAPES: Final = {
+    **dict.fromkeys(("circle", "disc", "disk", "dot"), Shape("disc(r)", 1, 1, "disc()")),
+    **dict.fromkeys(("ellipse", "oval"), Shape("ellipse(rx, ry)", 2, 2)),
+    **dict.fromkeys(("ring", "annulus"), Shape("ring(r, width)", 2, 2, "ring()")),
+    **dict.fromkeys(("rect", "rectangle", "box", "cube", "quad"), Shape("rect(w, h)", 1, 2, "rect()")),
+    **dict.fromkeys(
+        ("rounded", "rounded_rect", "rounded_rectangle", "roundrect", "rrect"), Shape("rounded(w, h, r)")
+    ),
+    **dict.fromkeys(("line", "segment"), Shape("line(a, b, width)", 2, 3)),
+    **dict.fromkeys(("capsule", "stadium"), Shape("capsule(a, b, width)", 2, 3)),
+    **dict.fromkeys(("path", "polyline"), Shape("path(points, width)", 1, 2)),
+    **dict.fromkeys(("polygon", "ngon"), Shape("polygon(n, r)")),
+    **dict.fromkeys(("pie", "sector", "wedge"), Shape("pie(r, from, to)")),
+    "arrow": Shape("arrow(a, b, width)", 2, 3),
+    "arc": Shape("arc(r, width, from, to)"),
+    "parallelogram": Shape("parallelogram(p, a, b)", 3, 3),
+    "hexagon": Shape("polygon(6)", bare="polygon(6)"),
+    "heptagon": Shape("polygon(7)", bare="polygon(7)"),
+    "octagon": Shape("polygon(8)", bare="polygon(8)"),
+}
+"""Names of shapes, in small letters."""
+
+
+def in_library(stmt: nodes.Call, place: Place) -> tuple[str | None, Fix | None]:
+    """Help and fix for a statement whose name is that of a shape of the library; both None for any other."""
+    shape = SHAPES.get(stmt.name.text.lower())
+    if shape is None or not place.session.vocabulary.geometries >= _LEAVES:
+        return None, None
+    imported = next(
+        (n for n, b in place.scope.visible() if b.kind == "import" and _is_library(b.value)), None
+    )
+    alias = imported or ("s" if place.scope.find("s") is None else "shapes")
+    text = f'import "{library.SHAPES}" as {alias};'
+    help = f"{'' if imported else text + ' then '}{alias}.{shape.call}"
+    if imported is None and place.scope.find(alias) is not None:
+        return help, None
+    edit = _edit(stmt, shape, alias)
+    if edit is None:
+        return help, None
+    message = f"write `{edit.replacement}`"
+    if imported:
+        return help, Fix(message, (edit,))
+    return help, Fix(f"import it and {message}", _with_import(edit, place.file, text))
+
+
+def _is_library(value: object) -> bool:
+    return isinstance(value, FileContext) and value.source.name == library.called(library.SHAPES)
+
+
+def _edit(stmt: nodes.Call, shape: Shape, alias: str) -> Edit | None:
+    """The call of the library's module, where the arguments that are there fit it."""
+    name = stmt.name.span
+    if not stmt.args:
+        end = name.end if stmt.args is None else name.source.text.find(")", name.end) + 1
+        return Edit(Span(name.source, name.start, end), f"{alias}.{shape.bare}") if shape.bare else None
+    fits = shape.least <= len(stmt.args) <= shape.most and not any(arg.name for arg in stmt.args)
+    return Edit(name, f"{alias}.{shape.module}") if fits else None
+
+
+def _with_import(edit: Edit, file: FileContext, text: str) -> tuple[Edit, ...]:
+    """An edit, and the import on a line of its own at the head of the file."""
+    first = file.first.span if file.first is not None else edit.span
+    source = first.source
+    if isinstance(file.first, nodes.Version):
+        return Edit(Span(source, first.end, first.end), f"\n{text}"), edit
+    if first.start == edit.span.start:
+        return (Edit(edit.span, f"{text}\n{edit.replacement}"),)
+    return Edit(Span(source, first.start, first.start), f"{text}\n"), edit

@@ -15,9 +15,8 @@ from scenelang.evaluate.report.suppression import NONE, Damage
 from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.scene.spans import Calls
-from scenelang.syntax.lexer import scan
+from scenelang.syntax.lexer import Report, scan
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report
 
 Advice = tuple[str | None, Fix | None]
 """Help, and a fix."""
@@ -26,14 +25,7 @@ _SHOWN: Final = 3  # places of one report
 
 
 class Shared(Record, frozen=False):
-    """A report that several places share.
-
-    Args:
-        index: its index among the diagnostics.
-        code: its code.
-        own: labels of its own.
-        again: further places.
-    """
+    """A report that several places share: its index among the diagnostics, its own labels, further places."""
 
     index: int
     code: str
@@ -44,10 +36,7 @@ class Shared(Record, frozen=False):
 def shown_places(places: Collection[Span], words: str, rest: str = "") -> tuple[Label, ...]:
     """Labels for the places that share one report: the first few, and how many there are beyond.
 
-    Args:
-        places: in the order in which they were met.
-        words: what is said at each place.
-        rest: how the number of the others is put: "in" for "and in 2 more".
+    ``rest`` is how their number is put: "in" for "and in 2 more".
     """
     labels = [Label(place, words) for place in islice(places, _SHOWN)]
     if len(places) > _SHOWN:
@@ -60,7 +49,6 @@ class Reporter(Record, frozen=False):
     """Where the mistakes of one evaluation go, and what is known of those reported.
 
     Args:
-        diagnostics: receives them.
         calls: the calls that are running.
         damaged: what syntax mistakes have damaged, by file.
         reported: the code that was reported at each place.

@@ -26,6 +26,7 @@ _NAMES = frozenset(("E0201", "E0202", "E0203", "E0204", "E0206", "E0207", "E0208
 _CERTAIN = frozenset(("E0116", "E0117", "E0123", "E0127", "E0132"))
 """Mistakes in one word, number or sign: those with a fix are read as fixed, and hide nothing."""
 
+_BRACES = frozenset(("E0104", "E0106", "E0129"))
 _PLACES = frozenset(("E0330", "E0331", "E0332", "E0333", "E0334", "E0335"))
 
 
@@ -72,12 +73,7 @@ NONE = Damage()
 
 
 def find_damage(file: nodes.File, found: Iterable[Diagnostic]) -> Damage:
-    """The damage that a file's syntax mistakes have done.
-
-    Args:
-        file: its tree.
-        found: diagnostics; those of syntax in this file count.
-    """
+    """The damage that a file's syntax mistakes, those among ``found``, have done."""
     source = file.span.source
     marks = [
         (d.code, d.span)
@@ -102,7 +98,7 @@ def find_damage(file: nodes.File, found: Iterable[Diagnostic]) -> Damage:
         tuple(dict.fromkeys(blocks)),
         frozenset(word for text in texts for word in _WORD.findall(text)),
         nameless,
-        any(_is_about_braces(code, span) for code, span in marks),
+        any(code in _BRACES or (code != "E0133" and re.search("[{}]", span.text)) for code, span in marks),
     )
 
 
@@ -120,10 +116,6 @@ def _is_nameless(definition: re.Match[str]) -> bool:
     if definition["name"]:
         return definition["name"].strip() in tables().literals
     return not definition["alias"]
-
-
-def _is_about_braces(code: str, span: Span) -> bool:
-    return code in ("E0104", "E0106", "E0129") or (code != "E0133" and not {"{", "}"}.isdisjoint(span.text))
 
 
 def _lines(span: Span) -> Span:

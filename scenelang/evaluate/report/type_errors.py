@@ -1,4 +1,4 @@
-"""Values of the wrong kind: uses of one variable that complain in the same words are one report."""
+"""Values of the wrong kind: uses of one variable or function that have the same odd kind are one report."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def report_problem(
         return
     blamed = operand or (operands[0] if operands else None)
     odd = problem.code in _KINDS and problem.found not in ("", "a number")
-    variable = _variable(report, blamed) if odd else None
-    key = None if variable is None else (problem.code, problem.found, variable.source, variable)
+    origin = _origin(report, blamed) if odd else None
+    key = None if origin is None else (problem.code, problem.found, origin.source, origin)
     shared = report.shared.get(key)
     if shared is not None and not report.follows(problem.code, place):
         report.share(shared, place, "in")
@@ -45,17 +45,17 @@ def report_problem(
         for index, words in problem.notes.items()
         if index < len(operands) and (other := operands[index]) is not None
     ]
-    if isinstance(operand, nodes.NameRef) and (defined := _variable(report, operand)) is not None:
+    if isinstance(operand, nodes.NameRef) and (defined := _origin(report, operand)) is not None:
         labels.append(Label(defined, f"`{operand.name.text}` is defined here"))
     found = report.error(problem.code, problem.message, place, help=help, fix=fix, labels=tuple(labels))
     if found is not None and key is not None:
         report.shared[key] = found
 
 
-def _variable(report: Reporter, operand: nodes.Expr | None) -> Span | None:
-    """The definition of the variable that an operand is, or is a part of."""
+def _origin(report: Reporter, operand: nodes.Expr | None) -> Span | None:
+    """The definition of the variable that an operand is, or is a part of, or of the function it calls."""
     while isinstance(operand, nodes.Member | nodes.Index):
         operand = operand.value
-    if not isinstance(operand, nodes.NameRef):
+    if not isinstance(operand, nodes.NameRef | nodes.CallExpr):
         return None
     return report.defined.get((operand.span.source, operand.span.start))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Final
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.diagnostics.suggest import did_you_mean, is_slip, listing, ranked
+from scenelang.diagnostics.suggest import Suggestion, did_you_mean, is_slip, listing, ranked
 from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.names import Binding, Scope
 from scenelang.evaluate.report import foreign_words
-from scenelang.evaluate.report.reporter import Advice, Reporter, shown_places
+from scenelang.evaluate.report.reporter import Advice, Reporter, Shared, shown_places
 from scenelang.syntax import nodes
 from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS
 
@@ -26,11 +27,7 @@ def reported_at_definition(
 ) -> bool:
     """Report a name that is used several times at the definition that was misspelt, if there is one.
 
-    Args:
-        report: where it is reported.
-        text: the unknown name.
-        source: the file that it is used in.
-        defined: names that are defined around it, each with its place and the kind of its binding.
+    ``defined`` are the names around it, each with its place and the kind of its binding.
     """
     places = report.uses(source).get(text, [])
     if len(places) < 2 or "." in text or report.effort.spent:
@@ -66,10 +63,6 @@ def report_unknown(
     """Report a name that stands for nothing; again only as a further place of the first report.
 
     Args:
-        name: the name.
-        place: where it is used.
-        code: code of the diagnostic.
-        message: the fact.
         advise: makes advice and a safe change; where there is neither an unused name nearby is suggested.
         kinds: kinds of bindings that it could have stood for.
     """
@@ -89,10 +82,27 @@ def report_unknown(
     if help is None:
         unused = [n for n, b in around if report.is_unused(n, b.span)]
         help, _ = did_you_mean(name.text, unused, name.span, slips=1, effort=report.effort)
-    suggested = next((b.labels() for n, b in around if help == f"did you mean `{n}`?"), ())
-    found = report.error(code, message, name.span, help=help, fix=fix, labels=suggested)
+    meant = help.name if isinstance(help, Suggestion) else None
+    suggested = next((b.labels() for n, b in around if n == meant), ())
+    owner, found, calls = place.scope.slots.owner, None, []
+    if owner is not None and code == "E0201":
+        ways = ("E0308", "surplus"), ("E0206", name.text)
+        calls = [(*way, owner.source, owner) for way in ways]
+        found = next((misfit for call in calls if (misfit := report.shared.get(call)) is not None), None)
+    if owner is not None and found is not None and found.code != code:  # calls give what it has lost
+        report.diagnostics.items[found.index] = Diagnostic(code, message, name.span)
+        found.code, found.own, found.again = code, (), {}
+        advise_parameter(report, found, owner)
+    else:
+        found = report.error(code, message, name.span, help=help, fix=fix, labels=suggested)
     if found is not None:
-        report.shared[key] = found
+        report.shared.update(dict.fromkeys([key, *calls], found))
+
+
+def advise_parameter(report: Reporter, unknown: Shared, owner: Span) -> None:
+    """An unknown name in a definition that is called with more than it takes: it has lost a parameter."""
+    items, help = report.diagnostics.items, f"add it to the parameters of `{owner.text}`"
+    items[unknown.index] = replace(items[unknown.index], help=help, fix=None)
 
 
 def within_effort(place: Place, kinds: Sequence[str]) -> list[tuple[str, Binding]]:
@@ -118,12 +128,13 @@ def unknown_member(name: nodes.Name, place: Place, exported: FileContext | None)
         return help or (f"it has {listing(known)}" if known else "it defines nothing"), fix
 
     nowhere = place._replace(scope=Scope(place.file.scope.slots))
-    report_unknown(nodes.Name(rest, last), nowhere, "E0212", f"`{alias}` has no `{rest}`", advise=advise)
+    report_unknown(nodes.Name(last, rest), nowhere, "E0212", f"`{alias}` has no `{rest}`", advise=advise)
 
 
 def report_early(name: nodes.Name, place: Place) -> bool:
     """Report a name that a later line defines, if one does."""
-    later = place.scope.defined_later(name.text)
+    scopes = place.scope.outwards()
+    later = next((scope.later[name.text] for scope in scopes if name.text in scope.later), None)
     if later is not None:
         message, labels = f"`{name.text}` is used before its line", (Label(later, "defined here"),)
         help = f"move the definition of `{name.text}` above this line"
@@ -139,7 +150,7 @@ def unknown(name: nodes.Name, place: Place, call: nodes.CallExpr | None = None) 
     alias, dot, _ = text.partition(".")
     if dot:
         head = Span(name.span.source, name.span.start, name.span.start + len(alias))
-        unknown(nodes.Name(alias, head), place)
+        unknown(nodes.Name(head, alias), place)
     elif not report_early(name, place):
         kinds = ("fn",) if call else (*VALUES, "import")
         code, what = ("E0207", "function") if call else ("E0201", "name")

@@ -121,18 +121,14 @@ def _unit_of(op: str, a: float, ua: str, b: float, ub: str) -> str:
 
 def _unfit(message: str, a: Any, b: Any, operand: int, shared: bool = True) -> Problem:
     """Two values that an operator does not take; ``shared`` where the odd kind of one is the cause."""
-    odd = [kind for kind in (describe(a), describe(b)) if kind != "a number"]
-    found = odd[0] if shared and len(odd) == 1 else ""
+    odd = {describe(a), describe(b)} - {"a number"}
+    found = odd.pop() if shared and len(odd) == 1 else ""
     notes = {1 - operand: describe((a, b)[1 - operand])}
     return Problem("E0303", message, operand=operand, notes=notes, found=found)
 
 
 def binary(op: str, a: Any, b: Any) -> Any:
-    """``a op b`` for the arithmetic operators, componentwise on vectors.
-
-    Raises:
-        Problem: values that do not combine, or no finite result.
-    """
+    """``a op b`` for the arithmetic operators, componentwise on vectors."""
     ca, cb = a.__class__, b.__class__
     if ca in UNITS and cb in UNITS:
         x, ua = unpack(a)

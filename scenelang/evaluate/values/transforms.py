@@ -32,7 +32,6 @@ class Spec(Record):
     """One transform or operation.
 
     Args:
-        word: its arguments.
         build: the node from one value an argument, None where left out; raises Problem.
         spread: whether one vector may stand for all arguments.
         help: advice for a wrong number of arguments; None prints the signature.
@@ -175,14 +174,3 @@ def spread(values: Sequence[Any], spec: Spec) -> list[Any]:
         numbers = f"{spec.word.required} or {len(spec.word.params)} numbers"
         raise unexpected(f"a vector of {numbers}", first, operand=0)
     return [*first.items, *[None] * (len(spec.word.params) - count)]
-
-
-def outside_unit(node: Any) -> float | None:
-    """A component of a colour or an amount of grey that lies outside 0 to 1."""
-    cls = node.__class__
-    if cls is not Color and cls is not Grayscale:
-        return None
-    for component in node.rgb if cls is Color else (node.amount,):
-        if not 0.0 <= component <= 1.0:
-            return float(component)
-    return None

@@ -21,9 +21,7 @@ class Problem(Exception):
     """What is wrong with an operation; the caller knows the place.
 
     Args:
-        code: diagnostic code.
         message: the fact; made of ``expected`` and ``found`` where a kind of value was expected.
-        help: advice.
         operand: which operand or argument is to blame, from 0; None for all of it.
         fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, for which the help comes
             with the fix; a ``colour`` of a string; of three ``turns`` the last.
@@ -80,9 +78,6 @@ class Time(_Quantity):
 
 class Vec:
     """A vector of values.
-
-    Args:
-        items: the values.
 
     Raises:
         Problem: more than `MAX_VECTOR` numbers, or nested deeper than `MAX_VECTOR_DEPTH`.

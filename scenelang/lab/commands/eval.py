@@ -44,7 +44,7 @@ def command(
     need_metrics()
     import torch
 
-    from scenelang.backend.memory import keep_memory
+    from scenelang.backend.options import keep_memory
     from scenelang.lab.evaluate import evaluate_set, worst_sheet
 
     loaded = common.model_to_measure(model, weights)

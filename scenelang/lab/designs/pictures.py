@@ -15,9 +15,7 @@ import torch
 from torch import Tensor
 
 from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH
-from scenelang.reference.field import map_back, warp_back
-from scenelang.reference.fold import fold
-from scenelang.reference.leaves import sector_distance
+from scenelang.reference.field import fold, map_back, sector_distance, warp_back
 from scenelang.training.scenes import sectors
 
 

@@ -19,19 +19,19 @@ import numpy as np
 import PIL.Image
 import torch
 
-from scenelang.backend.memory import keep_memory
 from scenelang.backend.neural import open_model
+from scenelang.backend.options import keep_memory
 from scenelang.image import Image, from_samples
 from scenelang.lab.about import Report, silent
 from scenelang.lab.frontier.fit import fit_cost
 from scenelang.lab.frontier.ways import Draw, Way, ways_of
-from scenelang.measure.cost import yardstick
+from scenelang.measure.choose import yardstick
 from scenelang.measure.frontier import Cost, Errors, Frontier, Point, Quality, Times, front
 from scenelang.measure.metrics import flip, psnr
 from scenelang.measure.scenes import reference_of, scenes_of
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.program.compile import compile_scene
-from scenelang.program.work import Load, load_of
+from scenelang.program.program import Load, load_of
 from scenelang.scene.schema import Scene
 from scenelang.training.loop import revision
 

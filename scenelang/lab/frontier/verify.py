@@ -15,7 +15,7 @@ from scenelang.measure.metrics import flip
 from scenelang.measure.scenes import reference_of, scenes_of
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
-from scenelang.program.work import load_of
+from scenelang.program.program import load_of
 
 KEPT: Final = 0.95
 """Share of scenes in which a promise has to hold."""

@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.backend.neural import draw_program
+from scenelang.graph.lower import step_of
 from scenelang.graph.spaces import PLANE
 from scenelang.graph.steps import Affine, Step, Warp
-from scenelang.graph.transforms import step_of
 from scenelang.image import Image
 from scenelang.lab.about import Report, about, silent
 from scenelang.lab.stability.probes import PROBES, Probe, animated, apart, rng_of, union_of

@@ -13,8 +13,7 @@ import numpy as np
 
 from scenelang.graph.nodes import Leaf
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
-from scenelang.reference.field import distance_scale
-from scenelang.reference.leaves import TORUS, Array, leaf_distance
+from scenelang.reference.field import TORUS, Array, distance_scale, leaf_distance
 
 _REACH = 0.15
 _TINY = 1e-300  # added to lengths that something is divided by

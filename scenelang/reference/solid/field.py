@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from scenelang.graph.nodes import Fold, Leaf, Node
 from scenelang.graph.steps import Step
-from scenelang.reference.leaves import Array
+from scenelang.reference.field import Array
 from scenelang.reference.solid.body import Body
 
 FAR = 1e9  # distance to what is not there

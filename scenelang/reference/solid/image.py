@@ -7,7 +7,7 @@ import numpy as np
 from scenelang.graph.nodes import Fold
 from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Ground, Light, Stage
 from scenelang.image import Image, from_samples
-from scenelang.reference.leaves import Array
+from scenelang.reference.field import Array
 from scenelang.reference.samples import sample_points
 from scenelang.reference.solid.body import length
 from scenelang.reference.solid.field import OPAQUE, Field

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.reference.leaves import Array
+from scenelang.reference.field import Array
 from scenelang.reference.solid.field import FAR, MEDIUM, OPAQUE, OUT, Field
 
 STEP = 2e-3

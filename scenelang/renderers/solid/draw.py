@@ -6,6 +6,8 @@ like. Colours are linear up to the last step. Letters as in `network.py`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +22,7 @@ from scenelang.renderers.solid.network import Wanted
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
 CLEAR = 2e-4  # world units before a surface where rays from the light end
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(3)
 NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2  # of a way through a medium, by what it takes of the light
 TILE = 1 << 16  # samples at a time
 CONTRAST = 0.04  # sRGB: pixels that differ more from a neighbour are sampled four times
@@ -137,7 +139,7 @@ class Lighting:
     def _look(self, way: Array, t: Array, gradient: bool = False) -> Meeting:
         """All about points at t (K,) of rays (3, K) from the eye."""
         begin, end, _ = self.field.spans(self.eye, way, t)
-        inside = [(begin[i] <= t) & (t <= end[i]) for i in range(len(begin))]
+        inside = (begin <= t) & (t <= end)
         return self.field.meet(self.eye[:, None] + way * t, inside, Wanted.ALL, gradient)
 
     def _ahead(self, found: Meeting, way: Array, index: Array | None) -> Array:
@@ -190,7 +192,13 @@ class Lighting:
 
 
 def draw_solids(
-    field: SolidField, stage: Stage, canvas: tuple[int, int], *, adaptive: bool = True
+    field: SolidField,
+    stage: Stage,
+    canvas: tuple[int, int],
+    *,
+    threads: int = 1,
+    adaptive: bool = True,
+    progress: Callable[[float], None] | None = None,
 ) -> tuple[Image, int]:
     """Draw a field of solids.
 
@@ -198,7 +206,9 @@ def draw_solids(
         field: the solids.
         stage: camera, light, ground and sky.
         canvas: width and height in pixels.
+        threads: bands drawn at the same time.
         adaptive: sample once where nothing changes from pixel to pixel, instead of four times everywhere.
+        progress: called with the share done, from any thread.
 
     Returns:
         The picture and how many (object, point) pairs went through the network.
@@ -208,19 +218,30 @@ def draw_solids(
     """
     width, height = canvas
     lighting = Lighting(field, stage)
-    out = np.empty((4, height, width))
-    met = 0
-    rows = max(1, TILE // width)
-    for top in range(0, height, rows):
-        part, cost = _band(lighting, canvas, range(top, min(top + rows, height)), adaptive)
-        out[:, top : top + rows], met = part, met + cost
+    out = np.empty((4, height, width), np.float32)
+    rows = max(1, min(TILE // width, -(-height // threads)))
+    bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
+    costs: list[int] = []
+
+    def one(band: range) -> None:
+        out[:, band.start : band.stop], cost = _band(lighting, canvas, band, adaptive)
+        costs.append(cost)
+        if progress is not None:
+            progress(len(costs) / len(bands))
+
+    if threads == 1 or len(bands) == 1:
+        for band in bands:
+            one(band)
+    else:
+        with ThreadPoolExecutor(threads, initializer=field.xp.one_core) as pool:
+            list(pool.map(one, bands))
     if not np.isfinite(out).all():
         raise ProgramError("numbers that the network cannot draw with")
     colour, alpha = np.moveaxis(out[:3], 0, 2), out[3]
     if stage.transparent:
         straight = encoded(colour / np.maximum(alpha, 1e-6)[..., None])
-        return from_samples(straight * alpha[..., None], alpha), met
-    return from_samples(encoded(colour), None), met
+        return from_samples(straight * alpha[..., None], alpha), sum(costs)
+    return from_samples(encoded(colour), None), sum(costs)
 
 
 def encoded(linear: np.ndarray) -> Any:
@@ -230,29 +251,21 @@ def encoded(linear: np.ndarray) -> Any:
 
 
 def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, adaptive: bool) -> tuple[np.ndarray, int]:
-    """Premultiplied radiance and alpha (4, rows, W) of some rows of pixels."""
+    """Premultiplied radiance and alpha (4, rows, W) of some rows of pixels, and pairs that met."""
     width, height = canvas
     if adaptive:
         near = range(max(rows.start - 1, 0), min(rows.stop + 1, height))
-        y, x = (a.reshape(-1) for a in np.mgrid[near.start : near.stop, 0:width])
-        shade = _shade(lighting, canvas, x + 0.5, y + 0.5)
-        once = shade[0].reshape(4, len(near), width)
-        rough = _rough(once)[rows.start - near.start :][: len(rows)]
-        picture = np.ascontiguousarray(once[:, rows.start - near.start :][:, : len(rows)])
-        y, x = np.nonzero(rough)
-        met = shade[1]
+        once, met = _shade(lighting, canvas, np.arange(width) + 0.5, np.array(near)[:, None] + 0.5)
+        band = slice(rows.start - near.start, rows.stop - near.start)
+        picture = np.ascontiguousarray(once[:, band])
+        y, x = np.nonzero(_rough(once if lighting.stage.transparent else once[:3])[band])
     else:
         picture, met = np.empty((4, len(rows), width), np.float32), 0
         y, x = (a.reshape(-1) for a in np.mgrid[0 : len(rows), 0:width])
     if len(x):
         quarter = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])
-        four, more = _shade(
-            lighting,
-            canvas,
-            (x[:, None] + quarter[0]).reshape(-1),
-            (y[:, None] + rows.start + quarter[1]).reshape(-1),
-        )
-        picture[:, y, x] = four.reshape(4, -1, 4).mean(2)
+        four, more = _shade(lighting, canvas, x[:, None] + quarter[0], y[:, None] + rows.start + quarter[1])
+        picture[:, y, x] = four.mean(2)
         met += more
     return picture, met
 
@@ -260,30 +273,29 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, adaptive: bo
 def _shade(
     lighting: Lighting, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Radiance and alpha (4, M) at places (M,) of the picture in pixels, from its upper left corner."""
+    """Radiance and alpha (4, …) at places of the picture in pixels from its upper left corner."""
     xp, camera = lighting.xp, lighting.stage.camera
-    (width, height), (forward, right, up) = canvas, np.array(camera.axes())
-    px = 2 / min(canvas)
-    ahead = forward / np.tan(camera.fov_rad / 2)
-    way = ahead[:, None] + right[:, None] * ((x - width / 2) * px) + up[:, None] * ((height / 2 - y) * px)
-    way = (way / np.sqrt((way * way).sum(0))).astype(np.float32)
+    forward, right, up = (np.reshape(axis, (3, 1, 1)) for axis in camera.axes())
+    px, (width, height) = 2 / min(canvas), canvas
+    # float64 up to here: at 8192 pixels float32 would move samples by a thousandth of a pixel
+    across = (right * ((x - width / 2) * px)).astype(np.float32)
+    ahead = (forward / np.tan(camera.fov_rad / 2) + up * ((height / 2 - y) * px)).astype(np.float32)
+    way = ahead + across
+    way /= np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
     with xp.inference():
-        shade = lighting.shade(xp.array(way, lighting.field.network.codes))
-        return xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None]], 0)), shade.met
+        shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes))
+        both = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None]], 0))
+    return both.reshape(4, *way.shape[1:]), shade.met
 
 
 def _rough(picture: np.ndarray) -> np.ndarray:
     """Pixels (H, W) of (4, H, W) that differ from what lies evenly between neighbours on opposite sides."""
     shown = np.sqrt(np.clip(picture, 0.0, 1.0))  # nearly as bright as it looks
-    wide = np.pad(shown, ((0, 0), (1, 1), (1, 1)), "edge")
-    h, w = shown.shape[1:]
-
-    def bend(y: int, x: int) -> np.ndarray:
-        ends = wide[:, 1 + y : 1 + y + h, 1 + x : 1 + x + w] + wide[:, 1 - y : 1 - y + h, 1 - x : 1 - x + w]
-        return np.asarray(abs(ends - 2 * shown).max(0))
-
-    most = np.maximum(bend(0, 1), bend(1, 0))
-    return np.asarray(np.maximum(most, np.maximum(bend(1, 1), bend(1, -1))) > CONTRAST)
+    shown = np.pad(shown, ((0, 0), (1, 1), (1, 1)), "edge")
+    here = 2 * shown[:, 1:-1, 1:-1]
+    across = abs(shown[:, 1:-1, 2:] + shown[:, 1:-1, :-2] - here).max(0)
+    along = abs(shown[:, 2:, 1:-1] + shown[:, :-2, 1:-1] - here).max(0)
+    return np.asarray(np.maximum(across, along) > CONTRAST)
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -6,14 +6,13 @@ object lies in a ball; farther than its blends reach beyond that, it changes not
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from scenelang.renderers.arrays import Array, Arrays, Layers
-from scenelang.renderers.field import INTERSECT, SMOOTH, UNION
+from scenelang.renderers.field import INTERSECT, SMOOTH, SUBTRACT, UNION
 from scenelang.renderers.solid.frames import SolidFrame, read_solid_frame
 from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted
 
@@ -31,7 +30,6 @@ class Solid:
         token: how it joins what came before.
         look: colour and medium (4, 1).
         layers: its decoder.
-        direct: the same from world points, where its way back is a single map.
         radius: leaf units from its origin beyond which it changes nothing.
         centre, extent: a ball (3,) of the world around that.
         cells: of its token, by what is wanted.
@@ -41,7 +39,6 @@ class Solid:
     token: int
     look: Array
     layers: Layers
-    direct: Layers | None
     radius: float
     centre: Array
     extent: float
@@ -87,8 +84,9 @@ class SolidField:
         self.network, self.xp = network, network.xp
         with self.xp.inference():
             self.solids = self._solids(vectors, tokens)
-        self.plain = all(solid.token == UNION for solid in self.solids)
-        """Whether every object draws."""
+        draws = [i for i, solid in enumerate(self.solids) if solid.draws]
+        self.draws = None if len(draws) == len(self.solids) else draws
+        """The objects that draw, None if all do."""
         self.media = any(float(solid.look[3, 0]) > 0.5 for solid in self.solids)
         """Whether some object is a medium."""
         self.mixed = self.media and any(float(solid.look[3, 0]) <= 0.5 for solid in self.solids)
@@ -97,10 +95,11 @@ class SolidField:
     def _solids(self, vectors: np.ndarray, tokens: np.ndarray) -> list[Solid]:
         xp, layout, like = self.xp, self.network.layout, self.network.codes
         solids: list[Solid] = []
+        frames = [read_solid_frame(vector[: layout.geometry], layout) for vector in vectors]
+        deepest = max((frame.scale * (1 + abs(frame.amount)) for frame in frames), default=0.0)
         smooths, widest = 0, 0.0  # of the blends from an object on
-        for vector, token in zip(vectors[::-1], tokens[::-1].tolist(), strict=True):
+        for frame, vector, token in zip(frames[::-1], vectors[::-1], tokens[::-1].tolist(), strict=True):
             g, m = vector[: layout.geometry], vector[layout.geometry :]
-            frame = read_solid_frame(g, layout)
             smooth = token == SMOOTH
             smooths, widest = smooths + smooth, max(widest, frame.blend * smooth)
             layers = [
@@ -111,11 +110,10 @@ class SolidField:
             colour = (matrix[:, :3] @ look[:3] + matrix[:, 3]).clip(0.0, 1.0)
             outer = frame.outer.placed(xp, like)
             steps = [step.placed(xp, like) for step in frame.steps]
-            direct = None
-            radius = 1 + SLACK + abs(frame.amount) + widest * (1 + smooths / 4) / frame.scale
-            if not steps and not frame.amount and radius <= RADIUS:
-                (w, b), *rest = layers
-                direct = [(w @ outer.linear, w @ outer.shift + b), *rest]
+            blends = widest * (1 + smooths / 4)
+            if smooths and token == SUBTRACT:  # it says how deep points inside others lie
+                blends += deepest
+            radius = 1 + SLACK + abs(frame.amount) + blends / frame.scale
             back = np.linalg.inv(frame.outer.linear.astype(np.float64))
             centre = (-back @ frame.outer.shift).astype(np.float32)
             solids.append(
@@ -124,7 +122,6 @@ class SolidField:
                     token=token,
                     look=xp.concat([colour, look[3:]], 0)[:, None],
                     layers=layers,
-                    direct=direct,
                     radius=radius,
                     centre=xp.array(centre, like),
                     extent=float(np.linalg.norm(back, 2)) * frame.ball(radius),
@@ -180,13 +177,13 @@ class SolidField:
         return begin, end, rate
 
     def meet(
-        self, p: Array, inside: Sequence[Array], wanted: Wanted, gradient: bool = False, change: bool = False
+        self, p: Array, inside: Array, wanted: Wanted, gradient: bool = False, change: bool = False
     ) -> Meeting:
         """Let points meet the objects.
 
         Args:
             p: world points (3, M).
-            inside: of each object, which points (M,) may be in its reach.
+            inside: of each object, which points (N, M) may be in its reach.
             wanted: what of the register to answer beside the distance.
             gradient, change: what else.
         """
@@ -195,7 +192,7 @@ class SolidField:
         memory[0] = EMPTY
         slope = xp.full((3, count), 0.0, p) if gradient else None
         bound = xp.full((count,), EMPTY, p) if change else None
-        touched = None if self.plain else inside[0] & ~inside[0]
+        touched = None if self.draws is None else inside[0] & ~inside[0]
         for solid, mask in zip(self.solids, inside, strict=True):
             if touched is not None:
                 if solid.draws:
@@ -230,11 +227,6 @@ class SolidField:
         """An object's world distance (M,) at world points (3, M), and its gradient (3, M) if asked for."""
         xp, network, frame = self.xp, self.network, solid.frame
         scale = frame.scale
-        if solid.direct is not None:
-            if not gradient:
-                return network.distance(p, solid.direct) * scale, None
-            d, g = network.gradient(p, solid.direct)
-            return d * scale, g * scale
         q = frame.local(xp, p)
         rim = length = None
         at = q

@@ -20,7 +20,8 @@ TOUCH = 1e-5  # world units: so near counts as met
 STEPS = 400  # of a ray at most
 HALVINGS = 6  # of the interval in which a medium gives way to a solid
 NUDGE = np.float32(1 - 1e-6)  # of a point, to one just before it
-T, PAST, FREE, WAY, WITHIN, SINCE, LENGTH = 0, 1, 2, 3, 6, 7, 8  # rows of what a ray carries along
+T, PAST, FREE, WITHIN, SINCE, LENGTH, WAY = 0, 1, 2, 3, 4, 5, 6  # rows of what a ray carries along
+BEGIN = WAY + 3  # and where its objects begin, end, and how fast their distances change
 
 
 @dataclass(slots=True)
@@ -51,117 +52,135 @@ def march(solids: SolidField, origin: Array, way: Array, limit: Array) -> Trail:
         way: unit directions (3, M).
         limit: how far to go (M,).
     """
-    xp, n, media = solids.xp, len(solids.solids), solids.media
-    wanted = Wanted.KIND if solids.mixed else Wanted.DISTANCE
+    xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
     trail = Trail(hit, length, soft)
-    draws = [i for i, solid in enumerate(solids.solids) if solid.draws]
     ids = solids.near(origin, way)
     if not len(ids):
         return trail
-    never, way = xp.full((), INF, way), xp.take(way, ids)
-    begin, end, rate = solids.spans(origin, way, xp.take(limit, ids))
-    start = begin[draws[0]]
-    for i in draws[1:]:
-        start = xp.minimum(start, begin[i])
-    blank = xp.full((4 if media else 1, len(ids)), 0.0, way)
-    some = xp.where(start < INF)
-    rays = xp.concat([start[None], start[None] * NUDGE, blank[:1], way, blank[1:], begin, end, rate], 0)
-    ids, rays = xp.take(ids, some), xp.take(rays, some)
-    b = WAY + 2 + len(blank)
-    e, r = b + n, b + 2 * n
-
-    def ask(rays: Array, t: Array) -> tuple[Meeting, list[Array]]:
-        inside = [(rays[b + i] <= t) & (t <= rays[e + i]) for i in range(n)]
-        p = origin[:, None] + rays[WAY : WAY + 3] * t
-        return solids.meet(p, inside, wanted, change=solids.mixed), inside
-
+    rays = _Rays(solids, origin, trail, ids, xp.take(way, ids), xp.take(limit, ids))
     for _ in range(STEPS):
-        if not len(ids):
+        if not len(rays.ids):
             break
-        t, past, before = rays[T], rays[PAST], rays[FREE]
-        met, inside = ask(rays, t)
-        trail.met += met.met
-        d = met.distance
-        free = abs(d)
-        within = None
-        if media:
-            dense, within = d < 0, rays[WITHIN] > 0
-            if solids.mixed:
-                dense = dense & (met.register[0] > 0.5)
-                free = xp.select(dense, met.change, free)
-        step = t - past
-        done = d < TOUCH if within is None else (d < 0) & ~dense
-        if within is None:
-            struck = xp.where(done)
-        else:
-            struck = xp.where(done & ~within)
-            enter, leave = xp.where(dense & ~within), xp.where(within & ~dense)
-            if len(enter):
-                xp.put(rays[SINCE], enter, _root(solids, rays, free, enter))
-            if len(leave):
-                back = _root(solids, rays, free, leave)
-                into = xp.where(xp.take(done, leave))
-                if len(into):
-                    part = xp.take(rays, xp.take(leave, into))
-                    low, high = part[PAST], part[T]
-                    for _ in range(HALVINGS):
-                        half = (low + high) / 2
-                        found, _ = ask(part, half)
-                        still = (found.distance < 0) & (found.register[0] > 0.5)
-                        low, high = xp.select(still, half, low), xp.select(still, high, half)
-                    xp.put(back, into, high)
-                    ended = xp.take(ids, xp.take(leave, into))
-                    xp.put(trail.hit, ended, high)
-                    xp.put(trail.soft, ended, high * 0 + 1)
-                _close(solids, trail, rays, ids, leave, back)
-            within = dense
-        if len(struck):
-            xp.put(trail.hit, xp.take(ids, struck), _root(solids, rays, free, struck))
-        rate = inside[0] * rays[r]
-        for i in range(1, n):
-            rate = xp.maximum(rate, inside[i] * rays[r + i])
-        safe = free / rate.clip(1e-3)
-        hope = (1.05 * free) * step / (before - free).clip(1e-12) + TOUCH
-        following = t + xp.minimum(xp.maximum(hope, safe), safe + GAP)
-        following_t = d * 0 + never
-        for i in draws:
-            goes = following <= rays[e + i]
-            stays = xp.select(goes, following, never)
-            if within is not None:  # the way through a medium ends with its ball
-                stays = xp.select(~goes & within & (rays[e + i] > t), rays[e + i], stays)
-            following_t = xp.minimum(following_t, xp.select(rays[b + i] > t, rays[b + i], stays))
-        following_t = xp.select(done, never, following_t)
-        lost = following_t == INF
-        if within is not None:
-            ended = xp.where(lost & within)
-            if len(ended):
-                _close(solids, trail, rays, ids, ended, xp.take(t, ended))
-            rays[WITHIN] = within & ~lost
-        jumps = following_t > following
-        rays[PAST] = xp.select(jumps, following_t * NUDGE, t)
-        rays[FREE] = free * ~jumps
-        rays[T] = following_t
-        left = xp.where(~lost)
-        if len(left) < 0.85 * len(ids) or not len(left):
-            ids, rays = xp.take(ids, left), xp.take(rays, left)
+        rays.step()
     return trail
 
 
-def _root(solids: SolidField, rays: Array, free: Array, index: Array) -> Array:
-    """Where between their last two points some rays met a surface, as far as the bounds at both tell."""
-    xp = solids.xp
-    rays, free = xp.take(rays[:WAY], index), xp.take(free, index)
-    t, past, before = rays[T], rays[PAST], rays[FREE]
-    return xp.maximum(past + (t - past) * (before / (before + free).clip(1e-9)), t - GAP)
+class _Rays:
+    """Rays under way."""
 
+    def __init__(
+        self, solids: SolidField, origin: Array, trail: Trail, ids: Array, way: Array, limit: Array
+    ) -> None:
+        self.solids, self.xp, self.trail, xp = solids, solids.xp, trail, solids.xp
+        self.origin, self.never = origin[:, None], xp.full((), INF, way)
+        self.wanted = Wanted.KIND if solids.mixed else Wanted.DISTANCE
+        begin, end, rate = solids.spans(origin, way, limit)
+        start = xp.least(begin if solids.draws is None else begin[solids.draws])
+        some = xp.where(start < INF)
+        blank = xp.full((WAY - FREE, len(start)), 0.0, way)
+        rows = xp.concat([start[None], start[None] * NUDGE, blank, way, begin, end, rate], 0)
+        self.ids, self.rows = xp.take(ids, some), xp.take(rows, some)
 
-def _close(solids: SolidField, trail: Trail, rays: Array, ids: Array, index: Array, end: Array) -> None:
-    """End the ways through media of some rays."""
-    xp = solids.xp
-    begin, before, ray = xp.take(rays[SINCE], index), xp.take(rays[LENGTH], index), xp.take(ids, index)
-    end = xp.maximum(end, begin)
-    trail.pieces.append((ray, begin, end, before))
-    total = before + end - begin
-    xp.put(rays[LENGTH], index, total)
-    xp.put(trail.length, ray, total)
+    def ask(self, rows: Array, t: Array) -> tuple[Meeting, Array]:
+        """What the field answers at t (k,) of rays, and in which balls (N, k) they are there."""
+        begin, end, _ = self.objects(rows)
+        inside = (begin <= t) & (t <= end)
+        p = self.origin + rows[WAY:BEGIN] * t
+        return self.solids.meet(p, inside, self.wanted, change=self.solids.mixed), inside
+
+    def objects(self, rows: Array) -> tuple[Array, Array, Array]:
+        """Where rays may meet each object, and how fast its distance changes: (N, k) each."""
+        n = len(self.solids.solids)
+        return rows[BEGIN : BEGIN + n], rows[BEGIN + n : BEGIN + 2 * n], rows[BEGIN + 2 * n :]
+
+    def step(self) -> None:
+        """Ask the field where the rays are, note what they met, and move them on."""
+        xp, rows, solids = self.xp, self.rows, self.solids
+        t = rows[T]
+        met, inside = self.ask(rows, t)
+        self.trail.met += met.met
+        free = abs(met.distance)
+        if not solids.media:
+            within = None
+            done = met.distance < TOUCH
+            struck = xp.where(done)
+        else:
+            within = met.distance < 0
+            done = within & False
+            if solids.mixed:
+                dense = met.register[0] > 0.5
+                within, done = within & dense, within & ~dense
+                free = xp.select(within, met.change, free)
+            struck = self._pass_media(within, done, free)
+        if len(struck):
+            xp.put(self.trail.hit, xp.take(self.ids, struck), self._root(free, struck))
+        begin, end, rate = self.objects(rows)
+        safe = free / xp.largest(inside * rate)[0].clip(1e-3)
+        hope = (1.05 * free) * (t - rows[PAST]) / (rows[FREE] - free).clip(1e-12) + TOUCH
+        following = t + xp.minimum(xp.maximum(hope, safe), safe + GAP)
+        places = xp.select(begin > t, begin, following)
+        if within is not None:  # the way through a medium ends with its ball
+            places = xp.select(within & (end > t), xp.minimum(places, end), places)
+        places = xp.select(places <= end, places, self.never)
+        place = xp.select(
+            done, self.never, xp.least(places if solids.draws is None else places[solids.draws])
+        )
+        going = place < INF
+        if within is not None:
+            ended = xp.where(within & ~going)
+            if len(ended):
+                self._close(ended, xp.take(t, ended))
+            rows[WITHIN] = within & going
+        jumps = place > following
+        rows[PAST] = xp.select(jumps, place * NUDGE, t)
+        rows[FREE] = free * ~jumps
+        rows[T] = place
+        left = xp.where(going)
+        if len(left) < 0.85 * len(self.ids) or not len(left):
+            self.ids, self.rows = xp.take(self.ids, left), xp.take(rows, left)
+
+    def _pass_media(self, within: Array, done: Array, free: Array) -> Array:
+        """Note where rays entered and left media; which (k,) struck something opaque from outside."""
+        xp, before = self.xp, self.rows[WITHIN] > 0
+        enter, leave = xp.where(within & ~before), xp.where(before & ~within)
+        if len(enter):
+            xp.put(self.rows[SINCE], enter, self._root(free, enter))
+        if len(leave):
+            back = self._root(free, leave)
+            into = xp.where(xp.take(done, leave))
+            if len(into):
+                part = xp.take(self.rows, xp.take(leave, into))
+                low, high = part[PAST], part[T]
+                for _ in range(HALVINGS):
+                    half = (low + high) / 2
+                    found, _ = self.ask(part, half)
+                    still = (found.distance < 0) & (found.register[0] > 0.5)
+                    low, high = xp.select(still, half, low), xp.select(still, high, half)
+                xp.put(back, into, high)
+                ended = xp.take(self.ids, xp.take(leave, into))
+                xp.put(self.trail.hit, ended, high)
+                xp.put(self.trail.soft, ended, high * 0 + 1)
+            self._close(leave, back)
+        return xp.where(done & ~before)
+
+    def _root(self, free: Array, index: Array) -> Array:
+        """Where between their last two points some rays met a surface, as far as both bounds tell."""
+        xp = self.xp
+        rows, free = xp.take(self.rows[:WITHIN], index), xp.take(free, index)
+        t, past, before = rows[T], rows[PAST], rows[FREE]
+        return xp.maximum(past + (t - past) * (before / (before + free).clip(1e-9)), t - GAP)
+
+    def _close(self, index: Array, end: Array) -> None:
+        """End the ways through media of some rays."""
+        xp, rows = self.xp, self.rows
+        begin, before, ray = (
+            xp.take(rows[SINCE], index),
+            xp.take(rows[LENGTH], index),
+            xp.take(self.ids, index),
+        )
+        end = xp.maximum(end, begin)
+        self.trail.pieces.append((ray, begin, end, before))
+        total = before + end - begin
+        xp.put(rows[LENGTH], index, total)
+        xp.put(self.trail.length, ray, total)

@@ -44,7 +44,7 @@ class SolidConfig:
 
     code: int = 4
     material_code: int = 2
-    width: int = 16
+    width: int = 8
     paint_lines: int = 2
     kind_lines: int = 2
 
@@ -160,8 +160,11 @@ class SolidNetwork:
             The memory behind the object, and how far the distance's gate is open (M,).
         """
         xp, state = self.xp, memory[0]
-        levels = xp.dense(xp.stack([d, state], 0), cell.lines, cell.bias)
-        gates = levels.clip(0.0, 1.0)
+        if wanted == Wanted.DISTANCE:
+            own, past = cell.lines[0]
+            gates = xp.unit(d * own + state * past + cell.bias)[None]
+        else:
+            gates = xp.unit(xp.dense(xp.concat([d[None], memory[:1]], 0), cell.lines, cell.bias))
         take = gates[0]
         keep = 1 - take
         new = (take * (d * cell.candidate - keep * cell.bump) + keep * state)[None]

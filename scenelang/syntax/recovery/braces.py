@@ -13,11 +13,11 @@ from functools import cache
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.syntax.automaton import advance, completion, fits, reach
+from scenelang.syntax.lexer import Report, Tokens
 from scenelang.syntax.recovery.layout import Slip, find_slips
 from scenelang.syntax.recovery.mistakes import report_broken_off, report_instead
-from scenelang.syntax.recovery.repairs import Repair
+from scenelang.syntax.recovery.repairs import Kinds, Repair
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Report, Tokens
 
 _BEHIND = 4  # so many tokens after the line have to fit as well
 _LONGEST = 80  # so many places before the first misfit are tried
@@ -100,20 +100,15 @@ class _Mender:
             self._apply(mend)
 
     def _best(self, slip: Slip, stop: int, count: int) -> tuple[Repair, bool]:
-        """How to mend a line, and whether all fits then.
-
-        Args:
-            slip: the line; it lacks `{` or has `}` too many, or the other way about.
-            stop: index of the first token of the next line.
-            count: how many braces it is about.
-        """
+        """How to mend ``count`` braces of a line, up to the token ``stop``, and whether all fits then."""
         kinds, first, opens = self.tokens.kinds, slip.first, slip.shift > 0
         # The layout cannot tell a brace at the end of a line from one at the start of the next.
         limit = stop
         while kinds[limit] in (self.opening, self.closing):
             limit += 1
         end = min(limit + _BEHIND, len(kinds) - 1)
-        surplus = self.closing if opens else self.opening
+        surplus, missing = (self.closing, self.opening) if opens else (self.opening, self.closing)
+        wanted, at_end = (missing,) * count, Repair(stop, 0, (missing,))
         goes_on = kinds[first] == self.closing and kinds[first + 1] == self.otherwise
         stack = (self.in_if if goes_on else self.in_block).copy()
         if kinds[first] == self.otherwise:
@@ -126,7 +121,7 @@ class _Mender:
             advance(stack, kinds[at])
         found = []  # how far all fits then, and what to do
         for at in places:
-            for mend in self._mends(stack, at, stop, limit, opens, count):
+            for mend in self._mends(stack, at, stop, limit, wanted):
                 if mend.insert.count(self.closing) > depth:
                     continue  # it would close more than is open
                 trial = stack.copy()
@@ -138,23 +133,16 @@ class _Mender:
             depth += (kinds[at] == self.opening) - (kinds[at] == self.closing)
             if not advance(stack, kinds[at]):
                 break
-        default = -1, self._at_end(stop, opens)
-        got, mend = max(found, key=lambda one: (one[0], -one[1].cost, one[1].at), default=default)
+        got, mend = max(found, key=lambda one: (one[0], -one[1].cost, one[1].at), default=(-1, at_end))
         if got <= misfit < end:  # another mistake is in the way: the end of the line is as good a guess
             last = [index for index in places if kinds[index] == surplus and index < limit][-1:]
-            return (Repair(last[0], 1, ()) if opens and last else self._at_end(stop, opens)), False
+            return (Repair(last[0], 1, ()) if opens and last else at_end), False
         return mend, got == end
 
-    def _at_end(self, stop: int, opens: bool) -> Repair:
-        return Repair(stop, 0, (self.opening if opens else self.closing,))
-
-    def _mends(
-        self, stack: list[int], at: int, stop: int, limit: int, opens: bool, count: int
-    ) -> Iterator[Repair]:
-        """What may be done at one place, each the cheaper the likelier it is."""
-        kind = self.tokens.kinds[at]
-        surplus, missing = (self.closing, self.opening) if opens else (self.opening, self.closing)
-        wanted = (missing,) * count
+    def _mends(self, stack: list[int], at: int, stop: int, limit: int, wanted: Kinds) -> Iterator[Repair]:
+        """What may be done at one place about missing braces, each the cheaper the likelier it is."""
+        kind, missing = self.tokens.kinds[at], wanted[0]
+        surplus = self.closing if missing == self.opening else self.opening
         if at <= stop:
             yield Repair(at, 0, wanted, -0.3)
         if at == stop:
@@ -162,16 +150,16 @@ class _Mender:
         if at >= limit:
             return
         if kind == surplus:
-            if count == 1:
-                yield Repair(at, 1, (), -0.5 if opens else -0.2)
+            if len(wanted) == 1:
+                yield Repair(at, 1, (), -0.5 if missing == self.opening else -0.2)
                 for rank, other in enumerate(_instead()):
                     yield Repair(at, 1, (other,), 0.001 * rank - 0.1)
             else:
-                yield Repair(at, 1, (missing,) * (count - 1), -0.4)
+                yield Repair(at, 1, wanted[1:], -0.4)
         elif kind != missing:
             yield Repair(at, 1, wanted, -0.1)
 
-    def _broken_off(self, stack: list[int], at: int, wanted: tuple[int, ...]) -> Iterator[Repair]:
+    def _broken_off(self, stack: list[int], at: int, wanted: Kinds) -> Iterator[Repair]:
         """The line breaks off before a token: what its statement lacks, and the braces after that."""
         semicolon = tables().literals[";"]
         if fits(stack, self.closing):  # nothing is unfinished inside the block

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Final
 
 from scenelang.diagnostics.suggest import ranked
@@ -29,29 +29,17 @@ def keywords_near(text: str) -> tuple[str, ...]:
 
 
 class Habit(Record):
-    """One habit.
+    """One habit."""
 
-    Args:
-        pattern: what is written (see `syntax.recovery.patterns`).
-        meant: what is written here. It is also read in its place, so that the rest can be checked.
-        message: the fact; names and words that the pattern has found may stand in it.
-        help: advice.
-        code: code of the diagnostic.
-        safe: whether ``meant`` is sure to mean the same, and so is a fix.
-    """
-
-    pattern: str
-    meant: str
-    message: str
+    pattern: str  # what is written (see `syntax.recovery.patterns`)
+    meant: str  # what is written here; also read in its place, so that the rest can be checked
+    message: str  # the fact; names and words that the pattern has found may stand in it
     help: str | None = None
     code: str = "E0133"
-    safe: bool = True
+    safe: bool = True  # whether ``meant`` is sure to mean the same, and so is a fix
 
 
-def _unsafe(pattern: str, meant: str, message: str, help: str, code: str = "E0133") -> Habit:
-    return Habit(pattern, meant, message, help, code, safe=False)
-
-
+_unsafe: Final = partial(Habit, safe=False)
 _LOOP: Final = "`for` takes a range or a vector"
 _PASSES: Final = "write for (<i> in 0..<n) { … }"
 _BRACES: Final = "blocks stand in braces"
@@ -109,8 +97,7 @@ HABITS: Final = (
     ),
     Habit("param <n> = <E> in (<A>, <B>);", "param <n> = <E> in <A>..<B>;", _RANGE),
     Habit("<call> <=|:> (<E>);", "<call>(<E>);", "`<call>` is called, not set"),
-    Habit("<call> = <E>;", "<call>(<E>);", "`<call>` is called, not set"),
-    Habit("<call>: <E>;", "<call>(<E>);", "`<call>` is called, not set"),
+    Habit("<call> <=|:> <E>;", "<call>(<E>);", "`<call>` is called, not set"),
     Habit("<n> = <LINE> <;?>", "let <n> = <LINE>;", "missing `let` before `<n>`", code="E0126"),
     Habit("<n> = <E>;", "let <n> = <E>;", "missing `let` before `<n>`", code="E0126"),
     _unsafe("<n> <+|-|*|/|%> = <E>;", "let <n> = BAD_EXPRESSION;", ONCE, ONCE_HELP),

@@ -11,8 +11,8 @@ from collections import Counter
 from itertools import pairwise
 
 from scenelang.records import Record
+from scenelang.syntax.lexer import Tokens
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import Tokens
 
 _SLIP = 1.4  # a slip costs as much as so many lines at the wrong depth
 _WIDEST = 12  # further off than this is not searched
@@ -43,18 +43,12 @@ class _Line(Record):
 def find_slips(tokens: Tokens) -> list[Slip]:
     """The slips that explain best why braces do not match; none where there are too many."""
     lines = _lines(tokens)
-    alone = _unbalanced_line(lines) if not any(line.indent for line in lines) else []
-    return alone or _slips(lines)
-
-
-def _unbalanced_line(lines: list[_Line]) -> list[Slip]:
-    """In a text without indentation whose lines each close what they open: the one that does not."""
-    pairs = [(line, after, after.depth - line.depth) for line, after in pairwise(lines)]
-    wrong = [Slip(line.first, after.first, -more, line.depth) for line, after, more in pairs if more]
-    return wrong if len(wrong) == 1 and len(lines) > 2 else []
-
-
-def _slips(lines: list[_Line]) -> list[Slip]:
+    if len(lines) > 2 and not any(line.indent for line in lines):
+        # Without indentation, where lines each close what they open: the one that does not.
+        pairs = [(line, after, after.depth - line.depth) for line, after in pairwise(lines)]
+        wrong = [Slip(line.first, after.first, -more, line.depth) for line, after, more in pairs if more]
+        if len(wrong) == 1:
+            return wrong
     wanted = -lines[-1].depth
     if abs(wanted) > _WIDEST or min(line.depth for line in lines) < -_WIDEST:
         return []
@@ -84,7 +78,9 @@ def _lines(tokens: Tokens) -> list[_Line]:
         candidate = (statement or kind in starters) and tokens.on_new_line(at)
         if candidate and (statement or brackets == 0 or leaves_open(tokens.kinds, at)):
             brackets = 0
-            lines.append(_Line(at, _indent(tokens, at), depth - (kind == closing)))
+            start = tokens.starts[at]
+            before = tokens.source.text[tokens.source.text.rfind("\n", 0, start) + 1 : start]
+            lines.append(_Line(at, len(before.expandtabs(8)), depth - (kind == closing)))
         depth += (kind == opening) - (kind == closing)
         if kind in (opening, closing, semicolon):
             brackets = 0
@@ -109,21 +105,11 @@ def leaves_open(kinds: list[int], at: int) -> bool:
     return False
 
 
-def _indent(tokens: Tokens, at: int) -> int:
-    text, start = tokens.source.text, tokens.starts[at]
-    return len(text[text.rfind("\n", 0, start) + 1 : start].expandtabs(8))
-
-
-def _unit(lines: list[_Line]) -> int:
-    """How much deeper one level stands; 0 where the text is not indented."""
-    pairs = pairwise(lines)
-    steps = Counter(line.indent - before.indent for before, line in pairs if line.indent > before.indent)
-    return min(steps, key=lambda step: (-steps[step], step), default=0)
-
-
 def _cheapest(lines: list[_Line], wanted: int) -> list[list[int]]:
     """For each line and state the state before it on the cheapest path."""
-    unit = _unit(lines)
+    pairs = pairwise(lines)
+    steps = Counter(line.indent - before.indent for before, line in pairs if line.indent > before.indent)
+    unit = min(steps, key=lambda step: (-steps[step], step), default=0)  # how much deeper a level stands
     offsets = range(-_WIDEST, _WIDEST + 1)
     costs = [0.0 if offset == 0 else _NEVER for offset in offsets]
     came_from = [list(range(len(offsets)))]

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
+from scenelang.syntax.lexer import Report, Tokens
 from scenelang.syntax.recovery.foreign import OPERATORS, keywords_near
 from scenelang.syntax.recovery.repairs import MAX_REPLAY, REPLACEMENTS, Repair
 from scenelang.syntax.tables import END, tables
-from scenelang.syntax.tokens import Report, Tokens
 
 DEFINITIONS = ("let", "param", "fn")
 _OPERATORS = ("+", "-", "*", "/", "%", "^", "<", "<=", ">", ">=", "==", "!=", "&&", "||", "?", "..", "..<")
@@ -24,12 +24,9 @@ _CODES = {")": "E0103", "]": "E0103", "BAD_EXPRESSION": "E0108", "NAME": "E0109"
 def report_repair(
     tokens: Tokens, report: Report, repair: Repair, open_brackets: Sequence[int], sure: bool = True
 ) -> None:
-    """Report the mistake that a repair mends.
+    """Report the mistake that a repair is going to mend.
 
     Args:
-        tokens: the tokens before the repair.
-        report: takes the diagnostic.
-        repair: what is going to be done.
         open_brackets: indices of the brackets open before it.
         sure: what is inserted can stand nowhere else.
     """

@@ -25,8 +25,8 @@ from itertools import takewhile
 from typing import Final
 
 from scenelang.records import Record
+from scenelang.syntax.lexer import Token, Tokens
 from scenelang.syntax.tables import END, tables
-from scenelang.syntax.tokens import Token, Tokens
 from scenelang.words import NODES, OPERATIONS, TRANSFORMS
 
 MOST: Final = 200
@@ -49,24 +49,17 @@ _PIECE = re.compile(
     r"|(?P<text>[A-Za-z_]\w*|\.\.<(?!\w+>)|\.\.|[<>=!]=|&&|\|\||\S))"
 )
 _TYPED = re.compile(rf"\b(?:{'|'.join(TYPES)})\s+(?=[A-Za-z_])|\s*:\s*[A-Za-z_]\w*")
+"""The types that stand before or after the names of parameters."""
 
 
 class Piece(Record):
-    """A hole or a literal text of a pattern.
+    """A hole or a literal text of a pattern."""
 
-    Args:
-        text: the name of the hole, or the literal text.
-        is_hole: which of both.
-        spaced: whether a space stands before it.
-        optional: whether it may be missing.
-        words: what it takes, where that is one of some words.
-    """
-
-    text: str
+    text: str  # the name of the hole, or the literal text
     is_hole: bool
-    spaced: bool
+    spaced: bool  # a space stands before it
     optional: bool = False
-    words: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()  # what it takes, where that is one of some words
 
 
 @cache
@@ -83,20 +76,13 @@ def pieces(pattern: str) -> tuple[Piece, ...]:
 
 
 class Match(Record):
-    """Where the pieces of a pattern were found.
-
-    Args:
-        tokens: the tokens.
-        start, stop: the tokens that it covers.
-        parts: for each piece that is there its key and its tokens. The key of a word is its text.
-        words: the words found for those of `WORDS`.
-    """
+    """Where the pieces of a pattern were found."""
 
     tokens: Tokens
     start: int
     stop: int
-    parts: tuple[tuple[str, int, int], ...]
-    words: Mapping[str, str]
+    parts: tuple[tuple[str, int, int], ...]  # key and tokens of each piece; the key of a word is its text
+    words: Mapping[str, str]  # the words found for those of `WORDS`
 
     def holes(self) -> dict[str, tuple[int, int]]:
         """The tokens of each hole."""
@@ -207,29 +193,16 @@ def _body(tokens: Tokens, at: int, head: int) -> int:
     return min(at + 20 * MOST, len(tokens.kinds) - 1)
 
 
-def without_types(text: str) -> str:
-    """Parameters without the types that stand before or after their names."""
-    return _TYPED.sub("", text)
-
-
 class Change(Record):
-    """What a replacement makes of a match, less what both have in common at their ends.
+    """What a replacement makes of a match, less what both have in common at their ends."""
 
-    Args:
-        first, stop: the tokens that go.
-        place: where it is shown: the text that goes, with the name before it.
-        new: the tokens that come; holes that change their order are left out.
-        start, end: the text that goes.
-        text: the text that comes.
-    """
-
-    first: int
+    first: int  # of the tokens that go
     stop: int
-    place: tuple[int, int]
-    new: list[Token]
-    start: int
+    place: tuple[int, int]  # where it is shown: the text that goes, with the name before it
+    new: list[Token]  # the tokens that come; holes that change their order are left out
+    start: int  # of the text that goes
     end: int
-    text: str
+    text: str  # that comes
 
 
 def _alike(keys: list[str], others: list[str]) -> int:
@@ -240,10 +213,7 @@ def _alike(keys: list[str], others: list[str]) -> int:
 def change(match: Match, replacement: str, extra: Mapping[str, str]) -> Change | None:
     """What to do to a match for it to become a replacement; None where nothing would change.
 
-    Args:
-        match: where the pattern was found.
-        replacement: the pattern to make of it.
-        extra: texts of holes that the match does not have.
+    The texts of holes that the match does not have are in ``extra``.
     """
     tokens, holes = match.tokens, match.holes()
     known = {**extra, **match.words}
@@ -253,10 +223,7 @@ def change(match: Match, replacement: str, extra: Mapping[str, str]) -> Change |
         if not p.is_hole or p.text in known or f"<{p.text}>" in holes
     ]
     keys = [f"<{p.text}>" if p.is_hole else p.text for p in wanted]
-    had = [
-        "" if key == "<PARAMS>" and without_types(match.text(i, j)) != match.text(i, j) else key
-        for key, i, j in match.parts
-    ]
+    had = ["" if key == "<PARAMS>" and _TYPED.search(match.text(i, j)) else key for key, i, j in match.parts]
     before = _alike(keys, had)
     behind = _alike(keys[before:][::-1], had[before:][::-1])
     middle, gone = wanted[before : len(wanted) - behind], match.parts[before : len(had) - behind]
@@ -300,6 +267,6 @@ def _written(match: Match, pieces: list[Piece], first: int, stop: int) -> tuple[
         else:
             new.append((language.literals.get(text, language.kind("NAME")), at, at))
         if place is not None:
-            text = without_types(match.text(*place)) if typed else match.text(*place)
+            text = _TYPED.sub("", match.text(*place)) if typed else match.text(*place)
         written += " " * (piece.spaced and number > 0) + text
     return written, new

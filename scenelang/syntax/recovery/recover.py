@@ -12,13 +12,13 @@ from typing import Any
 from scenelang.diagnostics.span import Span
 from scenelang.syntax import nodes
 from scenelang.syntax.automaton import advance, reach, statement_depth
+from scenelang.syntax.lexer import MAX_MISTAKES, Report, Tokens
 from scenelang.syntax.recovery import mistakes
 from scenelang.syntax.recovery.foreign import HEADS, keywords_near
 from scenelang.syntax.recovery.habits import Habits
 from scenelang.syntax.recovery.patterns import closing
 from scenelang.syntax.recovery.repairs import FOLLOWED, MAX_REPLAY, Repair, Search
 from scenelang.syntax.tables import tables
-from scenelang.syntax.tokens import MAX_MISTAKES, Report, Tokens
 from scenelang.words import DECLARING, NODES
 
 _WORDS = (*(word for word in DECLARING if word != "as"), "for", "if", "material", *NODES)
@@ -27,12 +27,7 @@ _STARTS = ("let", "fn", "module", "param", "import", "for", "if", "group", "chai
 
 
 class Recovery(Habits):
-    """Recovery for one file.
-
-    Args:
-        tokens: the tokens; they are edited.
-        report: takes the mistakes.
-    """
+    """Recovery for one file, whose tokens it edits."""
 
     def __init__(self, tokens: Tokens, report: Report) -> None:
         super().__init__(tokens, report)
@@ -40,11 +35,7 @@ class Recovery(Habits):
         self.heads = {self.literals[word] for word in _STARTS}
 
     def resume(self, states: list[int], values: list[Any], at: int) -> int | None:
-        """Mend what does not fit at a token.
-
-        Args:
-            states, values: the parser's stacks; cut back where the statement is read again.
-            at: index of the token.
+        """Mend what does not fit at a token; the parser's stacks are cut back to read a statement again.
 
         Returns:
             The index to go on at, or None where there are too many mistakes.

@@ -11,10 +11,10 @@ from functools import cache
 
 from scenelang.records import Record
 from scenelang.syntax.automaton import LOOKAHEAD, advance, completion, fits, reach
+from scenelang.syntax.lexer import Tokens
 from scenelang.syntax.recovery.foreign import OPERATORS, keywords_near
 from scenelang.syntax.recovery.layout import leaves_open
 from scenelang.syntax.tables import END, tables
-from scenelang.syntax.tokens import Tokens
 
 Kinds = tuple[int, ...]
 
@@ -95,13 +95,7 @@ Found = tuple[float, float, Repair, list[int]]
 
 
 class Search:
-    """Looks for the best repair of one mistake.
-
-    Args:
-        tokens: all tokens.
-        first: index of the first token of the statement that the mistake is in.
-        at: index of the token that did not fit.
-    """
+    """Looks for the best repair at a token that does not fit, in the statement from ``first`` on."""
 
     def __init__(self, tokens: Tokens, first: int, at: int) -> None:
         self.tokens = tokens
@@ -127,7 +121,7 @@ class Search:
 
         Args:
             base: the states before the statement.
-            stack: the states at the mistake; used as they are where the statement is too long to replay.
+            stack: those at the mistake; used where it is too far from there.
         """
         if self.at - self.first > MAX_REPLAY:
             return self._settle(self._try_all(stack, self.at))[1]

@@ -1,11 +1,12 @@
-"""The moves of groups, chains and booleans go to their leaves."""
+"""Passes over leaves: the moves of folds go to them, and their looks and chains take their normal form."""
 
 from __future__ import annotations
 
 from dataclasses import field
 
-from scenelang.graph.chain import Moves, merged
-from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node
+from scenelang.graph.chain import Moves, merged, normal
+from scenelang.graph.looks import Look
+from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node, map_leaves
 from scenelang.passes.context import Context
 from scenelang.records import Record
 
@@ -58,3 +59,44 @@ def _alone(leaf: Leaf) -> Leaf:
 
 def _tidy(node: Node, outward: Moves) -> Moves:
     return merged([move for move in node.moves + outward if not move.step.idle])
+
+
+def fold_looks(graph: Graph, context: Context) -> Graph:
+    """Apply the colour operations of constant materials to their white, and drop moves of their textures.
+
+    Objects that share a look still share it afterwards.
+
+    Before: any graph. After: LOOKS.
+    """
+    folded: dict[int, Look] = {}
+
+    def change(leaf: Leaf) -> Leaf:
+        look = folded.get(id(leaf.look))
+        if look is None:
+            look = folded[id(leaf.look)] = leaf.look.folded()
+        return leaf if look is leaf.look else leaf.changed(look, leaf.moves)
+
+    return map_leaves(graph, change, "fold_looks")
+
+
+def fold_warps(graph: Graph, context: Context) -> Graph:
+    """Merge warps, moving them towards the leaf past rotations, reflections and uniform scales.
+
+    Before: AT_LEAVES. After: MERGED, NO_IDENTITIES, and each leaf's moves are in the normal form of
+    `scenelang.graph.chain.normal`, where the rules are proved.
+
+    A learned lifting knows twirls and bends by themselves, as they are written, and no merged ones: for it
+    identities alone are dropped.
+    """
+    exact = context.manifest.lifting == "exact"
+
+    def change(leaf: Leaf) -> Leaf:
+        if not leaf.moves:
+            return leaf
+        if exact:
+            moves = normal(leaf.moves, graph.space)
+        else:
+            moves = merged([move for move in leaf.moves if not move.step.idle])
+        return leaf if moves == leaf.moves else leaf.changed(leaf.look, moves)
+
+    return map_leaves(graph, change, "fold_warps")

@@ -1,0 +1,161 @@
+"""Passes that drop what makes no difference: empty folds, and rows of the stream that nothing shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from scenelang.diagnostics.diagnostic import Label
+from scenelang.graph.affine import composed
+from scenelang.graph.bounds import felt_level, leaf_box, overlap
+from scenelang.graph.nodes import BLEND, Fold, Graph, Leaf, Link, Node, bottom_up
+from scenelang.graph.space import Box, Space
+from scenelang.graph.steps import Rows, Step
+from scenelang.passes.context import Context
+
+
+def drop_empty(graph: Graph, context: Context) -> Graph:
+    """Drop what is empty, and make transparent what has one child.
+
+    A fold without links is the empty set, at distance +infinity from everywhere. So a union, `smooth` or
+    subtraction with it changes nothing, subtracting from it or intersecting it leaves it empty, and what
+    is joined to it by union or `smooth` begins the stream anew. All of it is exact, colours too.
+
+    Before: any graph. After: COMPOSITE.
+    """
+
+    def fold(node: Fold, children: list[Node | None]) -> Node | None:
+        links = _linked(node, children, context)
+        if not links:
+            return None
+        if len(links) > 1:
+            return Fold(node.kind, tuple(links), node.moves, node.span)
+        only = links[0].node
+        if not node.moves:
+            return only
+        moves = only.moves + node.moves
+        if isinstance(only, Leaf):
+            return Leaf(only.geometry, only.look, moves, only.span)
+        return Fold(only.kind, only.links, moves, only.span)
+
+    children = [bottom_up(link.node, lambda leaf: leaf, fold) for link in graph.root.links]
+    root = Fold("scene", tuple(_linked(graph.root, children, context)))
+    return graph.rooted(root)
+
+
+def _linked(fold: Fold, children: list[Node | None], context: Context) -> list[Link]:
+    links: list[Link] = []
+    for index, (link, child) in enumerate(zip(fold.links, children, strict=True)):
+        if child is None:
+            if link.op == "intersect" and links:
+                context.diagnostics.add(
+                    "W0401",
+                    "an intersection with an empty node, which leaves nothing",
+                    link.node.span,
+                    labels=[Label(fold.span, "the intersection")] if fold.span is not None else [],
+                    help="give the node a child, or drop it",
+                )
+                links.clear()
+        elif links:
+            links.append(Link(link.op, child, link.k))
+        elif index == 0 or link.op in ("union", "smooth"):
+            links.append(Link("union", child))
+    return links
+
+
+def drop_unseen(graph: Graph, context: Context) -> Graph:
+    """Drop rows that provably stay out of what decides the picture, and whatever they leave without effect.
+
+    Before: STREAM. After: STREAM; the reference image keeps every pixel.
+    """
+    window = graph.window()
+    links = graph.root.links
+    keep = [False] * len(links)
+    smooths = 0.0
+    for index, (op, leaf) in reversed(list(enumerate(graph.rows()))):
+        level = felt_level(op, links[index].k, smooths)
+        if level is None or overlap(leaf_box(leaf, level, graph.space), window):
+            keep[index] = True
+            smooths += links[index].k / BLEND if op == "smooth" else 0.0
+        elif op == "intersect":
+            break  # what comes before is cut down to nothing on the canvas
+    return graph.rooted(begun(links, keep))
+
+
+def begun(links: Sequence[Link], keep: Sequence[bool]) -> Fold:
+    """The stream of the rows to keep; where its first row goes, so do those that only cut what is left.
+
+    A row that goes had no effect, or was the first.
+    """
+    kept: list[Link] = []
+    for index, (link, stays) in enumerate(zip(links, keep, strict=True)):
+        if not stays:
+            continue
+        if kept:
+            kept.append(link)
+        elif index == 0 or link.op in ("union", "smooth"):
+            kept.append(Link("union", link.node))
+    return Fold("scene", tuple(kept))
+
+
+_MOST = 8  # covers that are tried for each row: the largest ones seen, so that time stays linear
+
+_INSIDE = 1.0 - 1e-9  # share of a cover's inner disc that counts, to cover the rounding of float64
+
+Cover = tuple[float, Rows, float]
+"""World radius, map from the world to the leaf, radius of the disc or ball inside it."""
+
+
+def drop_hidden(graph: Graph, context: Context) -> Graph:
+    """Drop unions and subtractions whose whole leaf lies inside one that a later union draws.
+
+    What a row does to the picture stays within its leaf, and there the later union decides distance sign
+    and colour alone. A `smooth` looks at distances, so rows before the last one are kept. A leaf that is
+    drawn twice in the very same place is covered too.
+
+    Before: STREAM. After: STREAM; the reference image keeps every pixel.
+    """
+    space, links = graph.space, graph.root.links
+    keep = [True] * len(links)
+    covers: list[Cover] = []
+    drawn: set[tuple[str, tuple[Step, ...]]] = set()
+    cover_of = partial(_cover, space=space)
+    for index, (op, leaf) in reversed(list(enumerate(graph.rows()))):
+        if op == "smooth":
+            break
+        if op == "intersect":
+            continue
+        key = leaf.geometry, leaf.steps
+        if key in drawn or (covers and _covered(leaf_box(leaf, 0.0, space), covers)):
+            keep[index] = False
+        elif op == "union":
+            drawn.add(key)
+            cover = leaf.noted("cover", cover_of)
+            if cover is not None and (len(covers) < _MOST or cover > covers[-1]):
+                covers = sorted([*covers, cover], reverse=True)[:_MOST]
+    return graph.rooted(begun(links, keep))
+
+
+def _cover(leaf: Leaf, space: Space) -> Cover | None:
+    disc = space.disc(leaf.geometry, leaf.steps)
+    if disc is None:
+        return None
+    radius, inward = disc
+    return radius * space.stretches(composed(leaf.steps))[0], inward, radius * _INSIDE
+
+
+def _covered(box: Box, covers: list[Cover]) -> bool:
+    left, bottom, right, top, near, far = box
+    depths = (near,) if near == far else (near, far)
+    corners = [(x, y, z) for x in (left, right) for y in (bottom, top) for z in depths]
+    for _, rows, radius in covers:
+        a, b, c, x, d, e, f, y, g, h, i, z = rows
+        limit = radius * radius
+        # A ball is convex: a box is inside when its corners are.
+        for p, q, r in corners:
+            u, v, w = a * p + b * q + c * r + x, d * p + e * q + f * r + y, g * p + h * q + i * r + z
+            if not u * u + v * v + w * w < limit:
+                break
+        else:
+            return True
+    return False

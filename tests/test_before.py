@@ -1,0 +1,74 @@
+"""What was written for revision 090346d still works: Programs it saved, and calls of its public API.
+
+`before/api.json` has each public name of that revision and its parameters: ``/x`` by place alone, ``*x`` by
+name alone, ``...x`` and ``***x`` any number, ``x?`` may be left out; null where it was not a call. `render`'s
+``precision`` went with 8-bit inference.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+
+BEFORE = Path(__file__).parent / "before"
+API: dict[str, str | None] = json.loads((BEFORE / "api.json").read_text("utf-8"))
+GONE = {"render": {"precision"}}
+
+
+@pytest.mark.parametrize(("name", "frame"), [("alpha", 2), ("white", 0)])
+def test_saved_programs_are_those_of_today(name: str, frame: int, tmp_path: Path) -> None:
+    saved = BEFORE / f"{name}.safetensors"
+    loaded = nsg.load_program(saved)
+    compiled = nsg.compile(nsg.load(BEFORE / f"{name}.nsg", frame=frame))
+    assert np.array_equal(loaded.vectors, compiled.vectors)
+    assert np.array_equal(loaded.tokens, compiled.tokens)
+    assert np.array_equal(loaded.bounds, compiled.bounds)
+    assert (loaded.model, loaded.weights, loaded.objects) == (
+        compiled.model,
+        compiled.weights,
+        compiled.objects,
+    )
+    assert all(place is not None and place.line > 1 for place in loaded.places)
+    assert np.array_equal(nsg.render(loaded, threads=1), nsg.render(compiled, threads=1))
+    loaded.save(tmp_path / "again.safetensors")
+    assert (tmp_path / "again.safetensors").read_bytes() == saved.read_bytes()
+
+
+@pytest.mark.parametrize("name", sorted(name for name in API if "." not in name))
+def test_public_names_are_there(name: str) -> None:
+    assert name in nsg.__all__
+    assert hasattr(nsg, name)
+
+
+@pytest.mark.parametrize("name", sorted(name for name in API if "." in name))
+def test_members_are_there(name: str) -> None:
+    owner, _, member = name.partition(".")
+    cls = getattr(nsg, owner)
+    fields = {f for base in cls.__mro__ for f in getattr(base, "__annotations__", ())}
+    assert hasattr(cls, member) or member in fields
+
+
+@pytest.mark.parametrize("name", sorted(name for name, params in API.items() if params is not None))
+def test_calls_are_taken(name: str) -> None:
+    """All arguments by place where they were taken so, all by name, and only those that were required."""
+    owner, _, member = name.partition(".")
+    called = getattr(nsg, owner) if not member else getattr(getattr(nsg, owner), member)
+    takes = inspect.signature(called)
+    words = [word for word in (API[name] or "").split() if word.strip("?*/") not in GONE.get(name, ())]
+    plain = [word for word in words if not word.startswith(("...", "***"))]
+    placed = [word for word in plain if word[0] != "*"]
+    named = {word.strip("*?"): None for word in plain if word[0] not in "/"}
+    alone = [None for word in plain if word[0] == "/"]
+    if "***data" in words:  # fields of a model, which `test_members_are_there` looks for
+        takes.bind_partial(*alone)
+        return
+    takes.bind(*[None] * len(placed), **{word.strip("*?"): None for word in plain if word[0] == "*"})
+    takes.bind(*alone, **named)
+    required = [word for word in placed if word[-1] != "?"]
+    takes.bind(*[None] * len(required), **{w[1:]: None for w in plain if w[0] == "*" and w[-1] != "?"})
