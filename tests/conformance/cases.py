@@ -21,7 +21,8 @@ from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
 from scenelang.reference.field import evaluate
-from scenelang.reference.image import reference_image, sample_points
+from scenelang.reference.image import reference_image
+from scenelang.reference.samples import sample_points
 
 FOLDER = Path(__file__).parent / "cases"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.nsg"))

@@ -133,6 +133,7 @@ def draw(scene: Any) -> list[list[tuple[float, float, float]]]:
     """The whole picture over its background, rows from the top."""
     width, height = scene.canvas
     unit = min(width, height) / 2
+    background = (1.0, 1.0, 1.0) if scene.background == "default" else scene.background
     picture = []
     for row in range(height):
         line = []
@@ -141,11 +142,11 @@ def draw(scene: Any) -> list[list[tuple[float, float, float]]]:
             for oy in (-0.25, 0.25):
                 for ox in (-0.25, 0.25):
                     x, y = (column + 0.5 + ox - width / 2) / unit, (height / 2 - row - 0.5 - oy) / unit
-                    state: tuple[float, Any] = (math.inf, scene.background)
+                    state: tuple[float, Any] = (math.inf, background)
                     for index, node in enumerate(scene.nodes):
                         d, c = sample(node, x, y, [], None)
                         state = (d, c) if index == 0 else step(state, d, c, "union")
-                    shown = state[1] if state[0] < 0 else scene.background
+                    shown = state[1] if state[0] < 0 else background
                     total = [t + v / 4 for t, v in zip(total, shown, strict=True)]
             line.append(tuple(total))
         picture.append(line)
