@@ -22,7 +22,7 @@ AMBIENT = (0.12, 0.06)
 EXTINCTION = 3.0  # of media, per world unit
 FADE = 64.0  # the ground fades into the horizon by exp(-(x² + z²) / FADE)
 NEAREST = 1e-3  # the light counts as at least this far away
-MOST = 1e30  # numbers of a stage are below this
+MOST = 1e300  # numbers of a stage are below this
 LIFT = 1e-4  # how far off its surface a ray to the light starts
 
 
@@ -113,7 +113,7 @@ def read_stage(data: object) -> Stage:
     """The stage that JSON data holds; the inverse of `stage_data`.
 
     Raises:
-        ValueError: it holds none, or one out of float32.
+        ValueError: it holds none.
     """
     if not isinstance(data, dict) or data.keys() != set(Stage.__match_args__):
         raise ValueError("fields missing or unknown")
@@ -141,7 +141,7 @@ def _read(name: str, value: object) -> Any:
     if not isinstance(numbers, list) or len(numbers) != (3 if three else 1):
         raise ValueError(f"`{name}` does not hold what it should")
     if not all(type(v) in (int, float) and abs(v) < MOST for v in numbers):
-        raise ValueError(f"`{name}` is not a number of float32")
+        raise ValueError(f"`{name}` is not a finite number")
     return tuple(map(float, numbers)) if three else float(numbers[0])
 
 

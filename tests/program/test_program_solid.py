@@ -96,7 +96,7 @@ def changed(part: str, **fields: Any) -> dict[str, Any]:
         changed("", zenith=[1, 2]),
         changed("", horizon=["1", 0, 0]),
         changed("", ground={"y": 0}),
-        changed("camera", eye=[1e39, 0, 0]),
+        changed("camera", eye=[float("inf"), 0, 0]),
         changed("camera", fov_rad=[1.0]),
         changed("light", power=float("nan")),
         changed("light", power=True),
