@@ -59,7 +59,8 @@ class Painter:
             from scenelang.backend.small import choose_drawer
 
             if choose_drawer(program, self.device).library == "numpy":
-                key = frame_key("numpy", _version("scenelang"), _version("numpy"), program.digest())
+                cores = () if program.stage is None else (self.split,)
+                key = frame_key("numpy", _version("scenelang"), _version("numpy"), *cores, program.digest())
                 return Drawable(shot.number, key, shot, program, small=True)
         key = frame_key(
             "neural", _version("scenelang"), _version("torch"), self.place, self.split, program.digest()
@@ -80,7 +81,7 @@ class Painter:
         """How many threads a picture is split for, which shows in the last bits of its pixels."""
         if self.threads is not None:
             return self.threads
-        from scenelang.backend.neural import usable_cores
+        from scenelang.backend.options import usable_cores
 
         return usable_cores()
 
@@ -97,7 +98,7 @@ class Painter:
         if frame.small:
             from scenelang.backend.small import draw_small
 
-            return draw_small(frame.program, kept=self.kept, progress=progress).image
+            return draw_small(frame.program, kept=self.kept, progress=progress, threads=self.split).image
         split = self.split
         return paint(frame.program, self.place, threads=split, split=split, kept=self.kept, progress=progress)
 

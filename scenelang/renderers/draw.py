@@ -103,7 +103,8 @@ def draw_objects(
 ) -> Drawing:
     """Draw a Program of the plane or of solids, as `draw` does.
 
-    Solids are drawn anew in each picture, and always with the rules that ``skip`` leaves out.
+    Solids are drawn anew in each picture, and always with the rules that ``skip`` leaves out; all of their
+    pixels count as met.
 
     Raises:
         ProgramError: as `draw`, or the Program and the network are of different dimensions.
@@ -127,8 +128,10 @@ def draw_objects(
     if program.stage is None:
         raise ProgramError("a program of the plane, which the model does not draw")
     field = SolidField(network, program.vectors, program.tokens)  # type: ignore[arg-type]
-    image, met = draw_solids(field, program.stage, program.canvas, adaptive=samples == "adaptive")
-    return Drawing(image, met, 0, 0)
+    image, met, refined = draw_solids(
+        field, program.stage, program.canvas, threads=threads, samples=samples, progress=progress
+    )
+    return Drawing(image, met, refined, image.shape[0] * image.shape[1])
 
 
 def draw(

@@ -172,7 +172,7 @@ def test_a_sphere_is_drawn_as_in_closed_form(canvas: tuple[int, int]) -> None:
     stage = Stage(light=Light((2.0, 3.0, 2.5), 20.0))
     solids = field([Object("sphere", (scaled(0.8, 0.8, 0.8),), rgb=(0.5, 0.5, 0.5))])
     exact = sphere_picture(canvas, 0.8, stage)
-    assert psnr(draw_solids(solids, stage, canvas, adaptive=False)[0], exact) > 50
+    assert psnr(draw_solids(solids, stage, canvas, samples="four")[0], exact) > 50
     assert psnr(draw_solids(solids, stage, canvas)[0], exact) > 48
 
 
@@ -193,11 +193,11 @@ def test_a_medium_lets_through_what_its_length_says() -> None:
     """Straight through the middle, lit by nothing: what is behind times the transmittance, plus ambient."""
     stage = Stage(light=Light(power=0.0), ground=None, horizon=(0.5, 0.5, 0.5), zenith=(0.5, 0.5, 0.5))
     solids = field([Object("sphere", (scaled(0.5, 0.5, 0.5),), "volumetric", (1.0, 1.0, 1.0))])
-    image, _ = draw_solids(solids, stage, (65, 65), adaptive=False)
+    image, *_ = draw_solids(solids, stage, (65, 65), samples="four")
     clear = np.exp(-3 * 1.0)
     linear = 0.5 * clear + 0.12 * (1 - clear)
     assert image[32, 32] == pytest.approx(1.055 * linear ** (1 / 2.4) - 0.055, abs=2e-3)
-    alpha, _ = draw_solids(solids, Stage(light=Light(power=0.0), ground=None, transparent=True), (65, 65))
+    alpha, *_ = draw_solids(solids, Stage(light=Light(power=0.0), ground=None, transparent=True), (65, 65))
     assert alpha[32, 32, 3] == pytest.approx(1 - clear, abs=1e-3)
     assert alpha[0, 0, 3] == 0
 
@@ -212,13 +212,13 @@ def test_both_libraries_draw_the_same() -> None:
             value = getattr(net, group)
             parameter.copy_(torch.from_numpy(value[int(index)] if index else value))
     objects = [*MIXED[:2], Object("sphere", (scaled(0.4, 0.4, 0.4), moved(-0.8, 0, 0.4)), "volumetric")]
-    mine, _ = draw_solids(field(objects), Stage(), (48, 48))
-    theirs, _ = draw_solids(field(objects, other), Stage(), (48, 48))
+    mine, *_ = draw_solids(field(objects), Stage(), (48, 48))
+    theirs, *_ = draw_solids(field(objects, other), Stage(), (48, 48))
     assert psnr(mine, theirs) > 60
 
 
 def test_tiles_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole, _ = draw_solids(field(MIXED), Stage(), (48, 40))
+    whole, *_ = draw_solids(field(MIXED), Stage(), (48, 40))
     monkeypatch.setattr(draw, "TILE", 48 * 7)
     assert psnr(draw_solids(field(MIXED), Stage(), (48, 40), threads=3)[0], whole) > 100
 
@@ -229,7 +229,7 @@ def test_what_is_drawn_is_in_codes_and_cell() -> None:
     ball, ring = (draw_solids(field([Object(leaf, step)]), Stage(), (32, 32))[0] for leaf in LEAVES)
     g = vector(Object("sphere", step), network())
     g[:4] = network().codes[1]
-    swapped, _ = draw_solids(SolidField(network(), g[None], np.zeros(1, np.int8)), Stage(), (32, 32))
+    swapped, *_ = draw_solids(SolidField(network(), g[None], np.zeros(1, np.int8)), Stage(), (32, 32))
     assert psnr(swapped, ring) > 90
     assert psnr(swapped, ball) < 40
     noise = SolidArrays(network().config, weights())
@@ -246,7 +246,7 @@ def weights() -> dict[str, np.ndarray]:
 
 
 def test_nothing_is_an_empty_stage() -> None:
-    image, met = draw_solids(field([]), Stage(), (16, 16))
+    image, met, _ = draw_solids(field([]), Stage(), (16, 16))
     assert met == 0
     assert image[0, 8, 2] > image[0, 8, 0]
 

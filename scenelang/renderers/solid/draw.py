@@ -197,9 +197,9 @@ def draw_solids(
     canvas: tuple[int, int],
     *,
     threads: int = 1,
-    adaptive: bool = True,
+    samples: str = "adaptive",
     progress: Callable[[float], None] | None = None,
-) -> tuple[Image, int]:
+) -> tuple[Image, int, int]:
     """Draw a field of solids.
 
     Args:
@@ -207,11 +207,13 @@ def draw_solids(
         stage: camera, light, ground and sky.
         canvas: width and height in pixels.
         threads: bands drawn at the same time.
-        adaptive: sample once where nothing changes from pixel to pixel, instead of four times everywhere.
+        samples: of a pixel: ``"adaptive"``, four where something changes from pixel to pixel and one
+            elsewhere, ``"four"`` or ``"one"``.
         progress: called with the share done, from any thread.
 
     Returns:
-        The picture and how many (object, point) pairs went through the network.
+        The picture, how many (object, point) pairs went through the network, and how many pixels were
+        sampled four times.
 
     Raises:
         ProgramError: numbers out of all proportion, which no compiled scene has.
@@ -221,11 +223,11 @@ def draw_solids(
     out = np.empty((4, height, width), np.float32)
     rows = max(1, min(TILE // width, -(-height // threads)))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
-    costs: list[int] = []
+    costs: list[tuple[int, int]] = []
 
     def one(band: range) -> None:
-        out[:, band.start : band.stop], cost = _band(lighting, canvas, band, adaptive)
-        costs.append(cost)
+        out[:, band.start : band.stop], *cost = _band(lighting, canvas, band, samples)
+        costs.append((cost[0], cost[1]))
         if progress is not None:
             progress(len(costs) / len(bands))
 
@@ -238,10 +240,11 @@ def draw_solids(
     if not np.isfinite(out).all():
         raise ProgramError("numbers that the network cannot draw with")
     colour, alpha = np.moveaxis(out[:3], 0, 2), out[3]
+    met, refined = (sum(cost[i] for cost in costs) for i in (0, 1))
     if stage.transparent:
         straight = encoded(colour / np.maximum(alpha, 1e-6)[..., None])
-        return from_samples(straight * alpha[..., None], alpha), sum(costs)
-    return from_samples(encoded(colour), None), sum(costs)
+        return from_samples(straight * alpha[..., None], alpha), met, refined
+    return from_samples(encoded(colour), None), met, refined
 
 
 def encoded(linear: np.ndarray) -> Any:
@@ -250,10 +253,16 @@ def encoded(linear: np.ndarray) -> Any:
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
 
 
-def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, adaptive: bool) -> tuple[np.ndarray, int]:
-    """Premultiplied radiance and alpha (4, rows, W) of some rows of pixels, and pairs that met."""
+def _band(
+    lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
+) -> tuple[np.ndarray, int, int]:
+    """Premultiplied radiance and alpha (4, rows, W) of some rows of pixels, pairs that met, and pixels that
+    were sampled four times."""
     width, height = canvas
-    if adaptive:
+    if samples == "one":
+        every = np.array(rows)[:, None] + 0.5
+        return *_shade(lighting, canvas, np.arange(width) + 0.5, every), 0
+    if samples == "adaptive":
         near = range(max(rows.start - 1, 0), min(rows.stop + 1, height))
         once, met = _shade(lighting, canvas, np.arange(width) + 0.5, np.array(near)[:, None] + 0.5)
         band = slice(rows.start - near.start, rows.stop - near.start)
@@ -267,7 +276,7 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, adaptive: bo
         four, more = _shade(lighting, canvas, x[:, None] + quarter[0], y[:, None] + rows.start + quarter[1])
         picture[:, y, x] = four.mean(2)
         met += more
-    return picture, met
+    return picture, met, len(x)
 
 
 def _shade(
