@@ -44,7 +44,6 @@ ORDER = (
     "scenelang.reference",
     "scenelang.renderers",
     "scenelang.models.framed",
-    "scenelang.models.solid",
     "scenelang.models.load",
     "scenelang.training",
     "scenelang.backend",

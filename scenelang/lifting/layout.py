@@ -2,17 +2,16 @@
 
 A geometry vector g holds the way from the world back to the leaf:
 
-    code | the constant 1 | frame of the last affine map | outer warps | middle frame | inner warps | extras
+    code | the constant 1 | frame of the last affine map | outer warps | middle frame | inner warps
 
 and a material vector m what it looks like:
 
     texture frame | colour matrix, 3 x 4, row by row | the material's code
 
 A frame is the rows of the inverse of an affine map, d of d + 1 numbers. A warp is its strengths; the
-outermost of a group comes first. The extras of solids are the amount and frequency of their displacement and
-the width k of the blend that takes them in. Every slot is a function of the scene alone, and each
-transformation acts on them linearly (`scenelang.lifting.exact`). Both vectors together are 64 numbers; how
-they are shared out is the layout's, which a model's manifest names.
+outermost of a group comes first. Every slot is a function of the scene alone, and each transformation acts
+on them linearly (`scenelang.lifting.exact`). Both vectors together are 64 numbers; how they are shared out is
+the layout's, which a model's manifest names.
 """
 
 from __future__ import annotations
@@ -30,12 +29,10 @@ class Layout:
     Args:
         dimension: d.
         code: of a leaf's code.
-        strengths: of a warp: the turn by the length of a point, then by its coordinates x and y. In space
-            the turn by y is one about the y axis, after the other.
+        strengths: of a warp: the turn by the length of a point, then by its coordinates.
         outer, inner: warps of the two groups.
         texture: of a texture's frame, those kept free included.
         material: of a material's code.
-        extras: behind the inner warps.
     """
 
     dimension: int
@@ -45,7 +42,6 @@ class Layout:
     inner: int
     texture: int
     material: int
-    extras: int = 0
 
     @property
     def identity(self) -> tuple[float, ...]:
@@ -86,7 +82,7 @@ class Layout:
     @property
     def geometry(self) -> int:
         """Length of g, which m follows."""
-        return int(self.inner_warps.stop) + self.extras
+        return self.code + 1 + 2 * self.frame_size + (self.outer + self.inner) * self.strengths
 
     @property
     def colour(self) -> slice:
@@ -100,7 +96,4 @@ class Layout:
 
 
 PLANE_LAYOUT: Final = Layout(dimension=2, code=4, strengths=3, outer=3, inner=2, texture=8, material=12)
-SOLID_LAYOUT: Final = Layout(
-    dimension=3, code=4, strengths=3, outer=2, inner=2, texture=6, material=2, extras=3
-)
-LAYOUTS: Final = {"plane": PLANE_LAYOUT, "solid": SOLID_LAYOUT}  # layouts by the names that manifests use
+LAYOUTS: Final = {"plane": PLANE_LAYOUT}  # layouts by the names that manifests use

@@ -27,13 +27,9 @@ class Arrays:
     packed: ClassVar[Any] = staticmethod(np.ascontiguousarray)  # the same entries, contiguous in memory
     where: ClassVar[Any] = staticmethod(lambda mask: mask.nonzero()[0])  # indices (k,) of a mask (M,)
     exp: ClassVar[Any] = np.exp
-    log: ClassVar[Any] = np.log
     cos: ClassVar[Any] = np.cos
     sin: ClassVar[Any] = np.sin
-    sqrt: ClassVar[Any] = np.sqrt
     minimum: ClassVar[Any] = np.minimum
-    maximum: ClassVar[Any] = np.maximum
-    select: ClassVar[Any] = staticmethod(np.where)  # (mask, where it holds, elsewhere)
 
     def array(self, values: np.ndarray, like: Array) -> Array:
         """An array of a numpy array, where another one lies."""
@@ -54,14 +50,6 @@ class Arrays:
     def largest(self, x: Array) -> Array:
         """The largest over rows: (…, 1, M) of (…, R, M)."""
         return x.max(-2, keepdims=True)
-
-    def least(self, x: Array) -> Array:
-        """The least of the first axis: (M,) of (R, M)."""
-        return x.min(0)
-
-    def unit(self, x: Array) -> Array:
-        """Clamped to [0, 1], in place."""
-        return np.minimum(np.maximum(x, 0.0, out=x), 1.0, out=x)
 
     def length(self, p: Sequence[Array]) -> Array:
         """Euclidean lengths of points, by their coordinates."""
@@ -91,17 +79,6 @@ class Arrays:
             x = self.dense(x, *layer)  # (blocks, out, each)
             np.maximum(x, 0.0, out=x)
         return self.dense(x, *layers[-1]).swapaxes(0, 1).reshape(-1, blocks * each)[:, :count]
-
-    def sigmoid(self, x: Array) -> Array:
-        """``1 / (1 + exp(-x))``."""
-        return 1.0 / (1.0 + np.exp(-x))
-
-    def silu(self, x: Array) -> Array:
-        """``x sigmoid(x)``, in place."""
-        found = np.negative(x)
-        np.exp(found, out=found)
-        found += 1.0
-        return np.divide(x, found, out=x)
 
     def take(self, x: Array, index: Array) -> Array:
         """Entries (…, k) of (…, M)."""

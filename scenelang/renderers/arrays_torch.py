@@ -9,7 +9,7 @@ from functools import reduce
 import numpy as np
 import torch
 from torch import Tensor
-from torch.nn.functional import linear, silu
+from torch.nn.functional import linear
 
 from scenelang.renderers.arrays import Array, Arrays, Layers
 
@@ -28,8 +28,7 @@ class Torch(Arrays):
     stack = staticmethod(torch.stack)
     packed = staticmethod(Tensor.contiguous)
     where = staticmethod(_where)
-    exp, log, cos, sin, sqrt = torch.exp, torch.log, torch.cos, torch.sin, torch.sqrt
-    minimum, maximum, select = torch.minimum, torch.maximum, torch.where
+    exp, cos, sin, minimum = torch.exp, torch.cos, torch.sin, torch.minimum
 
     def array(self, values: np.ndarray, like: Tensor) -> Tensor:
         return torch.from_numpy(values).to(like.device)
@@ -45,12 +44,6 @@ class Torch(Arrays):
 
     def largest(self, x: Tensor) -> Tensor:
         return x.amax(-2, keepdim=True)
-
-    def least(self, x: Tensor) -> Tensor:
-        return x.amin(0)
-
-    def unit(self, x: Tensor) -> Tensor:
-        return x.clamp(0.0, 1.0)
 
     def length(self, p: Sequence[Tensor]) -> Tensor:
         first, *rest = p
@@ -76,12 +69,6 @@ class Torch(Arrays):
         for layer in layers[:-1]:
             x = self.dense(x, *layer).relu()
         return self.dense(x, *layers[-1])
-
-    def sigmoid(self, x: Tensor) -> Tensor:
-        return x.sigmoid()
-
-    def silu(self, x: Tensor) -> Tensor:
-        return silu(x, inplace=True)
 
     def take(self, x: Tensor, index: Tensor) -> Tensor:
         return x.index_select(-1, index)  # many times as fast as a subscript

@@ -11,7 +11,6 @@ from pydantic.dataclasses import dataclass as checked
 
 from scenelang.files import read_regular
 from scenelang.renderers.network import FramedConfig
-from scenelang.renderers.solid.network import SolidConfig
 from scenelang.training.scenes import SceneConfig
 
 CONFIGS = Path(__file__).parent / "configs"
@@ -54,35 +53,12 @@ class TrainConfig:
         return asdict(self)
 
 
-@checked(frozen=True, config={"extra": "forbid"})
-class SolidsConfig:
-    """Everything that decides what a training of solids yields, besides the code."""
-
-    model: str  # name of the model that the weights are for
-    seed: int  # seeds parameters and points
-    # steps of Adam for the cell and for all leaves together
-    cell: int
-    leaves: int
-    polish: int  # Gauss-Newton steps for each leaf, a multiple of 20
-    network: SolidConfig  # sizes
-
-
 def config_data(name: str) -> bytes:
     """The text of a configuration, by path or by the name of a shipped one."""
     path = Path(name)
     if not path.suffix and (CONFIGS / f"{name}.json").exists():
         path = CONFIGS / f"{name}.json"
     return read_regular(path, _MOST_BYTES)
-
-
-def is_solids(data: bytes) -> bool:
-    """Whether a configuration is a `SolidsConfig`."""
-    return b'"polish"' in data
-
-
-def read_solids_config(name: str) -> SolidsConfig:
-    """As `read_config`, of solids."""
-    return TypeAdapter[SolidsConfig](SolidsConfig).validate_json(config_data(name))
 
 
 def read_config(name: str) -> TrainConfig:

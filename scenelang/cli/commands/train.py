@@ -62,21 +62,14 @@ def command(
     CONFIG is a JSON file or the name of a shipped configuration. By default one thread computes, as for
     the shipped weights. Exits with 0 also when the budget ends first.
     """
-    from scenelang.training.config import (
-        SolidsConfig,
-        config_data,
-        is_solids,
-        read_config,
-        read_solids_config,
-    )
+    from scenelang.training.config import config_data, read_config
     from scenelang.training.loop import train
-    from scenelang.training.solids import train_solids
 
     if b'"study"' in config_data(config):
         raise click.UsageError(f"`{config}` configures a study; scenelang lab train trains it.")
     last: dict[str, float] = {}
     with reporting_mistakes(config, out), Bar() as bar:
-        wanted = read_solids_config(config) if is_solids(config_data(config)) else read_config(config)
+        wanted = read_config(config)
         place = prepare_torch(device, threads)
 
         def note(done: int, total: int, seconds: float, parts: dict[str, float]) -> None:
@@ -90,24 +83,19 @@ def command(
             else:
                 click.echo(f"{done:,} of {total:,} steps, {seconds:.0f} s, {_losses(parts)}", err=True)
 
-        if isinstance(wanted, SolidsConfig):
-            finished = train_solids(wanted, out, budget_s=budget_s, report=note)
-        else:
-            finished = train(
-                wanted,
-                out,
-                budget_s=budget_s,
-                device=place,
-                report=note,
-                save_every_s=save_every,
-                report_every=every,
-            )
+        finished = train(
+            wanted,
+            out,
+            budget_s=budget_s,
+            device=place,
+            report=note,
+            save_every_s=save_every,
+            report_every=every,
+        )
     reached = f", mean loss {_losses(last)}" if last else ""
     weights = out / "weights.safetensors"
     if not finished:
         click.echo(f"out of time{reached}: the same command goes on from the checkpoint in {out}")
-    elif isinstance(wanted, SolidsConfig):
-        click.echo(f"done{reached}: {weights}")
     else:
         from scenelang.measure.scenes import record_measured
 
