@@ -67,7 +67,7 @@ def test_it_resumes_where_it_was(tmp_path: Path) -> None:
     first = Study(config(rate=1e-3), tmp_path)
     for _ in itertools.islice(first.run(), 5):
         pass
-    first.progress.seconds = straight.progress.seconds  # the schedule looks at time
+    first.progress = first.progress._replace(seconds=straight.progress.seconds)  # the schedule looks at time
     first.save()
     second = Study(config(rate=1e-3), tmp_path)
     assert second.progress.step == 5
