@@ -1,4 +1,4 @@
-"""Writes what is made from the words of the language: ``python docs/make_words.py``; ``--check`` compares.
+"""Writes what is made from the words of the language: ``python docs/make_words.py``; a test compares.
 
 - `grammar/scenelang.tmLanguage.json`, the grammar for VS Code and others;
 - the words of `editors/vim/syntax/nsg.vim`;
@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -90,10 +89,7 @@ def made() -> dict[Path, str]:
 
 def main() -> None:
     for path, text in made().items():
-        if "--check" not in sys.argv:
-            path.write_text(text, "utf-8")
-        elif path.read_text("utf-8") != text:
-            raise SystemExit(f"{path.relative_to(ROOT)} is out of date: python docs/make_words.py")
+        path.write_text(text, "utf-8")
 
 
 if __name__ == "__main__":
