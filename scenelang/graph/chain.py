@@ -42,10 +42,8 @@ def normal(moves: Iterable[Move], space: Space) -> Moves:
     for move in moves:
         if isinstance(move.step, Warp):
             _append_warp(out, move.step, move, space)
-        elif isinstance(move.step, Affine):
+        else:
             _append_affine(out, move.step.rows, move)
-        elif not move.step.idle:
-            out.append(move)
     return tuple(out)
 
 
@@ -114,11 +112,9 @@ def split_levels(steps: Sequence[Step], limits: Mapping[str, int]) -> Levels:
     for step in steps:
         if isinstance(step, Warp):
             runs[-1].append(step)
-        elif isinstance(step, Affine):
+        else:
             maps.append(step.rows)
             runs.append([])
-        else:
-            raise LevelsError(f"a {type(step).__name__.lower()} does not fit")
     # w… | w… A | w… A w… | w… A w… A, where the first run may be empty and the last one is if A is last.
     first = runs[0]
     if len(maps) == 0 or (len(maps) == 1 and not runs[1]):

@@ -66,14 +66,10 @@ class Leaf(Record):
 
 
 class Link(Record):
-    """A child of a fold with the operator that joins it to what came before; the first is a union.
-
-    ``k`` is the width of a ``smooth`` blend, in world units, over 0.
-    """
+    """A child of a fold with the operator that joins it to what came before; the first is a union."""
 
     op: Combine
     node: Node
-    k: float = BLEND
 
 
 class Fold(Record):

@@ -208,8 +208,6 @@ def _warped(steps: Sequence[Step], radius: float) -> Box:
         if isinstance(step, Affine):
             pending = affine.compose(step.rows, pending)
             continue
-        if not isinstance(step, Warp):
-            return EVERYWHERE
         if pending is not IDENTITY:
             sector, pending = sector.mapped(pending), IDENTITY
         sector = sector.turned(step)

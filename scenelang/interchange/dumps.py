@@ -116,8 +116,6 @@ def move_text(move: Move, space: Space) -> str:
     step = move.step
     if isinstance(step, Warp):
         return f"warp({step.twirl:.6g}; {step.bend[0]:.6g} {step.bend[1]:.6g})"
-    if not isinstance(step, Affine):
-        return repr(step)
     if step.rows == IDENTITY:
         return "[identity]"
     rows = (" ".join(f"{step.rows[i] + 0.0:.6g}" for i in row) for row in space.shown)

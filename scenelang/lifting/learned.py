@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.graph.steps import Affine, Step, Warp
+from scenelang.graph.steps import Affine, Step
 
 Array = npt.NDArray[np.float64]
 MOST = 1e4  # of an entry: far outside all that was trained, and what float32 networks still take in
@@ -86,8 +86,6 @@ def step_numbers(step: Step) -> tuple[str, list[float]]:
     if isinstance(step, Affine):
         a, b, c, d, e, f, g, h, i, j, k, l = step.rows  # noqa: E741
         return "affine", [a, b, c, d, e, f, g, h, i, j, k, l, 0.0, 0.0, 0.0, 1.0]
-    if not isinstance(step, Warp):
-        raise ValueError(f"a {type(step).__name__.lower()} has no encoder")
     if step.twirl and any(step.bend):
         raise ValueError("a merged warp has no encoder; it is split before it is lifted")
     return ("bend", [step.bend[0]]) if step.bend[0] else ("twirl", [step.twirl])

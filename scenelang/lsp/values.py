@@ -122,5 +122,5 @@ def _shown(steps: Iterable[Step], space: Space) -> Iterator[str]:
     for step in steps:
         if isinstance(step, Affine):
             yield show_matrix(step.rows, space)
-        elif isinstance(step, Warp):
+        else:
             yield show_warp(step)

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.graph.nodes import BLEND, Fold, Leaf, Node
-from scenelang.graph.steps import Affine, Step, Warp
+from scenelang.graph.steps import Affine, Step
 from scenelang.words import TOKENS
 
 Array = Any  # numpy array or torch tensor
@@ -161,7 +161,7 @@ def carry_back(steps: Sequence[Step], p: Array) -> Array:
             inverse = np.linalg.inv(linear := _linear(step, len(p)))
             shift = -inverse @ np.reshape(step.rows, (3, 4))[: len(linear), 3]
             p = map_back(np.column_stack([inverse, shift]), p)
-        elif isinstance(step, Warp):
+        else:
             p = warp_back(step.twirl, step.bend, p)
     return p
 
