@@ -32,7 +32,7 @@ from PIL import ImageDraw, ImageFont
 
 import scenelang as nsg
 from scenelang.lab.charts import stability_chart
-from scenelang.lab.evaluate import Case, worst_sheet
+from scenelang.lab.evaluate import Case, sheet
 from scenelang.lab.experiments.charts import experiment_chart
 from scenelang.lab.experiments.charts import strips as experiment_strips
 from scenelang.lab.frontier.chart import frontier_chart
@@ -200,15 +200,15 @@ def compared() -> bytes:
     return png(tiled([over_white(picture) for picture in (network, exact, difference)], 3, (256, 256)))
 
 
-def worst_cases(name: str, count: int) -> bytes:
+def worst_cases(name: str, count: int, model: str = "shapes2d", folder: str = "") -> bytes:
     """The worst cases of an evaluation: network, exact picture, FLIP map."""
-    report = json.loads((DOCS / "results" / f"{name}.json").read_text("utf-8"))
+    report = json.loads((DOCS / "results" / folder / f"{name}.json").read_text("utf-8"))
     cases = [
         Case(c["index"], c["last"], 0, {"psnr": c["psnr"], "flip": c["flip"]}) for c in report["worst_cases"]
     ]
-    sheet = worst_sheet(load_model("shapes2d"), name, report["seed"], cases, count).to_pil()
-    sheet.thumbnail((1100, 1100))
-    return png(sheet.quantize(128))
+    shown = sheet(load_model(model), name, report["seed"], cases[:count]).to_pil()
+    shown.thumbnail((1100, 1100))
+    return png(shown.quantize(128))
 
 
 def stability() -> bytes:

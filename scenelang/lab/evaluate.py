@@ -11,10 +11,20 @@ import numpy.typing as npt
 
 from scenelang.image import Image
 from scenelang.lab.about import Report, about, silent
-from scenelang.measure.metrics import MOST_DB, compare, contact_sheet, side_by_side
-from scenelang.measure.scenes import draw_scene, reference_of, scenes_of, summarise
+from scenelang.measure.metrics import (
+    MOST_DB,
+    UNCAPPED_DB,
+    compare,
+    contact_sheet,
+    over_white,
+    psnr,
+    side_by_side,
+)
+from scenelang.measure.scenes import draw_scene, reference_of, scenes_of, spread, summarise
 from scenelang.models.load import Model
 from scenelang.words import TOKENS
+
+SHOWN = 12  # worst cases
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,21 +34,18 @@ class Case:
     index: int  # in its set
     last: str  # the word that joins the last object of the stream
     objects: int  # rows of the Program
-    figures: dict[str, float]  # psnr (dB), ssim, flip
+    figures: dict[str, float]  # psnr and psnr_uncapped (dB), ssim, flip
 
 
-def _worst(cases: list[Case], count: int = 12) -> list[Case]:
-    return sorted(cases, key=lambda c: c.figures["psnr"])[:count]
-
-
-def worst_sheet(model: Model, name: str, seed: int, cases: list[Case], count: int = 12) -> Image:
-    """A contact sheet of the cases of a set with the lowest PSNR: network, reference, FLIP map."""
-    scene_at = scenes_of(model, name, seed)
+def sheet(model: Model, name: str, seed: int, cases: list[Case], side: int | None = None) -> Image:
+    """A contact sheet of cases of a set: network, reference, FLIP map."""
+    scene_at = scenes_of(model, name, seed, side)
     rows = []
-    for case in _worst(cases, count):
+    for case in cases:
         scene = scene_at(case.index)
         label = f"#{case.index} {case.last} {case.figures['psnr']:.1f} dB FLIP {case.figures['flip']:.4f}"
-        rows.append(side_by_side(draw_scene(model, scene)[1], reference_of(scene, model.manifest), label))
+        picture, exact = draw_scene(model, scene)[1], reference_of(scene, model.manifest)
+        rows.append(side_by_side(over_white(picture), over_white(exact), label))
     return contact_sheet(rows)
 
 
@@ -48,6 +55,7 @@ def evaluate_set(
     count: int,
     seed: int,
     *,
+    side: int | None = None,
     threads: int = 1,
     report: Report = silent,
 ) -> tuple[dict[str, Any], list[Case]]:
@@ -58,38 +66,44 @@ def evaluate_set(
         name: the set.
         count: scenes.
         seed: of the scenes.
+        side: shorter side of the canvas in pixels; by default that of the set.
         threads: for drawing.
         report: called with the set, scenes done and all.
 
     Returns:
-        A summary for JSON, and every case.
+        A summary for JSON, and the cases of the lowest PSNR.
     """
-    scene_at = scenes_of(model, name, seed)
+    scene_at = scenes_of(model, name, seed, side)
     started = time.perf_counter()
     cases = []
     for index in range(count):
         scene = scene_at(index)
         program, picture = draw_scene(model, scene, threads)
-        figures = compare(picture, reference_of(scene, model.manifest))
+        exact = reference_of(scene, model.manifest)
+        uncapped = psnr(over_white(picture), over_white(exact), UNCAPPED_DB)
+        figures = {**compare(picture, exact), "psnr_uncapped": uncapped}
         cases.append(Case(index, _last_word(program.tokens), len(program), figures))
         report(name, index + 1, count)
+    worst = sorted(cases, key=lambda c: c.figures["psnr_uncapped"])[:SHOWN]
     summary = {
         "set": name,
         "scenes": count,
         "seed": seed,
+        "canvas": scene.canvas,
         "psnr_cap_db": MOST_DB,
         "weights": model.digest,
         **about(),
         "seconds": round(time.perf_counter() - started, 1),
         **_summary(cases),
-        "worst_cases": [{"index": c.index, "last": c.last, **c.figures} for c in _worst(cases)],
+        "psnr_uncapped": spread([c.figures["psnr_uncapped"] for c in cases], 5),
+        "worst_cases": [{"index": c.index, "last": c.last, **c.figures} for c in worst],
         "by_last_token": {
             word: _summary([c for c in cases if c.last == word])
             for word in (*TOKENS, "all_union")
             if any(c.last == word for c in cases)
         },
     }
-    return summary, cases
+    return summary, worst
 
 
 def _last_word(tokens: npt.NDArray[np.int8]) -> str:

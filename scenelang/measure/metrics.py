@@ -18,6 +18,7 @@ from scenelang.image import Image
 
 Array = npt.NDArray[Any]
 MOST_DB = 50.0
+UNCAPPED_DB = 100.0  # what no picture in single precision reaches
 GAP, TEXT = 4, 14  # pixels of a sheet, between pictures and for a line of text
 
 
@@ -29,10 +30,10 @@ def over_white(picture: Array) -> Array:
     return np.asarray(values[..., :3] * values[..., 3:] + 1 - values[..., 3:])
 
 
-def psnr(picture: Array, reference: Array) -> float:
-    """Peak signal-to-noise ratio in dB, at most `MOST_DB`, so that a perfect picture counts for something."""
+def psnr(picture: Array, reference: Array, most: float = MOST_DB) -> float:
+    """Peak signal-to-noise ratio in dB, at most ``most``, so that a perfect picture counts for something."""
     error = float(np.mean((np.asarray(picture, np.float64) - np.asarray(reference, np.float64)) ** 2))
-    return MOST_DB if error <= 0 else min(MOST_DB, -10 * math.log10(error))
+    return most if error <= 0 else min(most, -10 * math.log10(error))
 
 
 def ssim(picture: Array, reference: Array) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,8 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import Spans, lower
 from scenelang.image import Image
 from scenelang.measure.metrics import psnr
-from scenelang.measure.sets import scenes
+from scenelang.measure.sets import SETS, Rng, random_scene
+from scenelang.measure.solid_sets import SOLID_SETS, random_solid
 from scenelang.models.load import Model, load_model
 from scenelang.models.manifest import Manifest
 from scenelang.program.compile import compile_scene
@@ -23,6 +25,7 @@ from scenelang.scene.schema import Scene
 from scenelang.training.checkpoint import load_tensors, save_tensors
 
 PROBE = 48  # pixels along a side of the picture that tells how much a scene covers
+LEAST_COVER = 0.02  # share of the canvas
 RECORDED = 60  # scenes of each set that a weights' header tells the error of
 
 
@@ -35,15 +38,47 @@ def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: 
 
 
 def coverage(scene: Scene, manifest: Manifest) -> float:
-    """About which share of the canvas a scene covers."""
+    """About which share of the canvas a scene's objects cover; 0 where they hide all from the eye."""
     small = scene.model_copy(update={"canvas": (PROBE, PROBE), "background": None})
-    return float(reference_of(small, manifest)[..., 3].mean())
+    if manifest.dimension == 3:
+        small = small.model_copy(update={"ground": None, "canvas": (PROBE // 2, PROBE // 2)})
+    try:
+        return float(reference_of(small, manifest)[..., 3].mean())
+    except ValueError:
+        return 0.0  # the eye is inside something opaque
 
 
-def scenes_of(model: Model, name: str, seed: int) -> Callable[[int], Scene]:
-    """The scenes of a set by index, as `scenes` makes them for a model, on a canvas that it draws."""
-    made = scenes(name, seed, lambda scene: coverage(scene, model.manifest))
-    return lambda index: sized(made(index), model.manifest)
+def sets_of(manifest: Manifest) -> dict[str, Callable[[Rng], Scene]]:
+    """What makes a random scene of each set that a model of a dimension draws."""
+    if manifest.dimension == 3:
+        return {name: partial(random_solid, config=config) for name, config in SOLID_SETS.items()}
+    return {name: partial(random_scene, config=config) for name, config in SETS.items()}
+
+
+def scenes_of(model: Model, name: str, seed: int, side: int | None = None) -> Callable[[int], Scene]:
+    """The scenes of a set by index, on a canvas that a model draws.
+
+    Scenes that cover under 2 % of the canvas are drawn again.
+
+    Args:
+        seed: of the set; training uses other streams of random numbers.
+        side: shorter side of the canvas in pixels; by default that of the set.
+    """
+    manifest = model.manifest
+    make, least = sets_of(manifest)[name], LEAST_COVER
+    if manifest.dimension == 2:
+        least *= min(1.0, SETS[name].size ** 2)  # a tenth of the size covers a hundredth as much
+
+    def scene(index: int) -> Scene:
+        for attempt in range(1000):
+            made = make(np.random.default_rng([seed, index, attempt]))
+            if coverage(made, manifest) >= least:
+                width, height = made.canvas
+                factor = 1 if side is None else side / min(width, height)
+                return sized(made.sized((round(width * factor), round(height * factor))), manifest)
+        raise RuntimeError(f"no scene of set {name} covers enough")
+
+    return scene
 
 
 def sized(scene: Scene, manifest: Manifest) -> Scene:

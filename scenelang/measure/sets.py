@@ -8,7 +8,6 @@ uniform. The others change one thing each.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -154,24 +153,3 @@ def random_scene(rng: Rng, config: SetConfig) -> Scene:
     links = tuple(Link(op=w, node=n) for w, n in zip(words, nodes, strict=True))
     chain = Chain(children=links)
     return Scene(model="shapes2d", canvas=config.canvas, nodes=(chain,))
-
-
-def scenes(name: str, seed: int, covers: Callable[[Scene], float]) -> Callable[[int], Scene]:
-    """A function from index to scene of a set; scenes that cover under 2 % of the canvas are drawn again.
-
-    Args:
-        seed: of the set; training uses other streams of random numbers.
-        covers: share of the canvas that a scene covers.
-    """
-    config = SETS[name]
-    # a tenth of the size covers a hundredth as much
-    least = 0.02 * min(1.0, config.size**2)
-
-    def scene(index: int) -> Scene:
-        for attempt in range(1000):
-            made = random_scene(np.random.default_rng([seed, index, attempt]), config)
-            if covers(made) >= least:
-                return made
-        raise RuntimeError(f"no scene of set {name} covers enough")
-
-    return scene

@@ -14,10 +14,16 @@ from scenelang.lab.commands import common
 @click.command("eval")
 @click.argument("model")
 @click.option(
-    "--set", "sets", multiple=True, metavar="NAME", help="A set; may be repeated. Default: shapes2d."
+    "--set", "sets", multiple=True, metavar="NAME", help="A set; may be repeated. Default: MODEL's own."
 )
 @click.option("--all-sets", is_flag=True, help="Every set there is.")
 @click.option("--scenes", default=1000, show_default=True, type=click.IntRange(1, 1_000_000))
+@click.option(
+    "--side",
+    type=click.IntRange(1, 8192),
+    metavar="PIXELS",
+    help="Shorter side of the canvas. Default: as the set says.",
+)
 @common.seed
 @common.out
 @common.weights
@@ -27,6 +33,7 @@ def command(
     sets: tuple[str, ...],
     all_sets: bool,
     scenes: int,
+    side: int | None,
     seed: int,
     out: Path,
     weights: Path | None,
@@ -37,24 +44,24 @@ def command(
     Writes SET.json (PSNR, SSIM, FLIP: mean, 5th percentile from the bad end, worst; per boolean token) and
     SET-worst.png (network, reference, FLIP map of the worst cases) into FOLDER.
     """
-    from scenelang.measure.sets import SETS
-
-    chosen = tuple(SETS) if all_sets else sets or ("shapes2d",)
-    common.check_names("set", chosen, SETS)
     need_metrics()
     import torch
 
     from scenelang.backend.options import keep_memory
-    from scenelang.lab.evaluate import evaluate_set, worst_sheet
+    from scenelang.lab.evaluate import evaluate_set, sheet
+    from scenelang.measure.scenes import sets_of
 
     loaded = common.model_to_measure(model, weights)
+    known = sets_of(loaded.manifest)
+    chosen = tuple(known) if all_sets else sets or (loaded.manifest.set,)
+    common.check_names("set", chosen, known)
     keep_memory()
     torch.set_num_threads(threads)
     for name in chosen:
         with Bar() as bar:
-            summary, cases = evaluate_set(loaded, name, scenes, seed, threads=threads, report=bar)
+            summary, worst = evaluate_set(loaded, name, scenes, seed, side=side, threads=threads, report=bar)
         common.write_json(out / f"{name}.json", summary)
-        worst_sheet(loaded, name, seed, cases).save(out / f"{name}-worst.png")
+        sheet(loaded, name, seed, worst, side).save(out / f"{name}-worst.png")
         p, s, f = summary["psnr"], summary["ssim"], summary["flip"]
         click.echo(
             f"{name}: PSNR {p['mean']:.2f} dB (p5 {p['p5']:.2f}, worst {p['worst']:.2f}), "

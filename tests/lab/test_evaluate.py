@@ -1,0 +1,43 @@
+"""Evaluation of a set: the figures of its scenes, each as a user would draw it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import scenelang as nsg
+from scenelang.lab.commands.eval import command
+from scenelang.measure.scenes import scenes_of
+from scenelang.models.load import load_model
+
+
+def test_figures_of_solids_are_those_of_the_pictures_users_get(tmp_path: Path) -> None:
+    asked = ["solids3d", "--set", "staged", "--scenes", "3", "--side", "24", "--seed", "4"]
+    done = CliRunner().invoke(command, [*asked, "-o", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "staged.json").read_text("utf-8"))
+    assert found["canvas"] == [24, 24]
+    scene_at = scenes_of(load_model("solids3d"), "staged", 4, 24)
+    told = []
+    for index in range(3):
+        text = nsg.loads(scene_at(index).to_nsg())
+        network, exact = (
+            np.asarray(nsg.render(text, backend=way), np.float64) for way in ("neural", "reference")
+        )
+        if network.shape[2] == 4:  # over white
+            network, exact = (p[..., :3] * p[..., 3:] + 1 - p[..., 3:] for p in (network, exact))
+        told.append(-10 * np.log10(np.mean((network - exact) ** 2)))
+    assert found["psnr_uncapped"]["mean"] == pytest.approx(np.mean(told), abs=0.3)
+    assert found["worst_cases"][0]["psnr_uncapped"] == pytest.approx(min(told), abs=0.3)
+    assert (tmp_path / "staged-worst.png").exists()
+    assert found["psnr"]["mean"] == pytest.approx(np.minimum(told, 50).mean(), abs=0.3)
+
+
+def test_a_set_of_another_dimension_is_refused(tmp_path: Path) -> None:
+    done = CliRunner().invoke(command, ["solids3d", "--set", "tiny", "-o", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "no set `tiny`; there are solids3d, diffuse" in done.output
