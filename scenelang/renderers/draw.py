@@ -22,6 +22,7 @@ from scenelang.renderers.frames import ObjectFrame
 from scenelang.renderers.network import FramedNetwork
 
 if TYPE_CHECKING:
+    from scenelang.renderers.solid.march import Work
     from scenelang.renderers.solid.network import SolidNetwork
 
 _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
@@ -82,12 +83,14 @@ class Drawing:
         pairs: (object, sample) pairs that went through the network.
         refined: pixels that were sampled four times.
         met: pixels that an object reached; the others show the background, unseen by the network.
+        work: of solids, what it took in rays and steps.
     """
 
     image: Image
     pairs: int
     refined: int
     met: int
+    work: Work | None = None
 
 
 def draw_objects(
@@ -128,10 +131,10 @@ def draw_objects(
     if program.stage is None:
         raise ProgramError("a program of the plane, which the model does not draw")
     field = SolidField(network, program.vectors, program.tokens)  # type: ignore[arg-type]
-    image, met, refined = draw_solids(
+    image, work = draw_solids(
         field, program.stage, program.canvas, threads=threads, samples=samples, progress=progress
     )
-    return Drawing(image, met, refined, image.shape[0] * image.shape[1])
+    return Drawing(image, work.met, work.refined, image.shape[0] * image.shape[1], work)
 
 
 def draw(

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import torch
 
-from scenelang.graph.stage import Light, Stage
+from scenelang.graph.stage import Camera, Light, Stage
 from scenelang.graph.steps import Displace, Twist, Warp
 from scenelang.reference.field import combine, leaf_distance
 from scenelang.reference.solid.image import solid_image
 from scenelang.renderers.solid import draw
 from scenelang.renderers.solid.draw import draw_solids
-from scenelang.renderers.solid.field import Meeting, SolidField
+from scenelang.renderers.solid.field import SLACK, Meeting, SolidField
 from scenelang.renderers.solid.frames import read_solid_frame
 from scenelang.renderers.solid.network import SolidArrays, Wanted
 from scenelang.renderers.solid.parameters import Solids
@@ -246,9 +246,25 @@ def weights() -> dict[str, np.ndarray]:
 
 
 def test_nothing_is_an_empty_stage() -> None:
-    image, met, _ = draw_solids(field([]), Stage(), (16, 16))
-    assert met == 0
+    image, work = draw_solids(field([]), Stage(), (16, 16))
+    assert (work.rays, work.near, work.steps, work.met) == (256 + 4 * work.refined, 0, 0, 0)
     assert image[0, 8, 2] > image[0, 8, 0]
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_what_a_sphere_takes(threads: int) -> None:
+    """A ray is near where it meets the ball; one object is met once a step, and once more for its normal."""
+    stage = Stage(camera=Camera((0.0, 0.0, 6.0)), light=Light((0.0, 0.0, 9.0)), ground=None)
+    square = ((np.arange(60) - 29.5) / 60) ** 2 + ((np.arange(40)[:, None] - 19.5) / 60) ** 2
+    sine = np.sqrt(square / (1 + square))  # of the angle between a ray and the axis
+    image, work = draw_solids(field([Object("sphere")]), stage, (60, 40), threads=threads, samples="one")
+    assert image.shape == (40, 60, 3)
+    assert (work.rays, work.refined) == (2400, 0)
+    ball, seen = int((6 * sine <= 1 + SLACK).sum()), int((6 * sine < 1).sum())
+    assert work.lights == pytest.approx(seen, abs=8)  # the light behind the eye sees what the eye sees
+    assert work.near == pytest.approx(ball + work.lights, abs=8)
+    assert 2 * work.near < work.steps < 12 * work.near
+    assert work.met == pytest.approx(work.steps + seen, abs=8)
 
 
 def test_displacement_moves_the_surface() -> None:

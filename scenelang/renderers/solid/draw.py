@@ -17,7 +17,7 @@ from scenelang.image import Image, from_samples
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.solid.field import INF, Meeting, SolidField
-from scenelang.renderers.solid.march import GAP, Trail, march
+from scenelang.renderers.solid.march import GAP, Trail, Work, march
 from scenelang.renderers.solid.network import Wanted
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
@@ -29,11 +29,11 @@ CONTRAST = 0.04  # sRGB: pixels that differ more from a neighbour are sampled fo
 
 
 class Shade(NamedTuple):
-    """What M rays see: premultiplied linear radiance (3, M), alpha (M,), and what it cost."""
+    """What M rays see: premultiplied linear radiance (3, M), alpha (M,), and what it took."""
 
     radiance: Array
     alpha: Array
-    met: int
+    work: Work
 
 
 class Lighting:
@@ -74,7 +74,7 @@ class Lighting:
             drop = (stage.ground.y - stage.camera.eye[1]) / xp.select(down, way[1], way[1] * 0 - 1)
             limit = xp.select(down, drop, limit)
         trail = march(field, self.eye, way, limit)
-        met = trail.met
+        work = Work(way.shape[1], 0, trail.near, trail.steps, trail.met)
         surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
         both = xp.concat([surface, floor], 0)
         if len(both):
@@ -85,18 +85,18 @@ class Lighting:
             light, more = self._received(p, n)
             xp.put(seen, both, colour * light + haze)
             xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
-            met += len(surface) + more
+            work += more + Work(met=len(surface))
         if trail.pieces:
             clear = xp.exp(-EXTINCTION * trail.length)
             glow, more = self._scattered(way, trail)
-            seen, alpha, met = seen * clear + glow, 1 - (1 - alpha) * clear, met + more
-        return Shade(seen, alpha, met)
+            seen, alpha, work = seen * clear + glow, 1 - (1 - alpha) * clear, work + more
+        return Shade(seen, alpha, work)
 
     def _sky(self, way: Array) -> Array:
         high = (way[1] * 2).clip(0.0, 1.0)
         return self.horizon[:, None] + (self.zenith - self.horizon)[:, None] * high
 
-    def _received(self, p: Array, n: Array) -> tuple[Array, int]:
+    def _received(self, p: Array, n: Array) -> tuple[Array, Work]:
         """Light (3, K) that surface points (3, K) with unit normals receive."""
         xp = self.xp
         to = self.lamp[:, None] - p
@@ -105,17 +105,18 @@ class Lighting:
         lit = xp.where(facing > 0)
         got = facing * 0
         lifted = xp.take(p, lit) + LIFT * xp.take(n, lit)
-        clear, met = self._clear(lifted, CLEAR)
+        clear, work = self._clear(lifted, CLEAR)
         xp.put(got, lit, xp.take(facing / (r * r), lit) * clear)
-        return got * self.power[:, None] + (AMBIENT[0] + AMBIENT[1] * n[1]), met
+        return got * self.power[:, None] + (AMBIENT[0] + AMBIENT[1] * n[1]), work
 
-    def _clear(self, p: Array, before: float) -> tuple[Array, int]:
+    def _clear(self, p: Array, before: float) -> tuple[Array, Work]:
         """The share (K,) of the light that reaches points (3, K)."""
         xp = self.xp
         way = p - self.lamp[:, None]
         r = _length(xp, way)
         trail = march(self.field, self.lamp, way / r.clip(1e-9), r - before)
-        return (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length), trail.met
+        work = Work(0, p.shape[1], trail.near, trail.steps, trail.met)
+        return (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length), work
 
     def _surface(self, way: Array, index: Array, trail: Trail) -> tuple[Array, ...]:
         """Points where rays meet solids, normals, colours, and light that joins in before (3, K) each."""
@@ -161,7 +162,7 @@ class Lighting:
         colour = xp.array(np.asarray(ground.rgb, np.float32), p)[:, None]
         return p, n, kept * colour, (1 - kept) * self.horizon[:, None]
 
-    def _scattered(self, way: Array, trail: Trail) -> tuple[Array, int]:
+    def _scattered(self, way: Array, trail: Trail) -> tuple[Array, Work]:
         """Light (3, M) that media send towards the eye.
 
         Of a piece that takes u of the light, the integral over T sigma dt is one over du, from 0 to u.
@@ -179,7 +180,7 @@ class Lighting:
         p = self.eye[:, None] + ways * t
         colour = self._look(ways, t).register[:3]
         r = _length(xp, self.lamp[:, None] - p).clip(NEAREST)
-        clear, met = self._clear(p, 0.0)
+        clear, work = self._clear(p, 0.0)
         light = (clear / (4 * r * r)) * self.power[:, None] + AMBIENT[0]
         sent = (colour * light * weight).reshape(3, count, -1).sum(1)
         glow = 0 * way
@@ -188,7 +189,7 @@ class Lighting:
             k = len(part[0])
             xp.put(glow, part[0], xp.take(glow, part[0]) + sent[:, done : done + k])
             done += k
-        return glow, met + len(rays)
+        return glow, work + Work(met=len(rays))
 
 
 def draw_solids(
@@ -199,7 +200,7 @@ def draw_solids(
     threads: int = 1,
     samples: str = "adaptive",
     progress: Callable[[float], None] | None = None,
-) -> tuple[Image, int, int]:
+) -> tuple[Image, Work]:
     """Draw a field of solids.
 
     Args:
@@ -212,8 +213,7 @@ def draw_solids(
         progress: called with the share done, from any thread.
 
     Returns:
-        The picture, how many (object, point) pairs went through the network, and how many pixels were
-        sampled four times.
+        The picture and what it took.
 
     Raises:
         ProgramError: numbers out of all proportion, which no compiled scene has.
@@ -223,11 +223,11 @@ def draw_solids(
     out = np.empty((4, height, width), np.float32)
     rows = max(1, min(TILE // width, -(-height // threads)))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
-    costs: list[tuple[int, int]] = []
+    costs: list[Work] = []
 
     def one(band: range) -> None:
-        out[:, band.start : band.stop], *cost = _band(lighting, canvas, band, samples)
-        costs.append((cost[0], cost[1]))
+        out[:, band.start : band.stop], work = _band(lighting, canvas, band, samples)
+        costs.append(work)
         if progress is not None:
             progress(len(costs) / len(bands))
 
@@ -240,11 +240,11 @@ def draw_solids(
     if not np.isfinite(out).all():
         raise ProgramError("numbers that the network cannot draw with")
     colour, alpha = np.moveaxis(out[:3], 0, 2), out[3]
-    met, refined = (sum(cost[i] for cost in costs) for i in (0, 1))
+    work = sum(costs, Work())
     if stage.transparent:
         straight = encoded(colour / np.maximum(alpha, 1e-6)[..., None])
-        return from_samples(straight * alpha[..., None], alpha), met, refined
-    return from_samples(encoded(colour), None), met, refined
+        return from_samples(straight * alpha[..., None], alpha), work
+    return from_samples(encoded(colour), None), work
 
 
 def encoded(linear: np.ndarray) -> Any:
@@ -253,35 +253,32 @@ def encoded(linear: np.ndarray) -> Any:
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
 
 
-def _band(
-    lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
-) -> tuple[np.ndarray, int, int]:
-    """Premultiplied radiance and alpha (4, rows, W) of some rows of pixels, pairs that met, and pixels that
-    were sampled four times."""
+def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str) -> tuple[np.ndarray, Work]:
+    """Premultiplied radiance and alpha (4, rows, W) of some rows of pixels, and what they took."""
     width, height = canvas
     if samples == "one":
         every = np.array(rows)[:, None] + 0.5
-        return *_shade(lighting, canvas, np.arange(width) + 0.5, every), 0
+        return _shade(lighting, canvas, np.arange(width) + 0.5, every)
     if samples == "adaptive":
         near = range(max(rows.start - 1, 0), min(rows.stop + 1, height))
-        once, met = _shade(lighting, canvas, np.arange(width) + 0.5, np.array(near)[:, None] + 0.5)
+        once, work = _shade(lighting, canvas, np.arange(width) + 0.5, np.array(near)[:, None] + 0.5)
         band = slice(rows.start - near.start, rows.stop - near.start)
         picture = np.ascontiguousarray(once[:, band])
         y, x = np.nonzero(_rough(once if lighting.stage.transparent else once[:3])[band])
     else:
-        picture, met = np.empty((4, len(rows), width), np.float32), 0
+        picture, work = np.empty((4, len(rows), width), np.float32), Work()
         y, x = (a.reshape(-1) for a in np.mgrid[0 : len(rows), 0:width])
     if len(x):
         quarter = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])
         four, more = _shade(lighting, canvas, x[:, None] + quarter[0], y[:, None] + rows.start + quarter[1])
         picture[:, y, x] = four.mean(2)
-        met += more
-    return picture, met, len(x)
+        work += more + Work(refined=len(x))
+    return picture, work
 
 
 def _shade(
     lighting: Lighting, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray
-) -> tuple[np.ndarray, int]:
+) -> tuple[np.ndarray, Work]:
     """Radiance and alpha (4, …) at places of the picture in pixels from its upper left corner."""
     xp, camera = lighting.xp, lighting.stage.camera
     forward, right, up = (np.reshape(axis, (3, 1, 1)) for axis in camera.axes())
@@ -294,7 +291,7 @@ def _shade(
     with xp.inference():
         shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes))
         both = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None]], 0))
-    return both.reshape(4, *way.shape[1:]), shade.met
+    return both.reshape(4, *way.shape[1:]), shade.work
 
 
 def _rough(picture: np.ndarray) -> np.ndarray:

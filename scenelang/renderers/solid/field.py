@@ -102,9 +102,7 @@ class SolidField:
             g, m = vector[: layout.geometry], vector[layout.geometry :]
             smooth = token == SMOOTH
             smooths, widest = smooths + smooth, max(widest, frame.blend * smooth)
-            layers = [
-                (xp.packed(w), b) for w, b in self.network.decoder(xp.array(g[: layout.code].copy(), like))
-            ]
+            layers = self.network.decoder(xp.array(g[: layout.code].copy(), like))
             look = self.network.look(xp.array(m[layout.material_code].copy(), like))
             matrix = xp.array(m[layout.colour].reshape(3, 4).copy(), like)
             colour = (matrix[:, :3] @ look[:3] + matrix[:, 3]).clip(0.0, 1.0)

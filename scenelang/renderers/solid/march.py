@@ -7,7 +7,8 @@ passed. Rays that are done leave the batch.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
+from operator import add
 
 import numpy as np
 
@@ -24,6 +25,30 @@ T, PAST, FREE, WITHIN, SINCE, LENGTH, WAY = 0, 1, 2, 3, 4, 5, 6  # rows of what 
 BEGIN = WAY + 3  # and where its objects begin, end, and how fast their distances change
 
 
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What drawing took.
+
+    Args:
+        rays: from the eye.
+        lights: rays from the light.
+        near: rays of both kinds that came near an object; the others took no step.
+        steps: points of space on them at which the field was asked.
+        met: (object, point) pairs that went through the network.
+        refined: pixels that were sampled four times.
+    """
+
+    rays: int = 0
+    lights: int = 0
+    near: int = 0
+    steps: int = 0
+    met: int = 0
+    refined: int = 0
+
+    def __add__(self, other: Work) -> Work:
+        return Work(*map(add, astuple(self), astuple(other)))
+
+
 @dataclass(slots=True)
 class Trail:
     """What M rays met.
@@ -33,13 +58,15 @@ class Trail:
         length: (M,) world units in media before that or before the ray's end.
         soft: (M,) 1 where it was a medium that the surface ends, 0 elsewhere: the distance is not 0 there.
         pieces: of the ways in media, as (index of the ray, begin, end, length before it), each (P,).
-        met: (object, point) pairs that went through the network.
+        near, steps, met: as of `Work`.
     """
 
     hit: Array
     length: Array
     soft: Array
     pieces: list[tuple[Array, Array, Array, Array]] = field(default_factory=list)
+    near: int = 0
+    steps: int = 0
     met: int = 0
 
 
@@ -81,6 +108,7 @@ class _Rays:
         blank = xp.full((WAY - FREE, len(start)), 0.0, way)
         rows = xp.concat([start[None], start[None] * NUDGE, blank, way, begin, end, rate], 0)
         self.ids, self.rows = xp.take(ids, some), xp.take(rows, some)
+        trail.near = len(some)
 
     def ask(self, rows: Array, t: Array) -> tuple[Meeting, Array]:
         """What the field answers at t (k,) of rays, and in which balls (N, k) they are there."""
@@ -99,6 +127,7 @@ class _Rays:
         xp, rows, solids = self.xp, self.rows, self.solids
         t = rows[T]
         met, inside = self.ask(rows, t)
+        self.trail.steps += len(self.ids)
         self.trail.met += met.met
         free = abs(met.distance)
         if not solids.media:

@@ -87,7 +87,7 @@ class SolidNetwork:
         """The decoder of a code (C,): each weight is linear in (code, 1)."""
         one = self.xp.concat([code, self.xp.full((1,), 1.0, code)], 0)
         return [
-            ((one @ w.reshape(len(w), -1)).reshape(w.shape[1:]).swapaxes(0, 1), one @ b)
+            (self.xp.packed((one @ w.reshape(len(w), -1)).reshape(w.shape[1:]).swapaxes(0, 1)), one @ b)
             for w, b in zip(self.decoder_w, self.decoder_b, strict=True)
         ]
 
