@@ -1,0 +1,58 @@
+"""`.ci/oracles`: comparisons that do not run count as failed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SKIPPED = "@pytest.mark.skipif(True, reason='not installed')\n"
+MODULE = "import pytest\n@pytest.mark.{mark}\n{skip}def test_one():\n    assert {fine}\n"
+
+
+def program(path: Path, text: str) -> Path:
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("mark", "skip", "fine", "code"),
+    [
+        ("oracle", "", True, 0),
+        ("oracle", "", False, 1),
+        ("oracle", SKIPPED, True, 1),
+        ("other", "", True, 5),
+    ],
+)
+def test_oracles_have_to_run(tmp_path: Path, mark: str, skip: str, fine: bool, code: int) -> None:
+    """The installer is left out."""
+    python = program(tmp_path / "python", f'[ "$2" = pip ] || exec "{sys.executable}" "$@"')
+    program(tmp_path / "povray", "")
+    module = tmp_path / "test_module.py"
+    module.write_text(MODULE.format(mark=mark, skip=skip, fine=fine))
+    path = f"{tmp_path}:{os.environ['PATH']}"
+    arguments = [python, module, "-p", "no:cacheprovider", "--noconftest", "-W", "ignore"]
+    done = subprocess.run(
+        [ROOT / ".ci/oracles", *arguments], env={**os.environ, "PATH": path}, capture_output=True, check=False
+    )
+    assert done.returncode == code, done.stderr
+
+
+def test_a_missing_program_is_told(tmp_path: Path) -> None:
+    """Where nothing can install it."""
+    python = program(tmp_path / "python", "")
+    for name in ("bash", "dirname"):
+        os.symlink(f"/bin/{name}", tmp_path / name)
+    done = subprocess.run(
+        ["/bin/bash", ROOT / ".ci/oracles", python],
+        env={"PATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 1
+    assert "POV-Ray is not installed" in done.stderr
