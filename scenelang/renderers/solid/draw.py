@@ -6,8 +6,9 @@ like. Colours are linear up to the last step. Letters as in `network.py`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,13 +18,15 @@ from scenelang.image import Image, from_samples
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.solid.field import INF, Meeting, SolidField
-from scenelang.renderers.solid.march import GAP, Trail, Work, march
+from scenelang.renderers.solid.march import GAP, Piece, Trail, Work, march
 from scenelang.renderers.solid.network import Wanted
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
 CLEAR = 2e-4  # world units before a surface where rays from the light end
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(3)
 NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2  # of a way through a medium, by what it takes of the light
+NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle are cut
+CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents of angles at the light
 TILE = 1 << 16  # samples at a time
 CONTRAST = 0.04  # sRGB: pixels that differ more from a neighbour are sampled four times
 
@@ -81,8 +84,8 @@ class Lighting:
             parts = [self._surface(xp.take(way, surface), surface, trail)] if len(surface) else []
             if len(floor):
                 parts.append(self._ground(xp.take(way, floor), xp.take(limit, floor)))
-            p, n, colour, haze = (xp.concat(list(part), 1) for part in zip(*parts, strict=True))
-            light, more = self._received(p, n)
+            p, n, colour, haze, free = (xp.concat(list(part), -1) for part in zip(*parts, strict=True))
+            light, more = self._received(p, n, free)
             xp.put(seen, both, colour * light + haze)
             xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
             work += more + Work(met=len(surface))
@@ -96,13 +99,13 @@ class Lighting:
         high = (way[1] * 2).clip(0.0, 1.0)
         return self.horizon[:, None] + (self.zenith - self.horizon)[:, None] * high
 
-    def _received(self, p: Array, n: Array) -> tuple[Array, Work]:
-        """Light (3, K) that surface points (3, K) with unit normals receive."""
+    def _received(self, p: Array, n: Array, free: Array) -> tuple[Array, Work]:
+        """Light (3, K) that surface points (3, K) with unit normals receive: the lamp's where free."""
         xp = self.xp
         to = self.lamp[:, None] - p
         r = _length(xp, to).clip(NEAREST)
         facing = _dot(n, to) / r
-        lit = xp.where(facing > 0)
+        lit = xp.where((facing > 0) & free)
         got = facing * 0
         lifted = xp.take(p, lit) + LIFT * xp.take(n, lit)
         clear, work = self._clear(lifted, CLEAR)
@@ -114,12 +117,13 @@ class Lighting:
         xp = self.xp
         way = p - self.lamp[:, None]
         r = _length(xp, way)
-        trail = march(self.field, self.lamp, way / r.clip(1e-9), r - before)
+        trail = march(self.field, self.lamp, way / r.clip(1e-9), r - before, halvings=0)
         work = Work(0, p.shape[1], trail.near, trail.steps, trail.met)
         return (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length), work
 
     def _surface(self, way: Array, index: Array, trail: Trail) -> tuple[Array, ...]:
-        """Points where rays meet solids, normals, colours, and light that joins in before (3, K) each."""
+        """Points where rays meet solids, normals, colours, and light that joins in before, (3, K) each, and
+        where a ray to the light starts outside of what is opaque (K,)."""
         xp = self.xp
         t = xp.take(trail.hit, index)
         found = self._look(way, t + INTO, gradient=True)
@@ -135,10 +139,16 @@ class Lighting:
         towards = _dot(g, way)
         p = self.eye[:, None] + way * (t + sharp * (INTO + self._ahead(found, way, None)))
         n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
-        return p, n, found.register[:3], 0 * p
+        free = found.distance < INF
+        soft = xp.where(~sharp)
+        if len(soft):  # the medium's distance gives the normal, which may point into the solid
+            start = xp.take(p + LIFT * n, soft) - self.eye[:, None]
+            there = self._look(start, 0 * start[0] + 1)
+            xp.put(free, soft, (there.distance >= 0) | (there.register[3] > 0.5))
+        return p, n, found.register[:3], 0 * p, free
 
     def _look(self, way: Array, t: Array, gradient: bool = False) -> Meeting:
-        """All about points at t (K,) of rays (3, K) from the eye."""
+        """All about the points way t (3, K) from the eye."""
         begin, end, _ = self.field.spans(self.eye, way, t)
         inside = (begin <= t) & (t <= end)
         return self.field.meet(self.eye[:, None] + way * t, inside, Wanted.ALL, gradient)
@@ -160,15 +170,15 @@ class Lighting:
         n[1] = 1.0
         kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
         colour = xp.array(np.asarray(ground.rgb, np.float32), p)[:, None]
-        return p, n, kept * colour, (1 - kept) * self.horizon[:, None]
+        return p, n, kept * colour, (1 - kept) * self.horizon[:, None], t < INF
 
     def _scattered(self, way: Array, trail: Trail) -> tuple[Array, Work]:
         """Light (3, M) that media send towards the eye.
 
         Of a piece that takes u of the light, the integral over T sigma dt is one over du, from 0 to u.
         """
-        xp = self.xp
-        ray, begin, end, before = (xp.concat(parts, 0) for parts in zip(*trail.pieces, strict=True))
+        xp, pieces = self.xp, [part for piece in trail.pieces for part in self._cut(way, piece)]
+        ray, begin, end, before = (xp.concat(parts, 0) for parts in zip(*pieces, strict=True))
         taken = 1 - xp.exp(-EXTINCTION * (end - begin))
         nodes = xp.array(NODES.astype(np.float32), way)[:, None]
         weights = xp.array(WEIGHTS.astype(np.float32), way)[:, None]
@@ -185,11 +195,29 @@ class Lighting:
         sent = (colour * light * weight).reshape(3, count, -1).sum(1)
         glow = 0 * way
         done = 0
-        for part in trail.pieces:  # a ray occurs once in each
+        for part in pieces:  # a ray occurs once in each
             k = len(part[0])
             xp.put(glow, part[0], xp.take(glow, part[0]) + sent[:, done : done + k])
             done += k
         return glow, work + Work(met=len(rays))
+
+    def _cut(self, way: Array, piece: Piece) -> Iterator[Piece]:
+        """Pieces along which the light falls evenly enough, of pieces of rays, each ray once."""
+        xp, (ray, begin, end, before) = self.xp, piece
+        ways, to = xp.take(way, ray), (self.lamp - self.eye)[:, None]
+        first, last = to - ways * begin, to - ways * end
+        narrow = _dot(first, last) > NARROW * _length(xp, first) * _length(xp, last)
+        yield tuple(xp.take(part, xp.where(narrow)) for part in piece)
+        wide = xp.where(~narrow)
+        if not len(wide):
+            return
+        ray, begin, end, before, ways = (xp.take(part, wide) for part in (*piece, ways))
+        middle = _dot(ways, to)
+        aside = _length(xp, to - ways * middle).clip(NEAREST)
+        for low, high in pairwise(CUTS):
+            a, b = xp.maximum(begin, middle + low * aside), xp.minimum(end, middle + high * aside)
+            some = xp.where(a < b)
+            yield tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin))
 
 
 def draw_solids(

@@ -19,10 +19,11 @@ from scenelang.renderers.solid.network import Wanted
 GAP = 0.009  # world units
 TOUCH = 1e-5  # world units: so near counts as met
 STEPS = 400  # of a ray at most
-HALVINGS = 6  # of the interval in which a medium gives way to a solid
+HALVINGS = 12  # of the interval in which a medium gives way to a solid
 NUDGE = np.float32(1 - 1e-6)  # of a point, to one just before it
 T, PAST, FREE, WITHIN, SINCE, LENGTH, WAY = 0, 1, 2, 3, 4, 5, 6  # rows of what a ray carries along
 BEGIN = WAY + 3  # and where its objects begin, end, and how fast their distances change
+Piece = tuple[Array, ...]  # of ways in media: index of the ray, begin, end, length before it, each (P,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,20 +58,20 @@ class Trail:
         hit: (M,) how far the first opaque surface is, inf where there is none.
         length: (M,) world units in media before that or before the ray's end.
         soft: (M,) 1 where it was a medium that the surface ends, 0 elsewhere: the distance is not 0 there.
-        pieces: of the ways in media, as (index of the ray, begin, end, length before it), each (P,).
+        pieces: of the ways in media.
         near, steps, met: as of `Work`.
     """
 
     hit: Array
     length: Array
     soft: Array
-    pieces: list[tuple[Array, Array, Array, Array]] = field(default_factory=list)
+    pieces: list[Piece] = field(default_factory=list)
     near: int = 0
     steps: int = 0
     met: int = 0
 
 
-def march(solids: SolidField, origin: Array, way: Array, limit: Array) -> Trail:
+def march(solids: SolidField, origin: Array, way: Array, limit: Array, halvings: int = HALVINGS) -> Trail:
     """Follow rays.
 
     Args:
@@ -78,6 +79,7 @@ def march(solids: SolidField, origin: Array, way: Array, limit: Array) -> Trail:
         origin: of all rays (3,).
         way: unit directions (3, M).
         limit: how far to go (M,).
+        halvings: of the interval in which a medium gives way to a solid; none where only that it does counts.
     """
     xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
@@ -85,7 +87,7 @@ def march(solids: SolidField, origin: Array, way: Array, limit: Array) -> Trail:
     ids = solids.near(origin, way)
     if not len(ids):
         return trail
-    rays = _Rays(solids, origin, trail, ids, xp.take(way, ids), xp.take(limit, ids))
+    rays = _Rays(solids, origin, trail, ids, xp.take(way, ids), xp.take(limit, ids), halvings)
     for _ in range(STEPS):
         if not len(rays.ids):
             break
@@ -97,9 +99,16 @@ class _Rays:
     """Rays under way."""
 
     def __init__(
-        self, solids: SolidField, origin: Array, trail: Trail, ids: Array, way: Array, limit: Array
+        self,
+        solids: SolidField,
+        origin: Array,
+        trail: Trail,
+        ids: Array,
+        way: Array,
+        limit: Array,
+        halvings: int,
     ) -> None:
-        self.solids, self.xp, self.trail, xp = solids, solids.xp, trail, solids.xp
+        self.solids, self.xp, self.trail, self.halvings, xp = solids, solids.xp, trail, halvings, solids.xp
         self.origin, self.never = origin[:, None], xp.full((), INF, way)
         self.wanted = Wanted.KIND if solids.mixed else Wanted.DISTANCE
         begin, end, rate = solids.spans(origin, way, limit)
@@ -181,7 +190,7 @@ class _Rays:
             if len(into):
                 part = xp.take(self.rows, xp.take(leave, into))
                 low, high = part[PAST], part[T]
-                for _ in range(HALVINGS):
+                for _ in range(self.halvings):
                     half = (low + high) / 2
                     found, _ = self.ask(part, half)
                     still = (found.distance < 0) & (found.register[0] > 0.5)

@@ -1,0 +1,27 @@
+"""Scenes that strangers write: the network's picture beside the exact one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+
+SCENES = {
+    "a light inside a medium": """
+        light(position = [0, 0.3, 0], power = 2);
+        sphere { material volumetric { color(#fa6); } }
+        torus { translate(1.4, 0, 0); }
+    """,
+    "a solid that is half in a medium": """
+        sphere { material volumetric { color(#49f); } }
+        torus { rotate(60deg, axis = X); translate(0.7, 0, 0.2); material diffuse { color(#f40); } }
+    """,
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_network_draws_what_the_reference_does(name: str) -> None:
+    scene = nsg.loads("canvas(48, 48);" + SCENES[name])
+    ours, exact = (np.asarray(nsg.render(scene, backend=by), float) for by in ("neural", "reference"))
+    assert -10 * np.log10(np.square(ours - exact).mean()) > 46
