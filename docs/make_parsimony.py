@@ -175,32 +175,65 @@ def _way(found: Sequence[Record], name: str) -> tuple[float, float, float, float
 
 
 def examples_text(plans: Record) -> str:
-    """A line for every example."""
-    rows = []
-    for plan in plans["plans"]:
-        first, last, cost = plan["stages"][0], plan["stages"][-1], plan["drawing"]
-        rows.append(
-            [
-                f"[{plan['file'].removesuffix('.nsg')}](../examples/{plan['file']})",
-                f"{first['objects']} → {last['objects']}",
-                f"{first['matrices']} → {last['matrices']}",
-                f"{sum(first['tokens'].values())} → {plan['rows']}",
-                plan["model"],
-                plan["runner_up"] or "–",
-                f"{cost['parameters']:,}",
-                f"{_percent(cost['evaluated'], cost['pixels'])} of {cost['pixels']:,}",
-                _percent(cost["refined"], cost["pixels"]),
-                _percent(cost["meetings"], cost["meetings_unskipped"]),
-                f"{cost['ms']:.0f}",
-                f"{cost['psnr']:.1f}",
-                "–" if cost["flip"] is None else f"{cost['flip']:.4f}",
-            ]
-        )
-    head = ("scene", "objects", "matrices", "tokens", "model", "runner-up", "parameters", "pixels evaluated")
-    table = markdown((*head, "sampled four times", "meetings", "ms", "PSNR, dB", "FLIP"), rows)
+    """A line for every example, those of the plane before those of solids."""
+    tables = []
+    for solid, what, work in (
+        (False, ("pixels evaluated", "sampled four times", "meetings"), _met),
+        (True, ("pixels", "sampled four times", "rays", "near an object", "steps", "evaluations"), _traced),
+    ):
+        rows = [
+            [*_size(plan), *work(plan["drawing"]), *_outcome(plan["drawing"])]
+            for plan in plans["plans"]
+            if ("rays" in plan["drawing"]) == solid
+        ]
+        head = ("scene", "objects", "matrices", "tokens", "model", "runner-up", "parameters")
+        if rows:
+            tables.append(markdown((*head, *what, "ms", "PSNR, dB", "FLIP"), rows))
     weights = ", ".join(f"`{name}` {digest[:8]}…" for name, digest in plans["weights"].items())
     about = f"One thread, {plans['machine']}, torch {plans['torch']}, one run; weights of {weights}."
-    return f"{table}\n\n{about}"
+    return "\n\n".join([*tables, about])
+
+
+def _size(plan: Record) -> list[str]:
+    """What is drawn, and by which model."""
+    first, last = plan["stages"][0], plan["stages"][-1]
+    return [
+        f"[{plan['file'].removesuffix('.nsg')}](../examples/{plan['file']})",
+        f"{first['objects']} → {last['objects']}",
+        f"{first['matrices']} → {last['matrices']}",
+        f"{sum(first['tokens'].values())} → {plan['rows']}",
+        plan["model"],
+        plan["runner_up"] or "–",
+        f"{plan['drawing']['parameters']:,}",
+    ]
+
+
+def _met(cost: Record) -> list[str]:
+    """What the network saw of a scene of the plane."""
+    return [
+        f"{_percent(cost['evaluated'], cost['pixels'])} of {cost['pixels']:,}",
+        _percent(cost["refined"], cost["pixels"]),
+        _percent(cost["meetings"], cost["meetings_unskipped"]),
+    ]
+
+
+def _traced(cost: Record) -> list[str]:
+    """What the network was asked of a scene of solids."""
+    rays = cost["rays"] + cost["light_rays"]
+    return [
+        f"{cost['pixels']:,}",
+        _percent(cost["refined"], cost["pixels"]),
+        f"{rays:,}",
+        _percent(cost["near"], rays),
+        f"{cost['steps']:,}",
+        f"{cost['evaluations']:,}",
+    ]
+
+
+def _outcome(cost: Record) -> list[str]:
+    """Time and error."""
+    flip = "–" if cost["flip"] is None else f"{cost['flip']:.4f}"
+    return [f"{cost['ms']:.0f}", f"{cost['psnr']:.1f}", flip]
 
 
 def _percent(part: float, whole: float) -> str:

@@ -9,15 +9,18 @@ from typing import Any
 import numpy as np
 
 from scenelang.backend.neural import draw_program
+from scenelang.backend.small import draw_small
 from scenelang.graph.lower import Spans
 from scenelang.graph.nodes import Fold, Graph, nodes
 from scenelang.graph.steps import Affine
 from scenelang.measure.metrics import MOST_DB, flip, over_white, psnr
 from scenelang.measure.scenes import reference_of
 from scenelang.models.choose import WHITE, choose_model, lacking, uses, why_chosen
-from scenelang.models.load import Model
+from scenelang.models.load import Model, place_of
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.program.program import Program
+from scenelang.renderers.draw import Drawing
+from scenelang.renderers.solid.march import Work
 from scenelang.scene.schema import Scene
 from scenelang.words import TOKENS
 
@@ -112,34 +115,62 @@ def drawing_cost(
     """Draw a Program of a scene and say what it took and how far it is off.
 
     Returns:
-        ``pixels`` of the canvas, ``evaluated`` (pixels that an object reached; the network saw no other),
-        ``refined`` (pixels sampled four times), ``samples``, ``meetings`` (a sample and an object through
-        the network), ``meetings_unskipped`` (every sample with every object), ``ms`` (the best of three
-        frames, after one that does not count), ``psnr`` (dB, at most 50), ``flip`` (None without its
-        package) and ``parameters``.
+        ``pixels`` of the canvas, ``refined`` (pixels sampled four times), what `_meetings` or `_rays` say,
+        ``ms`` (the best of three frames, after one that does not count), ``psnr`` (dB, at most 50), ``flip``
+        (None without its package) and ``parameters``.
     """
-    drawing = draw_program(program, model, threads=threads)
+    by_numpy = program.stage is not None and place_of(model.network).type == "cpu"  # as `render` draws them
+
+    def draw() -> Drawing:
+        return (
+            draw_small(program, threads=threads)
+            if by_numpy
+            else draw_program(program, model, threads=threads)
+        )
+
+    drawing = draw()
     times = []
     for _ in range(REPEATS):
         started = time.perf_counter()
-        drawing = draw_program(program, model, threads=threads)
+        drawing = draw()
         times.append(1000 * (time.perf_counter() - started))
     exact = over_white(reference_of(scene, model.manifest, spans=spans))
-    width, height = program.canvas
-    samples = width * height + 4 * drawing.refined
-    if model.manifest.renderer != "framed":  # which take every sample, and meet every object there
-        samples = drawing.pairs // max(1, len(program))
     return {
-        "pixels": width * height,
-        "evaluated": drawing.met,
+        "pixels": program.canvas[0] * program.canvas[1],
         "refined": drawing.refined,
-        "samples": samples,
-        "meetings": drawing.pairs,
-        "meetings_unskipped": samples * len(program),
+        **(_meetings(drawing, program, model) if drawing.work is None else _rays(drawing.work)),
         "ms": round(min(times), 2),
         "psnr": round(min(MOST_DB, psnr(over_white(drawing.image), exact)), 2),
         "flip": _flip(over_white(drawing.image), exact),
         "parameters": sum(p.numel() for p in model.network.parameters()),
+    }
+
+
+def _meetings(drawing: Drawing, program: Program, model: Model) -> dict[str, int]:
+    """In the plane: ``evaluated`` (pixels that an object reached; the network saw no other), ``samples``,
+    ``meetings`` (a sample and an object through the network) and ``meetings_unskipped`` (every sample with
+    every object)."""
+    samples = program.canvas[0] * program.canvas[1] + 4 * drawing.refined
+    if model.manifest.renderer != "framed":  # which take every sample, and meet every object there
+        samples = drawing.pairs // max(1, len(program))
+    return {
+        "evaluated": drawing.met,
+        "samples": samples,
+        "meetings": drawing.pairs,
+        "meetings_unskipped": samples * len(program),
+    }
+
+
+def _rays(work: Work) -> dict[str, int]:
+    """In space: ``rays`` from the eye, ``light_rays`` between surfaces or media and the light, how many of
+    both came ``near`` an object, their ``steps`` (points at which the field was asked) and ``evaluations``
+    (an object's network at a point)."""
+    return {
+        "rays": work.rays,
+        "light_rays": work.lights,
+        "near": work.near,
+        "steps": work.steps,
+        "evaluations": work.met,
     }
 
 

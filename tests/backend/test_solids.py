@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import scenelang as nsg
 from scenelang.backend.neural import draw_program, open_model
 from scenelang.backend.options import RenderError
 from scenelang.backend.small import choose_drawer, draw_small
+from scenelang.cli.main import cli
 from scenelang.measure.plan import plan_of
 from scenelang.program.program import Program
 
@@ -98,7 +101,22 @@ def test_plans_of_solids(scene: nsg.Scene, program: Program) -> None:
     found = plan_of(scene, program, {}, open_model("solids3d"))
     assert found["model"] == "solids3d"
     assert found["rows"] == 4
-    assert found["drawing"]["psnr"] > 40
+    cost, drawing = found["drawing"], draw_small(program, threads=1)
+    assert cost["psnr"] > 40
+    assert cost["rays"] == 72 * 48 + 4 * cost["refined"]
+    assert cost["light_rays"] > 0
+    assert cost["near"] < cost["steps"] < cost["evaluations"] == drawing.pairs
+    assert "meetings" not in cost
+
+
+def test_the_plan_speaks_of_rays(tmp_path: Path) -> None:
+    file = tmp_path / "scene.nsg"
+    file.write_text(TEXT)
+    said = CliRunner().invoke(cli, ["explain-plan", str(file), "--threads", "1"]).output
+    assert re.search(r"rays +[\d,]+ from the eye and [\d,]+ to the light, \d+\.\d % near an object", said)
+    assert re.search(r"steps +[\d,]+, \d+\.\d on a ray near an object", said)
+    assert re.search(r"network +[\d,]+ evaluations of an object, \d\.\d\d of 4 a step", said)
+    assert "meetings" not in said
 
 
 def test_nothing_is_seen_from_inside() -> None:

@@ -32,8 +32,9 @@ def command(
     """Say what drawing a scene takes and what the compiler and the renderer leave out.
 
     FILE is a scene, or - for standard input. Shows objects, matrices and tokens after each pass, the model
-    and the next best, how many pixels an object reached, how many samples met how many objects, the
-    parameters, the time of a frame, and the error against the exact picture.
+    and the next best, how many pixels an object reached and how many samples met how many objects (in
+    space how many rays were followed, their steps and evaluations of the network), the parameters, the time
+    of a frame, and the error against the exact picture.
     """
     from scenelang.cli.jobs import prepare_scene
 
@@ -66,15 +67,34 @@ def _text(plan: dict[str, Any]) -> str:
         error += f", FLIP {cost['flip']:.4f},"
     lines += [
         f"stream     {plan['rows']:,} row{'s' * (plan['rows'] != 1)} of 64 numbers ({tokens or 'empty'})",
+        *(_rays(cost, plan["rows"]) if "rays" in cost else _meetings(cost)),
+        f"frame      {cost['ms']:.1f} ms",
+        f"error      {error} against the exact picture",
+    ]
+    return "\n".join(lines)
+
+
+def _meetings(cost: dict[str, Any]) -> list[str]:
+    return [
         f"pixels     {cost['evaluated']:,} of {cost['pixels']:,} evaluated "
         f"({_share(cost['evaluated'], cost['pixels'])}), {cost['refined']:,} of them sampled four times "
         f"({_share(cost['refined'], cost['pixels'])})",
         f"meetings   {cost['meetings']:,} of a sample and an object, "
         f"{_share(cost['meetings'], cost['meetings_unskipped'])} of {cost['meetings_unskipped']:,}",
-        f"frame      {cost['ms']:.1f} ms",
-        f"error      {error} against the exact picture",
     ]
-    return "\n".join(lines)
+
+
+def _rays(cost: dict[str, Any], objects: int) -> list[str]:
+    rays, steps = cost["rays"] + cost["light_rays"], cost["steps"]
+    return [
+        f"pixels     {cost['refined']:,} of {cost['pixels']:,} sampled four times "
+        f"({_share(cost['refined'], cost['pixels'])})",
+        f"rays       {cost['rays']:,} from the eye and {cost['light_rays']:,} to the light, "
+        f"{_share(cost['near'], rays)} near an object",
+        f"steps      {steps:,}, {steps / max(1, cost['near']):.1f} on a ray near an object",
+        f"network    {cost['evaluations']:,} evaluations of an object, "
+        f"{cost['evaluations'] / max(1, steps):.2f} of {objects} a step",
+    ]
 
 
 def _table(stages: list[dict[str, Any]]) -> list[str]:
