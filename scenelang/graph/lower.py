@@ -212,14 +212,15 @@ class _Lowering:
 
     def leaf(self, node: schema.Object, material: schema.Material | None) -> Leaf:
         seen = self.old.get(id(node))
-        if seen is not None and seen[0] is node and seen[1] is material:
+        number = self.objects + 1
+        if seen and seen[0] is node and seen[1] is material and seen[2].number == number:
             leaf = seen[2]
         else:
             if node.geometry not in self.manifest.geometries:
                 self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
             look = Look(self.manifest.default_material) if material is None else self.look(material)
             notes: dict[Any, Any] | None = None if self.kept is None else {}
-            leaf = Leaf(node.geometry, look, self.moves(node), self.place(node), notes)
+            leaf = Leaf(node.geometry, look, self.moves(node), self.place(node), number, notes)
         if self.kept is not None:
             self.kept[id(node)] = node, material, leaf
         return leaf

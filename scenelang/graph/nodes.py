@@ -37,6 +37,7 @@ class Leaf(Record):
 
     Args:
         moves: steps into the parent's space, nearest the leaf first.
+        number: of the object in the scene as written, from 1; not part of the value.
         notes: what was worked out about a leaf that stays from frame to frame of an animation, by what it
             is; None for a leaf that is used once. It is not part of the value.
     """
@@ -45,13 +46,14 @@ class Leaf(Record):
     look: Look
     moves: tuple[Move, ...] = ()
     span: Span | None = None
+    number: int = 0
     notes: dict[Any, Any] | None = None
 
     _key = attrgetter("geometry", "look", "moves", "span")
 
     def changed(self, look: Look, moves: tuple[Move, ...]) -> Leaf:
         """The same object with another look or other moves."""
-        return Leaf(self.geometry, look, moves, self.span, None if self.notes is None else {})
+        return Leaf(self.geometry, look, moves, self.span, self.number, None if self.notes is None else {})
 
     def noted(self, key: object, make: Callable[[Leaf], T]) -> T:
         """What ``make`` gives for this leaf, noted under ``key`` where the leaf takes notes."""

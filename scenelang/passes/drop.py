@@ -35,7 +35,7 @@ def drop_empty(graph: Graph, context: Context) -> Graph:
             return only
         moves = only.moves + node.moves
         if isinstance(only, Leaf):
-            return Leaf(only.geometry, only.look, moves, only.span)
+            return Leaf(only.geometry, only.look, moves, only.span, only.number)
         return Fold(only.kind, only.links, moves, only.span)
 
     children = [bottom_up(link.node, lambda leaf: leaf, fold) for link in graph.root.links]

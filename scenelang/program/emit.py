@@ -44,7 +44,8 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
         model=manifest.name,
         weights=codes.digest,
         objects=tuple([leaf.geometry for leaf in leaves]),
-        places=_places([leaf.span for leaf in leaves]),
+        places=places_of([leaf.span for leaf in leaves]),
+        numbers=tuple([leaf.number or at for at, leaf in enumerate(leaves, 1)]),
     )
 
 
@@ -125,7 +126,8 @@ def _bound(leaf: Leaf, level: float, space: Space) -> Bound:
     return leaf.noted(("bound", level), lambda leaf: space.bound(leaf.geometry, leaf.steps, level))
 
 
-def _places(spans: list[Span | None]) -> tuple[Place | None, ...]:
+def places_of(spans: list[Span | None]) -> tuple[Place | None, ...]:
+    """Where spans lie in their files."""
     known: dict[tuple[str, int, int] | None, Place | None] = {None: None}
     keys = [None if span is None else (span.source.name, span.start, span.end) for span in spans]
     for key, span in zip(keys, spans, strict=True):

@@ -3,7 +3,8 @@
 Its file is safetensors with a JSON header, read as if a stranger had written it. Tensors: ``vectors`` F32
 (N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the header's ``geometries``,
 ``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line, end column), all -1 where
-unknown. The header is the metadata entry ``scenelang``, where solids have a ``stage``.
+unknown; where rows are not all objects in order, ``numbers`` I32 (N,). The header is the metadata entry
+``scenelang``, where solids have a ``stage``.
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ class Program:
         objects: geometry name of each row.
         places: where each row was written; None where that is unknown.
         stage: camera, light, ground and sky of a scene of solids; None in the plane.
+        numbers: of each row's object in the scene as written, from 1; by default those of the rows.
 
     Raises:
         ProgramError: anything is not as above.
@@ -74,6 +76,7 @@ class Program:
     objects: tuple[str, ...]
     places: tuple[Place | None, ...] = field(repr=False)
     stage: Stage | None = None
+    numbers: tuple[int, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         count = len(self.objects)
@@ -87,6 +90,9 @@ class Program:
             object.__setattr__(self, name, _frozen(name, getattr(self, name), dtype, shape))
         if len(self.places) != count:
             raise ProgramError(f"{len(self.places)} places for {count} objects")
+        object.__setattr__(self, "numbers", self.numbers or _in_order(count))
+        if len(self.numbers) != count or not all(0 < n <= MOST_OBJECTS for n in self.numbers):
+            raise ProgramError(f"numbers that are not those of {count} objects")
         _check_rows(self)
         _check_settings(self)
 
@@ -125,6 +131,10 @@ class Program:
         write_output(path, program_bytes(self))
 
 
+def _in_order(count: int) -> tuple[int, ...]:
+    return tuple(range(1, count + 1))
+
+
 def program_bytes(program: Program) -> bytes:
     """The file of a Program; equal Programs give equal bytes."""
     from safetensors.numpy import save
@@ -152,6 +162,8 @@ def program_bytes(program: Program) -> bytes:
         "objects": np.array([of_geometry[name] for name in program.objects], dtype=np.int32),
         "places": np.array(places, dtype=np.int32).reshape(len(program), 5),
     }
+    if program.numbers != _in_order(len(program)):
+        tensors["numbers"] = np.array(program.numbers, dtype=np.int32)
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data
@@ -200,7 +212,7 @@ def _check_settings(program: Program) -> None:
         raise ProgramError("the digest of the weights is not 64 hexadecimal digits")
 
 
-MOST_BYTES = MOST_HEADER + 8 + MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20)
+MOST_BYTES = MOST_HEADER + 8 + MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4)
 
 _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
     "vectors": ("F32", (WIDTH,)),
@@ -208,6 +220,7 @@ _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
     "bounds": ("F32", (4,)),
     "objects": ("I32", ()),
     "places": ("I32", (5,)),
+    "numbers": ("I32", ()),
 }
 _HEADER: dict[str, Any] = {
     "background": list | None,
@@ -278,18 +291,19 @@ def parse_program(data: bytes) -> Program:
         objects=tuple(geometries[index] for index in objects.tolist()),
         places=tuple(Place(files[at], *rest) if at >= 0 else None for at, *rest in places.tolist()),
         stage=staged,
+        numbers=tuple(tensors["numbers"].tolist()) if "numbers" in tensors else (),
     )
 
 
 def _count(file: TensorFile) -> int:
     """Objects of a file whose tensors are those of a Program."""
-    if file.tensors.keys() != _LAYOUT.keys():
+    if file.tensors.keys() | {"numbers"} != _LAYOUT.keys():
         raise TensorError("it holds other tensors")
     count = (*file.tensors["vectors"].shape, 0)[0]
     if count > MOST_OBJECTS:
         raise TensorError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
-    for name, (kind, rest) in _LAYOUT.items():
-        tensor = file.tensors[name]
+    for name, tensor in file.tensors.items():
+        kind, rest = _LAYOUT[name]
         if tensor.type != kind or tensor.shape != (count, *rest):
             raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")
     return count
