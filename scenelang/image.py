@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import write_output
+from scenelang.files import write_output, write_whole
+from scenelang.outputs import Floats, Output, Outputs, can_exr, exr
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -37,16 +39,18 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         """Write a file whose format its suffix names, whole or not at all; see `encode`.
 
         Raises:
-            ValueError: Pillow knows no format of that suffix.
+            ValueError: no format has that suffix, or what writes it is not installed.
             OSError: the file cannot be written.
         """
         write_output(path, self.encode(image_format(path)))
 
     def encode(self, kind: str = "PNG") -> bytes:
-        """What a file holds, in one of Pillow's formats.
+        """What a file holds, in one of Pillow's formats or as ``"EXR"``, which has `layers`.
 
         Formats without alpha (JPEG) get the picture over white.
         """
+        if kind == "EXR":
+            return exr(self.layers())
         from PIL import Image as pillow
 
         image = self.to_pil()
@@ -59,21 +63,69 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
             pillow.alpha_composite(white, image.convert("RGBA")).convert("RGB").save(data, kind)
         return data.getvalue()
 
+    def layers(self) -> dict[str, Floats]:
+        """Linear light, times alpha where there is any, by channels: what an EXR holds."""
+        values = np.asarray(self, np.float64)
+        colour, alpha = values[..., :3], values[..., 3:]
+        light = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+        both = np.concatenate([light * alpha if alpha.size else light, alpha], 2).astype(np.float32)
+        return {name: both[..., at] for at, name in enumerate("RGBA"[: both.shape[2]])}
+
     def _repr_png_(self) -> bytes | None:
         if self.ndim != 3 or self.shape[2] not in (3, 4):
             return None
         return self.encode()
 
 
-def image_format(path: str | os.PathLike[str]) -> str:
-    """Pillow's name for the format that a file's suffix names.
+def output_file(path: Path, name: Output) -> Path:
+    """Where an output of a picture goes: ``STEM.depth.png``, or into the picture if that is an EXR.
 
     Raises:
-        ValueError: it writes no format of that suffix.
+        ValueError: the picture is neither.
     """
+    suffix = path.suffix.lower()
+    if suffix not in (".png", ".exr"):
+        raise ValueError(f"outputs go with .png or .exr pictures, not `{path.name}`")
+    return path if suffix == ".exr" else path.with_name(f"{path.stem}.{name}{path.suffix}")
+
+
+def save_outputs(
+    image: Image, outputs: Outputs, path: Path, write: Callable[[Path, bytes], None] = write_output
+) -> list[Path]:
+    """Write a picture and its outputs, each file whole or not at all; the files of the outputs.
+
+    Args:
+        write: the picture; `write_whole` where no user wrote its name.
+
+    Raises:
+        ValueError: their format cannot hold them.
+        OSError: a file cannot be written.
+    """
+    files = [output_file(path, name) for name in outputs.names]
+    if path in files:
+        facts = [outputs.facts(name) for name in outputs.names]
+        write(path, exr({**image.layers(), **outputs.layers()}, facts))
+        return files
+    pictures = [outputs.png(name) for name in outputs.names]
+    write(path, image.encode(image_format(path)))
+    for file, data in zip(files, pictures, strict=True):
+        write_whole(file, data)
+    return files
+
+
+def image_format(path: str | os.PathLike[str]) -> str:
+    """Pillow's name for the format that a file's suffix names, or ``"EXR"``.
+
+    Raises:
+        ValueError: no format has that suffix, or what writes it is not installed.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".exr":
+        if not can_exr():
+            raise ValueError("writing `.exr` needs OpenEXR: pip install 'scenelang[exr]'")
+        return "EXR"
     from PIL import Image as pillow
 
-    suffix = Path(path).suffix.lower()
     pillow.preinit()  # the common formats; loading all takes as long as loading Pillow
     if pillow.EXTENSION.get(suffix) not in pillow.SAVE:
         pillow.init()

@@ -40,6 +40,7 @@ ORDER = (
     "scenelang.program",
     "scenelang.lsp",
     "scenelang.interchange",
+    "scenelang.outputs",
     "scenelang.image",
     "scenelang.reference",
     "scenelang.renderers",

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import io
 import struct
-import zlib
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from scenelang.animation.store import Film, Pixels, changed
 from scenelang.animation.timing import runs
+from scenelang.outputs import SIGNATURE, chunk
 
-_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _LONGEST = 65535
 
 
@@ -32,7 +30,7 @@ def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> Non
         for piece in _pieces(count, film.fps)
     ]
     with part.open("wb") as out:
-        out.write(_SIGNATURE)
+        out.write(SIGNATURE)
         sequence, before, last = 0, None, None
         pixels: Pixels | None = None
         for index, (file, (numerator, denominator)) in enumerate(shown):
@@ -41,21 +39,21 @@ def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> Non
             left, top, right, bottom = changed(before, pixels)
             chunks = _png(np.ascontiguousarray(pixels[top:bottom, left:right]))
             if index == 0:
-                _chunk(out, b"IHDR", next(body for kind, body in chunks if kind == b"IHDR"))
-                _chunk(out, b"acTL", struct.pack(">II", len(shown), 0 if film.loop else 1))
+                out.write(chunk(b"IHDR", next(body for kind, body in chunks if kind == b"IHDR")))
+                out.write(chunk(b"acTL", struct.pack(">II", len(shown), 0 if film.loop else 1)))
             # what is shown stays (0), and the new pixels replace it (0) instead of being laid over it
             control = (sequence, right - left, bottom - top, left, top, numerator, denominator, 0, 0)
-            _chunk(out, b"fcTL", struct.pack(">IIIIIHHBB", *control))
+            out.write(chunk(b"fcTL", struct.pack(">IIIIIHHBB", *control)))
             sequence += 1
             for kind, body in chunks:
                 if kind == b"IDAT" and index == 0:
-                    _chunk(out, b"IDAT", body)
+                    out.write(chunk(b"IDAT", body))
                 elif kind == b"IDAT":
-                    _chunk(out, b"fdAT", struct.pack(">I", sequence) + body)
+                    out.write(chunk(b"fdAT", struct.pack(">I", sequence) + body))
                     sequence += 1
             before, last = pixels, file
             progress((index + 1) / len(shown))
-        _chunk(out, b"IEND", b"")
+        out.write(chunk(b"IEND", b""))
 
 
 def _pieces(count: int, fps: float) -> Iterator[tuple[int, int]]:
@@ -74,13 +72,9 @@ def _png(pixels: Pixels) -> list[tuple[bytes, bytes]]:
 
     data = io.BytesIO()
     Image.fromarray(pixels).save(data, "PNG")
-    raw, at, found = data.getvalue(), len(_SIGNATURE), []
+    raw, at, found = data.getvalue(), len(SIGNATURE), []
     while at < len(raw):
         (size,) = struct.unpack_from(">I", raw, at)
         found.append((raw[at + 4 : at + 8], raw[at + 8 : at + 8 + size]))
         at += 12 + size
     return found
-
-
-def _chunk(out: BinaryIO, kind: bytes, body: bytes) -> None:
-    out.write(struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)))

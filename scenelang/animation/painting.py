@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import version
@@ -15,6 +15,7 @@ from scenelang.animation.store import frame_key
 if TYPE_CHECKING:
     from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
+    from scenelang.outputs import Output, Outputs
     from scenelang.program.program import Program
     from scenelang.renderers.draw import Kept
 
@@ -101,6 +102,14 @@ class Painter:
             return draw_small(frame.program, kept=self.kept, progress=progress, threads=self.split).image
         split = self.split
         return paint(frame.program, self.place, threads=split, split=split, kept=self.kept, progress=progress)
+
+    def outputs(self, frame: Drawable, wanted: Sequence[Output]) -> Outputs:
+        """What is known of a frame beside its picture; raises as `scenelang.render_outputs`."""
+        from scenelang.backend.outputs import exact_outputs, neural_outputs
+
+        if frame.program is not None:
+            return neural_outputs(frame.program, wanted, self.threads)
+        return exact_outputs(frame.shot.scene, wanted, spans=frame.shot.spans, model=self.clip.model)
 
 
 def paint(

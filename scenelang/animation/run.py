@@ -20,10 +20,12 @@ from scenelang.animation.webp import write_webp
 from scenelang.backend.options import RenderError
 from scenelang.diagnostics.error import SceneError
 from scenelang.files import output_place, write_whole
+from scenelang.image import save_outputs
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
     from scenelang.animation.workers import Workers
+    from scenelang.outputs import Output
 
 WORTH_S: Final = 12.0  # drawing left that repays starting other processes, each of which loads torch
 _TRIED: Final = 3  # frames drawn here before it is decided
@@ -93,6 +95,7 @@ def make(
     palette: Palette = "auto",
     dither: bool = False,
     strict: bool = False,
+    outputs: Sequence[Output] = (),
     progress: Callable[[Progress], None] = lambda _: None,
 ) -> RenderResult:
     """Draw frames and write them whole: nothing is put in place before all of it is there.
@@ -104,6 +107,7 @@ def make(
         jobs: processes that draw; by default this one, and others as soon as they would pay.
         palette, dither: of a GIF, see `write_gif`.
         strict: count warnings as errors.
+        outputs: beside each of numbered pictures; such frames are drawn one by one and not kept.
         progress: called from any thread.
 
     Raises:
@@ -112,6 +116,8 @@ def make(
         OSError: a file cannot be written.
     """
     ready(target)
+    if outputs:
+        return _with_outputs(painter, target, numbers, outputs, strict, progress)
     suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
     made = RenderResult([], len(numbers))
     with Store(target.work, suffix) as store:
@@ -135,6 +141,27 @@ def make(
             made.files = [target.path]
         made.encode_s = time.perf_counter() - started
         store.remove()
+    return made
+
+
+def _with_outputs(
+    painter: Painter,
+    target: Target,
+    numbers: range,
+    outputs: Sequence[Output],
+    strict: bool,
+    progress: Callable[[Progress], None],
+) -> RenderResult:
+    target.path.mkdir(parents=True, exist_ok=True)
+    made, started = RenderResult([], len(numbers), drawn=len(numbers)), time.perf_counter()
+    for index, number in enumerate(numbers):
+        frame, file = painter.prepare(painter.clip.shot(number)), target.file(number)
+        if strict and painter.clip.diagnostics.items:
+            raise SceneError(painter.clip.diagnostics)
+        found = painter.outputs(frame, outputs)
+        image = painter.draw(frame, partial(_part, progress, index, len(numbers)))
+        made.files += sorted({file, *save_outputs(image, found, file, write_whole)})
+    made.draw_s = time.perf_counter() - started
     return made
 
 

@@ -12,8 +12,22 @@ from scenelang.scene.schema import Scene
 
 if TYPE_CHECKING:
     from scenelang.graph.lower import Spans
+    from scenelang.graph.nodes import Graph
     from scenelang.image import Image
     from scenelang.program.program import Program
+
+
+def exact_graph(scene: Scene, spans: Spans | None = None, model: str | None = None) -> Graph:
+    """The graph of a scene as written; raises `SceneError` where it uses what its model does not have."""
+    from scenelang.graph.lower import lower
+    from scenelang.program.compile import find_model
+
+    found = Diagnostics()
+    manifest = find_model(scene, found, model=model, spans=spans)
+    graph = lower(scene, manifest, spans, found) if manifest is not None else None
+    if graph is None or found.errors:
+        raise SceneError(found)
+    return graph
 
 
 def draw_exact(scene: Scene, *, spans: Spans | None = None, model: str | None = None) -> Image:
@@ -26,15 +40,9 @@ def draw_exact(scene: Scene, *, spans: Spans | None = None, model: str | None = 
         SceneError: the scene uses what its model does not have.
         RenderError: there is no picture from where the eye is.
     """
-    from scenelang.graph.lower import lower
-    from scenelang.program.compile import find_model
     from scenelang.reference.image import reference_image
 
-    found = Diagnostics()
-    manifest = find_model(scene, found, model=model, spans=spans)
-    graph = lower(scene, manifest, spans, found) if manifest is not None else None
-    if graph is None or found.errors:
-        raise SceneError(found)
+    graph = exact_graph(scene, spans, model)
     try:
         return reference_image(graph)
     except ValueError as error:
@@ -83,27 +91,11 @@ def render(
         raise ValueError(f"unknown samples `{samples}`; there are `adaptive`, `four` and `one`")
     if threads is not None and threads < 1:
         raise ValueError(f"{threads} threads, where at least 1 is needed")
-    if size is not None:
-        if not isinstance(program_or_scene, Scene):
-            raise ValueError("a size for a program, which is compiled for its canvas: give it with the scene")
-        program_or_scene = program_or_scene.sized(size)
-    if backend == "reference":
-        if samples != "adaptive":
-            raise RenderError("the reference always takes four samples a pixel")
-        if not isinstance(program_or_scene, Scene):
-            raise RenderError("the reference draws scenes; a program keeps only what the network needs")
-        return draw_exact(program_or_scene)
-    if backend != "neural":
-        raise ValueError(f"unknown backend `{backend}`; there are `neural` and `reference`")
-    if isinstance(program_or_scene, Scene):
-        from scenelang.program.compile import compile_scene
-
-        try:
-            program = compile_scene(program_or_scene)
-        except FileNotFoundError as error:
-            raise RenderError(f"a model has no weights here: {error.filename}") from None
-    else:
-        program = program_or_scene
+    if backend == "reference" and samples != "adaptive":
+        raise RenderError("the reference always takes four samples a pixel")
+    program = given(program_or_scene, size, backend)
+    if isinstance(program, Scene):
+        return draw_exact(program)
     from scenelang.backend.small import choose_drawer, draw_small
 
     if choose_drawer(program, device, samples).library == "numpy":
@@ -112,3 +104,27 @@ def render(
 
     model = open_model(program.model, choose_device(device))
     return draw_program(program, model, threads=threads, samples=samples, progress=progress).image
+
+
+def given(
+    program_or_scene: Program | Scene, size: tuple[int, int] | None, backend: Backend
+) -> Program | Scene:
+    """What a backend draws: the reference a Scene, the network a Program; raises as `render`."""
+    if size is not None:
+        if not isinstance(program_or_scene, Scene):
+            raise ValueError("a size for a program, which is compiled for its canvas: give it with the scene")
+        program_or_scene = program_or_scene.sized(size)
+    if backend not in get_args(Backend):
+        raise ValueError(f"unknown backend `{backend}`; there are `neural` and `reference`")
+    if not isinstance(program_or_scene, Scene):
+        if backend == "reference":
+            raise RenderError("the reference draws scenes; a program keeps only what the network needs")
+        return program_or_scene
+    if backend == "reference":
+        return program_or_scene
+    from scenelang.program.compile import compile_scene
+
+    try:
+        return compile_scene(program_or_scene)
+    except FileNotFoundError as error:
+        raise RenderError(f"a model has no weights here: {error.filename}") from None

@@ -16,6 +16,7 @@ from scenelang.animation.targets import PICTURES, Target, TargetError, find_targ
 from scenelang.animation.timing import FrameRange, FramesError
 from scenelang.cli.inputs import STDIN, Request, read_text, stem_of, unused_defines
 from scenelang.cli.main import Trouble, describe
+from scenelang.cli.outputs import check_outputs
 from scenelang.cli.progress import Bar
 from scenelang.cli.say import say_diagnostics
 from scenelang.diagnostics.diagnostic import Diagnostics
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
     from scenelang.animation.run import RenderResult
     from scenelang.backend.options import Backend, Device
+    from scenelang.outputs import Output
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,7 @@ class Requested:
     threads: int | None = None
     strict: bool = False  # count warnings as errors
     verbose: bool = False  # say where the time went
+    outputs: tuple[Output, ...] = ()  # beside each picture
 
     @property
     def certain(self) -> bool:
@@ -143,6 +146,10 @@ def animate(name: str, out: str, target: Target, request: Request, wanted: Reque
     if numbers is None or found.errors or (found.items and wanted.strict):
         say_diagnostics(found)
         return 1
+    if wanted.outputs and target.kind != "sequence":
+        what = f"`{out}` is one file; numbered pictures such as frame-%04d.png have outputs"
+        raise click.UsageError(f"{what}.")
+    check_outputs([target.file(number) for number in numbers], wanted.outputs)
     ready(target)
     painter = Painter(clip, wanted.backend, wanted.device, wanted.threads)
     try:
@@ -155,6 +162,7 @@ def animate(name: str, out: str, target: Target, request: Request, wanted: Reque
                 palette=wanted.palette,
                 dither=wanted.dither,
                 strict=wanted.strict,
+                outputs=wanted.outputs,
                 progress=lambda now: bar(now.told, now.done, now.total),
             )
     except SceneError:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from scenelang.image import Image
     from scenelang.measure.choose import Choice
     from scenelang.measure.frontier import Frontier, Limits, Point
+    from scenelang.outputs import Output, Outputs
     from scenelang.program.program import Program
 
 Draw = Callable[[Job, Callable[[float], None]], "Image"]
@@ -68,6 +69,20 @@ def exact(request: Request, clock: Clock) -> Draw:
         return image
 
     return draw
+
+
+def job_outputs(
+    job: Job, wanted: tuple[Output, ...], model: str | None, threads: int | None, *, exactly: bool
+) -> Outputs:
+    """What is known beside the picture, of the network or exactly."""
+    from scenelang.backend.outputs import exact_outputs, neural_outputs
+
+    if not exactly:
+        assert job.program is not None
+        return neural_outputs(job.program, wanted, threads)
+    assert job.source is not None
+    assert job.source.scene is not None
+    return exact_outputs(job.source.scene, wanted, spans=job.source.spans, model=model)
 
 
 # ---------------------------------------------------------------- by the frontier

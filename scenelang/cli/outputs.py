@@ -10,6 +10,7 @@ import click
 
 from scenelang.animation.targets import is_animation
 from scenelang.cli.inputs import stem_of
+from scenelang.outputs import Output
 
 
 def targets(names: Sequence[str], out: str) -> list[Path]:
@@ -49,6 +50,18 @@ def targets(names: Sequence[str], out: str) -> list[Path]:
             raise click.UsageError(f"`{first}` and `{name}` would both be drawn to `{file}`.")
     path.mkdir(parents=True, exist_ok=True)
     return files
+
+
+def check_outputs(paths: Sequence[Path], wanted: Sequence[Output]) -> None:
+    """Raise `click.UsageError` where outputs of pictures have no place, or a link is in it."""
+    from scenelang.image import output_file
+
+    try:
+        for path in paths:
+            for file in (output_file(path, name) for name in wanted):
+                _ = file == path or composed(file)
+    except ValueError as error:
+        raise click.UsageError(f"{error}.") from None
 
 
 def composed(file: Path) -> Path:

@@ -181,24 +181,31 @@ def distance_scale(steps: Sequence[Step], dimension: int = 2) -> float:
     return float(np.linalg.svd(linear, compute_uv=False)[-1])
 
 
-def evaluate(node: Node, p: Array, outer: tuple[Step, ...] = ()) -> tuple[Any, Any]:
+def evaluate(node: Node, p: Array, outer: tuple[Step, ...] = (), *, owners: bool = False) -> tuple[Any, Any]:
     """Distance D (M,) and colour C (M, 3) of a node at world points.
 
     Args:
         p: world points (d, M), float64.
         outer: steps of the folds around it, nearest first.
+        owners: in place of the colour the number (M, 1) of the object that paints; in a blend the nearer one.
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
         d = leaf_distance(node.geometry, carry_back(steps, p)) * distance_scale(steps, len(p))
-        return d, np.broadcast_to(np.asarray(node.look.colour(), np.float64), (*d.shape, 3))
-    big_d, big_c = np.full(p[0].shape, np.inf), np.zeros((*p[0].shape, 3))
+        paint = np.asarray((node.number,) if owners else node.look.colour(), np.float64)
+        return d, np.broadcast_to(paint, (*d.shape, len(paint)))
+    big_d, big_c = np.full(p[0].shape, np.inf), np.zeros((*p[0].shape, 1 if owners else 3))
     for index, link in enumerate(node.links):
-        d, c = evaluate(link.node, p, steps)
+        d, c = evaluate(link.node, p, steps, owners=owners)
         empty = isinstance(link.node, Fold) and not link.node.links
         if index == 0:
             big_d, big_c = d, c
         elif not (empty and link.op == "smooth"):  # nothing blends with the empty set
             with np.errstate(invalid="ignore"):
-                big_d, big_c = combine(big_d, big_c, d, c, TOKENS[link.op], link.k)
+                token = TOKENS[link.op]
+                if owners:
+                    big_d, share = combine(big_d, 0.0 * c, d, 0.0 * c + 1.0, token, link.k)
+                    big_c = np.where(share > 0.5, c, big_c)
+                else:
+                    big_d, big_c = combine(big_d, big_c, d, c, token, link.k)
     return big_d, big_c

@@ -140,7 +140,7 @@ class Coverage:
             touched = edge < 0  # what nothing was drawn on stays empty whatever follows
             evaluated = 0
             for row in field.rows if rows is None else self._near(rows, pad):
-                index, q, radius = self._meet(row, p, touched, pad, rows)
+                index, q, radius = self.meeting(row, p, touched, pad, rows)
                 met = q.shape[1]
                 evaluated += met
                 for start in range(0, met, CHUNK):
@@ -159,7 +159,7 @@ class Coverage:
             return Shade(field.picture(memory), edge, evaluated, met)
 
     def _near(self, rows: PixelRows, pad: float) -> list[Row]:
-        """The objects that may meet points in some rows; `_meet` finds none for the others."""
+        """The objects that may meet points in some rows; `meeting` finds none for the others."""
         if not len(rows.down):
             return []
         y, slope, more, reach, growth = self._reach.T
@@ -167,7 +167,7 @@ class Coverage:
         near = ((y + high >= -rows.down[-1]) & (y - high <= -rows.down[0])) | np.isinf(reach)
         return [self.field.rows[i] for i in np.flatnonzero(near).tolist()]
 
-    def _meet(
+    def meeting(
         self, row: Row, p: Array, touched: Array, pad: float, rows: PixelRows | None
     ) -> tuple[Array | None, Array, Array | None]:
         """Which points an object meets, and marks those on which a union draws.

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from scenelang.cli import options
-from scenelang.cli.main import describe
+from scenelang.cli.main import Trouble, describe
 from scenelang.cli.progress import Bar, Clock
 from scenelang.cli.say import say_diagnostics, say_trouble
 
@@ -18,7 +19,9 @@ if TYPE_CHECKING:
     from scenelang.cli.jobs import Job
     from scenelang.diagnostics.span import SourceFile
     from scenelang.evaluate.session import Defines
+    from scenelang.image import Image
     from scenelang.measure.frontier import Limits
+    from scenelang.outputs import Output, Outputs
 
 
 @click.command("render")
@@ -53,6 +56,14 @@ if TYPE_CHECKING:
     help="Samples of a pixel: four near outlines, four everywhere, or one, with hard edges.",
 )
 @click.option(
+    "--output",
+    "outputs",
+    multiple=True,
+    type=click.Choice(("depth", "normal", "object", "alpha")),
+    help="Write this beside the picture too, to OUT's STEM.depth.png and so on, or into an .exr; may be "
+    "given several times.",
+)
+@click.option(
     "--max-ms",
     type=click.FloatRange(0, min_open=True),
     metavar="N",
@@ -85,6 +96,7 @@ def command(
     model: str | None,
     backend: options.Backend,
     samples: Samples,
+    outputs: tuple[Output, ...],
     max_ms: float | None,
     max_flip: float | None,
     device: Literal["auto", "cpu", "cuda"],
@@ -108,18 +120,22 @@ def command(
       FOLDER/                       FOLDER/STEM-0000.png and so on
     A run that was interrupted goes on where it stopped.
 
+    With --output, PNG files have 16 bits and say what they hold in a text `scenelang`; an .exr holds the
+    picture and all outputs as layers of floats.
+
     With --max-ms or --max-flip each scene is drawn by what was measured to suffice, model and samples; -v
     says which, why, and what was next.
     """
     from scenelang.cli.animation import Requested, animate, wanted_target
-    from scenelang.cli.drawing import check_options, chosen, exact, neural
+    from scenelang.cli.drawing import check_options, chosen, exact, job_outputs, neural
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import PROGRAM
-    from scenelang.cli.outputs import targets
+    from scenelang.cli.outputs import check_outputs, targets
     from scenelang.measure.frontier import Limits
 
+    outputs = tuple(dict.fromkeys(outputs))
     clock = Clock()
-    wanted = Requested(frames, fps, jobs, palette, dither, backend, device, threads, strict, verbose)
+    wanted = Requested(frames, fps, jobs, palette, dither, backend, device, threads, strict, verbose, outputs)
     _ = wanted.frames
     if frame is not None and wanted.certain:
         raise click.UsageError("--frame asks for a picture, --frames and --fps for an animation.")
@@ -140,8 +156,9 @@ def command(
     elif wanted.certain:
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
     paths = targets(files, out)
-    found, code = _prepared(files, request, clock, strict, backend, verbose, source)
-    ready = [(job, path) for job, path in zip(found, paths, strict=True) if job and not job.failed(strict)]
+    check_outputs(paths, outputs)
+    inputs, code = _prepared(files, request, clock, strict, backend, verbose, source)
+    ready = [(job, path) for job, path in zip(inputs, paths, strict=True) if job and not job.failed(strict)]
     if not ready:
         ctx.exit(code)
     if limits:
@@ -152,17 +169,37 @@ def command(
         draw = exact(request, clock)
     else:
         draw = neural(clock, device, threads, samples)
+    told: list[str] = []
     with Bar() as bar:
         for index, (job, path) in enumerate(ready):
+            if outputs:  # before the picture: what it lacks is said at once
+                with clock("outputs"):
+                    found = job_outputs(job, outputs, request.model, threads, exactly=backend == "reference")
             image = draw(job, partial(_part, bar, index, len(ready)))
             with clock("save"):
-                image.save(path)
+                if outputs:
+                    told += _saved(image, found, path)
+                else:
+                    image.save(path)
             if verbose:
                 lines = "".join(f"\n  {note}" for note in job.notes)
                 click.echo(f"{job.name} -> {path}{lines}", err=True)
+    for line in told:
+        click.echo(line, err=True)
     if verbose:
         click.echo(clock.report(), err=True)
     ctx.exit(code)
+
+
+def _saved(image: Image, outputs: Outputs, path: Path) -> list[str]:
+    """Write a picture and its outputs; a line about each of these."""
+    from scenelang.image import save_outputs
+
+    try:
+        files = save_outputs(image, outputs, path)
+    except ValueError as error:
+        raise Trouble(f"cannot write `{path}`: {error}") from None
+    return [f"{file}: {outputs.told(name)}" for file, name in zip(files, outputs.names, strict=True)]
 
 
 def _prepared(

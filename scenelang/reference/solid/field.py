@@ -31,6 +31,7 @@ class State:
         near: no nearer than this does the kind of material change inside.
         rgb: linear colour, (3, 1) or (3, M).
         slope: gradient of d, (3, M).
+        owner: number of the object whose material holds, from 1.
     """
 
     d: Any
@@ -38,6 +39,7 @@ class State:
     near: Any = None
     rgb: Any = None
     slope: Any = None
+    owner: Any = None
 
     def kind(self) -> npt.NDArray[np.int8]:
         """`OUT`, `MEDIUM` or `OPAQUE`, (M,)."""
@@ -45,7 +47,7 @@ class State:
         return np.asarray(kind, np.int8)
 
 
-NOTHING = State(np.float64(FAR), np.False_, np.float64(FAR), np.zeros((3, 1)), np.zeros((3, 1)))
+NOTHING = State(np.float64(FAR), np.False_, np.float64(FAR), np.zeros((3, 1)), np.zeros((3, 1)), 0)
 
 
 def join(op: str, k: float, a: State, b: State) -> State:
@@ -65,10 +67,11 @@ def join(op: str, k: float, a: State, b: State) -> State:
         d, turn = np.maximum(a.d, b.d), b.d >= a.d
     slope = None if a.slope is None or b.slope is None else a.slope + (side * b.slope - a.slope) * turn
     if paint is None:
-        return State(d, a.medium, near, a.rgb, slope)
+        return State(d, a.medium, near, a.rgb, slope, a.owner)
     medium = np.where(paint > 0.5, b.medium, a.medium)
     rgb = None if a.rgb is None or b.rgb is None else a.rgb + (b.rgb - a.rgb) * paint
-    return State(d, medium, near, rgb, slope)
+    owner = None if a.owner is None or b.owner is None else np.where(paint > 0.5, b.owner, a.owner)
+    return State(d, medium, near, rgb, slope, owner)
 
 
 class Field:
@@ -131,12 +134,12 @@ class Field:
 
     def at(self, p: Array, *, gradient: bool = False) -> State:
         """All that the fold carries at world points (3, M), near left out, the gradient only if asked for."""
-        bodies = iter(self.bodies)
+        bodies = enumerate(self.bodies, 1)
 
         def known() -> State:
-            body = next(bodies)
+            number, body = next(bodies)
             slope = body.gradient(p) if gradient else None
-            return State(body.distance(p)[0], np.bool_(body.medium), None, body.rgb, slope)
+            return State(body.distance(p)[0], np.bool_(body.medium), None, body.rgb, slope, number)
 
         return _fold(self.root, known)
 

@@ -10,8 +10,8 @@ from scenelang.image import Image, from_samples
 from scenelang.reference.field import Array
 from scenelang.reference.samples import sample_points
 from scenelang.reference.solid.body import length
-from scenelang.reference.solid.field import OPAQUE, Field
-from scenelang.reference.solid.rays import Ints, march
+from scenelang.reference.solid.field import OPAQUE, Field, State
+from scenelang.reference.solid.rays import Changes, Ints, march
 
 TILE = 1 << 15  # samples at a time
 TOLERANCE = 2e-4
@@ -44,13 +44,9 @@ def solid_image(root: Fold, stage: Stage, canvas: tuple[int, int], *, per_side: 
     width, height = canvas
     step = max(1, TILE // (width * per_side * per_side))
     picture = np.empty((4, height, width))
-    forward, right, up = (np.reshape(axis, (3, 1)) for axis in stage.camera.axes())
-    forward = forward / np.tan(stage.camera.fov_rad / 2.0)
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
-        x, y = sample_points(canvas, rows, per_side)
-        way = forward + x * right + y * up
-        samples = radiance(field, stage, way / length(way))
+        samples = radiance(field, stage, ways(stage, canvas, rows, per_side))
         picture[:, top : rows.stop] = samples.reshape(4, len(rows), per_side, width, per_side).mean((2, 4))
     light, alpha = np.moveaxis(picture[:3], 0, 2), picture[3]
     if not stage.transparent:
@@ -66,15 +62,8 @@ def encoded(light: Array) -> Array:
 
 def radiance(field: Field, stage: Stage, d: Array) -> Array:
     """Linear light, premultiplied, and alpha (4, M), that comes to the eye along unit directions d (3, M)."""
-    o = np.broadcast_to(np.reshape(stage.camera.eye, (3, 1)), d.shape)
-    end = np.full(d.shape[1], np.inf)
     behind = np.concatenate([_sky(stage, d), np.full((1, d.shape[1]), not stage.transparent)])
-    if stage.ground and stage.camera.eye[1] > stage.ground.y:
-        down = np.nonzero(d[1] < 0.0)[0]
-        end[down] = (stage.ground.y - stage.camera.eye[1]) / d[1, down]
-    changes = march(field, o, d, end, exact=True)
-    if (changes.first == OPAQUE).any():
-        raise ValueError("the eye is inside an opaque object")
+    o, end, changes = seen_along(field, stage, d)
     if stage.ground:
         seen = np.nonzero((end < np.inf) & (changes.last != OPAQUE))[0]
         behind[:3, seen] = _ground(field, stage, stage.ground, o[:, seen] + end[seen] * d[:, seen])
@@ -98,6 +87,34 @@ def radiance(field: Field, stage: Stage, d: Array) -> Array:
     return out
 
 
+def seen_along(field: Field, stage: Stage, d: Array) -> tuple[Array, Array, Changes]:
+    """Of rays along d (3, M) where each begins (3, M), where the ground ends it (M,), and what it meets."""
+    o = np.broadcast_to(np.reshape(stage.camera.eye, (3, 1)), d.shape)
+    end = np.full(d.shape[1], np.inf)
+    if stage.ground and stage.camera.eye[1] > stage.ground.y:
+        down = np.nonzero(d[1] < 0.0)[0]
+        end[down] = (stage.ground.y - stage.camera.eye[1]) / d[1, down]
+    changes = march(field, o, d, end, exact=True)
+    if (changes.first == OPAQUE).any():
+        raise ValueError("the eye is inside an opaque object")
+    return o, end, changes
+
+
+def ways(stage: Stage, canvas: tuple[int, int], rows: range, per_side: int) -> Array:
+    """Unit directions (3, M) of the samples of some pixel rows, row by row of samples."""
+    forward, right, up = (np.reshape(axis, (3, 1)) for axis in stage.camera.axes())
+    x, y = sample_points(canvas, rows, per_side)
+    way: Array = forward / np.tan(stage.camera.fov_rad / 2.0) + x * right + y * up
+    return way / length(way)
+
+
+def facing(field: Field, p: Array, d: Array) -> tuple[State, Array]:
+    """What holds just behind surface points met along d, and unit normals towards where d comes from."""
+    state = field.at(p + _INSIDE * d, gradient=True)
+    normal = state.slope / np.maximum(length(state.slope), 1e-12)
+    return state, np.where((normal * d).sum(0) > 0.0, -normal, normal)
+
+
 def _sky(stage: Stage, d: Array) -> Array:
     if stage.transparent:
         return np.zeros(d.shape)
@@ -115,9 +132,7 @@ def _ground(field: Field, stage: Stage, ground: Ground, p: Array) -> Array:
 
 def _surface(field: Field, light: Light, p: Array, d: Array) -> Array:
     """Light from points of solids to where the directions d come from."""
-    state = field.at(p + _INSIDE * d, gradient=True)
-    normal = state.slope / np.maximum(length(state.slope), 1e-12)
-    normal = np.where((normal * d).sum(0) > 0.0, -normal, normal)
+    state, normal = facing(field, p, d)
     return state.rgb * _received(field, light, p, normal)
 
 

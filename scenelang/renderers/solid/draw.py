@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
+from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Camera, Stage
 from scenelang.image import Image, from_samples
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
@@ -68,20 +68,16 @@ class Lighting:
             way: unit directions (3, M).
         """
         xp, stage, field = self.xp, self.stage, self.field
-        seen, limit = self._sky(way), 0 * way[0] + INF
+        seen, limit = self._sky(way), self.limit(way)
         alpha = 0 * way[0] + (0.0 if stage.transparent else 1.0)
         if stage.transparent:
             seen = seen * 0
-        if stage.ground is not None and stage.camera.eye[1] > stage.ground.y:
-            down = way[1] < 0
-            drop = (stage.ground.y - stage.camera.eye[1]) / xp.select(down, way[1], way[1] * 0 - 1)
-            limit = xp.select(down, drop, limit)
         trail = march(field, self.eye, way, limit)
         work = Work(way.shape[1], 0, trail.near, trail.steps, trail.met)
         surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
         both = xp.concat([surface, floor], 0)
         if len(both):
-            parts = [self._surface(xp.take(way, surface), surface, trail)] if len(surface) else []
+            parts = [self.surface(xp.take(way, surface), surface, trail)] if len(surface) else []
             if len(floor):
                 parts.append(self._ground(xp.take(way, floor), xp.take(limit, floor)))
             p, n, colour, haze, free = (xp.concat(list(part), -1) for part in zip(*parts, strict=True))
@@ -94,6 +90,14 @@ class Lighting:
             glow, more = self._scattered(way, trail)
             seen, alpha, work = seen * clear + glow, 1 - (1 - alpha) * clear, work + more
         return Shade(seen, alpha, work)
+
+    def limit(self, way: Array) -> Array:
+        """How far rays from the eye go before they meet the ground (M,), inf for ever."""
+        xp, eye, ground, never = self.xp, self.stage.camera.eye, self.stage.ground, 0 * way[0] + INF
+        if ground is None or eye[1] <= ground.y:
+            return never
+        down = way[1] < 0
+        return xp.select(down, (ground.y - eye[1]) / xp.select(down, way[1], way[1] * 0 - 1), never)
 
     def _sky(self, way: Array) -> Array:
         high = (way[1] * 2).clip(0.0, 1.0)
@@ -121,7 +125,7 @@ class Lighting:
         work = Work(0, p.shape[1], trail.near, trail.steps, trail.met)
         return (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length), work
 
-    def _surface(self, way: Array, index: Array, trail: Trail) -> tuple[Array, ...]:
+    def surface(self, way: Array, index: Array, trail: Trail) -> tuple[Array, ...]:
         """Points where rays meet solids, normals, colours, and light that joins in before, (3, K) each, and
         where a ray to the light starts outside of what is opaque (K,)."""
         xp = self.xp
@@ -162,7 +166,7 @@ class Lighting:
         return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-GAP, GAP)
 
     def _ground(self, way: Array, t: Array) -> tuple[Array, ...]:
-        """As `_surface`, of the ground at t (K,)."""
+        """As `surface`, of the ground at t (K,)."""
         xp, ground = self.xp, self.stage.ground
         assert ground is not None
         p = self.eye[:, None] + way * t
@@ -292,7 +296,7 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
         once, work = _shade(lighting, canvas, np.arange(width) + 0.5, np.array(near)[:, None] + 0.5)
         band = slice(rows.start - near.start, rows.stop - near.start)
         picture = np.ascontiguousarray(once[:, band])
-        y, x = np.nonzero(_rough(once if lighting.stage.transparent else once[:3])[band])
+        y, x = np.nonzero(rough(once if lighting.stage.transparent else once[:3])[band])
     else:
         picture, work = np.empty((4, len(rows), width), np.float32), Work()
         y, x = (a.reshape(-1) for a in np.mgrid[0 : len(rows), 0:width])
@@ -308,21 +312,26 @@ def _shade(
     lighting: Lighting, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, Work]:
     """Radiance and alpha (4, …) at places of the picture in pixels from its upper left corner."""
-    xp, camera = lighting.xp, lighting.stage.camera
-    forward, right, up = (np.reshape(axis, (3, 1, 1)) for axis in camera.axes())
-    px, (width, height) = 2 / min(canvas), canvas
-    # float64 up to here: at 8192 pixels float32 would move samples by a thousandth of a pixel
-    across = (right * ((x - width / 2) * px)).astype(np.float32)
-    ahead = (forward / np.tan(camera.fov_rad / 2) + up * ((height / 2 - y) * px)).astype(np.float32)
-    way = ahead + across
-    way /= np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+    xp, way = lighting.xp, directions(lighting.stage.camera, canvas, x, y)
     with xp.inference():
         shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes))
         both = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None]], 0))
     return both.reshape(4, *way.shape[1:]), shade.work
 
 
-def _rough(picture: np.ndarray) -> np.ndarray:
+def directions(camera: Camera, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Unit directions (3, …) of rays through places of the picture in pixels from its upper left corner."""
+    forward, right, up = (np.reshape(axis, (3, 1, 1)) for axis in camera.axes())
+    px, (width, height) = 2 / min(canvas), canvas
+    # float64 up to here: at 8192 pixels float32 would move samples by a thousandth of a pixel
+    across = (right * ((x - width / 2) * px)).astype(np.float32)
+    ahead = (forward / np.tan(camera.fov_rad / 2) + up * ((height / 2 - y) * px)).astype(np.float32)
+    way: np.ndarray = ahead + across
+    way /= np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+    return way
+
+
+def rough(picture: np.ndarray) -> np.ndarray:
     """Pixels (H, W) of (4, H, W) that differ from what lies evenly between neighbours on opposite sides."""
     shown = np.sqrt(np.clip(picture, 0.0, 1.0))  # nearly as bright as it looks
     shown = np.pad(shown, ((0, 0), (1, 1), (1, 1)), "edge")

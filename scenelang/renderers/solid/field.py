@@ -204,7 +204,7 @@ class SolidField:
             pairs += met
             place = None if met == count else index
             before = _part(xp, memory, place)
-            d, own = self._distance(solid, _part(xp, p, place), gradient)
+            d, own = self.distance(solid, _part(xp, p, place), gradient)
             cell = solid.cells[wanted]
             found, take = self.network.join(d, before, solid.look, cell, wanted)
             if bound is not None:
@@ -221,7 +221,7 @@ class SolidField:
             bound = xp.minimum(bound, abs(memory[0]))
         return Meeting(memory[0], memory[1:], slope, bound, pairs)
 
-    def _distance(self, solid: Solid, p: Array, gradient: bool) -> tuple[Array, Array | None]:
+    def distance(self, solid: Solid, p: Array, gradient: bool) -> tuple[Array, Array | None]:
         """An object's world distance (M,) at world points (3, M), and its gradient (3, M) if asked for."""
         xp, network, frame = self.xp, self.network, solid.frame
         scale = frame.scale

@@ -1,0 +1,109 @@
+"""What is known of a picture beside its colours in one call: `scenelang.render_outputs`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, get_args
+
+from scenelang.backend.options import Backend, RenderError, keep_memory, usable_cores
+from scenelang.backend.render import exact_graph, given
+from scenelang.outputs import PLANE, Output, Outputs, Source
+from scenelang.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from scenelang.graph.lower import Spans
+    from scenelang.program.program import Place, Program
+
+
+def render_outputs(
+    program_or_scene: Program | Scene,
+    outputs: Sequence[Output],
+    *,
+    size: tuple[int, int] | None = None,
+    backend: Backend = "neural",
+    threads: int | None = None,
+) -> Outputs:
+    """Depth, normals, objects and alpha of a picture, for compositing; numpy computes them.
+
+    Args:
+        program_or_scene: what to look at.
+        outputs: which of ``"depth"``, ``"normal"``, ``"object"`` and ``"alpha"``; 2D has the last two.
+        size: canvas in pixels instead of the Scene's.
+        backend: ``"neural"`` asks the trained network, ``"reference"`` of a Scene the exact definition.
+        threads: of solids, by default as many as there are usable cores.
+
+    Returns:
+        Arrays (H, W) or (H, W, 3), None for what was not asked for.
+
+    Raises:
+        SceneError: the Scene cannot be compiled.
+        RenderError: the model or the scene has no such output, the weights are missing or others, or the
+            reference was given a Program.
+        ValueError: an argument is none of the above.
+    """
+    for name in outputs:
+        if name not in get_args(Output):
+            raise ValueError(f"unknown output `{name}`; there are {', '.join(get_args(Output))}")
+    found = given(program_or_scene, size, backend)
+    if isinstance(found, Scene):
+        return exact_outputs(found, outputs)
+    return neural_outputs(found, outputs, threads)
+
+
+def neural_outputs(program: Program, wanted: Sequence[Output], threads: int | None = None) -> Outputs:
+    """Outputs of a Program by its network; raises as `render_outputs`."""
+    from scenelang.models.framed import load_arrays
+    from scenelang.models.manifest import load_manifest
+    from scenelang.models.weights import ModelError
+    from scenelang.program.program import ProgramError
+    from scenelang.renderers.outputs import program_outputs
+
+    _check(wanted, program.stage is None)
+    try:
+        if load_manifest(program.model).renderer not in ("framed", "solid"):
+            raise RenderError(f"model `{program.model}` draws colours only")
+        keep_memory()
+        network, digest = load_arrays(program.model)
+        program.check_weights(digest)
+        found = program_outputs(network, program, threads=threads or usable_cores())
+    except KeyError:
+        raise RenderError(f"unknown model `{program.model}`") from None
+    except (ModelError, ProgramError) as error:
+        raise RenderError(str(error)) from None
+    return found.only(wanted, _sources(program.numbers, program.objects, program.places))
+
+
+def exact_outputs(
+    scene: Scene, wanted: Sequence[Output], *, spans: Spans | None = None, model: str | None = None
+) -> Outputs:
+    """Outputs of a scene by the exact definition; raises as `render_outputs`."""
+    from scenelang.graph.nodes import leaves
+    from scenelang.program.emit import places_of
+    from scenelang.reference.outputs import graph_outputs
+
+    graph = exact_graph(scene, spans, model)
+    _check(wanted, graph.stage is None)
+    try:
+        found = graph_outputs(graph)
+    except ValueError as error:
+        raise RenderError(str(error)) from None
+    objects = list(leaves(graph.root))
+    names, numbers = [leaf.geometry for leaf in objects], [leaf.number for leaf in objects]
+    return found.only(wanted, _sources(numbers, names, places_of([leaf.span for leaf in objects])))
+
+
+def _check(wanted: Sequence[Output], flat: bool) -> None:
+    for name in wanted:
+        if flat and name not in PLANE:
+            raise RenderError(f"a 2D picture has no {name}; it has {' and '.join(PLANE)}")
+
+
+def _sources(
+    numbers: Sequence[int], names: Sequence[str], places: Sequence[Place | None]
+) -> dict[int, Source]:
+    rows = zip(numbers, names, places, strict=True)
+    return {n: {"geometry": name, **_written(place)} for n, name, place in rows}
+
+
+def _written(place: Place | None) -> Source:
+    return {} if place is None else {"file": place.file, "line": place.line, "column": place.column}

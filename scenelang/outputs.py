@@ -1,0 +1,161 @@
+"""What is known of a picture's pixels beside their colour, and the files of it that people composite with.
+
+A PNG holds one output in 16 bits, an EXR the picture and all outputs as layers of floats. Both carry a text
+``scenelang``, JSON, that says what the numbers are and which objects are seen.
+
+Source: W3C, Portable Network Graphics (PNG) Specification, third edition, 2025, chapters 5 and 11.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import tempfile
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+Output = Literal["depth", "normal", "object", "alpha"]
+PLANE: tuple[Output, ...] = ("object", "alpha")
+"""What 2D pictures have."""
+DEEP = 0.01
+"""World units in a medium where its object is asked for, where it is as deep."""
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+Floats = npt.NDArray[np.float32]
+Source = dict[str, str | int]
+"""Of an object its ``geometry``, and ``file``, ``line`` and ``column`` where they are known."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outputs:
+    """Outputs of a picture; None where one was not asked for. Row 0 is the top.
+
+    Depth, normal and object are of the pixel's centre and not antialiased: no depth lies between two
+    surfaces. Media have neither depth nor normal.
+
+    Args:
+        depth: float32 (H, W), world units along the camera's axis to the first solid or the ground; inf where
+            there is neither.
+        normal: float32 (H, W, 3), of the same surface, unit length, in world axes, turned to the viewer; 0
+            where there is none.
+        object: int32 (H, W), number of the object in the scene as written, from 1: of the solid, or of the
+            first medium where no solid is seen; 0 for ground and background.
+        alpha: float32 (H, W), in [0, 1], how much of the pixel objects cover, ground and background left out;
+            a medium covers 1 - its transmittance.
+        objects: what the numbers in ``object`` are, in order.
+    """
+
+    depth: Floats | None = None
+    normal: Floats | None = None
+    object: npt.NDArray[np.int32] | None = None
+    alpha: Floats | None = None
+    objects: Mapping[int, Source] | None = None
+
+    def only(self, wanted: Sequence[Output], sources: Mapping[int, Source]) -> Outputs:
+        """Those that are asked for, with what ``sources`` says of the objects that are seen."""
+        found = {name: getattr(self, name) for name in wanted}
+        if self.object is None or "object" not in wanted:
+            return Outputs(**found)
+        seen = {n: sources[n] for n in np.unique(self.object).tolist() if n}
+        return Outputs(**found, objects=seen)
+
+    @property
+    def names(self) -> tuple[Output, ...]:
+        """Those that there are."""
+        return tuple(name for name in get_args(Output) if getattr(self, name) is not None)
+
+    def facts(self, name: Output) -> dict[str, Any]:
+        """What the file of an output says of its numbers, as JSON data."""
+        said: dict[str, Any] = {"output": name}
+        if name == "depth":
+            near, far = self.range()
+            said |= {"unit": "scene units along the camera's axis", "near": near, "far": far}
+        elif name == "normal":
+            said |= {"axes": "world"}
+        elif name == "object":
+            said |= {"objects": [{"index": n, **source} for n, source in (self.objects or {}).items()]}
+        return said
+
+    def range(self) -> tuple[float | None, float | None]:
+        """Least and greatest depth; None where no surface is seen."""
+        assert self.depth is not None
+        found = self.depth[np.isfinite(self.depth)]
+        return (float(found.min()), float(found.max())) if found.size else (None, None)
+
+    def told(self, name: Output) -> str:
+        """What to say about the file of an output."""
+        if name != "depth":
+            seen = f"{len(self.objects or ())} objects seen"
+            return {"normal": "normals in world axes", "object": seen}.get(name, "coverage by objects")
+        near, far = self.range()
+        return "no surface" if near is None else f"depth from {near:.6g} to {far:.6g} scene units"
+
+    def png(self, name: Output) -> bytes:
+        """An output as a PNG of 16 bits.
+
+        Depth is ``65535 near / depth``, 0 for none; a normal ``65535 (n + 1) / 2``; alpha ``65535 alpha``;
+        objects are their numbers.
+
+        Raises:
+            ValueError: a number has more than 16 bits.
+        """
+        facts, values = self.facts(name), np.asarray(getattr(self, name), np.float64)
+        if name == "depth":
+            values = 65535.0 * (facts["near"] or 0.0) / values
+            facts["stored"] = "65535 near / depth, 0 for none"
+        elif name == "normal":
+            values = 65535.0 * (values + 1.0) / 2.0
+            facts["stored"] = "65535 (normal + 1) / 2"
+        elif name == "alpha":
+            values = 65535.0 * values
+            facts["stored"] = "65535 alpha"
+        elif values.max(initial=0.0) > 65535.0:
+            raise ValueError("objects numbered beyond 65535, which only .exr holds")
+        return png16(np.floor(values + 0.5).astype(np.uint16), json.dumps(facts))
+
+    def layers(self) -> dict[str, Floats]:
+        """The channels of an EXR."""
+        single = {"depth.Z": self.depth, "object.id": self.object, "alpha.A": self.alpha}
+        found = {name: np.asarray(v, np.float32) for name, v in single.items() if v is not None}
+        if self.normal is not None:
+            found |= {f"normal.{axis}": self.normal[..., at] for at, axis in enumerate("XYZ")}
+        return found
+
+
+def chunk(kind: bytes, body: bytes) -> bytes:
+    """A chunk of a PNG."""
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+def png16(values: npt.NDArray[np.uint16], text: str) -> bytes:
+    """A PNG of 16 bits, grey (H, W) or RGB (H, W, 3), with a text `scenelang` in ASCII."""
+    height, width = values.shape[:2]
+    rows = values.astype(">u2").reshape(height, -1).view(np.uint8)
+    filtered = np.pad(rows, ((0, 0), (1, 0)))  # a byte 0, for no filter, before each row
+    head = struct.pack(">IIBBBBB", width, height, 16, 2 * (values.ndim - 2), 0, 0, 0)
+    body = chunk(b"IHDR", head) + chunk(b"tEXt", b"scenelang\0" + text.encode("ascii"))
+    return SIGNATURE + body + chunk(b"IDAT", zlib.compress(filtered.tobytes())) + chunk(b"IEND", b"")
+
+
+def can_exr() -> bool:
+    """Whether what writes EXR is installed."""
+    return find_spec("OpenEXR") is not None
+
+
+def exr(layers: Mapping[str, Floats], facts: object = None) -> bytes:
+    """An EXR of float channels (H, W) by their names; needs the extra ``exr``."""
+    import OpenEXR
+
+    head = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    if facts:
+        head["scenelang"] = json.dumps(facts)
+    with tempfile.TemporaryDirectory() as folder:  # the library writes to paths alone
+        path = Path(folder) / "picture.exr"
+        OpenEXR.File(head, {name: np.ascontiguousarray(v) for name, v in layers.items()}).write(str(path))
+        return path.read_bytes()

@@ -1,0 +1,77 @@
+"""Exact depth, normal, object and alpha, in float64, from the graph as written."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenelang.graph.nodes import Graph
+from scenelang.graph.stage import EXTINCTION, Stage
+from scenelang.outputs import DEEP, Outputs
+from scenelang.reference.field import Array, evaluate
+from scenelang.reference.image import TILE
+from scenelang.reference.samples import sample_points
+from scenelang.reference.solid.field import OPAQUE, Field
+from scenelang.reference.solid.image import TILE as SOLID_TILE
+from scenelang.reference.solid.image import facing, seen_along, ways
+
+
+def graph_outputs(graph: Graph) -> Outputs:
+    """All outputs that a lowered graph has.
+
+    Raises:
+        ValueError: the eye is inside something opaque.
+    """
+    width, height = graph.canvas
+    solid = graph.stage is not None
+    found = np.zeros((6, height, width))  # depth, normal, object and alpha
+    step = max(1, (SOLID_TILE if solid else TILE) // (4 * width))
+    field = Field(graph.root) if solid else None
+    for top in range(0, height, step):
+        rows = range(top, min(top + step, height))
+        if graph.stage is not None and field is not None:
+            centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
+            alpha = _covered(field, graph.stage, ways(graph.stage, graph.canvas, rows, 2))
+        else:
+            d, owner = evaluate(graph.root, sample_points(graph.canvas, rows, 1), owners=True)
+            centres = np.where(d < 0, owner[:, 0], 0)
+            alpha = evaluate(graph.root, sample_points(graph.canvas, rows, 2))[0] < 0
+        found[0 if solid else 4 : 5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
+        found[5, rows.start : rows.stop] = alpha.reshape(len(rows), 2, width, 2).mean((1, 3))
+    depth, normal, owner, alpha = found[0], np.moveaxis(found[1:4], 0, 2), found[4], found[5]
+    return Outputs(
+        depth.astype(np.float32) if solid else None,
+        normal.astype(np.float32) if solid else None,
+        owner.astype(np.int32),
+        alpha.astype(np.float32),
+    )
+
+
+def _covered(field: Field, stage: Stage, d: Array) -> Array:
+    """How much of what is behind objects hide along unit directions d (3, M)."""
+    _, end, changes = seen_along(field, stage, d)
+    hit = changes.after == OPAQUE
+    end[changes.ray[hit]] = changes.t[hit]
+    covered = (changes.last == OPAQUE).astype(float)
+    ray, enter, leave = changes.media(end)
+    depth = np.bincount(ray, leave - enter, len(end))
+    return 1.0 - (1.0 - covered) * np.exp(-EXTINCTION * depth)
+
+
+def _shown(field: Field, stage: Stage, d: Array) -> Array:
+    """Depth, normal and object (5, M) along unit directions d (3, M)."""
+    o, end, changes = seen_along(field, stage, d)
+    forward = np.asarray(stage.camera.axes()[0])
+    out = np.zeros((5, len(end)))
+    out[2, end < np.inf] = 1.0
+    hit = changes.after == OPAQUE
+    ray = changes.ray[hit]
+    end[ray] = changes.t[hit]
+    inside, enter, leave = changes.media(end)
+    inside, first = np.unique(inside, return_index=True)
+    t = np.minimum((enter[first] + leave[first]) / 2.0, enter[first] + DEEP)
+    out[4, inside] = field.at(o[:, inside] + t * d[:, inside]).owner
+    p = o[:, ray] + end[ray] * d[:, ray]
+    state, out[1:4, ray] = facing(field, p, d[:, ray])
+    out[4, ray] = state.owner
+    out[0] = np.where(end < np.inf, (forward @ d) * np.where(end < np.inf, end, 1.0), np.inf)
+    return out
