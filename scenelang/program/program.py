@@ -3,8 +3,7 @@
 Its file is safetensors with a JSON header, read as if a stranger had written it. Tensors: ``vectors`` F32
 (N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the header's ``geometries``,
 ``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line, end column), all -1 where
-unknown; where rows are not all objects in order, ``numbers`` I32 (N,). The header is the metadata entry
-``scenelang``, where solids have a ``stage``.
+unknown, ``numbers`` I32 (N,) unless 1 to N. The header is metadata ``scenelang``, with the ``stage`` of solids.
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ class Program:
         objects: geometry name of each row.
         places: where each row was written; None where that is unknown.
         stage: camera, light, ground and sky of a scene of solids; None in the plane.
-        numbers: of each row's object in the scene as written, from 1; by default those of the rows.
+        numbers: of each row's object in the scene as written, from 1; by default the rows'.
 
     Raises:
         ProgramError: anything is not as above.
@@ -90,7 +89,7 @@ class Program:
             object.__setattr__(self, name, _frozen(name, getattr(self, name), dtype, shape))
         if len(self.places) != count:
             raise ProgramError(f"{len(self.places)} places for {count} objects")
-        object.__setattr__(self, "numbers", self.numbers or _in_order(count))
+        object.__setattr__(self, "numbers", self.numbers or tuple(range(1, count + 1)))
         if len(self.numbers) != count or not all(0 < n <= MOST_OBJECTS for n in self.numbers):
             raise ProgramError(f"numbers that are not those of {count} objects")
         _check_rows(self)
@@ -131,10 +130,6 @@ class Program:
         write_output(path, program_bytes(self))
 
 
-def _in_order(count: int) -> tuple[int, ...]:
-    return tuple(range(1, count + 1))
-
-
 def program_bytes(program: Program) -> bytes:
     """The file of a Program; equal Programs give equal bytes."""
     from safetensors.numpy import save
@@ -162,7 +157,7 @@ def program_bytes(program: Program) -> bytes:
         "objects": np.array([of_geometry[name] for name in program.objects], dtype=np.int32),
         "places": np.array(places, dtype=np.int32).reshape(len(program), 5),
     }
-    if program.numbers != _in_order(len(program)):
+    if program.numbers != tuple(range(1, len(program) + 1)):
         tensors["numbers"] = np.array(program.numbers, dtype=np.int32)
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     data: bytes = save(tensors, metadata={"scenelang": text})
