@@ -3,7 +3,7 @@
 Its file is safetensors with a JSON header, read as if a stranger had written it. Tensors: ``vectors`` F32
 (N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the header's ``geometries``,
 ``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line, end column), all -1 where
-unknown, ``numbers`` I32 (N,) unless 1 to N. The header is metadata ``scenelang``, with the ``stage`` of solids.
+unknown, ``numbers`` I32 (N,) unless 1 to N. The header is metadata ``scenelang``, with a stage of solids.
 """
 
 from __future__ import annotations
