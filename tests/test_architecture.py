@@ -214,6 +214,17 @@ def test_check_loads_neither_torch_nor_numpy() -> None:
     assert not loaded_by("check", str(ROOT / "examples/night.nsg")) & {"torch", "numpy", "lark"}
 
 
+def test_check_loads_no_more_for_solids(tmp_path: Path) -> None:
+    """Above all not what pydantic needs to build validators."""
+    scene = tmp_path / "solids.nsg"
+    scene.write_text(
+        "camera(eye = [1, 2, 5]); light(color = #fed); ground(color = #cba);"
+        " subtract { torus; sphere { twist(1); material volumetric { color(#fed); hue(10deg); } } }"
+    )
+    flat = loaded_by("check", str(ROOT / "examples/night.nsg"))
+    assert loaded_by("check", str(scene)) <= flat
+
+
 def test_help_loads_nothing_heavy() -> None:
     assert not loaded_by("--help") & {"torch", "numpy", "pydantic"}
 

@@ -46,7 +46,7 @@ class Solid(Space):
 
     def inked(self, op: schema.MaterialOp) -> schema.MaterialOp:
         """Light adds up, so that colours are linear."""
-        return schema.Color(decoded(op.rgb)) if isinstance(op, schema.Color) else op
+        return op.model_copy(update={"rgb": decoded(op.rgb)}) if isinstance(op, schema.Color) else op
 
     def written(self, rgb: tuple[float, float, float]) -> tuple[float, float, float]:
         return encoded(rgb)
