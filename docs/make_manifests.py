@@ -18,8 +18,8 @@ from typing import Any
 
 from scenelang.lab.stability.ranges import measured_ranges
 from scenelang.measure.metrics import MOST_DB
-from scenelang.measure.sets import SETS
-from scenelang.models.manifest import ROOT, Manifest, available
+from scenelang.measure.scenes import sets_of
+from scenelang.models.manifest import ROOT, Manifest, available, load_manifest
 
 RESULTS = Path(__file__).parent / "results"
 BASE = "shapes2d"
@@ -33,6 +33,7 @@ def figures(report: dict[str, Any]) -> dict[str, float]:
         "psnr": psnr["mean"],
         "psnr_p5": psnr["p5"],
         "psnr_worst": psnr["worst"],
+        **({"psnr_uncapped": report["psnr_uncapped"]["mean"]} if "psnr_uncapped" in report else {}),
         "ssim": report["ssim"]["mean"],
         "flip": report["flip"]["mean"],
     }
@@ -42,12 +43,12 @@ def manifest(name: str) -> dict[str, Any]:
     """A manifest with everything measured put in."""
     data: dict[str, Any] = json.loads((ROOT / name / "manifest.json").read_text("utf-8"))
     folder = RESULTS if name == BASE else RESULTS / name
-    reports = {s: folder / f"{s}.json" for s in SETS}
+    reports = {s: folder / f"{s}.json" for s in sets_of(load_manifest(name))}
     sets = {s: figures(json.loads(p.read_text("utf-8"))) for s, p in reports.items() if p.exists()}
     data["measured"] = {"psnr_cap_db": MOST_DB, "sets": sets} if sets else {}
     suite = RESULTS / ("stability.json" if name == BASE else f"stability-{name}.json")
     if suite.exists():
-        ranges, lines = measured_ranges(json.loads(suite.read_text("utf-8")))
+        ranges, lines = measured_ranges(json.loads(suite.read_text("utf-8")), data["dimension"])
         data["trained"] = ranges
         data["measured"]["stability"] = lines
     return data

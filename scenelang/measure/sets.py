@@ -93,12 +93,12 @@ def _moves(rng: Rng, config: SetConfig) -> list[Transform]:
         return moves + [some[i] for i in rng.permutation(4)]
     if not config.affine_steps:
         return [*moves, scale, rotate, translate]
-    return moves + _long_chain(rng, config.affine_steps, scale, rotate, translate)
+    return moves + long_chain(rng, config.affine_steps, scale, [rotate, translate])
 
 
-def _long_chain(rng: Rng, steps: int, scale: Scale, rotate: Rotate, translate: Translate) -> list[Transform]:
-    """Random steps around the usual three, small enough that the object stays on the canvas."""
-    chain: list[Transform] = [scale]
+def long_chain(rng: Rng, steps: int, first: Transform, last: list[Transform]) -> list[Transform]:
+    """Random steps among the usual three, small enough that the object stays on the canvas."""
+    chain: list[Transform] = [first]
     for _ in range(steps - 3):
         kind = int(rng.integers(4))
         if kind == 0:
@@ -109,7 +109,7 @@ def _long_chain(rng: Rng, steps: int, scale: Scale, rotate: Rotate, translate: T
             chain.append(Translate(x=_uniform(rng, -0.12, 0.12), y=_uniform(rng, -0.12, 0.12)))
         else:
             chain.append(Shear(axes="xy", k=_uniform(rng, -0.25, 0.25)))
-    return [*chain, rotate, translate]
+    return [*chain, *last]
 
 
 def random_object(rng: Rng, config: SetConfig) -> Object:

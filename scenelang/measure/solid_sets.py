@@ -35,6 +35,7 @@ from scenelang.words import BLEND, COMBINE
 
 Triple = tuple[float, float, float]
 AXES = "xy", "xz", "yx", "yz", "zx", "zy"
+SIDES = 0.35, 0.85  # smallest and largest scale
 WARP = 0.8  # of deformed objects
 
 
@@ -91,7 +92,7 @@ def _warps(rng: Rng, most: float) -> list[Transform]:
 
 
 def _moves(rng: Rng, config: SolidConfig) -> list[Transform]:
-    x, y, z = (config.size * side for side in _triple(rng, 0.35, 0.85))
+    x, y, z = (config.size * side for side in _triple(rng, *SIDES))
     turn = Rotate(angle=float(rng.uniform(0, math.tau)), axis=_triple(rng, -1, 1))
     move = Translate(*(config.spread * rng.uniform((-1.2, -0.5, -1.2), (1.2, 0.9, 1.2))).tolist())
     maps: list[Transform] = [Scale(x, y, z), turn, move]

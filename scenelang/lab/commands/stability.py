@@ -30,11 +30,10 @@ def command(
     need_metrics()
     import torch
 
-    from scenelang.lab.stability.probes import PROBES
-    from scenelang.lab.stability.suite import INVARIANTS, run_stability
+    from scenelang.lab.stability.suite import INVARIANTS, kit_of, run_stability
 
-    common.check_names("probe", only, [*PROBES, *INVARIANTS])
     loaded = common.model_to_measure(model, weights)
+    common.check_names("probe", only, [*kit_of(loaded.manifest).probes, *INVARIANTS])
     torch.set_num_threads(1)
     with Bar() as bar:
         found = run_stability(loaded, scenes, seed, only, bar)

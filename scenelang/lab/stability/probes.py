@@ -1,7 +1,8 @@
 """What the stability suite varies: one quantity at a time, from what was trained to far beyond.
 
 A probe makes a random scene for a value of its quantity; the same index gives the same random numbers at
-every value, so that a curve differs by the quantity alone. The base is that of the set `shapes2d`.
+every value, so that a curve differs by the quantity alone. The base is that of the set `shapes2d`, or of
+another dimension where a `Kit` says so.
 """
 
 from __future__ import annotations
@@ -9,10 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from scenelang.measure.sets import SETS, Rng, SetConfig, random_object, random_scene
+from scenelang.measure.sets import SETS, Rng, SetConfig, long_chain, random_object, random_scene
 from scenelang.scene.schema import (
     Bend,
     Chain,
@@ -28,11 +30,13 @@ from scenelang.scene.schema import (
     Translate,
     Twirl,
 )
-from scenelang.words import Combine
+from scenelang.words import BLEND, Combine
 
 BASE = SETS["shapes2d"]
 LARGE = 3.0  # times the size of the base set's objects
 Make = Callable[[Rng, float], Scene]
+Base = Callable[..., Scene]
+"""A random scene of a base set from random numbers and, by name, what of the set is other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,161 +52,199 @@ class Probe:
     folded: bool = True
 
 
+@dataclass(frozen=True, slots=True)
+class Kit:
+    """What the suite measures models of a dimension with.
+
+    Args:
+        probes: by name.
+        apart: a number of objects that do not overlap.
+        animated: a number of frames of one scene that moves a little.
+    """
+
+    probes: dict[str, Probe]
+    apart: Callable[[Rng], list[Object]]
+    animated: Callable[[Rng, int], list[Scene]]
+
+
 def _scene(rng: Rng, **changes: object) -> Scene:
     return random_scene(rng, replace(BASE, **changes))  # type: ignore[arg-type]
 
 
-def _of(rng: Rng, count: float, **changes: object) -> Scene:
-    """So many objects."""
-    return _scene(rng, objects=(int(count),) * 2, **changes)
-
-
-def _operators(rng: Rng, count: float) -> Scene:
-    """One object and so many operators after it, none of them a plain union."""
-    scene = _of(rng, count + 1, unions=0.0)
-    words: tuple[Combine, ...] = ("smooth", "subtract", "intersect")
-    # intersections leave little of a picture: objects are larger, so that something is there to be wrong
-    return _joined(scene, lambda i: "union" if i == 0 else words[int(rng.integers(3))], 1.6)
-
-
-def _blends(rng: Rng, count: float, larger: float = 1.0) -> Scene:
-    return _joined(_of(rng, count + 1), lambda i: "smooth" if i else "union", larger)
-
-
-def _contrast(rng: Rng, contrast: float, size: float = LARGE) -> Scene:
-    """One `smooth` of three objects, a white one and two that are darker."""
-    scene = _blends(rng, 2, size)
-    white = int(rng.integers(3))
-
-    def grey(i: int) -> Material:
-        level = 1.0 if i == white else 1.0 - contrast
-        return Material(name="flat", ops=(Color(rgb=(level, level, level)),))
-
-    (chain,) = scene.nodes
-    assert isinstance(chain, Chain)
-    links = [
-        link.model_copy(update={"node": link.node.model_copy(update={"material": grey(i)})})
-        for i, link in enumerate(chain.children)
-    ]
-    return scene.model_copy(update={"nodes": (Chain(children=tuple(links)),)})
-
-
-def _rebuilt(
+def rebuilt(
     scene: Scene,
-    moves: Callable[[int, Object], Sequence[Transform]],
+    moves: Callable[[int, Object], Sequence[Transform]] = lambda _, node: node.transforms,
     word: Callable[[int, Combine], Combine] = lambda _, op: op,
+    look: Callable[[int, Object], Material | None] = lambda _, node: node.material,
+    k: float = BLEND,
 ) -> Scene:
-    """A scene of one chain of objects, with other transforms and other words between them."""
+    """A scene of one chain of objects, with other transforms, words, materials, and widths of blends."""
     (chain,) = scene.nodes
     assert isinstance(chain, Chain)
     links = []
     for i, link in enumerate(chain.children):
         assert isinstance(link.node, Object)
-        node = link.node.model_copy(update={"transforms": tuple(moves(i, link.node))})
-        links.append(Link(op=word(i, link.op), node=node))
-    return scene.model_copy(update={"nodes": (Chain(children=tuple(links)),)})
+        node = Object(link.node.geometry, moves(i, link.node), look(i, link.node))
+        links.append(Link(op := word(i, link.op), node, k=k if op == "smooth" else BLEND))
+    return scene.model_copy(update={"nodes": (Chain(links),)})
 
 
-def _joined(scene: Scene, word: Callable[[int], Combine], larger: float) -> Scene:
+def _larger(factor: float) -> Callable[[int, Object], list[Transform]]:
+    def larger(t: Transform) -> Transform:
+        if not isinstance(t, Scale):
+            return t
+        return Scale(t.x * factor, t.y * factor, t.z if t.z == 1.0 else t.z * factor)
+
+    return lambda _, node: [larger(t) for t in node.transforms]
+
+
+def _operators(base: Base, rng: Rng, count: float) -> Scene:
+    """One object and so many operators after it, none of them a plain union."""
+    scene = base(rng, objects=(int(count) + 1,) * 2, unions=0.0)
+    words: tuple[Combine, ...] = ("smooth", "subtract", "intersect")
+    # intersections leave little of a picture: objects are larger, so that something is there to be wrong
+    return rebuilt(scene, _larger(1.6), lambda i, _: "union" if i == 0 else words[int(rng.integers(3))])
+
+
+def blends(base: Base, rng: Rng, count: float, larger: float = 1.0, k: float = BLEND) -> Scene:
+    """One object and so many others, each joined by `smooth`."""
+    scene = base(rng, objects=(int(count) + 1,) * 2)
+    return rebuilt(scene, _larger(larger), lambda i, _: "smooth" if i else "union", k=k)
+
+
+def _contrast(base: Base, rng: Rng, contrast: float, size: float = LARGE) -> Scene:
+    """One `smooth` of three objects, a white one and two that are darker."""
+    scene = blends(base, rng, 2, size)
+    white = int(rng.integers(3))
+
+    def grey(i: int, node: Object) -> Material:
+        level = 1.0 if i == white else 1.0 - contrast
+        assert node.material is not None
+        return Material(name=node.material.name, ops=(Color(rgb=(level, level, level)),))
+
+    return rebuilt(scene, look=grey)
+
+
+def _thin(base: Base, rng: Rng, ratio: float) -> Scene:
     def moves(_: int, node: Object) -> list[Transform]:
         return [
-            Scale(x=t.x * larger, y=t.y * larger, z=1.0) if isinstance(t, Scale) else t
-            for t in node.transforms
+            t.model_copy(update={"y": t.x / ratio}) if isinstance(t, Scale) else t for t in node.transforms
         ]
 
-    return _rebuilt(scene, moves, lambda i, _: word(i))
+    return rebuilt(base(rng), moves)
 
 
-def _thin(rng: Rng, ratio: float) -> Scene:
-    def moves(_: int, node: Object) -> list[Transform]:
-        return [Scale(x=t.x, y=t.x / ratio, z=1.0) if isinstance(t, Scale) else t for t in node.transforms]
-
-    return _rebuilt(_scene(rng), moves)
-
-
-def _sheared(rng: Rng, k: float) -> Scene:
+def _sheared(base: Base, rng: Rng, k: float) -> Scene:
     def moves(_: int, node: Object) -> list[Transform]:
         *first, rotate, translate = node.transforms
         return [*first, Shear(axes="xy", k=k), rotate, translate]
 
-    return _rebuilt(_scene(rng), moves)
+    return rebuilt(base(rng), moves)
 
 
-def _order(rng: Rng, kind: float) -> Scene:
+def _order(base: Base, rng: Rng, kind: float) -> Scene:
     """0: as trained; 1: affine maps in any order after the deformations; 2: deformations after them, about
     the origin of the world; 3: a deformation between affine maps."""
 
     def moves(_: int, node: Object) -> list[Transform]:
-        twirl, bend, scale, rotate, translate = node.transforms
+        *warps, scale, rotate, translate = (t for t in node.transforms if t.kind != "displace")
         some = [scale, rotate, translate]
         if kind == 1:
-            return [twirl, bend, *(some[i] for i in rng.permutation(3))]
+            return [*warps, *(some[i] for i in rng.permutation(3))]
         if kind == 2:
-            return [*some, twirl, bend]
+            return [*some, *warps]
         if kind == 3:
-            return [twirl, scale, bend, rotate, translate]
-        return list(node.transforms)
+            return [*warps[:1], scale, *warps[1:], rotate, translate]
+        return [*warps, *some]
 
-    return _rebuilt(_scene(rng), moves)
+    return rebuilt(base(rng), moves)
 
 
-PROBES: dict[str, Probe] = {
-    "objects": Probe("objects of a scene", "objects", (1, 2, 4, 8, 16, 32, 64, 128), 4, _of),
-    "operators": Probe(
-        "operators in a row: smooth, subtract, intersect", "operators", tuple(range(1, 9)), 3, _operators
-    ),
-    "blends": Probe("smooth unions in a row", "smooth unions", (1, 2, 4, 8, 16, 32, 64), 4, _blends),
-    "contrast": Probe(
-        "blends of white and darker, three times the base set's size", "difference of the colours",
-        (0, 0.125, 0.25, 0.5, 0.75, 1), 0.25, _contrast,
-    ),
-    "deep": Probe(
-        "blends of white and black", "times the size", (0.3, 1, 1.5, 2, 3, 4), 1,
-        lambda rng, size: _contrast(rng, 1.0, size),
-    ),
-    "affine": Probe(
-        "affine maps of each object, each lifted by itself", "affine maps", (3, 4, 8, 16, 32, 64), 3,
-        lambda rng, steps: _scene(rng, affine_steps=max(3, int(steps))), folded=False,
-    ),
-    "warp": Probe(
-        "deformations beyond the base set's ±0.8", "times the range", (0.5, 1, 1.5, 2, 2.5, 3), 1,
-        lambda rng, factor: _scene(rng, warp=BASE.warp * factor),
-    ),
-    "size": Probe(
-        "sizes beyond the base set's", "times the size", (0.03, 0.1, 0.3, 1, 2, 4, 8), 1,
-        lambda rng, factor: _scene(rng, size=factor),
-    ),
-    "thin": Probe("thin objects", "ratio of the scales", (1, 3, 10, 30, 100, 300), 3, _thin),
-    "shear": Probe("sheared objects", "shear", (0, 0.5, 1, 2, 4, 8), 0, _sheared),
-    "order": Probe(
-        "orders of transformations", "order (0 as trained, 1 affine shuffled, 2 deformed last, 3 mixed)",
-        (0, 1, 2, 3), 0, _order,
-    ),
-    "canvas": Probe(
-        "canvas sizes", "pixels along a side", (32, 64, 128, 256, 512, 1024), 256,
-        lambda rng, side: _scene(rng, canvas=(int(side),) * 2),
-    ),
-}  # fmt: skip
+def _affine(base: Base, rng: Rng, steps: float) -> Scene:
+    def moves(_: int, node: Object) -> list[Transform]:
+        *warps, scale, rotate, translate = node.transforms
+        return [*warps, *long_chain(rng, max(3, int(steps)), scale, [rotate, translate])]
+
+    return rebuilt(base(rng), moves)
+
+
+def common(base: Base, deformed: Base, warp: float) -> dict[str, Probe]:
+    """The probes of any dimension.
+
+    Args:
+        base: makes scenes.
+        deformed: the like of deformed objects.
+        warp: its strongest deformations.
+    """
+    return {
+        "objects": Probe(
+            "objects of a scene", "objects", (1, 2, 4, 8, 16, 32, 64, 128), 4,
+            lambda rng, count: base(rng, objects=(int(count),) * 2),
+        ),
+        "operators": Probe(
+            "operators in a row: smooth, subtract, intersect", "operators", tuple(range(1, 9)), 3,
+            partial(_operators, base),
+        ),
+        "blends": Probe(
+            "smooth unions in a row", "smooth unions", (1, 2, 4, 8, 16, 32, 64), 4, partial(blends, base)
+        ),
+        "contrast": Probe(
+            "blends of white and darker, three times the base set's size", "difference of the colours",
+            (0, 0.125, 0.25, 0.5, 0.75, 1), 0.25, partial(_contrast, base),
+        ),
+        "deep": Probe(
+            "blends of white and black", "times the size", (0.3, 1, 1.5, 2, 3, 4), 1,
+            lambda rng, size: _contrast(base, rng, 1.0, size),
+        ),
+        "affine": Probe(
+            "affine maps of each object, each lifted by itself", "affine maps", (3, 4, 8, 16, 32, 64), 3,
+            partial(_affine, base), folded=False,
+        ),
+        "warp": Probe(
+            "deformations beyond the base set's ±0.8", "times the range", (0.5, 1, 1.5, 2, 2.5, 3), 1,
+            lambda rng, factor: deformed(rng, warp=warp * factor),
+        ),
+        "size": Probe(
+            "sizes beyond the base set's", "times the size", (0.03, 0.1, 0.3, 1, 2, 4, 8), 1,
+            lambda rng, factor: base(rng, size=factor),
+        ),
+        "thin": Probe(
+            "thin objects", "ratio of the scales", (1, 3, 10, 30, 100, 300), 3, partial(_thin, base)
+        ),
+        "shear": Probe("sheared objects", "shear", (0, 0.5, 1, 2, 4, 8), 0, partial(_sheared, base)),
+        "order": Probe(
+            "orders of transformations", "order (0 as trained, 1 affine shuffled, 2 deformed last, 3 mixed)",
+            (0, 1, 2, 3), 0, partial(_order, deformed),
+        ),
+        "canvas": Probe(
+            "canvas sizes", "pixels along a side", (32, 64, 128, 256, 512, 1024), 256,
+            lambda rng, side: base(rng, canvas=(int(side),) * 2),
+        ),
+    }  # fmt: skip
+
+
+def cell_of(i: int, count: int) -> Translate:
+    """To the middle of a cell of a grid with so many."""
+    side = math.isqrt(count - 1) + 1
+    cell = 2.0 / side
+    return Translate(x=(i % side + 0.5) * cell - 1, y=(i // side + 0.5) * cell - 1)
 
 
 def apart(rng: Rng, count: int = 9) -> list[Object]:
     """Objects that do not overlap, in cells of a grid: what order they come in makes no difference."""
-    side = math.isqrt(count - 1) + 1
-    cell = 2.0 / side
+    size = 0.42 * (2.0 / (math.isqrt(count - 1) + 1))
     found = []
     config = SetConfig(warp=0.0, deformed=False)
     for i in range(count):
         node = random_object(rng, config)
         turn = next(t for t in node.transforms if isinstance(t, Rotate))
-        place = Translate(x=(i % side + 0.5) * cell - 1, y=(i // side + 0.5) * cell - 1)
-        found.append(node.model_copy(update={"transforms": (Scale.uniform(0.42 * cell), turn, place)}))
+        found.append(node.model_copy(update={"transforms": (Scale.uniform(size), turn, cell_of(i, count))}))
     return found
 
 
 def union_of(nodes: list[Object]) -> Scene:
     """A union in order."""
-    links = tuple(Link(op="union", node=node) for node in nodes)
-    return Scene(model="shapes2d", nodes=(Chain(children=links),))
+    return Scene(nodes=(Chain(nodes),))
 
 
 def animated(rng: Rng, frames: int) -> list[Scene]:
@@ -211,7 +253,7 @@ def animated(rng: Rng, frames: int) -> list[Scene]:
     (chain,) = scene.nodes
     drifts = [(float(rng.normal()), float(rng.normal())) for _ in chain.children]  # type: ignore[union-attr]
     return [
-        _rebuilt(scene, lambda i, node, f=f: [_moved(t, f, *drifts[i]) for t in node.transforms])  # type: ignore[misc]
+        rebuilt(scene, lambda i, node, f=f: [_moved(t, f, *drifts[i]) for t in node.transforms])  # type: ignore[misc]
         for f in range(frames)
     ]
 
@@ -226,6 +268,15 @@ def _moved(move: Transform, frame: int, dx: float, dy: float) -> Transform:
     if isinstance(move, Bend):
         return Bend(k=move.k + 0.02 * math.cos(frame))
     return move
+
+
+def _interleaved(rng: Rng, steps: float) -> Scene:
+    return _scene(rng, affine_steps=max(3, int(steps)))
+
+
+PROBES = common(_scene, _scene, BASE.warp)
+PROBES["affine"] = replace(PROBES["affine"], make=_interleaved)
+FLAT = Kit(PROBES, apart, animated)
 
 
 def rng_of(seed: int, index: int, attempt: int = 0) -> Rng:

@@ -10,29 +10,51 @@ from collections.abc import Mapping
 from typing import Any
 
 from scenelang.measure.sets import SETS
+from scenelang.measure.solid_sets import SIDES
+from scenelang.measure.solid_sets import WARP as SOLID_WARP
 
 HARDLY, SLACK = 40.0, 1.0  # dB, of mean PSNR
 WARP = SETS["shapes2d"].warp
 SCALES = 0.2, 0.55  # of the base set
-# Quantity of a manifest -> the probe that varies it, and what its values are multiplied by at either end.
-QUANTITIES: dict[str, tuple[str, float, float]] = {
+ALIKE = {
     "objects": ("objects", 1.0, 1.0),
     "smooth": ("blends", 1.0, 1.0),
-    "twirl": ("warp", WARP, WARP),
-    "bend": ("warp", WARP, WARP),
-    "scale": ("size", *SCALES),
     "thin": ("thin", 1.0, 1.0),
-    "blend": ("deep", SCALES[1], SCALES[1]),
 }
-FROM_NOTHING = {"smooth": 0.0, "blend": 0.0}  # what the least value is where the probe starts later
-BOTH_WAYS = {"twirl", "bend"}  # the range is the same on either side of 0
+QUANTITIES: dict[int, dict[str, tuple[str, float, float]]] = {
+    2: {
+        **ALIKE,
+        "twirl": ("warp", WARP, WARP),
+        "bend": ("warp", WARP, WARP),
+        "scale": ("size", *SCALES),
+        "blend": ("deep", SCALES[1], SCALES[1]),
+    },
+    3: {
+        **ALIKE,
+        **dict.fromkeys(("twirl", "bend", "twist"), ("warp", SOLID_WARP, SOLID_WARP)),
+        "scale": ("size", *SIDES),
+        "blend": ("deep", SIDES[1], SIDES[1]),
+        "displace": ("amount", 1.0, 1.0),
+    },
+}
+"""By dimension, quantity of a manifest -> the probe that varies it, and what its values are multiplied by at
+either end."""
+FROM_NOTHING = {
+    "smooth": 0.0,
+    "blend": 0.0,
+    "displace": 0.0,
+}  # what the least value is where the probe starts later
+BOTH_WAYS = {"twirl", "bend", "twist"}  # the range is the same on either side of 0
 
 
-def measured_ranges(found: Mapping[str, Any]) -> tuple[dict[str, list[float]], dict[str, str]]:
+def measured_ranges(
+    found: Mapping[str, Any], dimension: int = 2
+) -> tuple[dict[str, list[float]], dict[str, str]]:
     """What the suite says of a model.
 
     Args:
         found: of `scenelang.lab.stability.suite.run_stability`.
+        dimension: the model's.
 
     Returns:
         Ranges ``quantity -> [low, high]`` for the manifest's ``trained``, and lines about what lies beyond
@@ -40,7 +62,7 @@ def measured_ranges(found: Mapping[str, Any]) -> tuple[dict[str, list[float]], d
     """
     ranges: dict[str, list[float]] = {}
     lines: dict[str, str] = {}
-    for quantity, (name, low_unit, high_unit) in QUANTITIES.items():
+    for quantity, (name, low_unit, high_unit) in QUANTITIES[dimension].items():
         probe = found["probes"].get(name)
         if probe is None:
             continue

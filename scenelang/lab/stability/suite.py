@@ -18,31 +18,38 @@ import numpy.typing as npt
 
 from scenelang.backend.neural import draw_program
 from scenelang.graph.lower import step_of
-from scenelang.graph.spaces import PLANE
+from scenelang.graph.spaces import SPACES
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.image import Image
 from scenelang.lab.about import Report, about, silent
-from scenelang.lab.stability.probes import PROBES, Probe, animated, apart, rng_of, union_of
+from scenelang.lab.stability.probes import FLAT, Kit, Probe, rng_of, union_of
+from scenelang.lab.stability.solid_probes import SOLIDS
 from scenelang.lifting import exact
-from scenelang.lifting.layout import PLANE_LAYOUT
+from scenelang.lifting.layout import LAYOUTS
 from scenelang.lifting.learned import lift_geometry
 from scenelang.measure.metrics import flip, psnr
-from scenelang.measure.scenes import coverage, reference_of, sized, spread
+from scenelang.measure.scenes import LEAST_COVER, coverage, reference_of, sized, spread
 from scenelang.models.load import Model
+from scenelang.models.manifest import Manifest
 from scenelang.passes import OPTIONAL
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
 from scenelang.renderers.draw import draw
 from scenelang.renderers.framed import Framed
+from scenelang.renderers.solid.parameters import Solids
 from scenelang.scene.schema import Chain, Object, Scene
 
 EDGE = 2 / 255  # a pixel of an edge differs by more from a neighbour
-LEAST_COVER = 0.02  # share of the canvas; scenes with less are drawn again
 FRAMES = 8
 SIZES = {"canvas"}  # probes that only models of any size can take
 IDEAL = 8  # samples along a pixel's side of a picture whose own sampling hardly shows
 
 Array = npt.NDArray[np.float64]
+
+
+def kit_of(manifest: Manifest) -> Kit:
+    """What a model is measured with."""
+    return SOLIDS if manifest.dimension == 3 else FLAT
 
 
 class Errors(NamedTuple):
@@ -58,17 +65,24 @@ class Errors(NamedTuple):
 def exact_picture(
     scene: Scene, model: Model, per_side: int = 2
 ) -> tuple[Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """The exact picture over white (H, W, 3), which pixels are covered, and which are on an edge.
+    """The exact picture (H, W, 3), of the plane over white, which pixels are covered, which are on an edge.
+
+    Solids cover what is not as it would be without them: what they throw their shadow on too.
 
     Args:
         scene: what is drawn.
         model: that its names are known by.
         per_side: samples along each side of a pixel; 2 is the definition.
     """
-    clear = scene.model_copy(update={"background": None})
+    solid = model.manifest.dimension == 3
+    clear = scene.model_copy(update={"nodes": ()} if solid else {"background": None})
     found = np.asarray(reference_of(clear, model.manifest, per_side=per_side), np.float64)
-    alpha = found[..., 3:]
-    picture = found[..., :3] * alpha + (1 - alpha)
+    if solid:
+        picture = np.asarray(reference_of(scene, model.manifest, per_side=per_side), np.float64)
+        alpha = (np.abs(picture - found).max(2, keepdims=True) > EDGE).astype(np.float64)
+    else:
+        alpha = found[..., 3:]
+        picture = found[..., :3] * alpha + (1 - alpha)
     edge = np.zeros(alpha.shape[:2], bool)
     for axis in (0, 1):
         step = np.abs(np.diff(np.concatenate([picture, alpha], 2), axis=axis)).max(2) > EDGE
@@ -105,32 +119,31 @@ def unfolded(scene: Scene, program: Program, model: Model) -> Program:
     (chain,) = scene.nodes
     assert isinstance(chain, Chain)
     vectors = program.vectors.copy()
+    layout, space = LAYOUTS[model.manifest.layout], SPACES[model.manifest.dimension]
+    nodes = [link.node for link in chain.children if isinstance(link.node, Object)]
+    steps = [[step_of(transform, space) for transform in node.transforms] for node in nodes]
     lifting = model.codes.lifting
     if lifting is not None:
-        nodes = [link.node for link in chain.children if isinstance(link.node, Object)]
-        steps = [[step_of(t, PLANE) for t in node.transforms] for node in nodes]
         leaves = [model.manifest.geometries.index(node.geometry) for node in nodes]
         chains: list[list[Step]] = [[s for s in chain if isinstance(s, Affine | Warp)] for chain in steps]
         vectors[:, : lifting.codes.shape[1]] = lift_geometry(lifting, chains, leaves)
         return dataclasses.replace(program, vectors=vectors)
-    for row, link in zip(vectors, chain.children, strict=True):
-        assert isinstance(link.node, Object)
-        g = exact.leaf_vector(row[: PLANE_LAYOUT.code].tolist()).astype(np.float32)
-        for transform in link.node.transforms:
-            step = step_of(transform, PLANE)
+    for row, chain_steps in zip(vectors, steps, strict=True):
+        g = exact.leaf_vector(row[: layout.code].tolist(), layout).astype(np.float32)
+        for step in chain_steps:
             if isinstance(step, Affine):
-                matrix = exact.affine_matrix(step.rows)
+                matrix = exact.affine_matrix(step.rows, None, layout)
             else:
-                matrix = exact.warp_matrix(step, PLANE_LAYOUT.inner_warps)  # type: ignore[arg-type]
+                matrix = exact.warp_matrix(step, layout.inner_warps, layout)  # type: ignore[arg-type]
             g = matrix.astype(np.float32) @ g
-        row[: PLANE_LAYOUT.geometry] = g
+        row[: layout.geometry] = g
     return dataclasses.replace(program, vectors=vectors)
 
 
 def picture_of(model: Model, program: Program, **options: Any) -> Image:
-    """A Program's picture; options are those of `renderers.draw.draw`."""
+    """A Program's picture; options are those of `renderers.draw.draw`, of solids those of `draw_program`."""
     if not isinstance(model.network, Framed):
-        return draw_program(program, model, threads=1).image
+        return draw_program(program, model, **{"threads": 1, **options}).image
     return draw(model.network, program, **options).image
 
 
@@ -153,16 +166,17 @@ def scene_of(probe: Probe, value: float, index: int, seed: int, model: Model) ->
 
 def run_probe(model: Model, name: str, scenes: int, seed: int, report: Report = silent) -> dict[str, Any]:
     """A curve: errors at every value of a probe; none for one that the model's canvas rules out."""
-    probe = PROBES[name]
+    probe = kit_of(model.manifest).probes[name]
     rows = []
     values = probe.values if name not in SIZES or not model.manifest.sizes else ()
+    fine = name in SIZES and model.manifest.dimension == 2  # that of solids would take hours
     for at, value in enumerate(values):
         found, ideal = [], []
         for index in range(scenes):
             scene = scene_of(probe, value, index, seed, model)
             picture = _drawn(model, scene, probe.folded)
             found.append(compare(picture, exact_picture(scene, model)))
-            if name in SIZES:
+            if fine:
                 ideal.append(compare(picture, exact_picture(scene, model, IDEAL)).per_edge)
         rows.append(
             {
@@ -174,7 +188,7 @@ def run_probe(model: Model, name: str, scenes: int, seed: int, report: Report = 
                 "per_covered": round(float(np.mean([e.per_covered for e in found])), 6),
             }
         )
-        if name in SIZES:
+        if fine:
             rows[-1]["per_edge_ideal"] = round(float(np.mean(ideal)), 6)
         report(name, at + 1, len(probe.values))
     return {
@@ -193,9 +207,9 @@ def interval(values: Sequence[float]) -> float:
 
 def order_of_disjoint(model: Model, scenes: int, seed: int) -> dict[str, float]:
     """Objects that do not overlap, in two orders: how far apart the pictures are, and a healthy PSNR."""
-    most, values = 0.0, []
+    most, values, kit = 0.0, [], kit_of(model.manifest)
     for index in range(scenes):
-        nodes = apart(rng := rng_of(seed, index))
+        nodes = kit.apart(rng := rng_of(seed, index))
         first = sized(union_of(nodes), model.manifest)
         second = sized(union_of([nodes[i] for i in rng.permutation(len(nodes))]), model.manifest)
         a, b = _drawn(model, first, True), _drawn(model, second, True)
@@ -213,7 +227,9 @@ def flicker(model: Model, scenes: int, seed: int) -> dict[str, float]:
     ratios: list[float] = []
     index = -1
     while (index := index + 1) < scenes or not ratios:
-        frames = [sized(f, model.manifest) for f in animated(rng_of(seed, index), FRAMES)]
+        frames = [
+            sized(f, model.manifest) for f in kit_of(model.manifest).animated(rng_of(seed, index), FRAMES)
+        ]
         ours = [np.asarray(_drawn(model, f, True), np.float64) for f in frames]
         exact_ones = [exact_picture(f, model)[0] for f in frames]
         extra = real = 0.0
@@ -228,19 +244,22 @@ def flicker(model: Model, scenes: int, seed: int) -> dict[str, float]:
 
 def arithmetic(model: Model, scenes: int, seed: int) -> dict[str, float]:
     """What tiles, threads and skipping change of a picture at most, on base scenes."""
-    probe = PROBES["objects"]
-    most = {"tiles": 0.0, "threads": 0.0, "skipping": 0.0}
-    if not isinstance(model.network, Framed):
-        return most  # draws whole pictures
+    probe = kit_of(model.manifest).probes["objects"]
+    ways: dict[str, dict[str, Any]] = {"threads": {"threads": 2}}
+    if isinstance(model.network, Framed):
+        ways = {
+            "tiles": {"tile": 1999},
+            "threads": {"threads": 2, "tile": 1 << 13},
+            "skipping": {"skip": False},
+        }
+    elif not isinstance(model.network, Solids):
+        return dict.fromkeys(("tiles", "threads", "skipping"), 0.0)  # draws whole pictures
+    most = dict.fromkeys(ways, 0.0)
     for index in range(scenes):
         scene = scene_of(probe, 4, index, seed, model)
         program = compile_scene(scene, model=model.manifest.name, codes=model.codes)
         base = np.asarray(picture_of(model, program))
-        for name, options in (
-            ("tiles", {"tile": 1999}),
-            ("threads", {"threads": 2, "tile": 1 << 13}),
-            ("skipping", {"skip": False}),
-        ):
+        for name, options in ways.items():
             other = np.asarray(picture_of(model, program, **options))
             most[name] = max(most[name], float(np.abs(other - base).max()))
     return {k: round(v, 7) for k, v in most.items()}
@@ -266,14 +285,18 @@ def run_stability(
         model: what draws.
         scenes: of every value.
         seed: of the scenes.
-        only: names of `PROBES` and `INVARIANTS`; all by default.
+        only: names of probes and of `INVARIANTS`; all by default.
         report: called with a name, values done and all.
 
     Returns:
         For JSON: ``probes`` and ``invariants`` by name, and what was measured on what.
     """
     started = time.perf_counter()
-    probes = {n: run_probe(model, n, scenes, seed, report) for n in PROBES if not only or n in only}
+    probes = {
+        n: run_probe(model, n, scenes, seed, report)
+        for n in kit_of(model.manifest).probes
+        if not only or n in only
+    }
     invariants = {}
     for name, measure in INVARIANTS.items():
         if not only or name in only:
