@@ -39,6 +39,7 @@ from scenelang.lab.frontier.chart import frontier_chart
 from scenelang.lab.parsimony import parts_chart
 from scenelang.measure.frontier import Frontier, frontier_path
 from scenelang.models.load import load_model
+from scenelang.models.manifest import load_manifest
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
@@ -211,11 +212,13 @@ def worst_cases(name: str, count: int, model: str = "shapes2d", folder: str = ""
     return png(shown.quantize(128))
 
 
-def stability() -> bytes:
+def stability(dimension: int) -> bytes:
     """Charts of the stability suite, from what `scenelang lab stability` wrote: of every model measured."""
     paths = sorted((DOCS / "results").glob("stability*.json"), key=lambda path: len(path.name))
     reports = [json.loads(path.read_text("utf-8")) for path in paths]
-    return _few_colours(stability_chart(reports))
+    return _few_colours(
+        stability_chart([r for r in reports if load_manifest(r["model"]).dimension == dimension])
+    )
 
 
 def _few_colours(chart: bytes) -> bytes:
@@ -268,7 +271,8 @@ def plan() -> dict[str, Callable[[], bytes]]:
             made[name] = lambda draw=draw, source=Source(text=text): draw(source)
     made["gallery.png"] = gallery
     made[f"{COMPARED}-compared.png"] = compared
-    made["stability.png"] = stability
+    made["stability.png"] = lambda: stability(2)
+    made["stability-solids.png"] = lambda: stability(3)
     if PARTS.exists():
         made["parts.png"] = parts
     if frontier_path("shapes2d").exists():

@@ -12,11 +12,13 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from scenelang.lab.experiments.runs import EXPERIMENTS as RUNNABLE
 from scenelang.lab.experiments.tables import markdown, table_of
 from scenelang.lab.stability.probes import LARGE
+from scenelang.models.manifest import load_manifest
 
 HERE = Path(__file__).parent
 WHAT = {
@@ -39,23 +41,37 @@ WHAT = {
 EXPERIMENTS = ("overfit", "compare", "table1", "table2", "table3", "table4", "losses", "seeds")
 
 
-def accuracy() -> str:
-    """The Markdown table of all sets that were measured."""
-    lines = [
-        "| set | what | scenes | PSNR, dB | 5th percentile | worst | SSIM | FLIP | FLIP, 95th percentile |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
-    for name, what in WHAT.items():
-        path = HERE / "results" / f"{name}.json"
+SOLIDS = {
+    "solids3d": "1 to 3 spheres and tori, diffuse or of mist",
+    "diffuse": "all diffuse",
+    "media": "all of mist",
+    "deformed": "with `twirl`, `bend`, `twist` up to ±0.8 and `displace`",
+    "booleans": "2 to 4, random booleans, blends of any width from 0.05 to 0.5",
+    "shuffled": "scale, rotate, translate, shear in random order, `twirl` and `bend` among them",
+    "wide": "a canvas of 5 to 3",
+    "staged": "random camera, light, ground and sky",
+    "mixed": "1 to 4, deformed, booleans, on a random stage",
+}
+
+
+def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
+    """The Markdown table of the sets of a folder that were measured."""
+    heads = ["set", "what", "scenes", "PSNR, dB", "5th percentile", "worst"]
+    heads += ["SSIM", "FLIP", "FLIP, 95th percentile"]
+    rows = []
+    for name, words in what.items():
+        path = HERE / "results" / folder / f"{name}.json"
         if not path.exists():
             continue
         d = json.loads(path.read_text())
         p, s, f = d["psnr"], d["ssim"], d["flip"]
-        lines.append(
-            f"| `{name}` | {what} | {d['scenes']:,} | {p['mean']:.2f} | {p['p5']:.2f} | {p['worst']:.2f} "
-            f"| {s['mean']:.4f} | {f['mean']:.4f} | {f['p5']:.4f} |"
-        )
-    return "\n".join(lines)
+        psnr = [f"{p[end]:.2f}" for end in ("mean", "p5", "worst")]
+        if "psnr_uncapped" in d:
+            psnr = [f"{d['psnr_uncapped']['mean']:.1f}", *psnr]
+            heads[3:4] = ["without cap", "PSNR, dB"] if "without cap" not in heads else heads[3:4]
+        errors = [f"{s['mean']:.4f}", f"{f['mean']:.4f}", f"{f['p5']:.4f}"]
+        rows.append([f"`{name}`", words, f"{d['scenes']:,}", *psnr, *errors])
+    return markdown(heads, rows)
 
 
 def experiment(name: str) -> Callable[[], str]:
@@ -80,11 +96,13 @@ def experiment(name: str) -> Callable[[], str]:
     return block
 
 
-def stability() -> str:
+def stability(dimension: int = 2) -> str:
     """Mean and worst PSNR at the healthy value and at both ends of every probe, of every model measured."""
     rows = []
     for path in sorted((HERE / "results").glob("stability*.json"), key=lambda path: len(path.name)):
         found = json.loads(path.read_text())
+        if load_manifest(found["model"]).dimension != dimension:
+            continue
         for probe in found["probes"].values():
             healthy = next(row for row in probe["rows"] if row["value"] == probe["healthy"])
             cells = [f"{row['value']:g}: {row['psnr']['mean']:.1f}" for row in probe["rows"]]
@@ -122,6 +140,9 @@ def blends() -> str:
 BLOCKS: dict[str, Callable[[], str]] = {
     "accuracy": accuracy,
     "stability": stability,
+    "solids": partial(accuracy, "solids3d", SOLIDS),
+    "large-solids": partial(accuracy, "solids3d-256", SOLIDS),
+    "solid-stability": partial(stability, 3),
     "blends": blends,
     **{name: experiment(name) for name in EXPERIMENTS},
 }

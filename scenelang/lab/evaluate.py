@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.files import write_whole
 from scenelang.image import Image
 from scenelang.lab.about import Report, about, silent
 from scenelang.measure.metrics import (
@@ -22,6 +26,8 @@ from scenelang.measure.metrics import (
 )
 from scenelang.measure.scenes import draw_scene, reference_of, scenes_of, spread, summarise
 from scenelang.models.load import Model
+from scenelang.models.manifest import Manifest
+from scenelang.scene.schema import Scene
 from scenelang.words import TOKENS
 
 SHOWN = 12  # worst cases
@@ -37,14 +43,34 @@ class Case:
     figures: dict[str, float]  # psnr and psnr_uncapped (dB), ssim, flip
 
 
-def sheet(model: Model, name: str, seed: int, cases: list[Case], side: int | None = None) -> Image:
+def exact_of(scene: Scene, manifest: Manifest, kept: Path | None) -> Image:
+    """The exact picture of a scene, from a folder where it was kept, or drawn and kept there."""
+    if kept is None:
+        return reference_of(scene, manifest)
+    path = kept / f"{hashlib.sha256(scene.model_dump_json().encode()).hexdigest()}.npy"
+    if not path.exists():
+        data = io.BytesIO()
+        np.save(data, reference_of(scene, manifest))
+        kept.mkdir(parents=True, exist_ok=True)
+        write_whole(path, data.getvalue())
+    return np.asarray(np.load(path, allow_pickle=False)).view(Image)
+
+
+def sheet(
+    model: Model,
+    name: str,
+    seed: int,
+    cases: list[Case],
+    side: int | None = None,
+    kept: Path | None = None,
+) -> Image:
     """A contact sheet of cases of a set: network, reference, FLIP map."""
     scene_at = scenes_of(model, name, seed, side)
     rows = []
     for case in cases:
         scene = scene_at(case.index)
-        label = f"#{case.index} {case.last} {case.figures['psnr']:.1f} dB FLIP {case.figures['flip']:.4f}"
-        picture, exact = draw_scene(model, scene)[1], reference_of(scene, model.manifest)
+        label = f"#{case.index} {case.figures['psnr']:.1f} dB"
+        picture, exact = draw_scene(model, scene)[1], exact_of(scene, model.manifest, kept)
         rows.append(side_by_side(over_white(picture), over_white(exact), label))
     return contact_sheet(rows)
 
@@ -56,6 +82,7 @@ def evaluate_set(
     seed: int,
     *,
     side: int | None = None,
+    kept: Path | None = None,
     threads: int = 1,
     report: Report = silent,
 ) -> tuple[dict[str, Any], list[Case]]:
@@ -67,6 +94,7 @@ def evaluate_set(
         count: scenes.
         seed: of the scenes.
         side: shorter side of the canvas in pixels; by default that of the set.
+        kept: folder of exact pictures, which other weights and renderers do not change.
         threads: for drawing.
         report: called with the set, scenes done and all.
 
@@ -79,7 +107,7 @@ def evaluate_set(
     for index in range(count):
         scene = scene_at(index)
         program, picture = draw_scene(model, scene, threads)
-        exact = reference_of(scene, model.manifest)
+        exact = exact_of(scene, model.manifest, kept)
         uncapped = psnr(over_white(picture), over_white(exact), UNCAPPED_DB)
         figures = {**compare(picture, exact), "psnr_uncapped": uncapped}
         cases.append(Case(index, _last_word(program.tokens), len(program), figures))

@@ -15,12 +15,23 @@ from scenelang.measure.scenes import scenes_of
 from scenelang.models.load import load_model
 
 
-def test_figures_of_solids_are_those_of_the_pictures_users_get(tmp_path: Path) -> None:
+def test_figures_of_solids_are_those_of_the_pictures_users_get(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked = ["solids3d", "--set", "staged", "--scenes", "3", "--side", "24", "--seed", "4"]
+    asked += ["--kept", str(tmp_path / "kept")]
     done = CliRunner().invoke(command, [*asked, "-o", str(tmp_path)])
     assert done.exit_code == 0, done.output
     found = json.loads((tmp_path / "staged.json").read_text("utf-8"))
     assert found["canvas"] == [24, 24]
+    (tmp_path / "staged.json").unlink()
+    kept = sorted((tmp_path / "kept").iterdir())
+    assert len(kept) == 3
+    with monkeypatch.context() as without:
+        without.setattr("scenelang.lab.evaluate.reference_of", None)  # nothing is drawn again
+        assert CliRunner().invoke(command, [*asked, "-o", str(tmp_path)]).exit_code == 0
+    again = json.loads((tmp_path / "staged.json").read_text("utf-8"))
+    assert (again["psnr_uncapped"], again["ssim"]) == (found["psnr_uncapped"], found["ssim"])
     scene_at = scenes_of(load_model("solids3d"), "staged", 4, 24)
     told = []
     for index in range(3):

@@ -24,6 +24,12 @@ from scenelang.lab.commands import common
     metavar="PIXELS",
     help="Shorter side of the canvas. Default: as the set says.",
 )
+@click.option(
+    "--kept",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="FOLDER",
+    help="Of exact pictures, which are drawn and kept there unless they are.",
+)
 @common.seed
 @common.out
 @common.weights
@@ -34,6 +40,7 @@ def command(
     all_sets: bool,
     scenes: int,
     side: int | None,
+    kept: Path | None,
     seed: int,
     out: Path,
     weights: Path | None,
@@ -59,9 +66,11 @@ def command(
     torch.set_num_threads(threads)
     for name in chosen:
         with Bar() as bar:
-            summary, worst = evaluate_set(loaded, name, scenes, seed, side=side, threads=threads, report=bar)
+            summary, worst = evaluate_set(
+                loaded, name, scenes, seed, side=side, kept=kept, threads=threads, report=bar
+            )
         common.write_json(out / f"{name}.json", summary)
-        sheet(loaded, name, seed, worst, side).save(out / f"{name}-worst.png")
+        sheet(loaded, name, seed, worst, side, kept).save(out / f"{name}-worst.png")
         p, s, f = summary["psnr"], summary["ssim"], summary["flip"]
         click.echo(
             f"{name}: PSNR {p['mean']:.2f} dB (p5 {p['p5']:.2f}, worst {p['worst']:.2f}), "

@@ -8,35 +8,30 @@ another dimension where a `Kit` says so.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from scenelang.measure.sets import SETS, Rng, SetConfig, long_chain, random_object, random_scene
+from scenelang.measure import varied
+from scenelang.measure.sets import SETS, Rng, SetConfig, random_object, random_scene
+from scenelang.measure.varied import LARGE as LARGE
+from scenelang.measure.varied import Base
 from scenelang.scene.schema import (
     Bend,
     Chain,
-    Color,
-    Link,
-    Material,
     Object,
     Rotate,
     Scale,
     Scene,
-    Shear,
     Transform,
     Translate,
     Twirl,
 )
-from scenelang.words import BLEND, Combine
 
 BASE = SETS["shapes2d"]
-LARGE = 3.0  # times the size of the base set's objects
 Make = Callable[[Rng, float], Scene]
-Base = Callable[..., Scene]
-"""A random scene of a base set from random numbers and, by name, what of the set is other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,103 +66,6 @@ def _scene(rng: Rng, **changes: object) -> Scene:
     return random_scene(rng, replace(BASE, **changes))  # type: ignore[arg-type]
 
 
-def rebuilt(
-    scene: Scene,
-    moves: Callable[[int, Object], Sequence[Transform]] = lambda _, node: node.transforms,
-    word: Callable[[int, Combine], Combine] = lambda _, op: op,
-    look: Callable[[int, Object], Material | None] = lambda _, node: node.material,
-    k: float = BLEND,
-) -> Scene:
-    """A scene of one chain of objects, with other transforms, words, materials, and widths of blends."""
-    (chain,) = scene.nodes
-    assert isinstance(chain, Chain)
-    links = []
-    for i, link in enumerate(chain.children):
-        assert isinstance(link.node, Object)
-        node = Object(link.node.geometry, moves(i, link.node), look(i, link.node))
-        links.append(Link(op := word(i, link.op), node, k=k if op == "smooth" else BLEND))
-    return scene.model_copy(update={"nodes": (Chain(links),)})
-
-
-def _larger(factor: float) -> Callable[[int, Object], list[Transform]]:
-    def larger(t: Transform) -> Transform:
-        if not isinstance(t, Scale):
-            return t
-        return Scale(t.x * factor, t.y * factor, t.z if t.z == 1.0 else t.z * factor)
-
-    return lambda _, node: [larger(t) for t in node.transforms]
-
-
-def _operators(base: Base, rng: Rng, count: float) -> Scene:
-    """One object and so many operators after it, none of them a plain union."""
-    scene = base(rng, objects=(int(count) + 1,) * 2, unions=0.0)
-    words: tuple[Combine, ...] = ("smooth", "subtract", "intersect")
-    # intersections leave little of a picture: objects are larger, so that something is there to be wrong
-    return rebuilt(scene, _larger(1.6), lambda i, _: "union" if i == 0 else words[int(rng.integers(3))])
-
-
-def blends(base: Base, rng: Rng, count: float, larger: float = 1.0, k: float = BLEND) -> Scene:
-    """One object and so many others, each joined by `smooth`."""
-    scene = base(rng, objects=(int(count) + 1,) * 2)
-    return rebuilt(scene, _larger(larger), lambda i, _: "smooth" if i else "union", k=k)
-
-
-def _contrast(base: Base, rng: Rng, contrast: float, size: float = LARGE) -> Scene:
-    """One `smooth` of three objects, a white one and two that are darker."""
-    scene = blends(base, rng, 2, size)
-    white = int(rng.integers(3))
-
-    def grey(i: int, node: Object) -> Material:
-        level = 1.0 if i == white else 1.0 - contrast
-        assert node.material is not None
-        return Material(name=node.material.name, ops=(Color(rgb=(level, level, level)),))
-
-    return rebuilt(scene, look=grey)
-
-
-def _thin(base: Base, rng: Rng, ratio: float) -> Scene:
-    def moves(_: int, node: Object) -> list[Transform]:
-        return [
-            t.model_copy(update={"y": t.x / ratio}) if isinstance(t, Scale) else t for t in node.transforms
-        ]
-
-    return rebuilt(base(rng), moves)
-
-
-def _sheared(base: Base, rng: Rng, k: float) -> Scene:
-    def moves(_: int, node: Object) -> list[Transform]:
-        *first, rotate, translate = node.transforms
-        return [*first, Shear(axes="xy", k=k), rotate, translate]
-
-    return rebuilt(base(rng), moves)
-
-
-def _order(base: Base, rng: Rng, kind: float) -> Scene:
-    """0: as trained; 1: affine maps in any order after the deformations; 2: deformations after them, about
-    the origin of the world; 3: a deformation between affine maps."""
-
-    def moves(_: int, node: Object) -> list[Transform]:
-        *warps, scale, rotate, translate = (t for t in node.transforms if t.kind != "displace")
-        some = [scale, rotate, translate]
-        if kind == 1:
-            return [*warps, *(some[i] for i in rng.permutation(3))]
-        if kind == 2:
-            return [*some, *warps]
-        if kind == 3:
-            return [*warps[:1], scale, *warps[1:], rotate, translate]
-        return [*warps, *some]
-
-    return rebuilt(base(rng), moves)
-
-
-def _affine(base: Base, rng: Rng, steps: float) -> Scene:
-    def moves(_: int, node: Object) -> list[Transform]:
-        *warps, scale, rotate, translate = node.transforms
-        return [*warps, *long_chain(rng, max(3, int(steps)), scale, [rotate, translate])]
-
-    return rebuilt(base(rng), moves)
-
-
 def common(base: Base, deformed: Base, warp: float) -> dict[str, Probe]:
     """The probes of any dimension.
 
@@ -183,22 +81,23 @@ def common(base: Base, deformed: Base, warp: float) -> dict[str, Probe]:
         ),
         "operators": Probe(
             "operators in a row: smooth, subtract, intersect", "operators", tuple(range(1, 9)), 3,
-            partial(_operators, base),
+            partial(varied.operators, base),
         ),
         "blends": Probe(
-            "smooth unions in a row", "smooth unions", (1, 2, 4, 8, 16, 32, 64), 4, partial(blends, base)
+            "smooth unions in a row", "smooth unions", (1, 2, 4, 8, 16, 32, 64), 4,
+            partial(varied.blends, base),
         ),
         "contrast": Probe(
             "blends of white and darker, three times the base set's size", "difference of the colours",
-            (0, 0.125, 0.25, 0.5, 0.75, 1), 0.25, partial(_contrast, base),
+            (0, 0.125, 0.25, 0.5, 0.75, 1), 0.25, partial(varied.contrast, base),
         ),
         "deep": Probe(
             "blends of white and black", "times the size", (0.3, 1, 1.5, 2, 3, 4), 1,
-            lambda rng, size: _contrast(base, rng, 1.0, size),
+            lambda rng, size: varied.contrast(base, rng, 1.0, size),
         ),
         "affine": Probe(
             "affine maps of each object, each lifted by itself", "affine maps", (3, 4, 8, 16, 32, 64), 3,
-            partial(_affine, base), folded=False,
+            partial(varied.affine, base), folded=False,
         ),
         "warp": Probe(
             "deformations beyond the base set's ±0.8", "times the range", (0.5, 1, 1.5, 2, 2.5, 3), 1,
@@ -209,12 +108,12 @@ def common(base: Base, deformed: Base, warp: float) -> dict[str, Probe]:
             lambda rng, factor: base(rng, size=factor),
         ),
         "thin": Probe(
-            "thin objects", "ratio of the scales", (1, 3, 10, 30, 100, 300), 3, partial(_thin, base)
+            "thin objects", "ratio of the scales", (1, 3, 10, 30, 100, 300), 3, partial(varied.thin, base)
         ),
-        "shear": Probe("sheared objects", "shear", (0, 0.5, 1, 2, 4, 8), 0, partial(_sheared, base)),
+        "shear": Probe("sheared objects", "shear", (0, 0.5, 1, 2, 4, 8), 0, partial(varied.sheared, base)),
         "order": Probe(
             "orders of transformations", "order (0 as trained, 1 affine shuffled, 2 deformed last, 3 mixed)",
-            (0, 1, 2, 3), 0, partial(_order, deformed),
+            (0, 1, 2, 3), 0, partial(varied.order, deformed),
         ),
         "canvas": Probe(
             "canvas sizes", "pixels along a side", (32, 64, 128, 256, 512, 1024), 256,
@@ -253,7 +152,7 @@ def animated(rng: Rng, frames: int) -> list[Scene]:
     (chain,) = scene.nodes
     drifts = [(float(rng.normal()), float(rng.normal())) for _ in chain.children]  # type: ignore[union-attr]
     return [
-        rebuilt(scene, lambda i, node, f=f: [_moved(t, f, *drifts[i]) for t in node.transforms])  # type: ignore[misc]
+        varied.rebuilt(scene, lambda i, node, f=f: [_moved(t, f, *drifts[i]) for t in node.transforms])  # type: ignore[misc]
         for f in range(frames)
     ]
 
