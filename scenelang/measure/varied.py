@@ -99,7 +99,7 @@ def order(base: Base, rng: Rng, kind: float) -> Scene:
         if kind == 2:
             return [*some, *warps]
         if kind == 3:
-            return [*warps[:1], scale, *warps[1:], rotate, translate]
+            return [*warps[:-1], scale, *warps[-1:], rotate, translate]
         return [*warps, *some]
 
     return rebuilt(base(rng), moves)

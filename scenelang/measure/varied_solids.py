@@ -32,18 +32,22 @@ BALL = 0.9  # radius of hollow balls
 
 
 def scene(rng: Rng, **changes: object) -> Scene:
+    """A scene of the base set, of which some is changed."""
     return random_solid(rng, replace(BASE, **changes))  # type: ignore[arg-type]
 
 
 def deformed(rng: Rng, **changes: object) -> Scene:
+    """The like with deformed objects."""
     return scene(rng, **{"warp": WARP, **changes})
 
 
 def crowd(rng: Rng, count: float) -> Scene:
+    """So many objects, from five on the smaller the more."""
     return scene(rng, objects=(int(count),) * 2, size=min(1.0, (4 / count) ** (1 / 3)))
 
 
 def bulged(rng: Rng, amount: float, frequency: float) -> Scene:
+    """All objects displaced alike."""
     return rebuilt(scene(rng), lambda _, node: [Displace(amount, frequency), *node.transforms])
 
 
@@ -54,6 +58,7 @@ def _beside(rng: Rng, *before: SceneNode | Link, **settings: object) -> Scene:
 
 
 def links(made: Scene) -> Sequence[Link]:
+    """Those of a scene of one chain."""
     (chain,) = made.nodes
     assert isinstance(chain, Chain)
     return chain.children
@@ -94,8 +99,10 @@ def in_mist(rng: Rng, radius: float) -> Scene:
 
 
 def seen(rng: Rng, camera: Camera) -> Scene:
+    """A base scene, seen from elsewhere."""
     return scene(rng).model_copy(update={"camera": camera})
 
 
 def high(angle: float) -> tuple[float, float, float]:
+    """An eye at the usual distance, so many radians up."""
     return 0.0, AWAY * math.sin(angle), AWAY * math.cos(angle)
