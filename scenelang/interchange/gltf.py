@@ -1,4 +1,7 @@
-"""A glTF node hierarchy as a Scene: nodes become groups, leaves named like geometries become objects."""
+"""A glTF node hierarchy as a Scene: nodes become groups, leaves named like geometries become objects.
+
+A solids' model has a camera and a light too (`gltf_stage.py`): the first of the file.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,13 @@ import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from scenelang.graph import affine
 from scenelang.graph.spaces import SPACES, flattened
 from scenelang.graph.steps import IDENTITY, Rows
-from scenelang.interchange.gltf_file import Gltf, GltfError, Node, read_gltf
+from scenelang.interchange.gltf_file import Gltf, GltfError, Node, read_gltf, short, srgb
+from scenelang.interchange.gltf_stage import camera_of, light_of
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.scene import schema
 
@@ -26,7 +30,6 @@ _MOST_LETTERS: Final = 200  # a longer name is not compared with those of geomet
 _FLAT: Final = 1e-6
 """How far the entries of a matrix that mix z with x and y may be from 0: they are written in float32."""
 _MOST_NAME: Final = 40
-DIGITS: Final = 6  # digits of what is written: files hold float32, whose eighth is noise
 
 
 @dataclass(slots=True)
@@ -84,16 +87,6 @@ def geometry_of(names: Iterable[str | None], geometries: Iterable[str]) -> str |
     return None
 
 
-def srgb(linear: float) -> float:
-    """The sRGB-encoded value of a linear one, both in [0, 1]: a level of 8 bits, or four decimals.
-
-    Source: IEC 61966-2-1.
-    """
-    value = 12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1 / 2.4) - 0.055
-    level = round(255 * value)
-    return level / 255 if abs(255 * value - level) < 1e-4 else round(value, 4)
-
-
 def _manifest(gltf: Gltf, model: str | None) -> Manifest:
     if model is not None:
         if model not in available():
@@ -121,6 +114,7 @@ class _Import:
     names: dict[int, str] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     objects: int = 0
+    stage: dict[str, Any] = field(default_factory=dict)
     _met: set[int] = field(default_factory=set)
     _looks: dict[int, schema.Material | None] = field(default_factory=dict)
 
@@ -132,17 +126,17 @@ class _Import:
             roots = tuple(at for at in range(len(self.gltf.nodes)) if at not in inner)
             if self.gltf.nodes and not roots:
                 raise GltfError("the nodes form a cycle")
-        made = [self.node(root, IDENTITY, "", 1) for root in roots]
+        made = [self.node(root, IDENTITY, IDENTITY, "", 1) for root in roots]
         nodes = tuple(node for node in made if node is not None)
-        scene = schema.Scene(model=self.manifest.name, nodes=nodes)
+        scene = schema.Scene(model=self.manifest.name, nodes=nodes, **self.stage)
         return Imported(scene, self.names, self.left_out, self.objects)
 
     @property
     def flat(self) -> bool:
         return self.manifest.dimension == 2
 
-    def node(self, index: int, waiting: Rows, above: str, depth: int) -> schema.SceneNode | None:
-        """A node with all below it; ``waiting`` maps are those above that leave the plane."""
+    def node(self, index: int, waiting: Rows, outer: Rows, above: str, depth: int) -> schema.SceneNode | None:
+        """A node with all below it; of the maps above it, ``outer``, those ``waiting`` leave the plane."""
         node = self.gltf.nodes[index]
         path = f"{above}/{_shown(node.name, index)}"
         if index in self._met:
@@ -161,8 +155,11 @@ class _Import:
             below = IDENTITY
         else:  # what turns out of the plane here may be turned back below
             steps, below = (), rows
+        world = affine.compose(outer, own_rows)
+        if not self.flat:
+            self.staged(node, world, path)
         own = self.leaf(node, path, below)
-        inside = [self.node(child, below, path, depth + 1) for child in node.children]
+        inside = [self.node(child, below, world, path, depth + 1) for child in node.children]
         nodes = [child for child in (own, *inside) if child is not None]
         if not nodes:
             return None
@@ -171,6 +168,23 @@ class _Import:
         group = schema.Group(children=tuple(nodes), transforms=steps)
         self.names[id(group)] = path
         return group
+
+    def staged(self, node: Node, world: Rows, path: str) -> None:
+        """Take in a node's camera and light if they are the first."""
+        try:
+            if node.camera is not None and "camera" in self.stage:
+                raise GltfError("a further camera")
+            if node.camera is not None:
+                camera, canvas, lost = camera_of(self.gltf.cameras[node.camera], world)
+                self.stage |= {"camera": camera, "canvas": canvas}
+                self.left_out += [f"{path}: {what}" for what in lost]
+            if node.light is not None and "light" in self.stage:
+                raise GltfError("a further light")
+            if node.light is not None:
+                self.stage["light"], lost = light_of(self.gltf.lights[node.light], world)
+                self.left_out += [f"{path}: {what}" for what in lost]
+        except GltfError as error:
+            self.left_out.append(f"{path}: {error}")
 
     def with_steps(self, node: schema.SceneNode, steps: Steps, path: str) -> schema.SceneNode:
         """A single child needs no group: the maps above it come after its own."""
@@ -194,7 +208,8 @@ class _Import:
         for name in sorted(node.extensions):
             if "instancing" in name:
                 self.left_out.append(f"{path}: its instances ({name[:_MOST_NAME]}); only one is drawn")
-        if node.mesh is None and node.children:
+        stands = node.camera is not None or node.light is not None
+        if node.mesh is None and (node.children or (stands and not self.flat)):
             return None
         names = _names(self.gltf, node)
         geometry = geometry_of(names, self.manifest.geometries)
@@ -202,7 +217,7 @@ class _Import:
             mesh = f" with mesh `{_clean(names[1])}`" if len(names) > 1 and names[1] else ""
             if node.camera is not None:
                 what = "a camera"
-            elif "KHR_lights_punctual" in node.extensions:
+            elif node.light is not None:
                 what = "a light"
             else:
                 what = "empty" if node.mesh is None else f"no geometry of {self.manifest.name} is named so"
@@ -272,8 +287,8 @@ class _Import:
         if (u, v, s) != (1.0, 1.0, 1.0) and all((u, v, s)):
             steps.append(_scale(u, v, 1.0 if self.flat else s, self.flat))
         if angle != 0.0:
-            turn = math.radians(_short(math.degrees(angle)))
-            steps.append(schema.Rotate(angle=turn, axis=(_short(axis[0]), _short(axis[1]), _short(axis[2]))))
+            turn = math.radians(short(math.degrees(angle)))
+            steps.append(schema.Rotate(angle=turn, axis=(short(axis[0]), short(axis[1]), short(axis[2]))))
         steps += self.shift(x, y, z)
         return rows, tuple(steps)
 
@@ -285,8 +300,8 @@ class _Import:
         if any(linear) or not all((rows[0], rows[5], rows[10])):
             if not SPACES[3].usable(rows):
                 return ()  # left out by whoever asks for it
-            short: Rows = tuple(map(_short, rows))  # type: ignore[assignment]
-            rows = short if SPACES[3].usable(short) else rows
+            brief: Rows = tuple(map(short, rows))  # type: ignore[assignment]
+            rows = brief if SPACES[3].usable(brief) else rows
             return (schema.Matrix(rows=(rows[0:4], rows[4:8], rows[8:12], (0.0, 0.0, 0.0, 1.0))),)
         scale = (rows[0], rows[5], rows[10])
         return (
@@ -296,7 +311,7 @@ class _Import:
 
     def shift(self, x: float, y: float, z: float) -> Steps:
         z = 0.0 if self.flat else z
-        return (schema.Translate(x=_short(x), y=_short(y), z=_short(z)),) if x or y or z else ()
+        return (schema.Translate(x=short(x), y=short(y), z=short(z)),) if x or y or z else ()
 
 
 _UP: Final[Rows] = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
@@ -304,13 +319,8 @@ _UP: Final[Rows] = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 _DOWN: Final[Rows] = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0)
 
 
-def _short(number: float) -> float:
-    """A number in `DIGITS` digits."""
-    return float(f"{number:.{DIGITS}g}")
-
-
 def _scale(x: float, y: float, z: float, flat: bool) -> schema.Scale:
-    x, y, z = _short(x), _short(y), _short(z)
+    x, y, z = short(x), short(y), short(z)
     return schema.Scale.uniform(x) if x == y and (flat or x == z) else schema.Scale(x=x, y=y, z=z)
 
 

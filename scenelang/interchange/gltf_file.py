@@ -1,13 +1,15 @@
-"""glTF 2.0 files, read as if a stranger had written them: nodes, names and base colours, nothing else.
+"""glTF 2.0 files, read as if a stranger had written them: nodes, names, base colours, cameras and lights.
 
 Neither buffers nor pictures are needed, so no URI is ever followed, and of a .glb only the first chunk is
 read.
 
-Source: Khronos Group, *glTF 2.0 Specification* (ISO/IEC 12113:2022), sections 3.5, 3.9 and 4.
+Source: Khronos Group, *glTF 2.0 Specification* (ISO/IEC 12113:2022), sections 3.5, 3.9, 3.10 and 4, and
+*KHR_lights_punctual*.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import struct
 from typing import Annotated, Any, Final
@@ -19,6 +21,8 @@ from scenelang.scene.fields import Finite
 
 MOST_BYTES: Final = 10_000_000  # of the JSON; buffers do not count where they lie in a .glb or beside a .gltf
 MOST_NODES: Final = 100_000
+LIGHTS: Final = "KHR_lights_punctual"
+DIGITS: Final = 6  # digits of what is written: files hold float32, whose eighth is noise
 _HEADER: Final = 20  # of a .glb and its first chunk
 
 Index = Annotated[int, Field(strict=True, ge=0)]
@@ -54,6 +58,13 @@ class Node(_Part):
     scale: tuple[Finite, Finite, Finite] = (1.0, 1.0, 1.0)
     extensions: dict[str, Any] = {}
 
+    @property
+    def light(self) -> int | None:
+        """Index of its light."""
+        held = self.extensions.get(LIGHTS)
+        index = held.get("light") if isinstance(held, dict) else None
+        return index if type(index) is int else None
+
 
 class Primitive(_Part):
     material: Index | None = None
@@ -86,6 +97,35 @@ class Look(_Part):
     pbr: Annotated[Pbr, Field(alias="pbrMetallicRoughness")] = Pbr()
 
 
+class Perspective(_Part):
+    """Angle of view from top to bottom in radians, and width by height."""
+
+    yfov: Annotated[Finite, Field(gt=0, lt=math.pi)]
+    aspect: Annotated[Finite | None, Field(alias="aspectRatio", ge=1e-4, le=1e4)] = None
+
+
+class View(_Part):
+    type: str
+    perspective: Perspective | None = None
+
+
+class Lamp(_Part):
+    """A light; ``color`` is linear, ``intensity`` of a point in candela."""
+
+    type: str
+    color: tuple[Share, Share, Share] = (1.0, 1.0, 1.0)
+    intensity: Annotated[Finite, Field(ge=0)] = 1.0
+    range: Finite | None = None
+
+
+class Lamps(_Part):
+    lights: tuple[Lamp, ...] = ()
+
+
+class Extensions(_Part):
+    lamps: Annotated[Lamps, Field(alias=LIGHTS)] = Lamps()
+
+
 class Gltf(_Part):
     """What of a file becomes a scene."""
 
@@ -95,6 +135,28 @@ class Gltf(_Part):
     nodes: Annotated[tuple[Node, ...], Field(max_length=MOST_NODES)] = ()
     meshes: tuple[Mesh, ...] = ()
     materials: tuple[Look, ...] = ()
+    cameras: tuple[View, ...] = ()
+    extensions: Extensions = Extensions()
+
+    @property
+    def lights(self) -> tuple[Lamp, ...]:
+        """Lights of the file."""
+        return self.extensions.lamps.lights
+
+
+def short(number: float) -> float:
+    """A number in `DIGITS` digits."""
+    return float(f"{number:.{DIGITS}g}")
+
+
+def srgb(linear: float) -> float:
+    """The sRGB-encoded value of a linear one, both in [0, 1]: a level of 8 bits, or four decimals.
+
+    Source: IEC 61966-2-1.
+    """
+    value = 12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1 / 2.4) - 0.055
+    level = round(255 * value)
+    return level / 255 if abs(255 * value - level) < 1e-4 else round(value, 4)
 
 
 def read_gltf(path: str | os.PathLike[str]) -> Gltf:
@@ -152,9 +214,10 @@ def _first_chunk(data: bytes) -> bytes:
 def _check_references(found: Gltf) -> None:
     """Every index names something there is."""
     counts = {"node": len(found.nodes), "mesh": len(found.meshes), "material": len(found.materials)}
+    counts |= {"camera": len(found.cameras), "light": len(found.lights)}
 
     def check(owner: str, kind: str, index: int | None) -> None:
-        if index is not None and index >= counts[kind]:
+        if index is not None and not 0 <= index < counts[kind]:
             raise GltfError(f"{owner} names {kind} {index}, and there are {counts[kind]}")
 
     if found.scene is not None and found.scene >= len(found.scenes):
@@ -164,6 +227,8 @@ def _check_references(found: Gltf) -> None:
             check(f"scene {at}", "node", index)
     for at, node in enumerate(found.nodes):
         check(f"node {at}", "mesh", node.mesh)
+        check(f"node {at}", "camera", node.camera)
+        check(f"node {at}", "light", node.light)
         for index in node.children:
             check(f"node {at}", "node", index)
     for at, mesh in enumerate(found.meshes):

@@ -36,7 +36,7 @@ def test_names_of_meshes_come_second() -> None:
         {"name": "nose", "mesh": 1},
         {"name": "cam", "camera": 0},
     ]
-    found = read(document(nodes, meshes=meshes))
+    found = read(document(nodes, meshes=meshes, cameras=[{"type": "orthographic"}]))
     assert [name for name, _ in objects(found.scene)] == ["star", "square"]
     assert found.left_out == [
         "/root/nose with mesh `blob`: no geometry of shapes2d is named so",

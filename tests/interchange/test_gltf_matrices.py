@@ -34,7 +34,7 @@ def solids(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def exact(monkeypatch: pytest.MonkeyPatch) -> None:
     """Numbers as they are computed, not as they are written."""
-    monkeypatch.setattr(module, "DIGITS", 17)
+    monkeypatch.setattr("scenelang.interchange.gltf_file.DIGITS", 17)
 
 
 def random_tree(rng: random.Random, leaf: str, flat: bool) -> list[Json]:

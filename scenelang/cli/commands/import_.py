@@ -40,7 +40,8 @@ def command(
 
     Nodes become groups with their transforms. A node becomes an object where its name or its mesh's is
     that of a geometry of the model; case and endings such as .001 do not count. It gets the base colour of
-    its material. What is left out is said, with the path of its node.
+    its material. 3D scenes have the file's first perspective camera and its first point light. What is left
+    out is said, with the path of its node.
     """
     from scenelang.diagnostics.diagnostic import Diagnostics
     from scenelang.interchange.gltf import load_gltf
