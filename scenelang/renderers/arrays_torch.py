@@ -43,6 +43,9 @@ class Torch(Arrays):
     def narrow(self, x: Tensor) -> Tensor:
         return x.float()
 
+    def whole(self, x: Tensor) -> Tensor:
+        return x.long()
+
     def largest(self, x: Tensor) -> Tensor:
         return x.amax(-2, keepdim=True)
 

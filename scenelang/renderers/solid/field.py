@@ -1,53 +1,22 @@
-"""The solids' field: what it answers at points of space, and where along a ray it has to be asked.
+"""The solids' field: what it answers at points of rays.
 
-Each object's frame (`solid_frames.py`) carries points into its own space, where the network meets them. An
-object lies in a ball; farther than its blends reach beyond that, it changes nothing and is not asked.
+Each object's frame (`frames.py`) carries points into its own space. There pairs of points and objects meet
+the network together, where the point is in the object's ball (`passes.py`); then the cell takes a point's
+objects in, one by one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from scenelang.renderers.arrays import Array, Arrays, Layers
-from scenelang.renderers.field import INTERSECT, SMOOTH, SUBTRACT, UNION
-from scenelang.renderers.solid.frames import SolidFrame, read_solid_frame
+from scenelang.renderers.arrays import Array, Arrays
+from scenelang.renderers.field import SMOOTH, UNION
 from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted
+from scenelang.renderers.solid.passes import BEGIN, END, OBJECT, WAY, Passes, find_passes, read_solids
 
 _ROWS = (1, 2, 5)  # of a point's memory, by `Wanted`
-INF = float("inf")
-SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball
-
-
-@dataclass(frozen=True, slots=True)
-class Solid:
-    """One object, ready to be met.
-
-    Args:
-        frame: where it lies.
-        token: how it joins what came before.
-        look: colour and medium (4, 1).
-        layers: its decoder.
-        radius: leaf units from its origin beyond which it changes nothing.
-        centre, extent: a ball (3,) of the world around that.
-        cells: of its token, by what is wanted.
-    """
-
-    frame: SolidFrame
-    token: int
-    look: Array
-    layers: Layers
-    radius: float
-    centre: Array
-    extent: float
-    cells: tuple[Cell, ...]
-
-    @property
-    def draws(self) -> bool:
-        """Whether something may be seen, where it is met, of what was empty before."""
-        return self.token in (UNION, SMOOTH)
 
 
 class Meeting(NamedTuple):
@@ -56,15 +25,19 @@ class Meeting(NamedTuple):
     Args:
         distance: D.
         register: colour and medium (4, M), the medium alone (1, M), or nothing (0, M).
+        inside: which balls (K, M) the points are in.
         gradient: of D (3, M), if asked for.
         change: a bound on D and on how far another object's material may begin, if asked for.
+        owner: number of the object whose material holds, from 1, if asked for.
         met: pairs of points and objects that met.
     """
 
     distance: Array
     register: Array
+    inside: Array
     gradient: Array = None
     change: Array = None
+    owner: Array = None
     met: int = 0
 
 
@@ -81,175 +54,191 @@ class SolidField:
     """
 
     def __init__(self, network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) -> None:
-        self.network, self.xp = network, network.xp
+        self.network, self.xp, self.tokens = network, network.xp, tokens
         with self.xp.inference():
-            self.solids = self._solids(vectors, tokens)
-        draws = [i for i, solid in enumerate(self.solids) if solid.draws]
-        self.draws = None if len(draws) == len(self.solids) else draws
-        """The objects that draw, None if all do."""
-        self.media = any(float(solid.look[3, 0]) > 0.5 for solid in self.solids)
+            self.solids = read_solids(network, vectors, tokens)
+            self._tables(vectors)
+        kinds = self.xp.to_numpy(self.looks)[3] > 0.5
+        self.draws = all(solid.draws for solid in self.solids)
+        """Whether all objects draw."""
+        self.media = bool(kinds.any())
         """Whether some object is a medium."""
-        self.mixed = self.media and any(float(solid.look[3, 0]) <= 0.5 for solid in self.solids)
+        self.mixed = self.media and not kinds.all()
         """Whether not all are."""
 
-    def _solids(self, vectors: np.ndarray, tokens: np.ndarray) -> list[Solid]:
-        xp, layout, like = self.xp, self.network.layout, self.network.codes
-        solids: list[Solid] = []
-        frames = [read_solid_frame(vector[: layout.geometry], layout) for vector in vectors]
-        deepest = max((frame.scale * (1 + abs(frame.amount)) for frame in frames), default=0.0)
-        smooths, widest = 0, 0.0  # of the blends from an object on
-        for frame, vector, token in zip(frames[::-1], vectors[::-1], tokens[::-1].tolist(), strict=True):
-            g, m = vector[: layout.geometry], vector[layout.geometry :]
-            smooth = token == SMOOTH
-            smooths, widest = smooths + smooth, max(widest, frame.blend * smooth)
-            layers = self.network.decoder(xp.array(g[: layout.code].copy(), like))
-            look = self.network.look(xp.array(m[layout.material_code].copy(), like))
-            matrix = xp.array(m[layout.colour].reshape(3, 4).copy(), like)
-            colour = (matrix[:, :3] @ look[:3] + matrix[:, 3]).clip(0.0, 1.0)
-            outer = frame.outer.placed(xp, like)
-            steps = [step.placed(xp, like) for step in frame.steps]
-            blends = widest * (1 + smooths / 4)
-            if smooths and token == SUBTRACT:  # it says how deep points inside others lie
-                blends += deepest
-            radius = 1 + SLACK + abs(frame.amount) + blends / frame.scale
-            back = np.linalg.inv(frame.outer.linear.astype(np.float64))
-            centre = (-back @ frame.outer.shift).astype(np.float32)
-            solids.append(
-                Solid(
-                    frame=replace(frame, outer=outer, steps=tuple(steps)),
-                    token=token,
-                    look=xp.concat([colour, look[3:]], 0)[:, None],
-                    layers=layers,
-                    radius=radius,
-                    centre=xp.array(centre, like),
-                    extent=float(np.linalg.norm(back, 2)) * frame.ball(radius),
-                    cells=self.network.cell(token, frame.blend if smooth else BLEND),
-                )
-            )
-        return solids[::-1]
+    def _tables(self, vectors: np.ndarray) -> None:
+        """What pairs of points and objects look up: arrays (…, N)."""
+        xp, network, layout = self.xp, self.network, self.network.layout
+        g, m = vectors[:, : layout.geometry], vectors[:, layout.geometry :]
+        frames, count = [solid.frame for solid in self.solids], len(vectors)
 
-    def near(self, origin: Array, way: Array) -> Array:
-        """Which rays (k,) may meet any object: those within a cone around its ball."""
-        xp = self.xp
-        found = way[0] > INF
-        for solid in self.solids:
-            if not solid.draws:
-                continue
-            to = solid.centre - origin
-            far = float(xp.sqrt(to @ to))
-            if far <= solid.extent:
-                return xp.where(way[0] < INF)
-            found = found | (to @ way >= far * (1 - (solid.extent / far) ** 2) ** 0.5 - 1e-5 * far)
-        return xp.where(found)
+        def table(values: object, *shape: int) -> Array:
+            return xp.array(np.array(values, np.float32).reshape(*shape, count), network.codes)
 
-    def spans(self, origin: Array, way: Array, limit: Array) -> tuple[Array, Array, Array]:
-        """Where rays may meet each object: begin and end (N, M), inf and -inf for never, and a bound (N, M)
-        on how fast its distance changes along them.
+        codes, decoders = np.unique(g[:, : layout.code], axis=0, return_inverse=True)
+        self.decoders = [network.decoder(xp.array(code, network.codes)) for code in codes]
+        self.decoder = table(decoders)
+        self.scale, self.amount, self.frequency = (
+            table([getattr(frame, name) for frame in frames]) for name in ("scale", "amount", "frequency")
+        )
+        self.linear = xp.stack([f.outer.linear for f in frames], -1) if frames else table([], 3, 3)
+        self.shift = xp.stack([f.outer.shift for f in frames], -1) if frames else table([], 3)
+        self.turned = [(i, frame) for i, frame in enumerate(frames) if frame.steps]
+        self.far = any(solid.radius > RADIUS for solid in self.solids)
+        self.bumpy = any(frame.amount for frame in frames)
+        look = network.look(xp.array(m[:, layout.material_code].copy(), network.codes)).T
+        matrix = table(m[:, layout.colour].T, 3, 4)
+        colour = (matrix[:, :3] * look[:3]).sum(1) + matrix[:, 3]
+        self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
+        self.empty = xp.full((), EMPTY, network.codes)
+        self.smooth = table(self.tokens == SMOOTH) > 0 if SMOOTH in self.tokens else None
+        keys = [(solid.token, solid.frame.blend if solid.token == SMOOTH else BLEND) for solid in self.solids]
+        self.alike = len(set(keys)) <= 1
+        cells = [network.cell(*key) for key in (keys[:1] if self.alike else keys)]
+        cells = cells or [network.cell(UNION, BLEND)]
+        self.cells = [
+            Cell(*(xp.concat(list(part), 1) for part in zip(*each, strict=True)))
+            for each in zip(*cells, strict=True)
+        ]
 
-        Args:
-            origin: of all rays (3,).
-            way: unit directions (3, M).
-            limit: where the rays end (M,).
-        """
-        xp, count = self.xp, way.shape[1]
-        shape = len(self.solids), count
-        begin, end, rate = (xp.full(shape, v, way) for v in (INF, -INF, 1.0))
-        for i, solid in enumerate(self.solids):
-            frame = solid.frame
-            a = frame.outer.linear @ way
-            b = frame.outer.linear @ origin + frame.outer.shift
-            square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-            middle = -(b @ a) / square
-            near = b[:, None] + middle * a  # the point closest to the ball's centre
-            left = frame.ball(solid.radius) ** 2 - near[0] * near[0] - near[1] * near[1] - near[2] * near[2]
-            half = xp.sqrt((left / square).clip(0.0))
-            first, last = (middle - half).clip(0.0), xp.minimum(middle + half, limit)
-            hit = (left > 0) & (first <= last)
-            begin[i] = xp.select(hit, first, begin[i])
-            end[i] = xp.select(hit, last, end[i])
-            rate[i] = (frame.scale * frame.growth(solid.radius)) * xp.sqrt(square)
-            if solid.token == INTERSECT:  # outside its ball nothing is left of what came before
-                begin[:i] = xp.maximum(begin[:i], begin[i])
-                end[:i] = xp.minimum(end[:i], end[i])
-                begin[:i] = xp.select(begin[:i] <= end[:i], begin[:i], xp.full((), INF, way))
-        return begin, end, rate
+    def passes(self, origin: Array, way: Array, limit: Array) -> tuple[Array, Passes]:
+        """As `find_passes`, of unit directions way (3, M)."""
+        origins = (self.linear * origin[:, None]).sum(1) + self.shift
+        return find_passes(self.xp, self.solids, origin, origins, way, limit)
 
     def meet(
-        self, p: Array, inside: Array, wanted: Wanted, gradient: bool = False, change: bool = False
+        self,
+        passes: Passes,
+        t: Array,
+        wanted: Wanted,
+        gradient: bool = False,
+        change: bool = False,
+        owners: bool = False,
     ) -> Meeting:
-        """Let points meet the objects.
+        """Let points of rays meet the objects.
 
         Args:
-            p: world points (3, M).
-            inside: of each object, which points (N, M) may be in its reach.
+            passes: of the rays.
+            t: how far along each the point is (M,).
             wanted: what of the register to answer beside the distance.
-            gradient, change: what else.
+            gradient, change, owners: what else; with owners the register says nothing.
         """
-        xp, count, pairs = self.xp, p.shape[1], 0
-        memory = xp.full((_ROWS[wanted], count), 0.0, p)
+        xp, count = self.xp, len(t)
+        inside = self._inside(passes, t)
+        places = [xp.where(mask) for mask in inside]
+        rays = xp.concat(places, 0)
+        flat = xp.concat([place + count * slot for slot, place in enumerate(places)], 0)
+        pairs = xp.take(passes.slots[: WAY.stop].reshape(WAY.stop, -1), flat)
+        objects = xp.whole(pairs[OBJECT])
+        if not self.draws:
+            objects = xp.select(objects < 0, -1 - objects, objects)
+        at = pairs[WAY] * xp.take(t, rays) + xp.take(passes.origins, objects)
+        d, own = self._distances(at, objects, gradient)
+        memory = xp.full((_ROWS[wanted], count), 0.0, t)
         memory[0] = EMPTY
-        slope = xp.full((3, count), 0.0, p) if gradient else None
-        bound = xp.full((count,), EMPTY, p) if change else None
-        touched = None if self.draws is None else inside[0] & ~inside[0]
-        for solid, mask in zip(self.solids, inside, strict=True):
-            if touched is not None:
-                if solid.draws:
-                    touched = touched | mask
-                else:
-                    mask = mask & touched
-            index = xp.where(mask)
-            met = len(index)
-            if not met:
+        slope = xp.full((3, count), 0.0, t) if gradient else None
+        bound = xp.full((count,), EMPTY, t) if change else None
+        owner = xp.full((count,), 0.0, t) if owners else None
+        stop = len(rays)
+        for place in reversed(places):  # a point's first object is in the last slot
+            if not len(place):
                 continue
-            pairs += met
-            place = None if met == count else index
-            before = _part(xp, memory, place)
-            d, own = self.distance(solid, _part(xp, p, place), gradient)
-            cell = solid.cells[wanted]
-            found, take = self.network.join(d, before, solid.look, cell, wanted)
+            stop, pair = stop - len(place), slice(stop - len(place), stop)
+            index, which, near = None if len(place) == count else place, objects[pair], d[pair]
+            before, look = _part(xp, memory, index), self.looks
+            if wanted:
+                look = xp.take(look, which)
+            cell = self.cells[wanted]
+            if not self.alike:
+                cell = Cell(*(xp.take(weights, which) for weights in cell))
+            if owner is not None:  # behind a register of 0, a look of 1 shows where its gate is open
+                before, look = xp.concat([before[:1], 0 * before[1:]], 0), 0 * look + 1
+            after, take = self.network.join(near, before, look, cell, wanted)
+            if owner is not None:
+                held = xp.select(after[-1] > 0.5, which + 1 + 0 * near, _part(xp, owner, index))
+                owner = _update(xp, owner, index, held)
             if bound is not None:
-                gap = abs(d)
-                if solid.token == SMOOTH:
-                    gap = xp.minimum(gap, abs(before[0] - d) / 2)
-                bound = _update(xp, bound, place, xp.minimum(_part(xp, bound, place), gap))
-            if slope is not None:
-                by_own, by_past = self.network.partials(d, before[0], take, cell)
-                past = _part(xp, slope, place)
-                slope = _update(xp, slope, place, by_own * own + by_past * past)
-            memory = _update(xp, memory, place, found)
+                gap = self._gap(near, before, look, which)
+                bound = _update(xp, bound, index, xp.minimum(_part(xp, bound, index), gap))
+            if slope is not None and own is not None:
+                by_own, by_past = self.network.partials(near, before[0], take, cell)
+                past = _part(xp, slope, index)
+                slope = _update(xp, slope, index, by_own * own[:, pair] + by_past * past)
+            memory = _update(xp, memory, index, after)
         if bound is not None:
             bound = xp.minimum(bound, abs(memory[0]))
-        return Meeting(memory[0], memory[1:], slope, bound, pairs)
+        return Meeting(memory[0], memory[1:], inside, slope, bound, owner, len(rays))
 
-    def distance(self, solid: Solid, p: Array, gradient: bool) -> tuple[Array, Array | None]:
-        """An object's world distance (M,) at world points (3, M), and its gradient (3, M) if asked for."""
-        xp, network, frame = self.xp, self.network, solid.frame
-        scale = frame.scale
-        q = frame.local(xp, p)
-        rim = length = None
-        at = q
-        if solid.radius > RADIUS:
-            length = xp.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
+    def _gap(self, d: Array, before: Array, look: Array, which: Array) -> Array:
+        """How far (k,) objects with distances d (k,) leave the kind of material as it is."""
+        xp, gap = self.xp, abs(d)
+        if self.smooth is not None:
+            blend = xp.minimum(gap, abs(before[0] - d) / 2)
+            gap = xp.select(xp.take(self.smooth, which), blend, gap)
+        # objects of the kind that is there change nothing of it
+        return xp.select(abs(before[1] - look[3]) > 0.5, gap, self.empty)
+
+    def _inside(self, passes: Passes, t: Array) -> Array:
+        """Which balls (K, M) points at t (M,) are in, of objects that change something there."""
+        inside = (passes.slots[BEGIN] <= t) & (t <= passes.slots[END])
+        if not self.draws:  # the others change only what is there
+            touched = inside[0] & ~inside[0]
+            for slot in reversed(range(len(inside))):
+                inside[slot] &= touched | (passes.slots[OBJECT, slot] >= 0)
+                touched = touched | inside[slot]
+        return inside
+
+    def _distances(self, at: Array, objects: Array, gradient: bool) -> tuple[Array, Array | None]:
+        """World distances (P,) to objects at points (3, P) behind their maps; gradients (3, P) if asked."""
+        xp, q, g = self.xp, at, None
+        own = []  # of the objects with more than a map, their points
+        for i, frame in self.turned:
+            index = xp.where(objects == i)
+            if len(index):
+                own.append((frame, index, xp.take(at, index)))
+        if own:
+            q = 1 * at
+            for frame, index, p in own:
+                xp.put(q, index, frame.local(xp, p))
+        length = rim = None
+        place = q
+        if self.far:
+            length = xp.sqrt((q * q).sum(0))
             rim = RADIUS / length.clip(RADIUS)
-            at = q * rim
-        if gradient:
-            d, g = network.gradient(at, solid.layers)
-        else:
-            d, g = network.distance(at, solid.layers), None
-        if rim is not None and length is not None:
+            place = q * rim
+        found = self._decoded(place, objects, gradient)
+        d, g = found[0], found[1:]
+        if length is not None and rim is not None:
             d = d + (length - RADIUS).clip(0.0)
-            if g is not None:
+            if gradient:
                 n = q / length.clip(1e-9)
-                radial = g[0] * n[0] + g[1] * n[1] + g[2] * n[2]
-                g = xp.select(length > RADIUS, rim * (g - radial * n) + n, g)
-        if frame.amount:
-            f = frame.frequency
-            s, c = xp.sin(f * q), xp.cos(f * q)
-            d = d + frame.amount * (s[0] * s[1] * s[2])
-            if g is not None:
+                g = xp.select(length > RADIUS, rim * (g - (g * n).sum(0) * n) + n, g)
+        if self.bumpy:
+            f, amount = xp.take(self.frequency, objects), xp.take(self.amount, objects)
+            s = xp.sin(f * q)
+            d = d + amount * (s[0] * s[1] * s[2])
+            if gradient:
+                c = xp.cos(f * q)
                 more = xp.stack([c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]], 0)
-                g = g + (frame.amount * f) * more
-        return d * scale, None if g is None else frame.pulled(xp, p, g) * scale
+                g = g + (amount * f) * more
+        scale = xp.take(self.scale, objects)
+        if not gradient:
+            return d * scale, None
+        for frame, index, p in own:
+            xp.put(g, index, frame.pulled(xp, p, xp.take(g, index)))
+        return d * scale, (xp.take(self.linear, objects) * g[:, None]).sum(0) * scale
+
+    def _decoded(self, q: Array, objects: Array, gradient: bool) -> Array:
+        """What decoders say at leaf coordinates (3, P): distances (1, P), or these and gradients (4, P)."""
+        xp, network = self.xp, self.network
+        if len(self.decoders) == 1:
+            return network.field(q, self.decoders[0], gradient)
+        found, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
+        for i, layers in enumerate(self.decoders):
+            index = xp.where(which == i)
+            if len(index):
+                xp.put(found, index, network.field(xp.take(q, index), layers, gradient))
+        return found
 
 
 def _part(xp: Arrays, whole: Array, index: Array | None) -> Array:

@@ -6,7 +6,7 @@ Points are arrays (3, M).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -126,20 +126,25 @@ class SolidFrame:
         return growth
 
     def local(self, xp: Arrays, p: Array) -> Array:
-        """Leaf coordinates of world points, both (3, M)."""
-        for step in (self.outer, *self.steps):
+        """Leaf coordinates of points behind `outer`, both (3, M)."""
+        for step in self.steps:
             p = step(xp, p)
         return p
 
     def pulled(self, xp: Arrays, p: Array, g: Array) -> Array:
-        """World gradient (3, M) at world points of what has the gradient g in leaf coordinates."""
+        """Gradient (3, M) at points behind `outer` of what has the gradient g in leaf coordinates."""
         passed = []
-        for step in (self.outer, *self.steps):
+        for step in self.steps:
             passed.append((step, p))
             p = step(xp, p)
         for step, at in reversed(passed):
             g = step.pulled(xp, at, g)
         return g
+
+    def placed(self, xp: Arrays, like: Array) -> SolidFrame:
+        """The same where an array lies."""
+        steps = tuple(step.placed(xp, like) for step in self.steps)
+        return replace(self, outer=self.outer.placed(xp, like), steps=steps)
 
 
 def read_solid_frame(g: np.ndarray, layout: Layout = SOLID_LAYOUT) -> SolidFrame:

@@ -12,17 +12,27 @@ from operator import add
 
 import numpy as np
 
-from scenelang.renderers.arrays import Array
-from scenelang.renderers.solid.field import INF, Meeting, SolidField
+from scenelang.renderers.arrays import Array, Arrays
+from scenelang.renderers.solid.field import Meeting, SolidField
 from scenelang.renderers.solid.network import Wanted
+from scenelang.renderers.solid.passes import BEGIN, END, INF, OBJECT, RATE, Passes, placed
 
 GAP = 0.009  # world units
 TOUCH = 1e-5  # world units: so near counts as met
 STEPS = 400  # of a ray at most
-HALVINGS = 12  # of the interval in which a medium gives way to a solid
+HALVINGS = 16  # of the interval in which a medium gives way to a solid
 NUDGE = np.float32(1 - 1e-6)  # of a point, to one just before it
-T, PAST, FREE, WITHIN, SINCE, LENGTH, WAY = 0, 1, 2, 3, 4, 5, 6  # rows of what a ray carries along
-BEGIN = WAY + 3  # and where its objects begin, end, and how fast their distances change
+T, PAST, FREE, WITHIN, SINCE, LENGTH, STATE = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+)  # rows of what a ray carries along, how many
+
+
 Piece = tuple[Array, ...]  # of ways in media: index of the ray, begin, end, length before it, each (P,)
 
 
@@ -58,6 +68,8 @@ class Trail:
         hit: (M,) how far the first opaque surface is, inf where there is none.
         length: (M,) world units in media before that or before the ray's end.
         soft: (M,) 1 where it was a medium that the surface ends, 0 elsewhere: the distance is not 0 there.
+        place: (M,) of rays in `passes`, -1 where they pass none.
+        passes: the balls that those pass.
         pieces: of the ways in media.
         near, steps, met: as of `Work`.
     """
@@ -65,10 +77,16 @@ class Trail:
     hit: Array
     length: Array
     soft: Array
+    place: Array
+    passes: Passes
     pieces: list[Piece] = field(default_factory=list)
     near: int = 0
     steps: int = 0
     met: int = 0
+
+    def at(self, xp: Arrays, index: Array) -> Passes:
+        """The balls that some of the rays pass."""
+        return self.passes.at(xp, xp.take(self.place, index))
 
 
 def march(solids: SolidField, origin: Array, way: Array, limit: Array, halvings: int = HALVINGS) -> Trail:
@@ -83,64 +101,47 @@ def march(solids: SolidField, origin: Array, way: Array, limit: Array, halvings:
     """
     xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
-    trail = Trail(hit, length, soft)
-    ids = solids.near(origin, way)
-    if not len(ids):
-        return trail
-    rays = _Rays(solids, origin, trail, ids, xp.take(way, ids), xp.take(limit, ids), halvings)
-    for _ in range(STEPS):
-        if not len(rays.ids):
-            break
-        rays.step()
+    ids, passes = solids.passes(origin, way, limit)
+    trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes, near=len(ids))
+    if len(ids):
+        rays = _Rays(solids, trail, ids)
+        for _ in range(STEPS):
+            if not len(rays.ids):
+                break
+            rays.step()
+        rays.finish(halvings)
     return trail
 
 
 class _Rays:
     """Rays under way."""
 
-    def __init__(
-        self,
-        solids: SolidField,
-        origin: Array,
-        trail: Trail,
-        ids: Array,
-        way: Array,
-        limit: Array,
-        halvings: int,
-    ) -> None:
-        self.solids, self.xp, self.trail, self.halvings, xp = solids, solids.xp, trail, halvings, solids.xp
-        self.origin, self.never = origin[:, None], xp.full((), INF, way)
+    def __init__(self, solids: SolidField, trail: Trail, ids: Array) -> None:
+        self.solids, self.xp, self.trail = solids, solids.xp, trail
+        self.ids, self.passes = ids, trail.passes
+        slots = self.passes.slots
+        self.never = self.xp.full((), INF, slots)
         self.wanted = Wanted.KIND if solids.mixed else Wanted.DISTANCE
-        begin, end, rate = solids.spans(origin, way, limit)
-        start = xp.least(begin if solids.draws is None else begin[solids.draws])
-        some = xp.where(start < INF)
-        blank = xp.full((WAY - FREE, len(start)), 0.0, way)
-        rows = xp.concat([start[None], start[None] * NUDGE, blank, way, begin, end, rate], 0)
-        self.ids, self.rows = xp.take(ids, some), xp.take(rows, some)
-        trail.near = len(some)
+        self.rows = self.xp.full((STATE, len(ids)), 0.0, slots)
+        self.rows[T] = self.xp.least(self._drawn(slots[BEGIN]))
+        self.rows[PAST] = self.rows[T] * NUDGE
+        self.ended: list[tuple[Array, Array, Passes]] = []  # in media, where something opaque is
 
-    def ask(self, rows: Array, t: Array) -> tuple[Meeting, Array]:
-        """What the field answers at t (k,) of rays, and in which balls (N, k) they are there."""
-        begin, end, _ = self.objects(rows)
-        inside = (begin <= t) & (t <= end)
-        p = self.origin + rows[WAY:BEGIN] * t
-        return self.solids.meet(p, inside, self.wanted, change=self.solids.mixed), inside
-
-    def objects(self, rows: Array) -> tuple[Array, Array, Array]:
-        """Where rays may meet each object, and how fast its distance changes: (N, k) each."""
-        n = len(self.solids.solids)
-        return rows[BEGIN : BEGIN + n], rows[BEGIN + n : BEGIN + 2 * n], rows[BEGIN + 2 * n :]
+    def _drawn(self, places: Array) -> Array:
+        """Places (K, k) of the objects that draw, inf for the others."""
+        if self.solids.draws:
+            return places
+        return self.xp.select(self.passes.slots[OBJECT] < 0, self.never, places)
 
     def step(self) -> None:
         """Ask the field where the rays are, note what they met, and move them on."""
-        xp, rows, solids = self.xp, self.rows, self.solids
+        xp, rows, solids, slots = self.xp, self.rows, self.solids, self.passes.slots
         t = rows[T]
-        met, inside = self.ask(rows, t)
-        self.trail.steps += len(self.ids)
-        self.trail.met += met.met
+        met = self._ask(self.passes, t)
+        self.trail.steps += len(t)
         free = abs(met.distance)
+        within = None
         if not solids.media:
-            within = None
             done = met.distance < TOUCH
             struck = xp.where(done)
         else:
@@ -153,22 +154,20 @@ class _Rays:
             struck = self._pass_media(within, done, free)
         if len(struck):
             xp.put(self.trail.hit, xp.take(self.ids, struck), self._root(free, struck))
-        begin, end, rate = self.objects(rows)
-        safe = free / xp.largest(inside * rate)[0].clip(1e-3)
+        begin, end = slots[BEGIN], slots[END]
+        safe = free / xp.largest(met.inside * slots[RATE])[0].clip(1e-3)
         hope = (1.05 * free) * (t - rows[PAST]) / (rows[FREE] - free).clip(1e-12) + TOUCH
         following = t + xp.minimum(xp.maximum(hope, safe), safe + GAP)
         places = xp.select(begin > t, begin, following)
         if within is not None:  # the way through a medium ends with its ball
             places = xp.select(within & (end > t), xp.minimum(places, end), places)
         places = xp.select(places <= end, places, self.never)
-        place = xp.select(
-            done, self.never, xp.least(places if solids.draws is None else places[solids.draws])
-        )
+        place = xp.select(done, self.never, xp.least(self._drawn(places)))
         going = place < INF
         if within is not None:
             ended = xp.where(within & ~going)
             if len(ended):
-                self._close(ended, xp.take(t, ended))
+                self._close(xp.take(self.ids, ended), xp.take(rows, ended), xp.take(t, ended))
             rows[WITHIN] = within & going
         jumps = place > following
         rows[PAST] = xp.select(jumps, place * NUDGE, t)
@@ -176,31 +175,49 @@ class _Rays:
         rows[T] = place
         left = xp.where(going)
         if len(left) < 0.85 * len(self.ids) or not len(left):
-            self.ids, self.rows = xp.take(self.ids, left), xp.take(rows, left)
+            self.ids, self.rows, self.passes = self._only(left)
+
+    def _only(self, index: Array) -> tuple[Array, Array, Passes]:
+        """Some of the rays: which they are, their rows and their balls."""
+        xp = self.xp
+        return xp.take(self.ids, index), xp.take(self.rows, index), self.passes.at(xp, index)
+
+    def _ask(self, passes: Passes, t: Array) -> Meeting:
+        found = self.solids.meet(passes, t, self.wanted, change=self.solids.mixed)
+        self.trail.met += found.met
+        return found
 
     def _pass_media(self, within: Array, done: Array, free: Array) -> Array:
         """Note where rays entered and left media; which (k,) struck something opaque from outside."""
         xp, before = self.xp, self.rows[WITHIN] > 0
-        enter, leave = xp.where(within & ~before), xp.where(before & ~within)
+        enter, leave = xp.where(within & ~before), xp.where(before & ~within & ~done)
         if len(enter):
             xp.put(self.rows[SINCE], enter, self._root(free, enter))
         if len(leave):
-            back = self._root(free, leave)
-            into = xp.where(xp.take(done, leave))
-            if len(into):
-                part = xp.take(self.rows, xp.take(leave, into))
-                low, high = part[PAST], part[T]
-                for _ in range(self.halvings):
-                    half = (low + high) / 2
-                    found, _ = self.ask(part, half)
-                    still = (found.distance < 0) & (found.register[0] > 0.5)
-                    low, high = xp.select(still, half, low), xp.select(still, high, half)
-                xp.put(back, into, high)
-                ended = xp.take(self.ids, xp.take(leave, into))
-                xp.put(self.trail.hit, ended, high)
-                xp.put(self.trail.soft, ended, high * 0 + 1)
-            self._close(leave, back)
+            ray, row, back = xp.take(self.ids, leave), xp.take(self.rows, leave), self._root(free, leave)
+            xp.put(self.rows[LENGTH], leave, self._close(ray, row, back))
+        into = xp.where(before & done)
+        if len(into):
+            self.ended.append(self._only(into))
         return xp.where(done & ~before)
+
+    def finish(self, halvings: int) -> None:
+        """Find where media give way to something opaque: there the distance need not be 0."""
+        if not self.ended:
+            return
+        xp = self.xp
+        ids, rows, passes = zip(*self.ended, strict=True)
+        ray, row = xp.concat(ids, 0), xp.concat(rows, 1)
+        slots = passes[0]._replace(slots=xp.concat([each.slots for each in passes], 2))
+        low, high = row[PAST], row[T]
+        for _ in range(halvings):
+            half = (low + high) / 2
+            found = self._ask(slots, half)
+            still = (found.distance < 0) & (found.register[0] > 0.5)
+            low, high = xp.select(still, half, low), xp.select(still, high, half)
+        xp.put(self.trail.hit, ray, high)
+        xp.put(self.trail.soft, ray, high * 0 + 1)
+        self._close(ray, row, high)
 
     def _root(self, free: Array, index: Array) -> Array:
         """Where between their last two points some rays met a surface, as far as both bounds tell."""
@@ -209,16 +226,11 @@ class _Rays:
         t, past, before = rows[T], rows[PAST], rows[FREE]
         return xp.maximum(past + (t - past) * (before / (before + free).clip(1e-9)), t - GAP)
 
-    def _close(self, index: Array, end: Array) -> None:
-        """End the ways through media of some rays."""
-        xp, rows = self.xp, self.rows
-        begin, before, ray = (
-            xp.take(rows[SINCE], index),
-            xp.take(rows[LENGTH], index),
-            xp.take(self.ids, index),
-        )
+    def _close(self, ray: Array, rows: Array, end: Array) -> Array:
+        """End the ways through media of rays (k,) with such rows (STATE, k); lengths (k,) in media so far."""
+        xp, begin, before = self.xp, rows[SINCE], rows[LENGTH]
         end = xp.maximum(end, begin)
         self.trail.pieces.append((ray, begin, end, before))
         total = before + end - begin
-        xp.put(rows[LENGTH], index, total)
         xp.put(self.trail.length, ray, total)
+        return total

@@ -50,12 +50,13 @@ class SolidConfig:
 
 
 class Cell(NamedTuple):
-    """Weights of the cell of one token, for blends of one width."""
+    """Weights of the cell for a token and a width of blends, or (…, M) for those of each point."""
 
-    lines: Array  # (1 + L + K, 2): levels of the gates from (distance, distance so far)
-    bias: Array  # (1 + L + K)
-    candidate: Array  # (): what an open gate makes of the object's distance
-    bump: Array  # (): by how much a half-open gate lowers the distance, times four
+    own: Array  # (1 + L + K, 1): levels of the gates from the object's distance
+    past: Array  # (1 + L + K, 1): and from the distance so far
+    bias: Array  # (1 + L + K, 1)
+    candidate: Array  # (1, 1): what an open gate makes of the object's distance
+    bump: Array  # (1, 1): by how much a half-open gate lowers the distance, times four
 
 
 class Wanted(IntEnum):
@@ -96,34 +97,25 @@ class SolidNetwork:
 
         The fold of s d and s D is s D', so that the cell's own width is that of any other.
         """
-        xp, paint, scale = self.xp, self.config.paint_lines, BLEND / width
-        gain = xp.exp(self.cell_gain[token])
-        lines = (self.cell_lines[token] * (gain * scale)).swapaxes(0, 1)
-        bias, bump = self.cell_bias[token], self.bump[token] / (gain[0] * scale)
+        paint, scale = self.config.paint_lines, BLEND / width
+        gain = self.xp.exp(self.cell_gain[token])[:, None]
+        own, past = (line[:, None] * (gain * scale) for line in self.cell_lines[token])
+        bias, bump = self.cell_bias[token][:, None], self.bump[token] / (gain[:1] * scale)
         kept = [[0], [0, *range(1 + paint, len(bias))], [*range(len(bias))]]
-        return tuple(
-            Cell(xp.packed(lines[rows]), xp.packed(bias[rows]), self.candidate[token], bump) for rows in kept
-        )
+        candidate = self.candidate[token].reshape(1, 1)
+        return tuple(Cell(own[rows], past[rows], bias[rows], candidate, bump) for rows in kept)
 
     def look(self, material_code: Array) -> Array:
         """Colour and medium (…, 4) of material codes (…, material_code)."""
         return material_code @ self.albedo[:-1] + self.albedo[-1]
 
-    def distance(self, q: Array, layers: Layers) -> Array:
-        """Distances (M,) of leaf coordinates (3, M), leaf units."""
-        return self._in_blocks(q, layers, False)[0]
-
-    def gradient(self, q: Array, layers: Layers) -> tuple[Array, Array]:
-        """Distances (M,) and their gradients (3, M)."""
-        found = self._in_blocks(q, layers, True)
-        return found[0], found[1:]
-
-    def _in_blocks(self, q: Array, layers: Layers, slopes: bool) -> Array:
-        xp, ask = self.xp, self._slopes if slopes else self._values
+    def field(self, q: Array, layers: Layers, gradient: bool) -> Array:
+        """Distances of leaf coordinates (3, M), leaf units: (1, M), or with their gradients (4, M)."""
+        ask = self._slopes if gradient else self._values
         count = q.shape[1]
         if count <= BLOCK:
             return ask(q, layers)
-        return xp.concat([ask(q[:, i : i + BLOCK], layers) for i in range(0, count, BLOCK)], 1)
+        return self.xp.concat([ask(q[:, i : i + BLOCK], layers) for i in range(0, count, BLOCK)], 1)
 
     def _values(self, q: Array, layers: Layers) -> Array:
         """Distances (1, M)."""
@@ -152,22 +144,19 @@ class SolidNetwork:
             d: the object's distance (M,).
             memory: the distance so far and the register behind it (1, M), (2, M) with the medium alone, or
                 (5, M).
-            look: the object's own register (4, 1).
+            look: the object's own register (4, 1), or (4, M).
             cell: of the object's token.
             wanted: what the memory holds.
 
         Returns:
             The memory behind the object, and how far the distance's gate is open (M,).
         """
-        xp, state = self.xp, memory[0]
-        if wanted == Wanted.DISTANCE:
-            own, past = cell.lines[0]
-            gates = xp.unit(d * own + state * past + cell.bias)[None]
-        else:
-            gates = xp.unit(xp.dense(xp.concat([d[None], memory[:1]], 0), cell.lines, cell.bias))
-        take = gates[0]
+        xp, state = self.xp, memory[:1]
+        gates = xp.unit(cell.own * d + cell.past * state + cell.bias)
+        take = gates[:1]
         keep = 1 - take
-        new = (take * (d * cell.candidate - keep * cell.bump) + keep * state)[None]
+        new = take * (d * cell.candidate - keep * cell.bump) + keep * state
+        take = take[0]
         if wanted == Wanted.DISTANCE:
             return new, take
         if wanted == Wanted.KIND:
@@ -180,10 +169,10 @@ class SolidNetwork:
 
     def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:
         """How the distance behind an object changes with its own (M,) and with that before it (M,)."""
-        rate = d * cell.candidate - state - (1 - 2 * take) * cell.bump
+        candidate, bump = cell.candidate[0], cell.bump[0]
+        rate = d * candidate - state - (1 - 2 * take) * bump
         rate = self.xp.select((take > 0) & (take < 1), rate, 0 * rate)
-        own, past = cell.lines[0].tolist()
-        return take * cell.candidate + rate * own, 1 - take + rate * past
+        return take * candidate + rate * cell.own[0], 1 - take + rate * cell.past[0]
 
 
 class SolidArrays(SolidNetwork):

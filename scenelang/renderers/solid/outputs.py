@@ -9,10 +9,12 @@ import numpy as np
 from scenelang.graph.stage import EXTINCTION, Stage
 from scenelang.outputs import DEEP, Outputs
 from scenelang.renderers.arrays import Array
-from scenelang.renderers.solid.draw import INTO, TILE, Lighting, directions, rough
-from scenelang.renderers.solid.field import INF, SolidField
+from scenelang.renderers.solid.draw import TILE, directions, rough
+from scenelang.renderers.solid.field import SolidField
+from scenelang.renderers.solid.light import INTO, Lighting
 from scenelang.renderers.solid.march import Trail, march
-from scenelang.renderers.solid.network import EMPTY, Wanted
+from scenelang.renderers.solid.network import Wanted
+from scenelang.renderers.solid.passes import INF
 
 ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 
@@ -73,7 +75,7 @@ def _shown(lighting: Lighting, ways: np.ndarray) -> np.ndarray:
         for ray, begin, end, before in reversed(trail.pieces):
             first = xp.where(before == 0)  # a ray's pieces come in order
             ray, t = xp.take(ray, first), xp.take(xp.minimum((begin + end) / 2, begin + DEEP), first)
-            out[4, ray] = _owner(field, lighting.eye, xp.take(way, ray), t)
+            out[4, ray] = field.meet(trail.at(xp, ray), t, Wanted.KIND, owners=True).owner
         solid = xp.where(trail.hit < INF)
         if len(solid):
             to = xp.take(way, solid)
@@ -81,28 +83,5 @@ def _shown(lighting: Lighting, ways: np.ndarray) -> np.ndarray:
             away = p - lighting.eye[:, None]
             out[0, solid], out[1:4, solid] = forward @ away, n
             t = xp.length(list(away)) + INTO
-            out[4, solid] = _owner(field, lighting.eye, to, t)
+            out[4, solid] = field.meet(trail.at(xp, solid), t, Wanted.KIND, owners=True).owner
     return np.asarray(xp.to_numpy(out)).reshape(ROWS, *ways.shape[1:])
-
-
-def _owner(field: SolidField, eye: Array, way: Array, t: Array) -> Array:
-    """The number of the object whose material holds at t (K,) of rays (3, K) from the eye, from 1.
-
-    The gate by which the cell takes in an object's medium tells: behind a register of 0, one of 1 shows it.
-    """
-    xp, token_of = field.xp, Wanted.KIND
-    begin, end, _ = field.spans(eye, way, t)
-    p = eye[:, None] + way * t
-    memory, owner = xp.full((2, len(t)), 0.0, way), xp.full((len(t),), 0.0, way)
-    memory[0] = EMPTY
-    for number, solid in enumerate(field.solids, 1):
-        index = xp.where((begin[number - 1] <= t) & (t <= end[number - 1]))
-        if not len(index):
-            continue
-        before = xp.take(memory, index)
-        before[1] = 0.0
-        d, _ = field.distance(solid, xp.take(p, index), False)
-        after, _ = field.network.join(d, before, 0 * solid.look + 1, solid.cells[token_of], token_of)
-        xp.put(memory, index, after)
-        xp.put(owner, index, xp.select(after[1] > 0.5, 0 * d + number, xp.take(owner, index)))
-    return owner

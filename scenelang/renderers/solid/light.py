@@ -1,0 +1,235 @@
+"""What rays from the eye see of solids: surfaces, ground, sky and media under the light.
+
+The light is computed, as the language defines it; what is learned is where things are and what they look
+like. Colours are linear. Letters as in `network.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
+from scenelang.renderers.arrays import Array, Arrays
+from scenelang.renderers.solid.field import Meeting, SolidField
+from scenelang.renderers.solid.march import GAP, Piece, Trail, Work, march
+from scenelang.renderers.solid.network import Wanted
+from scenelang.renderers.solid.passes import INF
+
+INTO = 3e-5  # world units behind a surface where its material is asked for
+CLEAR = 2e-4  # world units before a surface where rays from the light end
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(3)
+NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2  # of a way through a medium, by what it takes of the light
+NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle are cut
+CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents of angles at the light
+
+
+class Shade(NamedTuple):
+    """What M rays see: premultiplied linear radiance (3, M), alpha (M,), and what it took."""
+
+    radiance: Array
+    alpha: Array
+    work: Work
+
+
+class Points(NamedTuple):
+    """Points (3, K) where light may arrive, what they send to the eye without it, and what more with it."""
+
+    p: Array
+    base: Array
+    more: Array
+
+
+class Lighting:
+    """A field under the light of its stage.
+
+    Args:
+        field: the solids.
+        stage: where they are.
+    """
+
+    def __init__(self, field: SolidField, stage: Stage) -> None:
+        self.field, self.stage, self.xp = field, stage, field.xp
+        like = field.network.codes
+        self.eye, self.lamp, self.power, self.horizon, self.zenith = (
+            field.xp.array(np.asarray(value, np.float32), like)
+            for value in (
+                stage.camera.eye,
+                stage.light.position,
+                [stage.light.power * c for c in stage.light.rgb],
+                stage.horizon,
+                stage.zenith,
+            )
+        )
+
+    def shade(self, way: Array) -> Shade:
+        """What rays from the eye see.
+
+        Args:
+            way: unit directions (3, M).
+        """
+        xp, stage = self.xp, self.stage
+        seen, limit = self._sky(way), self.limit(way)
+        alpha = 0 * way[0] + (0.0 if stage.transparent else 1.0)
+        if stage.transparent:
+            seen = seen * 0
+        trail = march(self.field, self.eye, way, limit)
+        surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
+        both, found = xp.concat([surface, floor], 0), []
+        work = Work(way.shape[1], 0, trail.near, trail.steps, trail.met + len(surface))
+        if len(surface):
+            found.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail)))
+        if len(floor):
+            found.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
+        if trail.pieces:
+            pieces = [part for piece in trail.pieces for part in self._cut(way, piece)]
+            found.append(self._scattering(way, trail, pieces))
+            work += Work(met=found[-1].p.shape[1])
+        if not found:
+            return Shade(seen, alpha, work)
+        points = Points(*(xp.concat(list(part), 1) for part in zip(*found, strict=True)))
+        light, more = self._lit(points, xp.take(trail.soft, surface))
+        xp.put(seen, both, light[:, : len(both)])
+        xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
+        if trail.pieces:
+            clear, glow = xp.exp(-EXTINCTION * trail.length), 0 * way
+            sent = light[:, len(both) :].reshape(3, len(NODES), -1).sum(1)
+            for ray, *_ in pieces:  # a ray occurs once in each
+                xp.put(glow, ray, xp.take(glow, ray) + sent[:, : len(ray)])
+                sent = sent[:, len(ray) :]
+            seen, alpha = seen * clear + glow, 1 - (1 - alpha) * clear
+        return Shade(seen, alpha, work + more)
+
+    def limit(self, way: Array) -> Array:
+        """How far rays from the eye go before they meet the ground (M,), inf for ever."""
+        xp, eye, ground, never = self.xp, self.stage.camera.eye, self.stage.ground, 0 * way[0] + INF
+        if ground is None or eye[1] <= ground.y:
+            return never
+        down = way[1] < 0
+        return xp.select(down, (ground.y - eye[1]) / xp.select(down, way[1], way[1] * 0 - 1), never)
+
+    def _sky(self, way: Array) -> Array:
+        high = (way[1] * 2).clip(0.0, 1.0)
+        return self.horizon[:, None] + (self.zenith - self.horizon)[:, None] * high
+
+    def _reflecting(self, p: Array, n: Array, colour: Array, haze: Array) -> Points:
+        """Surface points (3, K) with unit normals and colours, and light that joins in before."""
+        to = self.lamp[:, None] - p
+        r = _length(self.xp, to).clip(NEAREST)
+        facing = (_dot(n, to) / r).clip(0.0)
+        base = colour * (AMBIENT[0] + AMBIENT[1] * n[1]) + haze
+        return Points(p + LIFT * n, base, colour * self.power[:, None] * (facing / (r * r)))
+
+    def _scattering(self, way: Array, trail: Trail, pieces: list[Piece]) -> Points:
+        """Points in media, whose light comes towards the eye: all pieces for each node in turn.
+
+        Of a piece that takes u of the light, the integral over T sigma dt is one over du, from 0 to u.
+        """
+        xp = self.xp
+        ray, begin, end, before = (xp.concat(parts, 0) for parts in zip(*pieces, strict=True))
+        taken = 1 - xp.exp(-EXTINCTION * (end - begin))
+        nodes = xp.array(NODES.astype(np.float32), way)[:, None]
+        weights = xp.array(WEIGHTS.astype(np.float32), way)[:, None]
+        t = (begin - xp.log(1 - nodes * taken) / EXTINCTION).reshape(-1)  # of (nodes, P)
+        weight = (weights * (taken * xp.exp(-EXTINCTION * before))).reshape(-1)
+        rays = xp.concat([ray] * len(NODES), 0)
+        p = self.eye[:, None] + xp.take(way, rays) * t
+        colour = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register[:3] * weight
+        r = _length(xp, self.lamp[:, None] - p).clip(NEAREST)
+        return Points(p, colour * AMBIENT[0], colour * self.power[:, None] / (4 * r * r))
+
+    def _lit(self, points: Points, soft: Array) -> tuple[Array, Work]:
+        """Light (3, K) from points (3, K), where the light reaches them, and what it took.
+
+        Args:
+            points: all of them.
+            soft: of the first, 1 where they are not at a distance of 0 though something begins there.
+        """
+        xp, (p, light, more) = self.xp, points
+        lit = xp.where(more.sum(0) > 0)
+        way = xp.take(p, lit) - self.lamp[:, None]
+        r = _length(xp, way)
+        edge = 0 * p[0]
+        edge[: len(soft)] = soft
+        edge = xp.take(edge, lit) > 0
+        trail = march(self.field, self.lamp, way / r.clip(1e-9), r - CLEAR * ~edge, halvings=0)
+        clear = (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length)
+        inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
+        if len(inside):  # rays may have ended before they met what is opaque there
+            at = self.field.meet(trail.at(xp, inside), xp.take(r, inside), Wanted.KIND)
+            opaque = (at.distance < 0) & (at.register[0] < 0.5)
+            xp.put(clear, inside, xp.take(clear, inside) * ~opaque)
+        xp.put(light, lit, xp.take(light, lit) + xp.take(more, lit) * clear)
+        return light, Work(0, len(lit), trail.near, trail.steps, trail.met)
+
+    def surface(self, way: Array, index: Array, trail: Trail) -> tuple[Array, ...]:
+        """Points where rays meet solids, normals, colours, and light that joins in before (3, K) each."""
+        xp = self.xp
+        t = xp.take(trail.hit, index)
+        passes = trail.at(self.xp, index)
+        found = self.field.meet(passes, t + INTO, Wanted.ALL, gradient=True)
+        sharp = xp.take(trail.soft, index) == 0
+        off = xp.where(sharp & (abs(found.distance) > 3 * INTO))
+        if len(off):  # where the distances on both sides of the surface said little about it
+            t_off = xp.take(t, off) + INTO + self._ahead(found, way, off)
+            again = self.field.meet(trail.at(xp, xp.take(index, off)), t_off, Wanted.ALL, gradient=True)
+            xp.put(t, off, t_off - INTO)
+            for old, new in (
+                (found.distance, again.distance),
+                (found.register, again.register),
+                (found.gradient, again.gradient),
+            ):
+                xp.put(old, off, new)
+        g = found.gradient
+        towards = _dot(g, way)
+        p = self.eye[:, None] + way * (t + sharp * (INTO + self._ahead(found, way, None)))
+        n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
+        return p, n, found.register[:3], 0 * p
+
+    def _ahead(self, found: Meeting, way: Array, index: Array | None) -> Array:
+        """How much farther rays meet the surface than where the field was asked."""
+        xp, d, g = self.xp, found.distance, found.gradient
+        if index is not None:
+            d, g, way = xp.take(d, index), xp.take(g, index), xp.take(way, index)
+        towards = _dot(g, way)
+        return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-GAP, GAP)
+
+    def _ground(self, way: Array, t: Array) -> tuple[Array, ...]:
+        """As `surface`, of the ground at t (K,)."""
+        xp, ground = self.xp, self.stage.ground
+        assert ground is not None
+        p = self.eye[:, None] + way * t
+        n = p * 0
+        n[1] = 1.0
+        kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
+        colour = xp.array(np.asarray(ground.rgb, np.float32), p)[:, None]
+        return p, n, kept * colour, (1 - kept) * self.horizon[:, None]
+
+    def _cut(self, way: Array, piece: Piece) -> Iterator[Piece]:
+        """Pieces along which the light falls evenly enough, of pieces of rays, each ray once."""
+        xp, (ray, begin, end, before) = self.xp, piece
+        ways, to = xp.take(way, ray), (self.lamp - self.eye)[:, None]
+        first, last = to - ways * begin, to - ways * end
+        narrow = _dot(first, last) > NARROW * _length(xp, first) * _length(xp, last)
+        yield tuple(xp.take(part, xp.where(narrow)) for part in piece)
+        wide = xp.where(~narrow)
+        if not len(wide):
+            return
+        ray, begin, end, before, ways = (xp.take(part, wide) for part in (*piece, ways))
+        middle = _dot(ways, to)
+        aside = _length(xp, to - ways * middle).clip(NEAREST)
+        for low, high in pairwise(CUTS):
+            a, b = xp.maximum(begin, middle + low * aside), xp.minimum(end, middle + high * aside)
+            some = xp.where(a < b)
+            yield tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin))
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _length(xp: Arrays, a: Array) -> Array:
+    return xp.sqrt(_dot(a, a))

@@ -1,0 +1,168 @@
+"""Which objects rays may meet: each lies in a ball, and farther than its blends reach it changes nothing.
+
+A ray has a slot for each ball that it passes, so that what follows costs what the balls along a ray do,
+however many objects the scene has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from scenelang.renderers.arrays import Array, Arrays
+from scenelang.renderers.field import INTERSECT, SMOOTH, SUBTRACT, UNION
+from scenelang.renderers.solid.frames import SolidFrame, read_solid_frame
+from scenelang.renderers.solid.network import SolidNetwork
+
+INF = float("inf")
+SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball
+OBJECT, WAY, BEGIN, END, RATE, SLOT = 0, slice(1, 4), 4, 5, 6, 7  # what a slot of a ray has, and how many
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """One object: where rays may meet it.
+
+    Args:
+        frame: where it lies.
+        token: how it joins what came before.
+        radius: leaf units from its origin beyond which it changes nothing.
+        ball: radius of the ball around that behind the frame's outer map.
+        rate: how fast its world distance changes in it at most, per step of 1 behind the map.
+        centre, extent: a ball (3,) of the world around that.
+    """
+
+    frame: SolidFrame
+    token: int
+    radius: float
+    ball: float
+    rate: float
+    centre: Array
+    extent: float
+
+    @property
+    def draws(self) -> bool:
+        """Whether something may be seen, where it is met, of what was empty before."""
+        return self.token in (UNION, SMOOTH)
+
+
+def read_solids(network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) -> list[Solid]:
+    """The objects of a stream.
+
+    Raises:
+        ProgramError: an object's vector holds no way from the world to a leaf.
+    """
+    xp, layout, like = network.xp, network.layout, network.codes
+    solids: list[Solid] = []
+    frames = [read_solid_frame(vector[: layout.geometry], layout) for vector in vectors]
+    deepest = max((frame.scale * (1 + abs(frame.amount)) for frame in frames), default=0.0)
+    smooths, widest = 0, 0.0  # of the blends from an object on
+    for frame, token in zip(frames[::-1], tokens[::-1].tolist(), strict=True):
+        smooth = token == SMOOTH
+        smooths, widest = smooths + smooth, max(widest, frame.blend * smooth)
+        blends = widest * (1 + smooths / 4)
+        if smooths and token == SUBTRACT:  # it says how deep points inside others lie
+            blends += deepest
+        radius = 1 + SLACK + abs(frame.amount) + blends / frame.scale
+        back = np.linalg.inv(frame.outer.linear.astype(np.float64))
+        centre, ball = (-back @ frame.outer.shift).astype(np.float32), frame.ball(radius)
+        solids.append(
+            Solid(
+                frame=frame.placed(xp, like),
+                token=token,
+                radius=radius,
+                ball=ball,
+                rate=frame.scale * frame.growth(radius),
+                centre=xp.array(centre, like),
+                extent=float(np.linalg.norm(back, 2)) * ball,
+            )
+        )
+    return solids[::-1]
+
+
+class Passes(NamedTuple):
+    """The balls that M rays from one point pass, K at most.
+
+    Args:
+        slots: (SLOT, K, M). A ray's last object comes first: its number, or -1 minus it where it does not
+            draw; the direction of the ray behind its map; begin and end, inf and -inf where there is none;
+            how fast its distance changes along the ray at most.
+        origins: (3, N), the point behind the map of each object.
+    """
+
+    slots: Array
+    origins: Array
+
+    def at(self, xp: Arrays, index: Array) -> Passes:
+        """Those of some of the rays."""
+        return Passes(xp.take(self.slots, index), self.origins)
+
+
+def find_passes(
+    xp: Arrays, solids: Sequence[Solid], origin: Array, origins: Array, way: Array, limit: Array
+) -> tuple[Array, Passes]:
+    """Which of M rays (k,) may meet something that draws, and the balls that these pass.
+
+    Args:
+        xp: functions of the arrays' library.
+        solids: the objects.
+        origin: of all rays (3,).
+        origins: the same behind the map of each object (3, N).
+        way: unit directions (3, M).
+        limit: where the rays end (M,).
+    """
+    low, high, found = 0 * way[0], limit, []
+    filled, drawn = xp.whole(low), low > 0
+    for i, solid in reversed(list(enumerate(solids))):
+        rays, values = _crossed(xp, solid, origin, origins[:, i], way, low, high)
+        if solid.token == INTERSECT:  # outside its ball nothing is left of what came before
+            low, high = 0 * way[0] + INF, 0 * way[0] - INF
+            xp.put(low, rays, values[BEGIN])
+            xp.put(high, rays, values[END])
+        values[OBJECT] = i if solid.draws else -1 - i
+        slot = xp.take(filled, rays)
+        xp.put(filled, rays, slot + 1)
+        if solid.draws:
+            xp.put(drawn, rays, slot >= 0)
+        found.append((rays, slot, values))
+    some = xp.where(drawn)
+    count, most = len(some), int(filled.max()) if len(some) else 0
+    slots = xp.full((SLOT, most, count), 0.0, way)
+    slots[BEGIN], slots[END] = INF, -INF
+    if count:
+        rays, slot, values = (xp.concat(parts, -1) for parts in zip(*found, strict=True))
+        place = xp.take(placed(xp, some, filled), rays)
+        kept = xp.where(place >= 0)
+        xp.put(slots.reshape(SLOT, -1), xp.take(slot * count + place, kept), xp.take(values, kept))
+    return some, Passes(slots, origins)
+
+
+def _crossed(
+    xp: Arrays, solid: Solid, origin: Array, start: Array, way: Array, low: Array, high: Array
+) -> tuple[Array, Array]:
+    """Which rays (k,) pass an object's ball between low and high, and their slots (SLOT, k) for it."""
+    near, to = None, solid.centre - origin
+    far = float(xp.sqrt(to @ to))
+    if far > solid.extent:  # rays within a cone around the ball
+        near = xp.where(to @ way >= far * (1 - (solid.extent / far) ** 2) ** 0.5 - 1e-5 * far)
+        way, low, high = xp.take(way, near), xp.take(low, near), xp.take(high, near)
+    a = solid.frame.outer.linear @ way
+    square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    middle = -(start @ a) / square
+    closest = start[:, None] + middle * a  # to the ball's centre
+    left = solid.ball**2 - closest[0] * closest[0] - closest[1] * closest[1] - closest[2] * closest[2]
+    half = xp.sqrt((left / square).clip(0.0))
+    begin, end = xp.maximum(middle - half, low), xp.minimum(middle + half, high)
+    hit = xp.where((left > 0) & (begin <= end))
+    values = xp.concat([square[None], a, begin[None], end[None], solid.rate * xp.sqrt(square)[None]], 0)
+    return hit if near is None else xp.take(near, hit), xp.take(values, hit)
+
+
+def placed(xp: Arrays, index: Array, like: Array) -> Array:
+    """Where in an index each of M entries is, -1 for those that are not; `like` are integers (M,)."""
+    found = 0 * like - 1
+    xp.put(found, index, xp.whole(0 * index + 1).cumsum(0) - 1)
+    return found
