@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from scenelang.program.program import Program
     from scenelang.renderers.draw import Kept
 
+DRAFT = 4  # pixels across that one of a draft stands for
 Progress = Callable[[float], None]
 _version = lru_cache(version)
 
@@ -102,6 +103,17 @@ class Painter:
             return draw_small(frame.program, kept=self.kept, progress=progress, threads=self.split).image
         split = self.split
         return paint(frame.program, self.place, threads=split, split=split, kept=self.kept, progress=progress)
+
+    def draft(self, frame: Drawable) -> Image | None:
+        """A coarse picture of solids in the frame's size, for about a twentieth of the work; else None."""
+        program = frame.program
+        if program is None or program.stage is None or min(program.canvas) < DRAFT * DRAFT:
+            return None
+        from scenelang.backend.small import draw_small
+
+        width, height = program.canvas
+        coarse = replace(program, canvas=(-(-width // DRAFT), -(-height // DRAFT)))
+        return draw_small(coarse, samples="one", threads=self.split).image.resized(program.canvas)
 
     def outputs(self, frame: Drawable, wanted: Sequence[Output]) -> Outputs:
         """What is known of a frame beside its picture; raises as `scenelang.render_outputs`."""

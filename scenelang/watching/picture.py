@@ -13,13 +13,13 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from scenelang.animation.clip import Clip, open_clip
-from scenelang.animation.painting import Painter
+from scenelang.animation.painting import Drawable, Painter
 from scenelang.animation.run import make
 from scenelang.animation.timing import FrameRange, FramesError
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
@@ -27,7 +27,6 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.session import Defines
 
 if TYPE_CHECKING:
-    from scenelang.animation.run import Progress
     from scenelang.animation.targets import Target
     from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
@@ -36,6 +35,8 @@ if TYPE_CHECKING:
 Stamps = dict[Path, tuple[int, int, int] | None]
 
 LOOK_S: Final = 0.03  # between two looks
+CHECK_S: Final = 0.1  # between two looks while it draws
+DRAFT_S: Final = 0.15  # a picture that takes longer is shown as a draft first
 SETTLE_S: Final = 0.02  # files must have been still for so long
 PATIENCE_S: Final = 0.3  # a file that is gone, or empty, may be in the middle of being written
 
@@ -50,6 +51,7 @@ class Outcome:
 
     image: Image | None = None  # a picture that was drawn
     good: bool = False  # whether the file that was asked for is as the scene says
+    draft: bool = False  # the picture is coarse, and a better one follows
     same: bool = False  # nothing had to be drawn: the scene means the same picture as before
     diagnostics: list[Diagnostic] = field(default_factory=list)  # of the scene
     # where the time went; `load_s` is torch's import
@@ -75,11 +77,13 @@ class Easel:
     backend: Backend
     device: Device
     threads: int | None
+    drafted: Callable[[Outcome], None] = lambda _: None  # told of a draft, which the picture follows
     paths: tuple[Path, ...] = ()  # the files that the picture depends on, the scene first
     seen: Stamps = field(default_factory=dict)  # how they were when their names were found out
     _key: str | None = None
     _image: Image | None = None
     _kept: Kept | None = None
+    _took_s: float = float("inf")  # to draw the last picture
 
     def __post_init__(self) -> None:
         self.paths = (Path(os.path.abspath(self.file)),)
@@ -124,14 +128,28 @@ class Easel:
         if frame.key == self._key and self.out.exists():
             outcome.image, outcome.good, outcome.same = self._image, True, True
             return
+        if self._took_s > DRAFT_S:
+            self._draft(painter, frame, replace(outcome, draft=True))
         started = time.perf_counter()
-        outcome.image = painter.draw(frame)
-        outcome.draw_s = time.perf_counter() - started
+        outcome.image = painter.draw(frame, checking(before))
+        outcome.draw_s = self._took_s = time.perf_counter() - started
         self._kept, self._image = painter.kept, outcome.image
         started = time.perf_counter()
         outcome.image.save(self.out)
         outcome.save_s = time.perf_counter() - started
         outcome.good, outcome.files, self._key = True, [self.out], frame.key
+
+    def _draft(self, painter: Painter, frame: Drawable, outcome: Outcome) -> None:
+        started = time.perf_counter()
+        outcome.image = painter.draft(frame)
+        outcome.draw_s = time.perf_counter() - started
+        if outcome.image is not None:
+            self._key = None  # what OUT shows is the picture of no scene
+            started = time.perf_counter()
+            outcome.image.save(self.out)
+            outcome.save_s = time.perf_counter() - started
+            outcome.good, outcome.files = True, [self.out]
+            self.drafted(outcome)
 
     def _open(self, found: Diagnostics) -> Clip:
         defines = Defines(dict(self.defines))
@@ -147,21 +165,26 @@ class Easel:
     def _film(
         self, painter: Painter, target: Target, numbers: range, outcome: Outcome, before: Stamps
     ) -> None:
-        looked = time.monotonic()
-
-        def check(_: Progress) -> None:
-            nonlocal looked
-            if time.monotonic() - looked > 0.1:
-                looked = time.monotonic()
-                if stamps(before) != before:
-                    raise Outdated
-
-        made = make(painter, target, numbers, progress=check)
+        made = make(painter, target, numbers, progress=checking(before))
         outcome.good, outcome.files = True, made.files
         outcome.compile_s, outcome.draw_s, outcome.save_s = made.compile_s, made.draw_s, made.encode_s
 
 
 # ---------------------------------------------------------------- waiting for changes
+
+
+def checking(before: Stamps) -> Callable[[object], None]:
+    """What raises `Outdated`, called now and then, as soon as files are not as they were ``before``."""
+    looked = time.monotonic()
+
+    def check(_: object) -> None:
+        nonlocal looked
+        if time.monotonic() - looked > CHECK_S:
+            looked = time.monotonic()
+            if stamps(before) != before:
+                raise Outdated
+
+    return check
 
 
 def stamps(paths: Collection[Path]) -> Stamps:

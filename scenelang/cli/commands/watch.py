@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -55,7 +56,8 @@ def command(
 ) -> None:
     """Draw a scene again whenever it, or a file that it imports, is saved.
 
-    OUT is always written, whole. Mistakes stay on the screen until they are mended, and OUT stays the last
+    OUT is always written, whole; where solids take long it holds a coarse draft until the picture is drawn,
+    which a further save calls off. Mistakes stay on the screen until they are mended, and OUT stays the last
     good picture. Where OUT is an animation, all of it is drawn again. Ctrl-C ends it, with exit code 130.
     """
     import sys
@@ -63,7 +65,7 @@ def command(
     from scenelang.animation.targets import is_animation
     from scenelang.cli.animation import Requested, wanted_target
     from scenelang.cli.outputs import composed, targets
-    from scenelang.watching.picture import Easel, Outdated, stamps, wait
+    from scenelang.watching.picture import Easel, Outdated, settle, stamps, wait
     from scenelang.watching.screen import Screen
 
     out = str(composed(Path(f"{file.stem}.png"))) if out is None else out
@@ -80,11 +82,13 @@ def command(
     easel = Easel(
         file, path, target, wanted.frames, frame or 0, defines.values, options, backend, device, threads
     )
+    easel.drafted = partial(_report, easel, screen)
     while True:
         before = stamps(easel.paths)
         try:
             _draw(easel, screen, before)
         except Outdated:
+            settle(easel.paths)
             continue
         # what changed since it was read, even before it was known to be read, is drawn at once
         wait({path: before[path] if path in before else easel.seen[path] for path in easel.paths})
@@ -92,7 +96,6 @@ def command(
 
 def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] | None]) -> None:
     from scenelang.backend.options import RenderError
-    from scenelang.diagnostics.render_text import plural
 
     clock = time.strftime("%H:%M:%S")
     try:
@@ -104,6 +107,13 @@ def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] 
         else:
             screen.say(f"{clock} Error: {describe(error) if isinstance(error, OSError) else error}")
         return
+    _report(easel, screen, outcome)
+
+
+def _report(easel: Easel, screen: Screen, outcome: Outcome) -> None:
+    from scenelang.diagnostics.render_text import plural
+
+    clock = time.strftime("%H:%M:%S")
     screen.clear()
     if outcome.diagnostics:
         screen.say_diagnostics(outcome.diagnostics)
@@ -134,7 +144,7 @@ def _told(outcome: Outcome, out: Path) -> str:
     """A line about a drawing that is good."""
     if outcome.same:
         return f"{out}: the same picture ({1000 * outcome.compile_s:.0f} ms)"
-    name = str(outcome.files[0])
+    name = f"{outcome.files[0]}{' (draft)' * outcome.draft}"
     if len(outcome.files) > 1:
         name = f"{name} … {outcome.files[-1].name}"
     stages = {"compile": outcome.compile_s, "load torch": outcome.load_s}
