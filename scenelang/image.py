@@ -150,3 +150,17 @@ def from_samples(colour: npt.NDArray[Any], alpha: npt.NDArray[Any] | None) -> Im
         colour = np.concatenate([straight, alpha[..., None]], 2)
     image: Image = np.clip(colour, 0.0, 1.0).astype(np.float32).view(Image)
     return image
+
+
+def enlarged(picture: Image, canvas: tuple[int, int]) -> Image:
+    """A picture in another width and height, each channel by bilinear interpolation."""
+    from PIL import Image as pillow
+
+    if picture.shape[:2] == canvas[::-1]:
+        return picture
+    parts = np.asarray(picture, np.float32)
+    if clear := picture.shape[2] == 4:
+        parts = np.concatenate([parts[..., :3] * parts[..., 3:], parts[..., 3:]], 2)
+    channels = [pillow.fromarray(np.ascontiguousarray(part)) for part in np.moveaxis(parts, 2, 0)]
+    found = np.stack([np.asarray(c.resize(canvas, pillow.Resampling.BILINEAR)) for c in channels], 2)
+    return from_samples(found[..., :3], found[..., 3] if clear else None)

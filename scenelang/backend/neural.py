@@ -105,7 +105,7 @@ def draw_program(
         threads: tiles drawn at the same time; by default one for each usable core.
         split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
-        samples: of a pixel, with the framed renderer: four near outlines, four everywhere, or one.
+        samples: of a pixel, as in `scenelang.render`, with framed and solids' renderers.
         skip: leave out points that an object cannot reach; without it no pixel measured differed by 0.001.
         progress: called with the share done, in [0, 1], from any thread.
 

@@ -8,7 +8,8 @@ from typing import Literal
 
 Backend = Literal["neural", "reference"]
 Device = Literal["auto", "cpu", "cuda"]
-Samples = Literal["adaptive", "four", "one"]
+Samples = Literal["adaptive", "four", "quick", "one", "draft"]
+"""Of a pixel, as `scenelang.backend.render.render` says."""
 
 
 class RenderError(Exception):

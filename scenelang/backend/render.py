@@ -74,8 +74,10 @@ def render(
         device: where torch runs the network, whatever the picture's size; with ``"auto"`` numpy draws small
             pictures, and torch others on CUDA where there is any.
         threads: tiles that torch draws at the same time; by default as many as there are usable cores.
-        samples: of a pixel: ``"four"`` as the language defines, ``"one"``, which is faster and has hard
-            edges, or ``"adaptive"``, four near outlines and one elsewhere, which looks the same as four.
+        samples: of a pixel: ``"four"`` as the language defines, ``"adaptive"``, four near outlines and one
+            elsewhere, which looks the same, ``"one"``, which is faster and has hard edges, or ``"draft"``,
+            one for each 2 x 2 pixels, enlarged. ``"quick"`` is ``"adaptive"`` with less care for solids:
+            steps that may pass what is thinner than 0.04, as those of ``"one"`` and ``"draft"`` may.
         progress: called with the share done, in [0, 1], from any thread.
 
     Returns:
@@ -88,7 +90,8 @@ def render(
         ValueError: an argument is none of the above.
     """
     if samples not in get_args(Samples):
-        raise ValueError(f"unknown samples `{samples}`; there are `adaptive`, `four` and `one`")
+        ways = ", ".join(f"`{way}`" for way in get_args(Samples))
+        raise ValueError(f"unknown samples `{samples}`; there are {ways}")
     if threads is not None and threads < 1:
         raise ValueError(f"{threads} threads, where at least 1 is needed")
     if backend == "reference" and samples != "adaptive":

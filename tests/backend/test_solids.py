@@ -14,6 +14,7 @@ from scenelang.backend.neural import draw_program, open_model
 from scenelang.backend.options import RenderError
 from scenelang.backend.small import choose_drawer, draw_small
 from scenelang.cli.main import cli
+from scenelang.image import enlarged
 from scenelang.measure.plan import plan_of
 from scenelang.program.program import Program
 
@@ -80,7 +81,13 @@ def test_samples_and_backgrounds(scene: nsg.Scene, exact: nsg.Image) -> None:
     assert one.pairs < few.pairs
     assert [one.refined, four.refined] == [0, 72 * 48]
     assert 0 < few.refined < four.refined
+    quick = draw_small(program, samples="quick")
+    assert psnr(one.image, exact) < psnr(quick.image, exact)
+    assert one.pairs < quick.pairs < 0.8 * few.pairs
+    assert quick.refined < few.refined
     clear = scene.model_copy(update={"background": None})
+    draft, half = nsg.render(clear, samples="draft"), nsg.render(clear, samples="one", size=(36, 24))
+    assert np.array_equal(draft, enlarged(half, (72, 48)))
     ours, theirs = nsg.render(clear), nsg.render(clear, backend="reference")
     assert ours.shape == theirs.shape == (48, 72, 4)
     assert abs(np.asarray(ours)[..., 3] - np.asarray(theirs)[..., 3]).mean() < 2e-3

@@ -11,6 +11,7 @@ import pytest
 import scenelang
 from scenelang.backend.neural import draw_program, open_model
 from scenelang.backend.options import RenderError
+from scenelang.image import enlarged
 from scenelang.measure.metrics import psnr
 from scenelang.models.load import Model
 from scenelang.models.manifest import load_manifest
@@ -52,6 +53,11 @@ def test_sampling_is_counted() -> None:
     assert drawn["four"].refined == 64 * 64
     assert 0 < drawn["adaptive"].refined < 64 * 64 / 4
     assert drawn["one"].pairs < drawn["adaptive"].pairs < drawn["four"].pairs
+    quick = draw_program(program, model, threads=1, samples="quick")
+    assert np.array_equal(quick.image, drawn["adaptive"].image)  # the plane knows no quicker way to refine
+    draft = scenelang.render(scene(), samples="draft")
+    assert draft.shape == (64, 64, 3)
+    assert np.array_equal(draft, enlarged(scenelang.render(scene(), samples="one", size=(32, 32)), (64, 64)))
 
 
 def test_nothing_skipped_is_the_same_picture() -> None:
@@ -64,7 +70,7 @@ def test_nothing_skipped_is_the_same_picture() -> None:
 
 
 def test_unknown_samples_are_refused() -> None:
-    with pytest.raises(ValueError, match="unknown samples `two`; there are `adaptive`, `four` and `one`"):
+    with pytest.raises(ValueError, match="unknown samples `two`; there are `adaptive`, `four`, `quick`, "):
         scenelang.render(scene(), samples="two")  # type: ignore[arg-type]
 
 

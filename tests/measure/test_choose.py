@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenelang.image import from_samples
-from scenelang.lab.frontier.measure import enlarged, promised
+from scenelang.image import enlarged, from_samples
+from scenelang.lab.frontier.measure import promised
 from scenelang.measure.choose import (
     NothingFits,
     choose,
@@ -318,10 +318,10 @@ def test_damaged_points_are_refused(key: str, value: object) -> None:
 
 def test_enlarging_keeps_flat_colours_and_corners() -> None:
     small = from_samples(np.full((8, 8, 3), 0.25, np.float32), None)
-    np.testing.assert_allclose(enlarged(small, 32, 32), np.full((32, 32, 3), 0.25))
+    np.testing.assert_allclose(enlarged(small, (32, 32)), np.full((32, 32, 3), 0.25))
     halves = np.zeros((2, 2, 3), np.float32)
     halves[:, 1] = 1
-    wide = np.asarray(enlarged(from_samples(halves, None), 64, 64))
+    wide = np.asarray(enlarged(from_samples(halves, None), (64, 64)))
     assert (wide[:, 0] == 0).all()
     assert (wide[:, -1] == 1).all()
-    assert enlarged(small, 8, 8) is small
+    assert enlarged(small, (8, 8)) is small

@@ -52,8 +52,9 @@ if TYPE_CHECKING:
 @options.backend
 @options.choice(
     "--samples",
-    words="adaptive four one",
-    help="Samples of a pixel: four near outlines, four everywhere, or one, with hard edges.",
+    words="adaptive four quick one draft",
+    help="Samples of a pixel: four near outlines, four everywhere, four near strong outlines (solids), one, "
+    "with hard edges, or one for each 2 x 2 pixels.",
 )
 @click.option(
     "--output",

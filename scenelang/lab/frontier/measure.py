@@ -16,12 +16,11 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
-import PIL.Image
 import torch
 
 from scenelang.backend.neural import open_model
 from scenelang.backend.options import keep_memory
-from scenelang.image import Image, from_samples
+from scenelang.image import Image, enlarged
 from scenelang.lab.about import Report, silent
 from scenelang.lab.frontier.fit import fit_cost
 from scenelang.lab.frontier.ways import Draw, Way, ways_of
@@ -164,28 +163,13 @@ def _one_scene(
         record.fitted.append(best[way.name])
         if not way.drawn:
             continue
-        picture = enlarged(shown[way.name], exact.shape[1], exact.shape[0])
+        picture = enlarged(shown[way.name], (exact.shape[1], exact.shape[0]))
         record.flip.append(flip(picture, exact))
         record.psnr.append(psnr(picture, exact))
         if index < SHOWN:
             record.pictures.append(picture)
         if many is not None:
             record.converged.append(flip(picture, many))
-
-
-def enlarged(picture: Image, width: int, height: int) -> Image:
-    """A picture at another size, each channel by bilinear interpolation; the same where it has that size."""
-    if picture.shape[:2] == (height, width):
-        return picture
-    channels = [
-        np.asarray(
-            PIL.Image.fromarray(np.ascontiguousarray(picture[..., i], np.float32)).resize(
-                (width, height), PIL.Image.Resampling.BILINEAR
-            )
-        )
-        for i in range(3)
-    ]
-    return from_samples(np.stack(channels, 2), None)
 
 
 def _other_loads(

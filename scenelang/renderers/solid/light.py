@@ -15,14 +15,12 @@ import numpy as np
 from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.solid.field import Meeting, SolidField
-from scenelang.renderers.solid.march import GAP, Piece, Trail, Work, march
+from scenelang.renderers.solid.march import CAREFUL, Pace, Piece, Trail, Work, march
 from scenelang.renderers.solid.network import Wanted
 from scenelang.renderers.solid.passes import INF
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
 CLEAR = 2e-4  # world units before a surface where rays from the light end
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(3)
-NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2  # of a way through a medium, by what it takes of the light
 NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle are cut
 CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents of angles at the light
 
@@ -49,10 +47,11 @@ class Lighting:
     Args:
         field: the solids.
         stage: where they are.
+        pace: how carefully it is drawn.
     """
 
-    def __init__(self, field: SolidField, stage: Stage) -> None:
-        self.field, self.stage, self.xp = field, stage, field.xp
+    def __init__(self, field: SolidField, stage: Stage, pace: Pace = CAREFUL) -> None:
+        self.field, self.stage, self.xp, self.pace = field, stage, field.xp, pace
         like = field.network.codes
         self.eye, self.lamp, self.power, self.horizon, self.zenith = (
             field.xp.array(np.asarray(value, np.float32), like)
@@ -76,7 +75,7 @@ class Lighting:
         alpha = 0 * way[0] + (0.0 if stage.transparent else 1.0)
         if stage.transparent:
             seen = seen * 0
-        trail = march(self.field, self.eye, way, limit)
+        trail = march(self.field, self.eye, way, limit, gap=self.pace.gap)
         surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
         both, found = xp.concat([surface, floor], 0), []
         work = Work(way.shape[1], 0, trail.near, trail.steps, trail.met + len(surface))
@@ -96,7 +95,7 @@ class Lighting:
         xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
         if trail.pieces:
             clear, glow = xp.exp(-EXTINCTION * trail.length), 0 * way
-            sent = light[:, len(both) :].reshape(3, len(NODES), -1).sum(1)
+            sent = light[:, len(both) :].reshape(3, self.pace.nodes, -1).sum(1)
             for ray, *_ in pieces:  # a ray occurs once in each
                 xp.put(glow, ray, xp.take(glow, ray) + sent[:, : len(ray)])
                 sent = sent[:, len(ray) :]
@@ -131,11 +130,14 @@ class Lighting:
         xp = self.xp
         ray, begin, end, before = (xp.concat(parts, 0) for parts in zip(*pieces, strict=True))
         taken = 1 - xp.exp(-EXTINCTION * (end - begin))
-        nodes = xp.array(NODES.astype(np.float32), way)[:, None]
-        weights = xp.array(WEIGHTS.astype(np.float32), way)[:, None]
+        nodes, weights = (
+            xp.array(values[:, None].astype(np.float32), way)
+            for values in np.polynomial.legendre.leggauss(self.pace.nodes)
+        )
+        nodes, weights = (nodes + 1) / 2, weights / 2  # of a way, by what it takes of the light
         t = (begin - xp.log(1 - nodes * taken) / EXTINCTION).reshape(-1)  # of (nodes, P)
         weight = (weights * (taken * xp.exp(-EXTINCTION * before))).reshape(-1)
-        rays = xp.concat([ray] * len(NODES), 0)
+        rays = xp.concat([ray] * self.pace.nodes, 0)
         p = self.eye[:, None] + xp.take(way, rays) * t
         colour = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register[:3] * weight
         r = _length(xp, self.lamp[:, None] - p).clip(NEAREST)
@@ -155,7 +157,8 @@ class Lighting:
         edge = 0 * p[0]
         edge[: len(soft)] = soft
         edge = xp.take(edge, lit) > 0
-        trail = march(self.field, self.lamp, way / r.clip(1e-9), r - CLEAR * ~edge, halvings=0)
+        limit = r - CLEAR * ~edge
+        trail = march(self.field, self.lamp, way / r.clip(1e-9), limit, 0, self.pace.gap)
         clear = (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length)
         inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
         if len(inside):  # rays may have ended before they met what is opaque there
@@ -195,7 +198,7 @@ class Lighting:
         if index is not None:
             d, g, way = xp.take(d, index), xp.take(g, index), xp.take(way, index)
         towards = _dot(g, way)
-        return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-GAP, GAP)
+        return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-self.pace.gap, self.pace.gap)
 
     def _ground(self, way: Array, t: Array) -> tuple[Array, ...]:
         """As `surface`, of the ground at t (K,)."""

@@ -1,7 +1,7 @@
 """Rays through the solids' field: the first surface, and the ways through media before it.
 
 The field bounds how far a surface or another kind of material is, and steps go as far (Hart 1996), plus up to
-`GAP` where the last two bounds let expect the next surface beyond: just behind that. What is thinner may be
+a gap where the last two bounds let expect the next surface beyond: just behind that. What is thinner may be
 passed. Rays that are done leave the batch.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import astuple, dataclass, field
 from operator import add
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from scenelang.renderers.solid.field import Meeting, SolidField
 from scenelang.renderers.solid.network import Wanted
 from scenelang.renderers.solid.passes import BEGIN, END, INF, OBJECT, RATE, Passes, placed
 
-GAP = 0.009  # world units
 TOUCH = 1e-5  # world units: so near counts as met
 STEPS = 400  # of a ray at most
 HALVINGS = 16  # of the interval in which a medium gives way to a solid
@@ -34,6 +34,23 @@ T, PAST, FREE, WITHIN, SINCE, LENGTH, STATE = (
 
 
 Piece = tuple[Array, ...]  # of ways in media: index of the ray, begin, end, length before it, each (P,)
+
+
+class Pace(NamedTuple):
+    """What is saved where solids are drawn, and what it costs.
+
+    Args:
+        gap: world units by which steps may go beyond what is certain; what is thinner may be passed.
+        nodes: points on a ray's way through a medium at which the light is asked for.
+        contrast: pixels that differ more from their neighbours, in sRGB, are sampled four times.
+    """
+
+    gap: float = 0.009
+    nodes: int = 3
+    contrast: float = 0.04
+
+
+CAREFUL = Pace()
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +106,14 @@ class Trail:
         return self.passes.at(xp, xp.take(self.place, index))
 
 
-def march(solids: SolidField, origin: Array, way: Array, limit: Array, halvings: int = HALVINGS) -> Trail:
+def march(
+    solids: SolidField,
+    origin: Array,
+    way: Array,
+    limit: Array,
+    halvings: int = HALVINGS,
+    gap: float = CAREFUL.gap,
+) -> Trail:
     """Follow rays.
 
     Args:
@@ -98,13 +122,14 @@ def march(solids: SolidField, origin: Array, way: Array, limit: Array, halvings:
         way: unit directions (3, M).
         limit: how far to go (M,).
         halvings: of the interval in which a medium gives way to a solid; none where only that it does counts.
+        gap: as of `Pace`.
     """
     xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
     ids, passes = solids.passes(origin, way, limit)
     trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes, near=len(ids))
     if len(ids):
-        rays = _Rays(solids, trail, ids)
+        rays = _Rays(solids, trail, ids, gap)
         for _ in range(STEPS):
             if not len(rays.ids):
                 break
@@ -116,8 +141,8 @@ def march(solids: SolidField, origin: Array, way: Array, limit: Array, halvings:
 class _Rays:
     """Rays under way."""
 
-    def __init__(self, solids: SolidField, trail: Trail, ids: Array) -> None:
-        self.solids, self.xp, self.trail = solids, solids.xp, trail
+    def __init__(self, solids: SolidField, trail: Trail, ids: Array, gap: float) -> None:
+        self.solids, self.xp, self.trail, self.gap = solids, solids.xp, trail, gap
         self.ids, self.passes = ids, trail.passes
         slots = self.passes.slots
         self.never = self.xp.full((), INF, slots)
@@ -157,7 +182,7 @@ class _Rays:
         begin, end = slots[BEGIN], slots[END]
         safe = free / xp.largest(met.inside * slots[RATE])[0].clip(1e-3)
         hope = (1.05 * free) * (t - rows[PAST]) / (rows[FREE] - free).clip(1e-12) + TOUCH
-        following = t + xp.minimum(xp.maximum(hope, safe), safe + GAP)
+        following = t + xp.minimum(xp.maximum(hope, safe), safe + self.gap)
         places = xp.select(begin > t, begin, following)
         if within is not None:  # the way through a medium ends with its ball
             places = xp.select(within & (end > t), xp.minimum(places, end), places)
@@ -224,7 +249,7 @@ class _Rays:
         xp = self.xp
         rows, free = xp.take(self.rows[:WITHIN], index), xp.take(free, index)
         t, past, before = rows[T], rows[PAST], rows[FREE]
-        return xp.maximum(past + (t - past) * (before / (before + free).clip(1e-9)), t - GAP)
+        return xp.maximum(past + (t - past) * (before / (before + free).clip(1e-9)), t - self.gap)
 
     def _close(self, ray: Array, rows: Array, end: Array) -> Array:
         """End the ways through media of rays (k,) with such rows (STATE, k); lengths (k,) in media so far."""
