@@ -214,6 +214,25 @@ def test_a_medium_lets_through_what_its_length_says() -> None:
     assert alpha[0, 0, 3] == 0
 
 
+@pytest.mark.parametrize(
+    ("radius", "away", "power"), [(0.5, 3.0, 40.0), (1.0, 2.0, 300.0), (1.4, 3.0, 1500.0)]
+)
+def test_a_medium_glows_where_the_light_is_behind_it(radius: float, away: float, power: float) -> None:
+    """Along the axis: the deeper a point lies, the more light arrives and the less of it gets out."""
+    camera, dark = Camera((0.0, 0.0, 6.0), (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0)
+    light = Light((0.0, 0.0, -away), power)
+    stage = Stage(camera=camera, light=light, ground=None, horizon=dark, zenith=dark)
+    step = scaled(radius, radius, radius)
+    image, *_ = draw_solids(
+        field([Object("sphere", (step,), "volumetric", (1.0, 1.0, 1.0))]), stage, (65, 65)
+    )
+    z = np.linspace(-radius, radius, 20_001)
+    arrived, left = np.exp(-3 * (z + radius)), np.exp(-3 * (radius - z))
+    sent = 2 * radius * np.mean(3 * left * (power / (4 * (z + away) ** 2) * arrived + 0.12))
+    linear = ((image[32, 32] + 0.055) / 1.055) ** 2.4
+    assert linear == pytest.approx(sent, rel=0.02)
+
+
 def test_both_libraries_draw_the_same() -> None:
     net = network()
     other = Solids(net.config, 2, 2)

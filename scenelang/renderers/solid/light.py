@@ -21,6 +21,7 @@ from scenelang.renderers.solid.passes import INF
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
 CLEAR = 2e-4  # world units before a surface where rays from the light end
+DEEP, DEEPS = 0.5, 8  # world units that pieces of media are cut to; the last of so many takes the rest
 NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle are cut
 CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents of angles at the light
 
@@ -84,7 +85,8 @@ class Lighting:
         if len(floor):
             found.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
         if trail.pieces:
-            pieces = [part for piece in trail.pieces for part in self._cut(way, piece)]
+            cut = [part for piece in trail.pieces for part in self._cut(way, piece)]
+            pieces = [part for piece in cut for part in self._shortened(piece)]
             found.append(self._scattering(way, trail, pieces))
             work += Work(met=found[-1].p.shape[1])
         if not found:
@@ -210,6 +212,18 @@ class Lighting:
         kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
         colour = xp.array(np.asarray(ground.rgb, np.float32), p)[:, None]
         return p, n, kept * colour, (1 - kept) * self.horizon[:, None]
+
+    def _shortened(self, piece: Piece) -> Iterator[Piece]:
+        """Pieces so short that the light which reaches them through media changes evenly, each ray once."""
+        xp, (ray, begin, end, before) = self.xp, piece
+        for index in range(DEEPS):
+            gone = index * DEEP
+            some = xp.where(begin + gone < end)
+            if not len(some):
+                return
+            ray, begin, end, before = (xp.take(part, some) for part in (ray, begin, end, before))
+            stop = end if index == DEEPS - 1 else xp.minimum(end, begin + gone + DEEP)
+            yield ray, begin + gone, stop, before + gone
 
     def _cut(self, way: Array, piece: Piece) -> Iterator[Piece]:
         """Pieces along which the light falls evenly enough, of pieces of rays, each ray once."""
