@@ -6,7 +6,7 @@ from math import atan, hypot
 from typing import TYPE_CHECKING, Any
 
 from scenelang.records import Record
-from scenelang.scene.faults import camera_fault, light_fault
+from scenelang.scene.faults import MOST, camera_fault, light_fault
 
 if TYPE_CHECKING:
     from scenelang.scene.schema import Scene
@@ -22,7 +22,6 @@ AMBIENT = (0.12, 0.06)
 EXTINCTION = 3.0  # of media, per world unit
 FADE = 64.0  # the ground fades into the horizon by exp(-(x² + z²) / FADE)
 NEAREST = 1e-3  # the light counts as at least this far away
-MOST = 1e300  # numbers of a stage are below this
 LIFT = 1e-4  # how far off its surface a ray to the light starts
 
 
@@ -140,7 +139,7 @@ def _read(name: str, value: object) -> Any:
     numbers = value if three else [value]
     if not isinstance(numbers, list) or len(numbers) != (3 if three else 1):
         raise ValueError(f"`{name}` does not hold what it should")
-    if not all(type(v) in (int, float) and abs(v) < MOST for v in numbers):
+    if not all(type(v) in (int, float) and abs(v) <= MOST for v in numbers):
         raise ValueError(f"`{name}` is not a finite number")
     return tuple(map(float, numbers)) if three else float(numbers[0])
 

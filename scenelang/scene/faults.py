@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from math import degrees, dist, isfinite, pi
+from math import degrees, pi
+from typing import Final
 
 Triple = tuple[float, float, float]
+MOST: Final = 1e12
+"""Numbers of a stage are no larger: float32 holds what is computed of them."""
 
 
 def camera_fault(eye: Triple, target: Triple, fov_rad: float) -> tuple[str, str] | None:
     """The argument that leaves a camera without a picture, and why, if one does."""
     if eye == target:
         return "eye", "the eye is the target"
-    if not isfinite(dist(eye, target)):
-        return "eye", "the eye is too far from the target"
     if not 0.0 < fov_rad < pi:
         return "fov", f"a field of view of {degrees(fov_rad):g}° is not between 0° and 180°"
+    if fov_rad < 1.0 / MOST:
+        return "fov", f"a field of view of {degrees(fov_rad):g}° is too narrow"
     return None
 
 

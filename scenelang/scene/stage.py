@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from scenelang.scene.faults import Triple, camera_fault
+from scenelang.scene.faults import MOST, Triple, camera_fault
 from scenelang.scene.fields import Finite, Frozen, Length, Opaque, Radians
 
-Point = Annotated[tuple[Finite, Finite, Finite], Field(description="x, y, z in the world")]
+Place = Annotated[Length, Field(ge=-MOST, le=MOST)]
+Point = Annotated[tuple[Place, Place, Place], Field(description="x, y, z in the world")]
 Unsaid = Annotated[Literal["default"], Tag("unsaid")]
 """What the scene does not state: the language's default."""
 STATED = Tag("stated")
@@ -46,7 +47,9 @@ class Light(Frozen):
     """A point light; ``color`` is as written."""
 
     position: Point = (2.5, 4.0, 3.0)
-    power: Annotated[Finite, Field(ge=0, description="what a white surface at distance 1 receives")] = 28.0
+    power: Annotated[
+        Finite, Field(ge=0, le=MOST, description="what a white surface at distance 1 receives")
+    ] = 28.0
     color: Opaque = (1.0, 1.0, 1.0)
 
     if TYPE_CHECKING:
@@ -57,7 +60,7 @@ class Light(Frozen):
 class Ground(Frozen):
     """A diffuse plane at height ``y``; ``color`` is as written, or the default's."""
 
-    y: Length = -1.0
+    y: Place = -1.0
     color: Annotated[Annotated[Opaque, STATED] | Unsaid, EITHER] = "default"
 
     if TYPE_CHECKING:

@@ -25,3 +25,18 @@ def test_the_network_draws_what_the_reference_does(name: str) -> None:
     scene = nsg.loads("canvas(48, 48);" + SCENES[name])
     ours, exact = (np.asarray(nsg.render(scene, backend=by), float) for by in ("neural", "reference"))
     assert -10 * np.log10(np.square(ours - exact).mean()) > 46
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "camera([0, 0, 1e12]); light([1e12, 1e12, 0], 1e12); ground(-1e12);",
+        "camera([0, 1, 0], [0, 1, 1e-12]); light([0, 1, 0], 1e12);",
+        "camera([0, 5, 1e-12], fov = 179.9999999deg); light([0, 0.5, 0]);",
+        "camera(fov = 1e-10deg); ground(1.2); light([0, -1, 0]); background(none);",
+    ],
+)
+@pytest.mark.parametrize("backend", ["neural", "reference"])
+def test_the_stages_farthest_numbers_are_drawn_without_a_warning(text: str, backend: str) -> None:
+    solids = "sphere { scale(0.5); } torus { translate(1, 0, 0); material volumetric; }"
+    assert np.isfinite(nsg.render(nsg.loads(f"canvas(9, 6); {text} {solids}"), backend=backend)).all()

@@ -21,7 +21,7 @@ from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import angle, number
 from scenelang.evaluate.values.transforms import color, vector
 from scenelang.evaluate.values.value import POISON, Problem, Time, Vec, show, unexpected
-from scenelang.scene.faults import camera_fault, light_fault
+from scenelang.scene.faults import MOST, camera_fault, light_fault
 from scenelang.scene.schema import MAX_FRAMES, Animation, Camera, Ground, Light
 from scenelang.scene.spans import Written
 from scenelang.syntax import nodes
@@ -149,11 +149,15 @@ def _background(session: Session, where: Written, value: Any) -> None:
 
 def _state(session: Session, where: Written, cls: type[Camera | Light | Ground], *given: Any) -> None:
     """Set one value of the stage from its fields in order, with defaults for those left out."""
+    names = list(cls.model_fields)
+    for at, value in enumerate(given):
+        if value is not LEFT_OUT and max(map(abs, value if value.__class__ is tuple else (value,))) > MOST:
+            raise Problem("E0311", f"`{names[at]}` is not within {MOST:,.0f} of 0", operand=at)
     default = [field.default for field in cls.model_fields.values()]
     values = [own if value is LEFT_OUT else value for value, own in zip(given, default, strict=True)]
-    node = make(cls, dict(zip(cls.model_fields, values, strict=True)))
+    node = make(cls, dict(zip(names, values, strict=True)))
     if isinstance(node, Camera) and (fault := camera_fault(node.eye, node.target, node.fov)):
-        at = list(cls.model_fields).index(fault[0])
+        at = names.index(fault[0])
         raise Problem("E0338", fault[1], operand=1 if given[at] is LEFT_OUT else at)
     if isinstance(node, Light) and (dark := light_fault(node.power)):
         raise Problem("E0339", dark, operand=1)
