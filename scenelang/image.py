@@ -35,14 +35,6 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
 
         return pillow.fromarray(self.to_uint8())
 
-    def resized(self, size: tuple[int, int]) -> Image:
-        """The picture in other (width, height), in 8 bits, between its pixels' centres bilinear."""
-        from PIL import Image as pillow
-
-        larger = self.to_pil().resize(size, pillow.Resampling.BILINEAR)
-        image: Image = (np.asarray(larger, np.float32) / 255.0).view(Image)
-        return image
-
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file whose format its suffix names, whole or not at all; see `encode`.
 

@@ -50,7 +50,7 @@ class Painter:
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
         """Compile a frame and say what its picture depends on; raises as `Clip.program`, or `RenderError`.
 
-        Numpy draws a picture by itself (``single``) if it is small, torch draws animations.
+        Numpy draws a picture by itself (``single``) if it is small, torch draws animations, of solids numpy too.
         """
         if self.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})
@@ -97,12 +97,8 @@ class Painter:
 
         if self.kept is None and self.clip.reuse:
             self.kept = Kept()
-        if frame.small:
-            from scenelang.backend.small import draw_small
-
-            return draw_small(frame.program, kept=self.kept, progress=progress, threads=self.split).image
-        split = self.split
-        return paint(frame.program, self.place, threads=split, split=split, kept=self.kept, progress=progress)
+        place, split = None if frame.small else self.place, self.split
+        return paint(frame.program, place, threads=split, split=split, kept=self.kept, progress=progress)
 
     def draft(self, frame: Drawable) -> Image | None:
         """A coarse picture of solids in the frame's size, for about a twentieth of the work; else None."""
@@ -110,10 +106,11 @@ class Painter:
         if program is None or program.stage is None or min(program.canvas) < DRAFT * DRAFT:
             return None
         from scenelang.backend.small import draw_small
+        from scenelang.image import enlarged
 
         width, height = program.canvas
         coarse = replace(program, canvas=(-(-width // DRAFT), -(-height // DRAFT)))
-        return draw_small(coarse, samples="one", threads=self.split).image.resized(program.canvas)
+        return enlarged(draw_small(coarse, samples="one", threads=self.split).image, program.canvas)
 
     def outputs(self, frame: Drawable, wanted: Sequence[Output]) -> Outputs:
         """What is known of a frame beside its picture; raises as `scenelang.render_outputs`."""
@@ -126,14 +123,21 @@ class Painter:
 
 def paint(
     program: Program,
-    place: str,
+    place: str | None,
     *,
     threads: int,
     split: int,
     kept: Kept | None,
     progress: Progress | None = None,
 ) -> Image:
-    """Draw a Program on a torch device, split for so many threads, of which so many draw at the same time."""
+    """Draw a Program on a torch device, or by numpy where that is None.
+
+    The picture is split for so many threads, of which so many draw at the same time.
+    """
+    if place is None:
+        from scenelang.backend.small import draw_small
+
+        return draw_small(program, kept=kept, progress=progress, threads=threads, split=split).image
     from scenelang.backend.neural import draw_program, open_model
 
     model = open_model(program.model, place)

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Final
 
 from scenelang.animation.apng import write_apng
 from scenelang.animation.gif import write_gif
-from scenelang.animation.painting import Painter
+from scenelang.animation.painting import Drawable, Painter
 from scenelang.animation.store import Encoder, Film, Store, deliver, put_frame
 from scenelang.animation.targets import Target
 from scenelang.animation.video import find_codec, write_video
 from scenelang.animation.webp import write_webp
-from scenelang.backend.options import RenderError
+from scenelang.backend.options import RenderError, usable_cores
 from scenelang.diagnostics.error import SceneError
 from scenelang.files import output_place, write_whole
 from scenelang.image import save_outputs
@@ -180,15 +180,13 @@ def _drawn(
     alpha = False
     workers: Workers | None = None
     spent_s = 0.0
-    if painter.backend == "neural":
-        _ = painter.place  # loads torch, which is not part of a frame
     try:
         for index, number in enumerate(numbers):
-            started = time.perf_counter()
+            started = time.perf_counter() - painter.load_s  # loading torch is not part of a frame
             frame = painter.prepare(painter.clip.shot(number))
             if strict and painter.clip.diagnostics.items:
                 raise SceneError(painter.clip.diagnostics)
-            made.compile_s += time.perf_counter() - started
+            made.compile_s += time.perf_counter() - painter.load_s - started
             keys.append(frame.key)
             alpha |= frame.shot.scene.background is None
             started = time.perf_counter()
@@ -198,9 +196,9 @@ def _drawn(
                     made.resumed += 1
                 else:
                     if workers is None:
-                        workers = _helpers(painter, jobs, made.drawn, spent_s, len(numbers) - index)
+                        workers = _helpers(painter, frame, jobs, made.drawn, spent_s, len(numbers) - index)
                     if workers is not None and frame.program is not None:
-                        workers.submit(frame.program, store.file(frame.key))
+                        workers.submit(frame.program, store.file(frame.key), None if frame.small else "cpu")
                     else:
                         say = partial(_part, progress, index, len(numbers))
                         put_frame(store.file(frame.key), painter.draw(frame, say))
@@ -225,12 +223,13 @@ def _part(progress: Callable[[Progress], None], index: int, total: int, share: f
     progress(Progress("drawing", index + share, total))
 
 
-def _helpers(painter: Painter, jobs: int | None, drawn: int, spent_s: float, left: int) -> Workers | None:
+def _helpers(
+    painter: Painter, frame: Drawable, jobs: int | None, drawn: int, spent_s: float, left: int
+) -> Workers | None:
     """Other processes to draw in from here on, if they pay."""
-    if painter.backend != "neural" or painter.place != "cpu" or jobs == 1:
+    if frame.program is None or jobs == 1 or not (frame.small or painter.place == "cpu"):
         return None
     from scenelang.animation.workers import Workers
-    from scenelang.backend.neural import usable_cores
 
     if jobs is None:
         if painter.threads is not None or usable_cores() < 2 or drawn < _TRIED:

@@ -49,22 +49,23 @@ class Workers:
             self.take()
         return len(self._waiting)
 
-    def submit(self, program: Program, file: Path) -> None:
+    def submit(self, program: Program, file: Path, place: str | None) -> None:
         """Have a Program drawn to a picture file; waits while many are under way. Raises as `take`."""
         while len(self._waiting) >= AHEAD * self.count:
             self.take()
-        self._waiting.append(self._pool.submit(self._draw, program_bytes(program), file))
+        self._waiting.append(self._pool.submit(self._draw, program_bytes(program), file, place))
 
     def take(self) -> None:
         """Wait for the first of those asked for; raises the `RenderError` or `OSError` by which it failed."""
         self._waiting.popleft().result()
 
-    def _draw(self, program: bytes, file: Path) -> None:
+    def _draw(self, program: bytes, file: Path, place: str | None) -> None:
         process = self._free.get()
         try:
             assert process.stdin is not None
             assert process.stdout is not None
-            head = {"file": str(file.absolute()), "split": self.split, "bytes": len(program)}
+            head = {"file": str(file.absolute()), "split": self.split, "place": place}
+            head["bytes"] = len(program)
             try:
                 process.stdin.write(json.dumps(head).encode() + b"\n" + program)
                 process.stdin.flush()
@@ -114,7 +115,8 @@ def main() -> None:
 def _answer(head: dict[str, Any], data: bytes, kept: Kept) -> dict[str, Any]:
     file = Path(head["file"])
     try:
-        put_frame(file, paint(parse_program(data), "cpu", threads=1, split=head["split"], kept=kept))
+        program, place = parse_program(data), head["place"]
+        put_frame(file, paint(program, place, threads=1, split=head["split"], kept=kept))
     except RenderError as error:
         return {"error": str(error)}
     except OSError as error:

@@ -72,6 +72,7 @@ def draw_small(
     kept: Kept | None = None,
     progress: Callable[[float], None] | None = None,
     threads: int | None = None,
+    split: int | None = None,
 ) -> Drawing:
     """Draw a Program by numpy, on one core, or solids on all.
 
@@ -79,6 +80,7 @@ def draw_small(
         program: of any size, for a model with a framed or a solids' network.
         samples: of a pixel, as in `scenelang.render`.
         kept: the picture before this one, of which tiles that show the same are taken over.
+        threads, split: of solids, as for `scenelang.backend.neural.draw_program`.
 
     Raises:
         RenderError: its model's weights are missing, or it was compiled for others or by no compiler.
@@ -87,7 +89,16 @@ def draw_small(
     try:
         network, digest = load_arrays(program.model)
         program.check_weights(digest)
-        count = 1 if program.stage is None else threads or usable_cores()
-        return draw_objects(network, program, threads=count, kept=kept, samples=samples, progress=progress)
+        if program.stage is None:
+            threads = split = 1
+        return draw_objects(
+            network,
+            program,
+            threads=threads or usable_cores(),
+            split=split,
+            kept=kept,
+            samples=samples,
+            progress=progress,
+        )
     except (ModelError, ProgramError) as error:
         raise RenderError(str(error)) from None

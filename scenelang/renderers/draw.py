@@ -138,7 +138,13 @@ def draw_objects(
         raise ProgramError("a program of the plane, which the model does not draw")
     field = SolidField(network, program.vectors, program.tokens)  # type: ignore[arg-type]
     image, work = draw_solids(
-        field, program.stage, program.canvas, threads=threads, samples=samples, progress=progress
+        field,
+        program.stage,
+        program.canvas,
+        threads=threads,
+        split=split,
+        samples=samples,
+        progress=progress,
     )
     return Drawing(image, work.met, work.refined, image.shape[0] * image.shape[1], work)
 

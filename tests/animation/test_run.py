@@ -315,3 +315,18 @@ def test_ctrl_c(tmp_path: Path) -> None:
     assert process.returncode == 130
     assert "Traceback" not in said
     assert left(tmp_path) == [".a.gif.frames"]
+
+
+def test_solids_load_no_torch_and_other_processes_draw_the_same(tmp_path: Path) -> None:
+    path = write(
+        tmp_path, "animate(1, 3); canvas(64, 48); sphere { translate(u, 0, 0); } torus { rotate(1turn * u); }"
+    )
+    code = f"""import sys, scenelang as nsg
+nsg.animate({str(path)!r}, {str(tmp_path / "one-%d.png")!r}, jobs=1)
+made = nsg.animate({str(path)!r}, {str(tmp_path / "two-%d.png")!r}, jobs=2)
+assert made.jobs == 2
+assert "torch" not in sys.modules"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+    for number in range(3):
+        one, two = (tmp_path / f"{name}-{number}.png" for name in ("one", "two"))
+        assert one.read_bytes() == two.read_bytes()

@@ -26,6 +26,7 @@ def draw_solids(
     canvas: tuple[int, int],
     *,
     threads: int = 1,
+    split: int | None = None,
     samples: str = "adaptive",
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Image, Work]:
@@ -36,6 +37,7 @@ def draw_solids(
         stage: camera, light, ground and sky.
         canvas: width and height in pixels.
         threads: bands drawn at the same time.
+        split: bands are as high as for so many threads; by default ``threads``.
         samples: of a pixel: ``"adaptive"``, four where something changes from pixel to pixel and one
             elsewhere, ``"quick"``, the same at another of `PACES`, ``"four"`` or ``"one"``.
         progress: called with the share done, from any thread.
@@ -49,7 +51,7 @@ def draw_solids(
     width, height = canvas
     lighting = Lighting(field, stage, PACES.get(samples, CAREFUL))
     out = np.empty((4, height, width), np.float32)
-    rows = max(1, min(TILE // width, -(-height // threads)))
+    rows = max(1, min(TILE // width, -(-height // (split or threads))))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     costs: list[Work] = []
 
