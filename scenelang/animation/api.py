@@ -39,8 +39,8 @@ def render_frames(
     """Draw the frames of a scene file, or Scenes, one after another; no picture is held.
 
     A file is read once, when the first picture is asked for; a frame compiles what it does not share with
-    the one before. Torch draws them, numpy those of solids: each picture is the one that `scenelang.render` gives for its frame
-    on the same device, bit for bit. A scene without ``animate(…)`` has one frame.
+    the one before. Torch draws them, numpy those of solids: each picture is the one that `scenelang.render`
+    gives for its frame on the same device, bit for bit. A scene without ``animate(…)`` has one frame.
 
     Args:
         path: the scene file, or a Scene or several, each with its own canvas.

@@ -50,7 +50,7 @@ class Painter:
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
         """Compile a frame and say what its picture depends on; raises as `Clip.program`, or `RenderError`.
 
-        Numpy draws a picture by itself (``single``) if it is small, torch draws animations, of solids numpy too.
+        Torch draws animations; numpy draws solids, and a small picture by itself (``single``).
         """
         if self.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})
