@@ -119,6 +119,11 @@ class Arrays:
         for row, value in zip(x, values, strict=True):  # four times as fast as `x[:, index] = values`
             row[index] = value
 
+    def add(self, x: Array, index: Array, values: Array) -> None:
+        """Add values (R, k) to entries of (R, M), to some of them more than once."""
+        for row, value in zip(x, values, strict=True):
+            row += np.bincount(index, value, len(row))
+
     def inference(self) -> AbstractContextManager[object]:
         """Within it no gradients are kept, and numbers beyond float32 pass without a warning."""
         return np.errstate(all="ignore")

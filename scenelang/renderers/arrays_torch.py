@@ -92,6 +92,9 @@ class Torch(Arrays):
     def put(self, x: Tensor, index: Tensor, values: Tensor) -> None:
         x.index_copy_(-1, index, values)
 
+    def add(self, x: Tensor, index: Tensor, values: Tensor) -> None:
+        x.index_add_(-1, index, values)
+
     def inference(self) -> AbstractContextManager[object]:
         return torch.no_grad()
 

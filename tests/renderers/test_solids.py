@@ -233,6 +233,21 @@ def test_a_medium_glows_where_the_light_is_behind_it(radius: float, away: float,
     assert linear == pytest.approx(sent, rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("other", "least"),
+    [
+        (Object("torus", (scaled(0.9, 0.9, 0.9), moved(0, 0, -0.4)), "volumetric", (0, 0.1, 0.9)), 57),
+        (Object("sphere", (scaled(0.5, 0.9, 0.5), moved(0.5, 0.2, 0)), "volumetric", (0, 0.1, 0.9)), 57),
+        (Object("torus", (scaled(0.6, 0.6, 0.6), turned(0.7), moved(0.9, 1.2, 0.9))), 52.5),
+    ],
+)  # fmt: skip
+def test_colours_and_shadows_change_within_media(other: Object, least: float) -> None:
+    """A later medium in another, and a shadow that falls into one: three nodes a ray do not tell where."""
+    objects = [Object("sphere", (scaled(0.9, 0.9, 0.9),), "volumetric", (0.9, 0.5, 0.1)), other]
+    exact = solid_image(graph(objects), Stage(), (40, 40))
+    assert psnr(draw_solids(field(objects), Stage(), (40, 40))[0], exact) > least
+
+
 def test_both_libraries_draw_the_same() -> None:
     net = network()
     other = Solids(net.config, 2, 2)

@@ -65,6 +65,8 @@ class SolidField:
         """Whether some object is a medium."""
         self.mixed = self.media and not kinds.all()
         """Whether not all are."""
+        self.coloured = self.media and np.ptp(self.xp.to_numpy(self.looks)[:3, kinds], 1).max() > 0
+        """Whether media have different colours."""
 
     def _tables(self, vectors: np.ndarray) -> None:
         """What pairs of points and objects look up: arrays (…, N)."""

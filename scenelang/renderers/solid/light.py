@@ -6,7 +6,6 @@ like. Colours are linear. Letters as in `network.py`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,11 +16,18 @@ from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.solid.field import Meeting, SolidField
 from scenelang.renderers.solid.march import CAREFUL, Pace, Piece, Trail, Work, march
 from scenelang.renderers.solid.network import Wanted
-from scenelang.renderers.solid.passes import INF
+from scenelang.renderers.solid.passes import BEGIN, END, INF
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
 CLEAR = 2e-4  # world units before a surface where rays from the light end
-DEEP, DEEPS = 0.5, 8  # world units that pieces of media are cut to; the last of so many takes the rest
+EVEN = 2  # how much more evenly than the light that the medium takes nodes lie
+PARTS = 4  # of pieces of which nodes do not tell enough
+LEAST = 0.02  # of what is seen, that a piece has to have a part of to be cut
+JUMP = 0.03  # linear: of colours that differ
+LOOKS = (0.003, *(i / 8 for i in range(1, 8)), 0.997)  # of a piece, where its colour is asked for
+HALVINGS = 8  # of the way between
+LONG = 2.0  # world units: longer pieces are cut
+STEEP = 1.2  # how much more light the last node may get than the first
 NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle are cut
 CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents of angles at the light
 
@@ -84,25 +90,55 @@ class Lighting:
             found.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail)))
         if len(floor):
             found.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
+        mist = None
         if trail.pieces:
-            cut = [part for piece in trail.pieces for part in self._cut(way, piece)]
-            pieces = [part for piece in cut for part in self._shortened(piece)]
-            found.append(self._scattering(way, trail, pieces))
-            work += Work(met=found[-1].p.shape[1])
+            pieces = self._cut(way, self._parted(trail))
+            mist, share = self._scattering(way, trail, pieces)
+            found.append(mist)
         if not found:
             return Shade(seen, alpha, work)
         points = Points(*(xp.concat(list(part), 1) for part in zip(*found, strict=True)))
-        light, more = self._lit(points, xp.take(trail.soft, surface))
+        light, free, more = self._lit(points, xp.take(trail.soft, surface))
+        work += more
         xp.put(seen, both, light[:, : len(both)])
         xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
-        if trail.pieces:
-            clear, glow = xp.exp(-EXTINCTION * trail.length), 0 * way
-            sent = light[:, len(both) :].reshape(3, self.pace.nodes, -1).sum(1)
-            for ray, *_ in pieces:  # a ray occurs once in each
-                xp.put(glow, ray, xp.take(glow, ray) + sent[:, : len(ray)])
-                sent = sent[:, len(ray) :]
-            seen, alpha = seen * clear + glow, 1 - (1 - alpha) * clear
-        return Shade(seen, alpha, work + more)
+        if mist is not None:
+            glow, more = self._glow(way, trail, pieces, share, light[:, len(both) :], free[len(both) :])
+            clear = xp.exp(-EXTINCTION * trail.length)
+            seen, alpha, work = seen * clear + glow, 1 - (1 - alpha) * clear, work + more
+        return Shade(seen, alpha, work)
+
+    def _glow(
+        self, way: Array, trail: Trail, pieces: Piece, share: Array, light: Array, free: Array
+    ) -> tuple[Array, Work]:
+        """Light (3, M) that pieces of rays in media send towards the eye.
+
+        Those whose nodes do not tell how the light goes on between them are cut and asked again.
+
+        Args:
+            way: of the rays (3, M).
+            trail: what they met.
+            pieces: their ways through media, P.
+            share: what these have of what is seen (P,).
+            light: what nodes on them send (3, K).
+            free: whether any light reaches those (K,).
+        """
+        xp, count, glow, work = self.xp, self.pace.nodes, 0 * way, Work(met=light.shape[1])
+        sent, nodes = light.reshape(3, count, -1), free.reshape(count, -1)
+        shown = sent.sum(0)
+        edge = (nodes != nodes[:1]).sum(0) > 0
+        cut = (edge | (shown[-1] > STEEP * shown[0]) | (pieces[2] - pieces[1] > LONG)) & (share > LEAST)
+        whole, parts = xp.where(~cut), xp.where(cut)
+        xp.add(glow, xp.take(pieces[0], whole), xp.take(sent.sum(1), whole))
+        if len(parts):
+            ray, begin, end, before = (xp.take(part, parts) for part in pieces)
+            each = (end - begin) / PARTS
+            finer = [(ray, begin + i * each, begin + (i + 1) * each, before + i * each) for i in range(PARTS)]
+            pieces = tuple(xp.concat(part, 0) for part in zip(*finer, strict=True))
+            light, _, more = self._lit(self._scattering(way, trail, pieces)[0], trail.soft[:0])
+            work += more + Work(met=light.shape[1])
+            xp.add(glow, pieces[0], light.reshape(3, count, -1).sum(1))
+        return glow, work
 
     def limit(self, way: Array) -> Array:
         """How far rays from the eye go before they meet the ground (M,), inf for ever."""
@@ -124,29 +160,31 @@ class Lighting:
         base = colour * (AMBIENT[0] + AMBIENT[1] * n[1]) + haze
         return Points(p + LIFT * n, base, colour * self.power[:, None] * (facing / (r * r)))
 
-    def _scattering(self, way: Array, trail: Trail, pieces: list[Piece]) -> Points:
-        """Points in media, whose light comes towards the eye: all pieces for each node in turn.
+    def _scattering(self, way: Array, trail: Trail, pieces: Piece) -> tuple[Points, Array]:
+        """Nodes in media, whose light comes towards the eye, all pieces for each in turn, and shares (P,).
 
-        Of a piece that takes u of the light, the integral over T sigma dt is one over du, from 0 to u.
+        With u = 1 - T^(1 / EVEN), the integral over T sigma dt is one over EVEN (1 - u)^(EVEN - 1) du. Where
+        light fades as T does, three nodes are exact.
         """
-        xp = self.xp
-        ray, begin, end, before = (xp.concat(parts, 0) for parts in zip(*pieces, strict=True))
-        taken = 1 - xp.exp(-EXTINCTION * (end - begin))
+        xp, (ray, begin, end, before) = self.xp, pieces
+        taken = 1 - xp.exp(-EXTINCTION / EVEN * (end - begin))
         nodes, weights = (
             xp.array(values[:, None].astype(np.float32), way)
             for values in np.polynomial.legendre.leggauss(self.pace.nodes)
         )
-        nodes, weights = (nodes + 1) / 2, weights / 2  # of a way, by what it takes of the light
-        t = (begin - xp.log(1 - nodes * taken) / EXTINCTION).reshape(-1)  # of (nodes, P)
-        weight = (weights * (taken * xp.exp(-EXTINCTION * before))).reshape(-1)
+        nodes, weights = (nodes + 1) / 2, weights / 2
+        left = 1 - nodes * taken
+        t = (begin - xp.log(left) * (EVEN / EXTINCTION)).reshape(-1)  # of (nodes, P)
+        weight = weights * (EVEN * taken * left ** (EVEN - 1) * xp.exp(-EXTINCTION * before))
         rays = xp.concat([ray] * self.pace.nodes, 0)
         p = self.eye[:, None] + xp.take(way, rays) * t
-        colour = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register[:3] * weight
+        colour = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register[:3] * weight.reshape(-1)
         r = _length(xp, self.lamp[:, None] - p).clip(NEAREST)
-        return Points(p, colour * AMBIENT[0], colour * self.power[:, None] / (4 * r * r))
+        points = Points(p, colour * AMBIENT[0], colour * self.power[:, None] / (4 * r * r))
+        return points, weight.sum(0)
 
-    def _lit(self, points: Points, soft: Array) -> tuple[Array, Work]:
-        """Light (3, K) from points (3, K), where the light reaches them, and what it took.
+    def _lit(self, points: Points, soft: Array) -> tuple[Array, Array, Work]:
+        """Light (3, K) from points (3, K), which of them (K,) the light's own reaches, and what it took.
 
         Args:
             points: all of them.
@@ -168,7 +206,9 @@ class Lighting:
             opaque = (at.distance < 0) & (at.register[0] < 0.5)
             xp.put(clear, inside, xp.take(clear, inside) * ~opaque)
         xp.put(light, lit, xp.take(light, lit) + xp.take(more, lit) * clear)
-        return light, Work(0, len(lit), trail.near, trail.steps, trail.met)
+        free = 0 * p[0] > 1
+        xp.put(free, lit, clear > 0)
+        return light, free, Work(0, len(lit), trail.near, trail.steps, trail.met)
 
     def surface(self, way: Array, index: Array, trail: Trail) -> tuple[Array, ...]:
         """Points where rays meet solids, normals, colours, and light that joins in before (3, K) each."""
@@ -213,35 +253,63 @@ class Lighting:
         colour = xp.array(np.asarray(ground.rgb, np.float32), p)[:, None]
         return p, n, kept * colour, (1 - kept) * self.horizon[:, None]
 
-    def _shortened(self, piece: Piece) -> Iterator[Piece]:
-        """Pieces so short that the light which reaches them through media changes evenly, each ray once."""
-        xp, (ray, begin, end, before) = self.xp, piece
-        for index in range(DEEPS):
-            gone = index * DEEP
-            some = xp.where(begin + gone < end)
-            if not len(some):
-                return
-            ray, begin, end, before = (xp.take(part, some) for part in (ray, begin, end, before))
-            stop = end if index == DEEPS - 1 else xp.minimum(end, begin + gone + DEEP)
-            yield ray, begin + gone, stop, before + gone
+    def _parted(self, trail: Trail) -> Piece:
+        """The ways of rays through media, cut where one medium's colour gives way to another's."""
+        xp, field = self.xp, self.field
+        ray, begin, end, before = piece = tuple(
+            xp.concat(parts, 0) for parts in zip(*trail.pieces, strict=True)
+        )
+        slots = trail.at(xp, ray).slots
+        several = ((slots[BEGIN] < end) & (slots[END] > begin)).sum(0) > 1
+        some = xp.where(several)
+        if not field.coloured or not len(some):
+            return piece
+        found = [tuple(xp.take(part, xp.where(~several)) for part in piece)]
+        ray, begin, end, before = (xp.take(part, some) for part in piece)
+        passes = trail.at(xp, ray)
+        places = [begin + (end - begin) * share for share in LOOKS]
+        seen = [field.meet(passes, t, Wanted.ALL).register for t in places]
+        steps = [xp.where(abs(a - b).sum(0) > JUMP) for a, b in pairwise(seen)]
+        which = xp.concat(steps, 0)
+        low, high, first, last = (
+            xp.concat([xp.take(part, step) for part, step in zip(parts, steps, strict=True)], -1)
+            for parts in (places[:-1], places[1:], seen[:-1], seen[1:])
+        )
+        passes = passes.at(xp, which)
+        for _ in range(HALVINGS):
+            half = (low + high) / 2
+            there = field.meet(passes, half, Wanted.ALL).register
+            nearer = abs(there - first).sum(0) < abs(there - last).sum(0)
+            low, high = xp.select(nearer, half, low), xp.select(nearer, high, half)
+        start, done = begin, 0
+        for step in steps:  # a ray changes once in each
+            stop, done = low[done : done + len(step)], done + len(step)
+            rays, starts, befores = (xp.take(part, step) for part in (ray, start, before))
+            found.append((rays, starts, stop, befores))
+            start, before = 1 * start, 1 * before
+            xp.put(start, step, stop)
+            xp.put(before, step, befores + stop - starts)
+        found.append((ray, start, end, before))
+        return tuple(xp.concat(list(parts), 0) for parts in zip(*found, strict=True))
 
-    def _cut(self, way: Array, piece: Piece) -> Iterator[Piece]:
-        """Pieces along which the light falls evenly enough, of pieces of rays, each ray once."""
+    def _cut(self, way: Array, piece: Piece) -> Piece:
+        """The same pieces of rays, cut where the light falls unevenly along them."""
         xp, (ray, begin, end, before) = self.xp, piece
         ways, to = xp.take(way, ray), (self.lamp - self.eye)[:, None]
         first, last = to - ways * begin, to - ways * end
         narrow = _dot(first, last) > NARROW * _length(xp, first) * _length(xp, last)
-        yield tuple(xp.take(part, xp.where(narrow)) for part in piece)
+        found = [tuple(xp.take(part, xp.where(narrow)) for part in piece)]
         wide = xp.where(~narrow)
         if not len(wide):
-            return
+            return found[0]
         ray, begin, end, before, ways = (xp.take(part, wide) for part in (*piece, ways))
         middle = _dot(ways, to)
         aside = _length(xp, to - ways * middle).clip(NEAREST)
         for low, high in pairwise(CUTS):
             a, b = xp.maximum(begin, middle + low * aside), xp.minimum(end, middle + high * aside)
             some = xp.where(a < b)
-            yield tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin))
+            found.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin)))
+        return tuple(xp.concat(list(parts), 0) for parts in zip(*found, strict=True))
 
 
 def _dot(a: Array, b: Array) -> Array:
