@@ -78,8 +78,10 @@ def solids(root: Fold) -> dict[str, Any]:
     return found
 
 
-def exported(objects: dict[str, Any], stage: Stage, canvas: tuple[int, int], samples: int) -> Any:
-    """A scene as Mitsuba renders it; samples of a pixel, a square number."""
+def exported(
+    objects: dict[str, Any], stage: Stage, canvas: tuple[int, int], samples: int, **film: int
+) -> Any:
+    """A scene as Mitsuba renders it; samples of a pixel, a square number; more of the film, as a window."""
     camera, light, ground = stage.camera, stage.light, stage.ground
     scene = {
         "type": "scene",
@@ -89,7 +91,13 @@ def exported(objects: dict[str, Any], stage: Stage, canvas: tuple[int, int], sam
             "fov": math.degrees(camera.fov_rad),
             "fov_axis": "smaller",
             "to_world": mi.ScalarTransform4f().look_at(camera.eye, camera.target, [0, 1, 0]),
-            "film": {"type": "hdrfilm", "width": canvas[0], "height": canvas[1], "rfilter": {"type": "box"}},
+            "film": {
+                "type": "hdrfilm",
+                "width": canvas[0],
+                "height": canvas[1],
+                "rfilter": {"type": "box"},
+                **film,
+            },
             "sampler": {"type": "stratified", "sample_count": samples},
         },
         "light": {

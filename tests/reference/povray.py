@@ -17,7 +17,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from math import tan
 from pathlib import Path
 from typing import Any
@@ -31,8 +31,8 @@ from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
 FADE = 1e-3
 GAP = 2e-3
 DIM = 0.25  # numbers in the file are this share of the light's
-FILE = "scene"
 OPTIONS = "-D", "-P", "-V", "-GA", "All_Console=off", "Dither=off", "File_Gamma=1.0", "-UR", "-UV", "+WT1"
+OPTIONS += "-A", "+FP16", "+Iscene.pov", "+Oscene.ppm"
 
 HEAD = f"""#version 3.7;
 global_settings {{ assumed_gamma 1.0 max_trace_level 100 adc_bailout 1e-6 }}
@@ -214,21 +214,26 @@ def exported(root: Fold, stage: Stage, canvas: tuple[int, int]) -> str:
     return "\n".join([HEAD, *formulas.lines, staged(stage, canvas), *bodies, ""])
 
 
-def povray_picture(
-    root: Fold, stage: Stage, canvas: tuple[int, int], run: Callable[..., Any] = subprocess.run
-) -> np.ndarray:
-    """Linear light (H, W, 3), four samples a pixel.
+def traced(scene: str, canvas: tuple[int, int], *options: str) -> np.ndarray:
+    """Linear light (H, W, 3) that POV-Ray draws, one sample a pixel unless options say otherwise.
 
     Raises:
         RuntimeError: POV-Ray failed; the message is its own.
     """
-    width, height = 2 * canvas[0], 2 * canvas[1]
+    width, height = canvas
     with tempfile.TemporaryDirectory() as folder:
-        Path(folder, f"{FILE}.pov").write_text(exported(root, stage, canvas))
-        options = [*OPTIONS, f"+I{FILE}.pov", f"+O{FILE}.ppm", "+FP16", f"+W{width}", f"+H{height}", "-A"]
-        done = run([povray(), *options], cwd=folder, capture_output=True, text=True, check=False)
+        Path(folder, "scene.pov").write_text(scene)
+        command = [str(povray()), *OPTIONS, f"+W{width}", f"+H{height}", *options]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode:
             raise RuntimeError(done.stderr)
-        data = Path(folder, f"{FILE}.ppm").read_bytes()
-    numbers_ = np.frombuffer(data[-width * height * 6 :], ">u2").astype(np.float64) / 65535 / DIM
-    return np.asarray(numbers_.reshape(canvas[1], 2, canvas[0], 2, 3).mean((1, 3)))
+        data = Path(folder, "scene.ppm").read_bytes()
+    linear = np.frombuffer(data[-width * height * 6 :], ">u2").astype(np.float64) / 65535 / DIM
+    return linear.reshape(height, width, 3)
+
+
+def povray_picture(root: Fold, stage: Stage, canvas: tuple[int, int]) -> np.ndarray:
+    """Linear light (H, W, 3), four samples a pixel."""
+    width, height = canvas
+    drawn = traced(exported(root, stage, canvas), (2 * width, 2 * height))
+    return np.asarray(drawn.reshape(height, 2, width, 2, 3).mean((1, 3)))
