@@ -67,7 +67,7 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         """Linear light, times alpha where there is any, by channels: what an EXR holds."""
         values = np.asarray(self, np.float64)
         colour, alpha = values[..., :3], values[..., 3:]
-        light = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+        light = decoded(colour)
         both = np.concatenate([light * alpha if alpha.size else light, alpha], 2).astype(np.float32)
         return {name: both[..., at] for at, name in enumerate("RGBA"[: both.shape[2]])}
 
@@ -142,6 +142,25 @@ def from_samples(colour: npt.NDArray[Any], alpha: npt.NDArray[Any] | None) -> Im
         colour = np.concatenate([straight, alpha[..., None]], 2)
     image: Image = np.clip(colour, 0.0, 1.0).astype(np.float32).view(Image)
     return image
+
+
+def from_light(picture: npt.NDArray[Any], transparent: bool) -> Image:
+    """An image of premultiplied linear light and alpha (4, H, W)."""
+    light, alpha = np.moveaxis(picture[:3], 0, 2), picture[3]
+    if not transparent:
+        return from_samples(encoded(light), None)
+    return from_samples(encoded(light / np.maximum(alpha, 1e-6)[..., None]) * alpha[..., None], alpha)
+
+
+def encoded(linear: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """sRGB of linear values, clamped to [0, 1] (IEC 61966-2-1)."""
+    x = np.clip(linear, 0.0, 1.0)
+    return np.asarray(np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055))
+
+
+def decoded(srgb: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The inverse of `encoded`."""
+    return np.asarray(np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4))
 
 
 def enlarged(picture: Image, canvas: tuple[int, int]) -> Image:

@@ -93,7 +93,7 @@ backend = choice(
 device = choice(
     "--device",
     words="auto cpu cuda",
-    help="Where torch draws; auto is CUDA where there is any, and numpy for a small picture.",
+    help="Where torch draws; auto is CUDA where there is any, and numpy for solids or a small picture.",
 )
 threads = click.option("--threads", type=click.IntRange(1), metavar="N", help="Threads on the CPU.")
 verbose = click.option("-v", "--verbose", is_flag=True, help="Say what was compiled and where the time went.")

@@ -10,6 +10,7 @@ import pytest
 
 from scenelang.graph.nodes import Fold
 from scenelang.graph.stage import Camera, Ground, Light, Stage
+from scenelang.image import encoded
 from scenelang.measure.metrics import flip
 from scenelang.reference.solid import image as exact
 from tests.pictures import psnr_db
@@ -77,7 +78,7 @@ def compared(drawn: np.ndarray, root: Fold, stage: Stage, monkeypatch: pytest.Mo
     monkeypatch.setattr(exact, "AMBIENT", (0.0, 0.0))
     monkeypatch.setattr(exact, "FADE", 1e30)
     ours = np.asarray(exact.solid_image(root, stage, (drawn.shape[1], drawn.shape[0]), per_side=8))
-    theirs = exact.encoded(drawn)
+    theirs = encoded(drawn)
     decibels, difference = psnr_db(theirs, ours), flip(theirs, ours)
     print(f"PSNR {decibels:.1f} dB, FLIP {difference:.4f}")
     assert decibels > 45

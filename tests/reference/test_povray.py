@@ -10,8 +10,9 @@ import pytest
 from scenelang.graph.nodes import Fold
 from scenelang.graph.stage import Camera, Ground, Light, Stage
 from scenelang.graph.steps import Displace, Twist, Warp
+from scenelang.image import encoded
 from scenelang.measure.metrics import flip
-from scenelang.reference.solid.image import encoded, solid_image
+from scenelang.reference.solid.image import solid_image
 from tests.pictures import psnr_db
 from tests.reference import solid_oracle
 from tests.reference.povray import povray, povray_picture

@@ -6,7 +6,7 @@ import numpy as np
 
 from scenelang.graph.nodes import Fold
 from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Ground, Light, Stage
-from scenelang.image import Image, from_samples
+from scenelang.image import Image, from_light
 from scenelang.reference.field import Array
 from scenelang.reference.samples import sample_points
 from scenelang.reference.solid.body import length
@@ -48,16 +48,7 @@ def solid_image(root: Fold, stage: Stage, canvas: tuple[int, int], *, per_side: 
         rows = range(top, min(top + step, height))
         samples = radiance(field, stage, ways(stage, canvas, rows, per_side))
         picture[:, top : rows.stop] = samples.reshape(4, len(rows), per_side, width, per_side).mean((2, 4))
-    light, alpha = np.moveaxis(picture[:3], 0, 2), picture[3]
-    if not stage.transparent:
-        return from_samples(encoded(light), None)
-    return from_samples(encoded(light / np.maximum(alpha, 1e-9)[..., None]) * alpha[..., None], alpha)
-
-
-def encoded(light: Array) -> Array:
-    """Linear light as sRGB, both clamped to [0, 1] (IEC 61966-2-1)."""
-    light = np.clip(light, 0.0, 1.0)
-    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return from_light(picture, stage.transparent)
 
 
 def radiance(field: Field, stage: Stage, d: Array) -> Array:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 
 from scenelang.graph.stage import Camera, Stage
-from scenelang.image import Image, from_samples
+from scenelang.image import Image, from_light
 from scenelang.program.program import ProgramError
 from scenelang.renderers.solid.field import SolidField
 from scenelang.renderers.solid.light import Lighting
@@ -69,18 +68,7 @@ def draw_solids(
             list(pool.map(one, bands))
     if not np.isfinite(out).all():
         raise ProgramError("numbers that the network cannot draw with")
-    colour, alpha = np.moveaxis(out[:3], 0, 2), out[3]
-    work = sum(costs, Work())
-    if stage.transparent:
-        straight = encoded(colour / np.maximum(alpha, 1e-6)[..., None])
-        return from_samples(straight * alpha[..., None], alpha), work
-    return from_samples(encoded(colour), None), work
-
-
-def encoded(linear: np.ndarray) -> Any:
-    """sRGB of linear values, clamped to [0, 1] (IEC 61966-2-1)."""
-    x = np.clip(linear, 0.0, 1.0)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+    return from_light(out, stage.transparent), sum(costs, Work())
 
 
 def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str) -> tuple[np.ndarray, Work]:
