@@ -11,14 +11,16 @@ import pytest
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link
-from scenelang.graph.stage import Camera, Stage
+from scenelang.graph.stage import Camera, Ground, Light, Stage
 from scenelang.graph.verify import verify
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
 from scenelang.passes.check_eye import check_eye
 from scenelang.passes.context import Context
+from scenelang.passes.drop import drop_hidden, drop_unseen
 from scenelang.passes.linearise import linearise
 from scenelang.reference.solid.field import Field
+from scenelang.reference.solid.image import solid_image
 from scenelang.scene import schema
 from scenelang.words import COMBINE
 
@@ -141,6 +143,34 @@ def test_eyes_inside_are_reported() -> None:
         assert [d.code for d in context.diagnostics] == ["E0408"] * opaque
         seen["opaque" if opaque else "clear"] += 1
     assert min(seen.values()) > 15
+
+
+def test_what_is_left_out_is_seen_nowhere() -> None:
+    """Not even by its shadow: cameras and lights anywhere, above and below the ground."""
+    fewer = 0
+    for seed in range(150):
+        rng = random.Random(seed)
+
+        def place(size: float, rng: random.Random = rng) -> tuple[float, float, float]:
+            return rng.uniform(-size, size), rng.uniform(-size, size), rng.uniform(-size, size)
+
+        ground = Ground(rng.uniform(-1, 0.6)) if rng.random() < 0.8 else None
+        stage = Stage(Camera(place(4), place(0.3)), Light(place(3)), ground)
+        nodes = [random_leaf(rng, 1.2) for _ in range(5)] + [random_node(rng, 1)]
+        graph = replace(lower(schema.Scene(nodes=nodes), SOLIDS, None, Diagnostics()), stage=stage)
+        context = Context(SOLIDS, Diagnostics())
+        for step in PASSES[: [step.run for step in PASSES].index(linearise) + 1]:
+            graph = step.run(graph, context)
+        left = drop_hidden(drop_unseen(graph, context), context)
+        if context.diagnostics.errors or len(left.root.links) == len(graph.root.links):
+            continue
+        try:
+            wanted = solid_image(graph.root, stage, (12, 12), per_side=1)
+        except ValueError:  # the eye is inside something opaque
+            continue
+        fewer += 1
+        assert np.allclose(solid_image(left.root, stage, (12, 12), per_side=1), wanted, atol=2e-3)
+    assert fewer > 15
 
 
 def test_what_is_below_the_ground_is_left_out() -> None:

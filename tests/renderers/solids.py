@@ -120,3 +120,8 @@ def graph(objects: Sequence[Object]) -> Fold:
             for o in objects
         ),
     )
+
+
+def psnr(a: np.ndarray, b: np.ndarray) -> float:
+    """In dB."""
+    return float(-10 * np.log10(np.square(np.asarray(a, float) - b).mean() + 1e-12))

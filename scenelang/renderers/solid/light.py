@@ -21,8 +21,8 @@ from scenelang.renderers.solid.passes import BEGIN, END, INF
 INTO = 3e-5  # world units behind a surface where its material is asked for
 CLEAR = 2e-4  # world units before a surface where rays from the light end
 EVEN = 2  # how much more evenly than the light that the medium takes nodes lie
-PARTS = 4  # of pieces of which nodes do not tell enough
-LEAST = 0.02  # of what is seen, that a piece has to have a part of to be cut
+PARTS = 3  # of pieces of which nodes do not tell enough
+LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
 JUMP = 0.03  # linear: of colours that differ
 LOOKS = (0.003, *(i / 8 for i in range(1, 8)), 0.997)  # of a piece, where its colour is asked for
 HALVINGS = 8  # of the way between
