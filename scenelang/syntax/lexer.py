@@ -262,6 +262,12 @@ class _Slips:
         self.report.add("E0123", "string in the wrong quotes", start, end, help=help, fix=fix)
 
     def _number(self, start: int, end: int, text: str) -> None:
+        if re.fullmatch("0[xX][0-9a-fA-F]{6}", text):
+            self._keep("COLOR", start, end)
+            self.report.add(
+                "E0116", f"`{text}` is not a number", start, end, help="this is a colour", fix=f"#{text[2:]}"
+            )
+            return
         self._keep("NUMBER", start, end)
         found = re.match(r"([0-9]*\.?[0-9]*)(.*)", text, re.DOTALL)
         value, rest = found.groups() if found else ("", text)

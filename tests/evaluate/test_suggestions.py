@@ -9,7 +9,7 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import did_you_mean, ranked
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.values.functions import FUNCTIONS
-from scenelang.words import LANGUAGE
+from scenelang.words import LANGUAGE, STAGE
 from tests.evaluate.cases import Outcome, run_text
 from tests.syntax.reading import apply
 
@@ -123,6 +123,7 @@ def test_words_of_other_languages_lead_to_words_of_this_one() -> None:
         "subtract",
         "material",
         "else if",
+        *STAGE,
     }
     assert set(foreign_words.WORDS.values()) <= ours
     assert not set(foreign_words.WORDS) & ours

@@ -8,13 +8,14 @@ from typing import Any
 from scenelang import words
 from scenelang.diagnostics.diagnostic import Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.diagnostics.suggest import did_you_mean, listing
+from scenelang.diagnostics.suggest import did_you_mean, instead, listing
 from scenelang.evaluate import costs
 from scenelang.evaluate.file_context import Place
 from scenelang.evaluate.limits import MAX_DEPTH
 from scenelang.evaluate.names import UNBOUND, Definition, Env
 from scenelang.evaluate.prepare.expressions import POISONED, Code, Given, Run, computed, prepare_arguments
 from scenelang.evaluate.prepare.references import lookup, wrong_kind
+from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.report.undefined import (
     advise_parameter,
@@ -96,6 +97,8 @@ def bind(
             formal = [(param.text, param.span, "argument") for param in places]
             if not reported_at_definition(report, word.text, word.span.source, formal):
                 hint, fix = did_you_mean(word.text, params, word.span, effort=report.effort)
+                if hint is None and called in foreign_words.ARGUMENTS:
+                    hint, fix = instead(word.text, foreign_words.ARGUMENTS[called], params, word.span)
                 hint = hint or (f"its arguments are {listing(params)}" if params else "it takes no arguments")
                 message = f"`{called}` has no argument `{word.text}`"
                 fail(word.text, message, word.span, hint, fix, "E0206")

@@ -140,7 +140,7 @@ def _advice(stmt: nodes.Call, place: Place) -> Advice:
 
         help = f"it is called `{meant}` here and stands in a material: material flat {{ {meant}(…); }}"
         fix = in_material(stmt, place.session, meant)
-    help = help or foreign_words.STATEMENTS.get(text)
+    help = help or foreign_words.STATEMENTS.get(text.lower())
     if help is None and place.kind in ("file", "group", "chain") and words.geometries:
         help = f"the model draws {listing(words.geometries)}"
     return help, fix

@@ -180,6 +180,10 @@ def _light(session: Session, where: Written, position: Any, power: Any, rgb: Any
 
 
 def _ground(session: Session, where: Written, y: Any, rgb: Any) -> None:
+    if y.__class__ is Vec:
+        raise unexpected(
+            "a number", y, "the height comes first: ground(-1, #888), or ground(color = #888)", 0
+        )
     if y is not None:
         _state(session, where, Ground, _given(y, number, 0), _given(rgb, _opaque, "colour", 1))
         return

@@ -117,10 +117,14 @@ WORDS: Final = _each_word(
         "intersection": "intersect",
         "difference minus": "subtract",
         "merge add join": "union",
-        "blend smooth_union": "smooth",
+        "blend smooth_union opsmoothunion smin": "smooth",
         "texture": "material",
         "size_px resolution viewport": "canvas",
         "animation": "animate",
+        "light_source pointlight point_light spotlight sun lamp": "light",
+        "perspectivecamera perspective look_at lookat": "camera",
+        "plane floor": "ground",
+        "sky sky_sphere skybox": "background",
         "elif elsif elseif": "else if",
     }
 )
@@ -129,7 +133,7 @@ WORDS: Final = _each_word(
 STATEMENTS: Final = _each_word(
     {
         "children": "what is called has no children: put what it draws into its block",
-        "blend smooth_union": "it is called `smooth` here, as in smooth(k = 0.3) { … }",
+        "blend smooth_union opsmoothunion smin": "it is called `smooth` here, as in smooth(k = 0.3) { … }",
         "hull": "there is no hull; smooth { … } blends objects into each other",
         "minkowski": "there is no Minkowski sum; smooth { … } blends objects into each other",
         "linear_extrude rotate_extrude": "a 2D scene is not extruded",
@@ -141,7 +145,28 @@ STATEMENTS: Final = _each_word(
         "echo print": "nothing is printed while a scene is made",
         "return": "a function is one expression: fn f(x) = x ^ 2;",
         "while": "loops run over a range or a vector: for (i in 0..<n) { … }",
-        "opacity alpha": "objects are opaque",
+        "opacity alpha": "objects are opaque, but for `volumetric` in 3D",
+        "rotatex rotate_x rotx": "write rotate(90deg, axis = X);",
+        "rotatey rotate_y roty": "write rotate(90deg, axis = Y);",
+        "rotatez rotate_z rotz": "write rotate(90deg);",
+        "ambient ambient_light ambientlight": "ambient light is the same in every scene",
+        "density extinction absorption": "media all take light at one rate, 3 per world unit",
+        "roughness metallic metalness shininess specular reflection": "solids are matte",
     }
 )
 """Statements that are built otherwise."""
+
+_COLOUR: Final = {"colour": "color"}
+ARGUMENTS: Final = {
+    "camera": _each_word(
+        {
+            "location position pos from origin look_from lookfrom": "eye",
+            "look_at lookat to at center centre": "target",
+            "angle fovy": "fov",
+        }
+    ),
+    "light": _COLOUR
+    | _each_word({"location pos at from": "position", "intensity strength energy brightness": "power"}),
+    "ground": _COLOUR | _each_word({"height level": "y"}),
+}
+"""Arguments of statements, under another name."""

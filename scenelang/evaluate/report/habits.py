@@ -17,7 +17,7 @@ from scenelang.evaluate.values.value import COMPONENTS, Problem
 from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import TRANSFORMS
+from scenelang.words import STAGE, TRANSFORMS
 
 _GLUED: Final = "give it a unit: deg, rad or turn"
 _RADIANS: Final = "a multiple of PI or TAU is in radians: multiply by 1rad"
@@ -258,7 +258,8 @@ SHAPES: Final = {
 def in_library(stmt: nodes.Call, place: Place) -> tuple[str | None, Fix | None]:
     """Help and fix for a statement whose name is that of a shape of the library; both None for any other."""
     shape = SHAPES.get(stmt.name.text.lower())
-    if shape is None or not place.session.vocabulary.geometries >= _LEAVES:
+    session = place.session
+    if shape is None or not session.vocabulary.geometries >= _LEAVES or session.settings.given.keys() & STAGE:
         return None, None
     imported = next(
         (n for n, b in place.scope.visible() if b.kind == "import" and _is_library(b.value)), None

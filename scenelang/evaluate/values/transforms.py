@@ -46,7 +46,8 @@ class Spec(Record):
 def vector(value: Any, length: int, operand: int = 0, what: str = "a vector") -> tuple[float, ...]:
     """``length`` numbers; raises Problem for anything else."""
     if value.__class__ is not Vec or len(value.items) != length:
-        raise unexpected(f"{what} of {length} numbers", value, operand=operand)
+        help = "write [x, y, z], or X, Y or Z" if what in ("a point", "an axis") else None
+        raise unexpected(f"{what} of {length} numbers", value, help, operand)
     return tuple([number(item, operand) for item in value.items])
 
 

@@ -49,6 +49,9 @@ _TYPES: Final = "names have no types"
 _RANGE: Final = "ranges are written with `..`"
 ONCE: Final = "`<n>` cannot be changed"
 ONCE_HELP: Final = "names keep their values; bind another one with let, or count with for (i in 0..<n) { … }"
+_BRACKETS: Final = "vectors stand in brackets"
+_WIDTH: Final = "of boolean words only `smooth` has one, the width of its blend: smooth(k = 0.3) { … }"
+_BLOCKS: Final = "write camera(eye = [0, 1, 6]); light(position = [2, 4, 3]); sphere { translate(0, 1, 0); }"
 _IMPORT: Final = "functions are there without an import"
 
 HABITS: Final = (
@@ -107,19 +110,28 @@ HABITS: Final = (
     # blocks
     Habit("<n> <VALUES>;", "<n>(<VALUES>);", _PARENTHESES, code="E0107"),
     Habit("<node>()", "<node>", "`<node>` takes no arguments"),
+    _unsafe("<node>(<P>) {", "<node> {", "`<node>` takes no arguments", _WIDTH),
+    _unsafe("< <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
+    _unsafe("<n> < <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
+    Habit("<call> <rgb|srgb> < <A>, <B>, <C> >", "<call>([<A>, <B>, <C>]);", _BRACKETS),
+    Habit("<call> <rgb|srgb> < <A>, <B>, <C> >;", "<call>([<A>, <B>, <C>]);", _BRACKETS),
     Habit(
         "material { <call>(",
         "material <material> { <call>(",
         "material without a name",
         "a scene in 2D has `flat`, one in 3D `diffuse` and `volumetric`",
     ),
+    Habit("material = <n>;", "material <n>;", "`material` is not set"),
     Habit("material(<n>)", "material <n>", "a material's name stands without parentheses"),
     # expressions
     _unsafe("[for <E>]", "BAD_EXPRESSION", "vectors are not made by loops", "write the items out"),
     _unsafe("[<E> for <F>]", "BAD_EXPRESSION", "vectors are not made by loops", "write the items out"),
     Habit("[<A>:<S>:<B>]", "<A>..<B> step <S>", _RANGE),
     Habit("[<A>:<B>]", "<A>..<B>", _RANGE),
-    Habit("(<A>, <E>)", "[<A>, <E>]", "vectors stand in brackets"),
+    Habit("(<A>, <E>)", "[<A>, <E>]", _BRACKETS),
+    Habit("(<A>, <B>, <C>)", "[<A>, <B>, <C>]", _BRACKETS),
+    Habit("<rgb|srgb> < <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
+    Habit("< <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
     # imports
     Habit("import <library> <LINE?> <;?>", "", _IMPORT),
     Habit("from <library> import <LINE> <;?>", "", _IMPORT),

@@ -42,9 +42,9 @@ _GROUPED = re.compile(r"[0-9]{1,3}(?:,[0-9]{3}(?![\w°]|\.(?!\.)))+")
 
 @cache
 def _anchor(pattern: str) -> str:
-    """What a pattern begins with: a bracket, an operand, a name or a word."""
+    """What a pattern begins with: a bracket or `<`, an operand, a name or a word."""
     head = pieces(pattern)[0]
-    if head.text in ("(", "[", "A"):
+    if head.text in ("(", "[", "<", "A"):
         return head.text
     return "name" if head.is_hole and not head.words else "word"
 
@@ -84,7 +84,7 @@ class Habits:
     def _anchors(self, first: int, at: int) -> dict[str, list[int]]:
         """Where a pattern may begin, by what it begins with."""
         tokens, depth = self.tokens, 0
-        found = {"(": [], "[": [], "A": [], "name": [first], "word": [first, at - 1]}
+        found = {"(": [], "[": [], "<": [at], "A": [], "name": [first], "word": [first, at - 1]}
         for index in range(at - 1, max(first, at - MOST), -1):
             text = tokens.text(index)
             depth += (text in (")", "]")) - (text in ("(", "["))

@@ -48,7 +48,7 @@ class Recovery(Habits):
         if start is not None:
             return start
         first = self._index(values[depth]) if depth < len(values) else at
-        if first < at and (
+        if (first < at or self._is(at, "<")) and (
             self._grouped_digits(at)
             or self._import_of_others(first)
             or (at - first <= MAX_REPLAY and self._foreign(states[: depth + 1], first, at))
