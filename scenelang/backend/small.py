@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, Literal, NamedTuple
 
+from scenelang.backend.load import load_of
 from scenelang.backend.options import Device, RenderError, Samples, keep_memory, usable_cores
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError
-from scenelang.program.program import Program, ProgramError, load_of
+from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing, Kept, draw_objects
 
 MOST_MS: Final = 250.0

@@ -163,8 +163,8 @@ def _chosen(
     frontier: Frontier, job: Job, program: Program, limits: Limits, model: str | None, scale: float
 ) -> tuple[Choice, Program]:
     """The best choice whose model draws the scene without further warnings, and its Program."""
+    from scenelang.backend.load import load_of
     from scenelang.measure.choose import choose, offers
-    from scenelang.program.program import load_of
 
     refused: dict[str, str] = {}
     able = []

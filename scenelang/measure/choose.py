@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 import torch
 
+from scenelang.backend.load import Load
 from scenelang.measure.frontier import Cost, Frontier, Limits, Point
 from scenelang.models.choose import lacking, paints, uses
 from scenelang.models.manifest import Manifest
-from scenelang.program.program import Load
 from scenelang.scene.schema import Scene
 
 UNITS: Final = (1.0, 1e3, 1e6, 1e6, 1e3)  # of the terms of a `Cost`

@@ -55,6 +55,11 @@ def sets_of(manifest: Manifest) -> dict[str, Callable[[Rng], Scene]]:
     return {name: partial(random_scene, config=config) for name, config in SETS.items()}
 
 
+def usual_set(manifest: Manifest) -> str:
+    """The set that speed and accuracy of a model's set are measured on: of solids one that has everything."""
+    return "mixed" if manifest.dimension == 3 else manifest.set
+
+
 def scenes_of(model: Model, name: str, seed: int, side: int | None = None) -> Callable[[int], Scene]:
     """The scenes of a set by index, on a canvas that a model draws.
 

@@ -75,6 +75,7 @@ SOLID_SETS: dict[str, SolidConfig] = {
     "shuffled": SolidConfig(shuffled=True),
     "wide": SolidConfig(canvas=(160, 96)),
     "staged": SolidConfig(staged=True),
+    "many": SolidConfig(objects=(16, 16), media=0.3, size=0.6),
     "mixed": SolidConfig(objects=(1, 4), warp=WARP, unions=0.4, spread=0.6, staged=True),
 }
 

@@ -39,6 +39,7 @@ def test_a_small_run(measured: Frontier) -> None:
         "shapes2d",
         "shapes2d, four samples",
         "shapes2d, one sample",
+        "shapes2d, draft",
         "shapes2d, nothing skipped",
         "exact reference, 1 spp",
         "exact reference, 4 spp",
@@ -65,7 +66,32 @@ def test_a_small_run(measured: Frontier) -> None:
         assert Path("out", name).stat().st_size > 10_000
     page = Path("out/frontier.html").read_text("utf-8")
     data = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
-    assert [len(p["pictures"]) for p in data["points"]] == [2] * 7
+    assert [len(p["pictures"]) for p in data["points"]] == [2] * 8
+
+
+@pytest.mark.slow
+def test_a_small_run_of_solids(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The exact field draws in the same march: as near as the network, and never chosen."""
+    monkeypatch.setattr(ways, "_paper", lambda base: iter(()))
+    for name, value in (("SIDE", 48), ("SIDES", ()), ("FITTED", 1), ("REPEATS", 1)):
+        monkeypatch.setattr(measure, name, value)
+    result = folder.run("lab", "frontier", "solids3d", "-o", "out", "--scenes", "2", "--seed", "5")
+    assert result.exit_code == 0, result.output
+    found = Frontier.from_json(Path("out/frontier.json").read_bytes())
+    points = {p.name: p for p in found.points}
+    assert (found.set, found.canvas, found.converged) == ("mixed", (48, 48), {})
+    assert {p.samples for p in found.points if p.model == "solids3d"} == {
+        "adaptive",
+        "four",
+        "quick",
+        "one",
+        "draft",
+    }
+    flips = {name: p.flip.mean for name, p in points.items() if p.flip is not None}
+    assert flips["exact reference, 4 spp"] == 0
+    assert flips["exact field"] < flips["solids3d, one sample"] < flips["solids3d, draft"]
+    assert not points["exact field"].offered
+    assert points["solids3d, quick"].cost is not None
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scenelang.backend.load import Load
 from scenelang.image import enlarged, from_samples
 from scenelang.lab.frontier.measure import promised
 from scenelang.measure.choose import (
@@ -33,7 +34,6 @@ from scenelang.measure.frontier import (
     front,
 )
 from scenelang.models.manifest import load_manifest
-from scenelang.program.program import Load
 from scenelang.scene.schema import Object, Scale, Scene, Twist
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import scenelang as nsg
+from scenelang.backend.load import Load, load_of
+from scenelang.backend.small import draw_small
 from scenelang.lab.frontier.fit import fit_cost
 from scenelang.measure.choose import predicted_ms, yardstick
 from scenelang.measure.frontier import Cost
 from scenelang.program.compile import compile_scene
-from scenelang.program.program import Load, load_of
 from scenelang.scene.schema import Object, Scale, Scene, Translate
 
 
@@ -75,6 +77,21 @@ def test_the_load_of_a_scene_is_its_bounds_within_the_canvas() -> None:
     ]
     assert load.meetings == pytest.approx(sum(inside), rel=1e-6)
     assert load.meetings < 2 * 20_000
+
+
+def test_the_load_of_solids_is_counted_by_a_small_picture() -> None:
+    """What a pixel takes does not change with the canvas; mist takes more than a solid, two more than one."""
+    loads = {}
+    for text in ("sphere { }", "sphere { material volumetric; }", "sphere { } torus { translate(0, 1, 1); }"):
+        for side in (64, 128):
+            program = compile_scene(nsg.loads(f"canvas({side}, {side}); {text}"))
+            loads[text, side] = load = load_of(program)
+            drawn = draw_small(program, samples="one")
+            assert load.meetings == pytest.approx(drawn.pairs, rel=0.35)
+            assert load.outline == load.meetings / side
+            assert load.pixels == side * side
+    ball, mist, both = (load.meetings for (_, side), load in loads.items() if side == 128)
+    assert ball < both < mist
 
 
 def test_the_yardstick_is_a_time() -> None:

@@ -16,12 +16,21 @@ from scenelang.measure.frontier import Frontier, Point, front
 
 FLOOR: Final = 5e-5
 """FLIP below which points lie on the chart's lower edge; 0 has no place on a logarithmic axis."""
-COLOURS: Final = {"framed": "#1f77b4", "streaming": "#c8452f", "reading": "#7b5ea7", "reference": "#2f8f5b"}
+COLOURS: Final = {
+    "framed": "#1f77b4",
+    "solid": "#1f77b4",
+    "exact field": "#b0872b",
+    "streaming": "#c8452f",
+    "reading": "#7b5ea7",
+    "reference": "#2f8f5b",
+}
 MARKS: Final = {
     "unskipped": ("v", "nothing skipped"),
     "adaptive": ("o", "four samples near outlines"),
     "four": ("s", "four samples everywhere"),
     "one": ("^", "one sample a pixel"),
+    "quick": ("D", "four samples near strong outlines, longer steps"),
+    "draft": ("<", "one sample for four pixels, enlarged"),
 }
 
 
@@ -125,7 +134,7 @@ def _legend(axis: Any, frontier: Frontier) -> None:
     from matplotlib.lines import Line2D
 
     shown = {p.renderer for p in frontier.points}
-    used = {mark_of(p) for p in frontier.points if p.flip is not None and p.renderer == "framed"}
+    used = {mark_of(p) for p in frontier.points if p.flip is not None and p.renderer in ("framed", "solid")}
     handles = [
         Line2D([], [], color=colour, marker="o", linestyle="none", label=name)
         for name, colour in COLOURS.items()

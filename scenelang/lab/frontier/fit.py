@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.backend.load import Load
 from scenelang.measure.choose import UNITS
 from scenelang.measure.frontier import Cost
-from scenelang.program.program import Load
 
 
 def fit_cost(loads: Sequence[Load], ms: Sequence[float], skip: bool, *, fixed: bool = False) -> Cost:

@@ -18,19 +18,19 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from scenelang.backend.load import Load, load_of
 from scenelang.backend.neural import open_model
 from scenelang.backend.options import keep_memory
-from scenelang.image import Image, enlarged
+from scenelang.image import Image, enlarged, from_samples
 from scenelang.lab.about import Report, silent
 from scenelang.lab.frontier.fit import fit_cost
 from scenelang.lab.frontier.ways import Draw, Way, ways_of
 from scenelang.measure.choose import yardstick
 from scenelang.measure.frontier import Cost, Errors, Frontier, Point, Quality, Times, front
-from scenelang.measure.metrics import flip, psnr
-from scenelang.measure.scenes import reference_of, scenes_of
+from scenelang.measure.metrics import flip, over_white, psnr
+from scenelang.measure.scenes import reference_of, scenes_of, usual_set
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.program.compile import compile_scene
-from scenelang.program.program import Load, load_of
 from scenelang.scene.schema import Scene
 from scenelang.training.loop import revision
 
@@ -41,6 +41,7 @@ LEAST = 4
 COMPARED = 30  # scenes of ways that are measured for comparison and promise nothing
 TIMED = 8  # scenes of ways of which only the time is taken
 REPEATS = 2
+SIDE = 256  # pixels along a side of the scenes
 SIDES = (128, 512)  # further canvases that times are fitted on
 MANY = "many"  # set of more objects that times are fitted on
 FITTED = 6  # scenes of each of these
@@ -71,7 +72,7 @@ def measure_frontier(
 
     Args:
         base: the model named like the set.
-        scenes: how many; of 256 x 256 pixels.
+        scenes: how many; of 256 x 256 pixels, of the `usual_set`.
         seed: of the scenes.
         threads: cores to draw on.
         report: called with the stage, what is done and all.
@@ -84,7 +85,7 @@ def measure_frontier(
     manifest = load_manifest(base)
     ways = ways_of(base, threads)
     records = {way.name: Record() for way in ways}
-    scene_at = scenes_of(open_model(base), manifest.set, seed)
+    scene_at = scenes_of(open_model(base), usual_set(manifest), seed, SIDE)
     first = scene_at(0)
     quota = {way.name: _quota(way, first, scenes, threads) for way in ways}
     stick = yardstick()
@@ -102,7 +103,7 @@ def measure_frontier(
     on_front = {p.name for p, yes in zip(offered, kept, strict=True) if yes}
     points = [replace(p, on_front=p.name in on_front) for p in points]
     frontier = Frontier(
-        set=manifest.set,
+        set=usual_set(manifest),
         seed=seed,
         scenes=scenes,
         canvas=first.canvas,
@@ -117,7 +118,12 @@ def measure_frontier(
         points=tuple(sorted(points, key=lambda p: p.ms.median)),
     )
     pictures = {name: record.pictures for name, record in records.items() if record.pictures}
-    return frontier, pictures, [reference_of(scene_at(i), manifest) for i in range(min(SHOWN, scenes))]
+    shown = [_white(reference_of(scene_at(i), manifest)) for i in range(min(SHOWN, scenes))]
+    return frontier, pictures, shown
+
+
+def _white(picture: Image) -> Image:
+    return from_samples(over_white(picture), None)
 
 
 def _timed(run: Draw, threads: int) -> tuple[float, Image]:
@@ -145,9 +151,11 @@ def _one_scene(
     index: int,
     threads: int,
 ) -> None:
-    exact = reference_of(scene, manifest)
+    exact = over_white(reference_of(scene, manifest))
     load = load_of(compile_scene(scene, model=manifest.name))
-    many = reference_of(scene, manifest, per_side=8) if index < CONVERGED else None
+    many = None
+    if index < CONVERGED and manifest.dimension == 2:  # with 64 samples a picture of solids takes minutes
+        many = over_white(reference_of(scene, manifest, per_side=8))
     runs = [(way, way.prepare(scene)) for way in ways]
     best: dict[str, float] = {}
     shown: dict[str, Image] = {}
@@ -163,7 +171,7 @@ def _one_scene(
         record.fitted.append(best[way.name])
         if not way.drawn:
             continue
-        picture = enlarged(shown[way.name], (exact.shape[1], exact.shape[0]))
+        picture = _white(enlarged(shown[way.name], (exact.shape[1], exact.shape[0])))
         record.flip.append(flip(picture, exact))
         record.psnr.append(psnr(picture, exact))
         if index < SHOWN:
@@ -183,8 +191,10 @@ def _other_loads(
     """Time offered ways on other canvases and on more objects, so that their cost can be told from them."""
     manifest = load_manifest(base)
     model = open_model(base)
-    plain, many = scenes_of(model, manifest.set, seed), scenes_of(model, MANY, seed)
-    cases = [(plain(i), (side, side)) for side in SIDES for i in range(FITTED)]
+    plain, many = (scenes_of(model, name, seed, SIDE) for name in (usual_set(manifest), MANY))
+    # of solids others than those of `SIDE`: they differ more in what a pixel takes
+    offset = 0 if manifest.dimension == 2 else 1000
+    cases = [(plain(offset + i), (side, side)) for side in SIDES for i in range(FITTED)]
     cases += [(scene, scene.canvas) for scene in map(many, range(FITTED))]
     for done, (scene, canvas) in enumerate(cases):
         scene = scene.model_copy(update={"canvas": canvas})

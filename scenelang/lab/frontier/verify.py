@@ -8,14 +8,14 @@ import torch
 
 from scenelang.backend.neural import open_model
 from scenelang.lab.about import Report, about, silent
+from scenelang.lab.frontier.measure import SIDE
 from scenelang.lab.frontier.ways import ways_of
 from scenelang.measure.choose import error_scale
 from scenelang.measure.frontier import Frontier
-from scenelang.measure.metrics import flip
-from scenelang.measure.scenes import reference_of, scenes_of
+from scenelang.measure.metrics import flip, over_white
+from scenelang.measure.scenes import reference_of, scenes_of, usual_set
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
-from scenelang.program.program import load_of
 
 KEPT: Final = 0.95
 """Share of scenes in which a promise has to hold."""
@@ -71,16 +71,15 @@ def verify(
     ways = [w for w in ways_of(base, 1) if w.name in points and not w.side and w.backend == "neural"]
     cases = {}
     for case in CASES:
-        scene_at = scenes_of(model, case.set or manifest.set, seed)
+        scene_at = scenes_of(model, case.set or usual_set(manifest), seed, SIDE)
         count = max(1, round(scenes * case.share))
         ratios: dict[str, list[float]] = {way.name: [] for way in ways}
         for index in range(count):
             scene = scene_at(index)
             if case.canvas is not None:
                 scene = scene.model_copy(update={"canvas": case.canvas})
-            exact = reference_of(scene, manifest)
-            load = load_of(compile_scene(scene, model=base))
-            scale = error_scale(scene.canvas, load.objects)
+            exact = over_white(reference_of(scene, manifest))
+            scale = error_scale(scene.canvas, len(compile_scene(scene, model=base)))
             for way in ways:
                 point = points[way.name]
                 if point.ms.median > 500 and (case.set or case.canvas or index >= SLOW):
@@ -88,7 +87,7 @@ def verify(
                 found = point.flip
                 assert found is not None
                 promise = found.bound * scale
-                error = flip(way.prepare(scene)(), exact)
+                error = flip(over_white(way.prepare(scene)()), exact)
                 ratios[way.name].append(error / promise if promise > 0 else (1.0 if error <= 0 else 2.0))
             report(case.name, index + 1, count)
         cases[case.name] = {

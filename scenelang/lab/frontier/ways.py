@@ -12,13 +12,16 @@ import torch
 
 from scenelang.backend.neural import draw_program, open_model
 from scenelang.backend.options import Samples
+from scenelang.backend.small import draw_small
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.image import Image, from_samples
+from scenelang.lab.frontier.closed import ClosedForms
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.models.weights import read_facts
 from scenelang.program.compile import compile_scene
 from scenelang.reference.image import reference_image
+from scenelang.renderers.draw import draw_objects
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 from scenelang.scene.schema import Scene
 
@@ -96,10 +99,22 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
         )
 
     yield way(name)
-    if manifest.renderer == "framed":
+    if manifest.renderer in ("framed", "solid"):
         yield way(f"{name}, four samples", samples="four")
         yield way(f"{name}, one sample", samples="one")
+        yield way(f"{name}, draft", samples="draft")
+    if manifest.renderer == "framed":
         yield way(f"{name}, nothing skipped", "the same picture, later", skip=False)
+    if manifest.renderer == "solid":
+        yield way(f"{name}, quick", samples="quick")
+        for title, samples in (("", "adaptive"), (", four samples", "four"), (", quick", "quick")):
+            yield Way(
+                f"exact field{title}",
+                _formulas(name, threads, samples),
+                renderer="exact field",
+                samples=samples,  # type: ignore[arg-type]
+                why_not="formulas in place of the network, in the same march",
+            )
 
 
 def _neural(name: str, side: int, threads: int, **options: Any) -> Prepare:
@@ -107,6 +122,10 @@ def _neural(name: str, side: int, threads: int, **options: Any) -> Prepare:
         if side:
             scene = scene.model_copy(update={"canvas": (side, side)})
         program = compile_scene(scene, model=name)
+        if program.stage is not None:  # as `render` draws them
+            return lambda: (
+                draw_small(program, threads=threads, samples=options.get("samples", "adaptive")).image
+            )
         model = open_model(name)
 
         def run() -> Image:
@@ -117,12 +136,20 @@ def _neural(name: str, side: int, threads: int, **options: Any) -> Prepare:
     return prepare
 
 
+def _formulas(name: str, threads: int, samples: str) -> Prepare:
+    def prepare(scene: Scene) -> Draw:
+        program, field = compile_scene(scene, model=name), ClosedForms(name)
+        return lambda: draw_objects(field, program, threads=threads, samples=samples).image
+
+    return prepare
+
+
 def _references(manifest: Manifest) -> Iterator[Way]:
     for per_side, why_not in (
         (2, None),
         (1, "drawn for comparison: the language defines four"),
         (4, "drawn for comparison: the language defines four"),
-    ):
+    )[: 2 if manifest.dimension == 3 else 3]:  # a picture of solids with 16 takes half a minute
         yield Way(
             f"exact reference, {per_side**2} spp",
             _exact(manifest, per_side),
