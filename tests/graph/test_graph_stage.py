@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from scenelang.graph.stage import Camera, Light, decoded
+from scenelang.graph import stage
+from scenelang.graph.stage import Camera, Ground, Light, Stage, decoded
 
 
 @pytest.mark.parametrize(
@@ -53,3 +55,13 @@ def test_colours_are_decoded_from_srgb() -> None:
     # 188/255 is the 8-bit value nearest to half of the light.
     assert decoded((0.0, 188 / 255, 1.0)) == pytest.approx((0.0, 0.5029, 1.0), abs=1e-4)
     assert decoded((0.04, 0.0404, 0.0405))[0] == pytest.approx(0.04 / 12.92)
+
+
+def test_constants_are_those_of_the_language() -> None:
+    """Other tests draw with whatever they are."""
+    camera, light = Camera((0, 1.2, 6), (0, 0, 0), math.radians(36.8699)), Light((2.5, 4, 3), 28, (1, 1, 1))
+    written = Stage(camera, light, Ground(-1, (0.50, 0.48, 0.45)), (0.80, 0.86, 0.92), (0.30, 0.50, 0.85))
+    assert Stage() == replace(written, camera=replace(camera, fov_rad=Camera().fov_rad))
+    assert Camera().fov_rad == pytest.approx(camera.fov_rad, abs=1e-6)
+    assert (stage.AMBIENT, stage.EXTINCTION, stage.FADE) == ((0.12, 0.06), 3, 64)
+    assert (stage.NEAREST, stage.LIFT) == (1e-3, 1e-4)
