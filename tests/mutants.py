@@ -53,7 +53,7 @@ COMPILING = (
     "tests/passes/test_without.py", "tests/passes/test_prove.py", "tests/passes/test_pass_picture.py",
     "tests/animation/test_clip.py", "tests/conformance",
 )  # fmt: skip
-SOLIDS = "tests/renderers/test_solids.py", "tests/backend/test_solids.py", "tests/lab/test_closed.py"
+SOLIDS = "tests/lab/test_closed.py", "tests/renderers/test_solids.py", "tests/backend/test_solids.py"
 TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/renderers/solid/*.py": SOLIDS,
     "scenelang/reference/solid/*.py": ("tests/reference/test_solid.py",),
