@@ -46,8 +46,11 @@ EXAMPLES = DOCS.parent / "examples"
 REFERENCE = EXAMPLES / "reference"
 PICTURES = DOCS / "pictures"
 PARTS = DOCS / "results/experiments/parts.json"
-GALLERY = ("gear", "flower", "lava", "walker", "logo", "mandala", "night", "vortex")
-GALLERY_FRAMES = {"vortex": 8, "lava": 30}
+GALLERY = (
+    *("gear", "chess", "flower", "stones", "lava", "lotus"),
+    *("lantern", "walker", "clouds", "mandala", "icecream", "vortex"),
+)
+GALLERY_FRAMES = {"vortex": 8, "lava": 30, "stones": 48}
 COMPARED = "chain"
 CHARTED = ("compare", "table1")  # experiments whose chart the documentation shows
 STRIPPED = ("overfit", "compare", "table1", "table3")  # and whose pictures
@@ -58,6 +61,7 @@ STRIP_PX, LABEL_PX = 150, 20  # a cell of a strip, and the line below it
 MOVING_PX, MOVING_FPS = 192, 12  # animations: the shorter side, and the most frames a second
 MOVING_BYTES = 220_000
 PALETTE = 256
+SHADED = 3000  # colours from which on a palette is dithered, so that shading shows no bands
 NEAR = 2.5  # a palette that changes values by more than this on average (of 255) is not used
 _SCENE = re.compile(
     r"^```nsg(?: title=[^\n]*)?\n((?:(?!```)[^\n]*\n)*)```\n\n"
@@ -101,6 +105,8 @@ def png(picture: pillow.Image) -> bytes:
     """A small PNG: with a palette where that looks the same."""
     if picture.mode == "RGB":
         few = picture.quantize(PALETTE, pillow.Quantize.MEDIANCUT, dither=pillow.Dither.NONE)
+        if picture.getcolors(SHADED) is None:
+            few = picture.quantize(palette=few, dither=pillow.Dither.FLOYDSTEINBERG)
         off = np.abs(np.asarray(few.convert("RGB"), np.float64) - np.asarray(picture, np.float64))
         if off.mean() < NEAR and np.percentile(off, 99.9) < 10 * NEAR:
             picture = few
