@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +17,18 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.evaluation import load_scene
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
+from scenelang.graph.stage import stage_data
+from scenelang.lifting.layout import LAYOUTS
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
 from scenelang.reference.field import evaluate
 from scenelang.reference.image import reference_image
 from scenelang.reference.samples import sample_points
+from scenelang.reference.solid.image import solid_image
 
 FOLDER = Path(__file__).parent / "cases"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.nsg"))
-GEOMETRY, MATERIAL = slice(4, 32), slice(32, 52)  # what of a vector is not learned
 
 Arrays = dict[str, npt.NDArray[np.float32]]
 
@@ -70,11 +72,14 @@ def run(name: str, given: Mapping[str, Any]) -> Outcome:
     if scene is None or program is None:
         return Outcome(facts, {}, None)
     graph = lower(scene, load_manifest(program.model), None, Diagnostics())
+    geometry, material = unlearned(program)
     arrays: Arrays = {
         "picture": np.asarray(reference_image(graph)),
-        "geometry": program.vectors[:, GEOMETRY],
-        "material": program.vectors[:, MATERIAL],
+        "geometry": program.vectors[:, geometry],
+        "material": program.vectors[:, material],
     }
+    if program.stage is not None:
+        facts["stage"] = json.loads(json.dumps(stage_data(program.stage)))
     facts |= {
         "canvas": list(program.canvas),
         "background": None if program.background is None else list(program.background),
@@ -88,19 +93,31 @@ def run(name: str, given: Mapping[str, Any]) -> Outcome:
     return Outcome(facts, arrays, graph)
 
 
+def unlearned(program: Program) -> tuple[slice, slice]:
+    """What of the geometry and of the material part of its vectors is not learned: all but the codes."""
+    layout = LAYOUTS[load_manifest(program.model).layout]
+    return slice(layout.code, layout.geometry), slice(layout.geometry, layout.geometry + layout.colour.stop)
+
+
 def stream_digest(program: Program) -> str:
     """SHA-256, hex, of the stream without anything learned; README.md defines it."""
     total = hashlib.sha256()
     for name in program.objects:
         total.update(name.encode() + b"\0")
     total.update(program.tokens.astype("i1").tobytes())
-    for part in (GEOMETRY, MATERIAL):
+    for part in unlearned(program):
         total.update(np.ascontiguousarray(program.vectors[:, part], dtype="<f4").tobytes())
     return total.hexdigest()
 
 
 def is_stable(graph: Graph, by: float = 1e-9) -> bool:
-    """Whether moving all samples by a little changes nothing that shows."""
+    """Whether moving all samples, or the eye, by a little changes nothing that shows."""
+    if graph.stage is not None:
+        camera = graph.stage.camera
+        eyes = (camera.eye, *(tuple(c + d for c in camera.eye) for d in (-by, by)))
+        stages = (replace(graph.stage, camera=replace(camera, eye=eye)) for eye in eyes)
+        seen = [np.asarray(solid_image(graph.root, stage, graph.canvas)) for stage in stages]
+        return all(np.abs(picture - seen[0]).max() < 1e-5 for picture in seen)
     points = sample_points(graph.canvas, range(graph.canvas[1]), 2)
     pictures = []
     for dx, dy in ((0.0, 0.0), (by, by), (-by, by), (by, -by), (-by, -by)):

@@ -30,7 +30,8 @@ def test_case(name: str) -> None:
         k: v for k, v in facts.items() if k not in learned
     }
     assert outcome.arrays.keys() == arrays.keys()
-    for key, tolerance in (("picture", 1e-6), ("geometry", 0.0), ("material", 0.0)):
+    picture = 1e-4 if "stage" in facts else 1e-6  # rays of solids end by a tolerance
+    for key, tolerance in (("picture", picture), ("geometry", 0.0), ("material", 0.0)):
         if key in arrays:
             assert outcome.arrays[key].shape == arrays[key].shape
             np.testing.assert_allclose(outcome.arrays[key], arrays[key], rtol=0, atol=tolerance)
