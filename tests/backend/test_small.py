@@ -35,9 +35,10 @@ def assert_same(p: Program, **options: str) -> None:
     by_numpy = draw_small(p, **options).image  # type: ignore[arg-type]
     assert by_numpy.dtype == by_torch.dtype
     assert by_numpy.shape == by_torch.shape
-    np.testing.assert_allclose(by_numpy, by_torch, rtol=0, atol=STEP)
+    steps = 1 if p.stage is None else 2  # of a pixel of solids that just is, or is not, sampled four times
+    np.testing.assert_allclose(by_numpy, by_torch, rtol=0, atol=steps * STEP)
     levels = by_numpy.to_uint8().astype(int) - by_torch.to_uint8()
-    assert np.abs(levels).max(initial=0) <= 1
+    assert np.abs(levels).max(initial=0) <= steps
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
