@@ -252,9 +252,9 @@ def parts() -> bytes:
     return _few_colours(parts_chart(json.loads(PARTS.read_text("utf-8"))))
 
 
-def frontier() -> bytes:
-    """The shipped frontier's charts."""
-    return _few_colours(frontier_chart(Frontier.from_json(frontier_path("shapes2d").read_bytes())))
+def frontier(model: str) -> bytes:
+    """The charts of a shipped frontier."""
+    return _few_colours(frontier_chart(Frontier.from_json(frontier_path(model).read_bytes())))
 
 
 def plan() -> dict[str, Callable[[], bytes]]:
@@ -281,8 +281,9 @@ def plan() -> dict[str, Callable[[], bytes]]:
     made["stability-solids.png"] = lambda: stability(3)
     if PARTS.exists():
         made["parts.png"] = parts
-    if frontier_path("shapes2d").exists():
-        made["frontier.png"] = frontier
+    for model, name in (("shapes2d", "frontier"), ("solids3d", "frontier-solids")):
+        if frontier_path(model).exists():
+            made[f"{name}.png"] = lambda model=model: frontier(model)
     made |= experiments()
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
     return made

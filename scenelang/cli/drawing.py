@@ -128,7 +128,9 @@ def chosen(
         point = points[id(job)]
         if point.backend == "reference":
             return exact(request, clock)(job, progress)
-        return neural(clock, "cpu", threads, point.samples)(job, progress)
+        assert job.program is not None
+        place: Device = "cpu" if job.program.stage is None else "auto"  # as they were measured
+        return neural(clock, place, threads, point.samples)(job, progress)
 
     return draw, [(job, path) for job, path in ready if id(job) in points], code
 

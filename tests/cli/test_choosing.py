@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import scenelang as nsg
+from scenelang.backend.load import load_of
 from scenelang.measure import frontier as frontier_file
 from scenelang.measure.frontier import Cost, Errors, Frontier
 from scenelang.models.manifest import available
@@ -191,3 +193,29 @@ def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.
     text = said(shipped, "--max-flip", "0.05")
     assert "chosen by the frontier: shapes2d: 16 ms" in text
     assert f"not in question: {other}: 4 objects, trained on 3" in text
+
+
+@pytest.mark.parametrize(
+    ("limit", "samples"), [(("--max-ms", "12"), "quick"), (("--max-flip", "0.02"), "draft")]
+)
+def test_solids_are_chosen_for(
+    folder: Folder, monkeypatch: pytest.MonkeyPatch, limit: tuple[str, str], samples: str
+) -> None:
+    """And drawn by numpy, by which their times were taken; a cost grows with what the scene shows."""
+    found = [
+        point(f"solids3d, {way}", ms, flip, model="solids3d", renderer="solid", samples=way)
+        for way, ms, flip in (("draft", 3, 0.015), ("quick", 9, 0.003), ("adaptive", 14, 0.002))
+    ]
+    ball = "sphere { scale(0.5); }\n"
+    each = 1e6 / load_of(nsg.compile(nsg.loads(ball))).meetings
+    found[1] = replace(found[1], cost=Cost(0.0, 0.0, 0.0, 9 * each, 0.0, 1.0))
+    path = folder.path / "solids.json"
+    path.write_text(replace(frontier(*found), set="mixed").to_json(), "utf-8")
+    monkeypatch.setattr(frontier_file, "frontier_path", lambda model: path)
+    monkeypatch.setattr("scenelang.measure.choose.yardstick", lambda: 1.0)
+    result = folder.run("render", folder.write("ball.nsg", ball), "-o", "a.png", "-v", *limit)
+    assert result.exit_code == 0, result.output
+    assert f"chosen by the frontier: solids3d, {samples}: " in result.stderr
+    assert "drawn by numpy on all cores" in result.stderr
+    mist = folder.write("mist.nsg", "sphere { scale(1.5); material volumetric; }\n")
+    assert folder.run("render", mist, "-o", "a.png", "--max-ms", "12", "--max-flip", "0.005").exit_code == 2
