@@ -76,7 +76,7 @@ cameras = st.builds(
     st.floats(0.01, 3.1),
 )
 lights = st.builds(nsg.Light, points, st.floats(0, 1e6), colours)
-grounds = st.builds(nsg.Ground, numbers, colours | st.just("default"))
+grounds = st.builds(nsg.Ground, places, colours | st.just("default"))
 objects = st.builds(
     lambda geometry, transforms, material: nsg.Object(geometry, transforms=transforms, material=material),
     geometry=st.sampled_from(["square", "star", "triangle", "pentagon", "sphere", "torus"]),

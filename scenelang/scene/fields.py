@@ -7,6 +7,7 @@ the validators check.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Final, Literal
 
@@ -115,6 +116,18 @@ def _kind_is_required(schema: dict[str, Any]) -> None:
 _SEVERAL = frozenset(("children", "nodes", "ops", "transforms"))
 
 
+_COLOURS = frozenset(("background", "color", "rgb"))
+
+
+def _decoded(name: str, text: str) -> tuple[float, float, float]:
+    """The colour that ``#d33`` or ``#dd3333`` is, for a class of that name."""
+    if not re.fullmatch(r"#([0-9a-fA-F]{3}){1,2}", text):
+        raise ValueError(f"{name}: `{text}` is not a colour such as `#d33` or `#dd3333`")
+    digits = text[1:] if len(text) == 7 else "".join(digit * 2 for digit in text[1:])
+    red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
+    return red, green, blue
+
+
 class Frozen(BaseModel):
     """What all nodes of a Scene are."""
 
@@ -161,6 +174,9 @@ class Frozen(BaseModel):
         for name in _SEVERAL & given.keys():
             if isinstance(given[name], Frozen):
                 given[name] = (given[name],)
+        for name in _COLOURS & given.keys():
+            if isinstance(given[name], str) and given[name] != "default":
+                given[name] = _decoded(cls.__name__, given[name])
         return given
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
@@ -187,8 +203,6 @@ _KINDS: Final = {
     "string_type": "text",
     "bool_type": "true or false",
     "tuple_type": "a sequence",
-    "model_attributes_type": "what stands there",
-    "model_type": "what stands there",
 }
 
 
@@ -227,6 +241,8 @@ def _line(item: ErrorDetails, known: list[str]) -> str:
     if kind == "union_tag_invalid":
         wanted = item["ctx"]["expected_tags"].replace("'", "")
         return f"`{path}` is a {_shown(value)}; it may be {wanted}"
+    if "class_name" in item.get("ctx", {}):
+        return f"`{path}` is {_shown(value)}, not a {item['ctx']['class_name']}"
     if kind in _KINDS:
         return f"`{path}` is {_shown(value)}, not {_KINDS[kind]}"
     return f"`{path}`: {said(item)}" if path else said(item)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -27,15 +26,6 @@ class _Turn(Frozen):
                 f"or {name}(angle={args[0]!r}) for radians"
             )
         return data
-
-
-def _decoded(text: str) -> tuple[float, float, float]:
-    """The colour that ``#d33`` or ``#dd3333`` is."""
-    if not re.fullmatch(r"#([0-9a-fA-F]{3}){1,2}", text):
-        raise ValueError(f"Color: `{text}` is not a colour such as `#d33` or `#dd3333`")
-    digits = text[1:] if len(text) == 7 else "".join(digit * 2 for digit in text[1:])
-    red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
-    return red, green, blue
 
 
 class Translate(Frozen):
@@ -179,11 +169,6 @@ class Color(Frozen):
     if TYPE_CHECKING:
 
         def __init__(self, rgb: str | tuple[float, float, float]) -> None: ...
-
-    @classmethod
-    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
-        given = super()._arranged(args, data)
-        return {**given, "rgb": _decoded(given["rgb"])} if isinstance(given.get("rgb"), str) else given
 
     @classmethod
     def hex(cls, text: str) -> Color:

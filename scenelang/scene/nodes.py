@@ -217,7 +217,7 @@ class SceneData(Frozen):
             version: Literal[1] = 1,
             model: str | None = None,
             canvas: tuple[int, int] = (256, 256),
-            background: tuple[float, float, float] | Unsaid | None = "default",
+            background: tuple[float, float, float] | str | None = "default",
             camera: Camera | Unsaid = "default",
             light: Light | Unsaid = "default",
             ground: Ground | Unsaid | None = "default",

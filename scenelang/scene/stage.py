@@ -54,7 +54,7 @@ class Light(Frozen):
 
     if TYPE_CHECKING:
 
-        def __init__(self, position: Triple = ..., power: float = ..., color: Triple = ...) -> None: ...
+        def __init__(self, position: Triple = ..., power: float = ..., color: Triple | str = ...) -> None: ...
 
 
 class Ground(Frozen):
@@ -65,4 +65,4 @@ class Ground(Frozen):
 
     if TYPE_CHECKING:
 
-        def __init__(self, y: float = ..., color: Triple | Unsaid = ...) -> None: ...
+        def __init__(self, y: float = ..., color: Triple | str = ...) -> None: ...

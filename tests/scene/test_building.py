@@ -61,6 +61,9 @@ def test_short_forms(short: object, long: object) -> None:
         (lambda: nsg.Object("two words"), "`geometry`: not a possible name"),
         (lambda: nsg.Scale(0), "a scale by 0"),
         (lambda: nsg.Color("red"), "`red` is not a colour such as `#d33`"),
+        (lambda: nsg.Light(color="red"), "Light: `red` is not a colour such as `#d33`"),
+        (lambda: nsg.Scene(background="#12"), "Scene: `#12` is not a colour such as `#d33`"),
+        (lambda: nsg.Scene(camera=nsg.Light()), "`camera` is Light(), not a Camera"),
         (lambda: nsg.Scene((STAR,)), "Scene takes its arguments by name"),  # type: ignore[call-arg, arg-type]
     ],
 )
@@ -102,3 +105,10 @@ def test_types_suit_mypy(tmp_path: Path) -> None:
     options = ["--config-file=", f"--cache-dir={tmp_path}", "--follow-imports=silent"]
     done = subprocess.run([*command, *options], capture_output=True, text=True, cwd=ROOT, check=False)
     assert done.returncode == 0, done.stdout
+
+
+def test_colours_of_the_stage_are_written_as_others_are() -> None:
+    red = (0xDD / 255, 0x33 / 255, 0x33 / 255)
+    assert nsg.Light(color="#d33").color == nsg.Ground(color="#dd3333").color == red
+    assert nsg.Scene(background="#d33").background == nsg.Color("#d33").rgb == red
+    assert nsg.Ground(color="default") == nsg.Ground()
