@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from scenelang.animation.targets import is_animation
 from scenelang.cli.inputs import stem_of
-from scenelang.outputs import Output
+
+if TYPE_CHECKING:
+    from scenelang.outputs import Output
 
 
 def targets(names: Sequence[str], out: str) -> list[Path]:

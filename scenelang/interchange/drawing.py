@@ -10,10 +10,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.looks import coloured
 from scenelang.graph.nodes import Fold, Graph, Leaf, Node
 from scenelang.graph.space import Space
+from scenelang.graph.spaces import SPACES
 from scenelang.interchange.dumps import hex_text, move_text, op_text, stage_text, token_names
+from scenelang.program.compile import find_model
 from scenelang.scene import schema
 from scenelang.scene.text import material, transform
 
@@ -64,6 +67,8 @@ def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Drawing:
     """The tree of a scene with its transforms, materials and boolean words."""
     drawn = Drawing()
     width, height = scene.canvas
+    manifest = find_model(scene, Diagnostics())
+    space = SPACES[manifest.dimension if manifest is not None else 2]
     model = () if scene.model is None else (f"model {scene.model}",)
     top = drawn.add(Box((f"scene {width} x {height}", *model)))
     Child = tuple[str, schema.SceneNode, schema.Material | None]
@@ -72,7 +77,7 @@ def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Drawing:
         parent, children = todo.popleft()
         for word, node, outer in _some(drawn, parent, children, most):
             inner = node.material or outer
-            number = drawn.add(_scene_box(node, inner), parent, word)
+            number = drawn.add(_scene_box(node, inner, space), parent, word)
             if not isinstance(node, schema.Object) and node.children:
                 todo.append((number, [(*child, inner) for child in _children(node)]))
     return drawn
@@ -84,11 +89,12 @@ def _children(node: schema.Group | schema.Boolean | schema.Chain) -> Iterable[tu
     return [("", child) for child in node.children]
 
 
-def _scene_box(node: schema.SceneNode, inner: schema.Material | None) -> Box:
+def _scene_box(node: schema.SceneNode, inner: schema.Material | None, space: Space) -> Box:
     steps = [transform(t).rstrip(";") for t in node.transforms]
     own = [] if node.material is None else [material(node.material).rstrip(";")]
     if isinstance(node, schema.Object):
-        fill = None if inner is None else hex_text(coloured(inner.ops))
+        ops = () if inner is None else map(space.inked, inner.ops)
+        fill = None if inner is None else hex_text(space.written(coloured(ops)))
         return Box((node.geometry, *_short([*own, *steps])), fill, leaf=True)
     name = node.op if isinstance(node, schema.Boolean) else node.kind
     return Box((name, *_short([*own, *steps])))

@@ -194,3 +194,14 @@ def test_quotes_in_names_stay_inside_labels(folder: Folder) -> None:
     drawn = Drawing([Box(('a"b\\c]<d>;{e}|#35;',))])
     assert '["a#34;b#92;c]#60;d#62;#59;#123;e#125;#124;#35;35#59;"]' in to_mermaid(drawn)
     assert 'label="a\\"b\\\\c]<d>;{e}|#35;"' in to_dot(drawn)
+
+
+def test_the_colours_of_solids_are_those_they_are_drawn_in(folder: Folder) -> None:
+    """`hue` acts on linear values there."""
+    text = "torus { material volumetric { color([0.3, 0.5, 1.0]); hue(0.1turn); } }"
+    name = folder.write("a.nsg", text)
+    fills = [
+        re.findall("fill:(#[0-9a-f]{6})", folder.run("graph", name, *after).stdout)
+        for after in ((), ("--after", "lower"))
+    ]
+    assert fills[0] == fills[1] == ["#ba4dff"]
