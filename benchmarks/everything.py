@@ -33,6 +33,8 @@ def commands(out: Path, budget: float, scenes: int) -> list[list[str]]:
         ["chart", experiments],
         ["eval", "shapes2d", "--all-sets", "--scenes", f"{some}", "-o", f"{out}/eval"],
         ["stability", "shapes2d", "--scenes", f"{few}", "-o", f"{out}/stability"],
+        ["eval", "solids3d", "--all-sets", "--scenes", f"{some}", "-o", f"{out}/eval-solids3d"],
+        ["stability", "solids3d", "--scenes", f"{few}", "-o", f"{out}/stability-solids3d"],
         ["frontier", "shapes2d", "--scenes", f"{some}", "-o", f"{out}/frontier"],
     ]
 

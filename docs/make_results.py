@@ -55,23 +55,26 @@ SOLIDS = {
 
 
 def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
-    """The Markdown table of the sets of a folder that were measured."""
+    """The Markdown table of the sets of a folder that were measured; of solids also what no cap hides."""
     heads = ["set", "what", "scenes", "PSNR, dB", "5th percentile", "worst"]
-    heads += ["SSIM", "FLIP", "FLIP, 95th percentile"]
-    rows = []
+    heads += ["SSIM", "FLIP", "FLIP, 95th percentile", *(["PSNR without the cap"] if folder else [])]
+    rows, said = [], ""
     for name, words in what.items():
         path = HERE / "results" / folder / f"{name}.json"
         if not path.exists():
             continue
         d = json.loads(path.read_text())
         p, s, f = d["psnr"], d["ssim"], d["flip"]
-        psnr = [f"{p[end]:.2f}" for end in ("mean", "p5", "worst")]
-        if "psnr_uncapped" in d:
-            psnr = [f"{d['psnr_uncapped']['mean']:.1f}", *psnr]
-            heads[3:4] = ["without cap", "PSNR, dB"] if "without cap" not in heads else heads[3:4]
-        errors = [f"{s['mean']:.4f}", f"{f['mean']:.4f}", f"{f['p5']:.4f}"]
-        rows.append([f"`{name}`", words, f"{d['scenes']:,}", *psnr, *errors])
-    return markdown(heads, rows)
+        cells = [f"{p[end]:.2f}" for end in ("mean", "p5", "worst")]
+        cells += [f"{s['mean']:.4f}", f"{f['mean']:.4f}", f"{f['p5']:.4f}"]
+        cells += [f"{d['psnr_uncapped']['mean']:.1f}"] if folder else []
+        rows.append([f"`{name}`", words, f"{d['scenes']:,}", *cells])
+        said = (
+            f"\n\nSeed {d['seed']}, weights `{d['weights'][:8]}…`, revision `{d['revision'][:8]}`."
+            if folder
+            else ""
+        )
+    return markdown(heads, rows) + said
 
 
 def experiment(name: str) -> Callable[[], str]:

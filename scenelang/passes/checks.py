@@ -13,7 +13,7 @@ from scenelang.graph import affine
 from scenelang.graph.chain import LevelsError, split_levels
 from scenelang.graph.nodes import Graph, Leaf, leaves
 from scenelang.graph.space import REACH, Space
-from scenelang.graph.steps import Affine, Step, Twist, Warp
+from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
 from scenelang.passes.context import Context
 from scenelang.words import Combine
 
@@ -88,10 +88,14 @@ _CODES = {
     "smooth": "W0505",
     "thin": "W0506",
     "blend": "W0507",
+    "twist": "W0509",
+    "displace": "W0510",
 }
 _SUBJECTS = {
     "twirl": "a `twirl` of {value} on {name}",
     "bend": "a `bend` of {value} on {name}",
+    "twist": "a `twist` of {value} on {name}",
+    "displace": "a displacement of {value} of {name}",
     "scale": "a scale of {value} of {name}",
     "thin": "{name}, {value} times as long as wide,",
 }
@@ -173,6 +177,10 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
                 found.append(("twirl", step.twirl))
             if step.bend != (0.0, 0.0):
                 found.append(("bend", hypot(*step.bend)))
+        elif isinstance(step, Twist):
+            found.append(("twist", step.twist))
+        elif isinstance(step, Displace):
+            found.append(("displace", abs(step.amount)))
     return found
 
 

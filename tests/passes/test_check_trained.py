@@ -88,3 +88,26 @@ def test_help_says_what_was_measured() -> None:
 def test_what_a_model_does_not_state_is_not_looked_at() -> None:
     bare = dataclasses.replace(MANIFEST, trained={})
     assert warned(f"smooth {{ star {{ twirl(99); }} square {{ {DARK} scale(90, 1); }} }}", bare) == []
+
+
+SOLIDS = dataclasses.replace(
+    load_manifest("solids3d"),
+    trained={"twist": (-2, 2), "bend": (-1, 1), "displace": (0, 0.1), "scale": (0.1, 2), "thin": (1, 5)},
+    measured={},
+)
+
+
+@pytest.mark.parametrize(
+    ("inside", "outside", "words"),
+    [
+        ("twist(-2);", "twist(-2.1);", "W0509 a `twist` of -2.1 on `torus` is outside the measured range -2"),
+        ("twist(2); scale(2);", "scale(1, 2, 1); twist(2); twist(0.1);", "W0509 a `twist` of 4.2"),
+        ("displace(-0.1, 9);", "displace(-0.2, 9);", "W0510 a displacement of 0.2 of `torus` is outside"),
+        ("scale(1, 1, 0.2);", "scale(2, 1, 0.3);", "W0506 `torus`, 6.67 times as long as wide,"),
+        ("bend(1); scale(2);", "bend(1); scale(1, 1, 2.1);", "W0504 a scale of 2.1 of `torus`"),
+    ],
+)  # fmt: skip
+def test_bounds_of_solids(inside: str, outside: str, words: str) -> None:
+    assert warned(f"torus {{ {inside} }}", SOLIDS) == []
+    (found,) = warned(f"torus {{ {outside} }}", SOLIDS)
+    assert found.startswith(words)

@@ -16,29 +16,28 @@ from scenelang.measure.solid_sets import WARP as SOLID_WARP
 HARDLY, SLACK = 40.0, 1.0  # dB, of mean PSNR
 WARP = SETS["shapes2d"].warp
 SCALES = 0.2, 0.55  # of the base set
-ALIKE = {
-    "objects": ("objects", 1.0, 1.0),
-    "smooth": ("blends", 1.0, 1.0),
-    "thin": ("thin", 1.0, 1.0),
-}
-QUANTITIES: dict[int, dict[str, tuple[str, float, float]]] = {
-    2: {
-        **ALIKE,
-        "twirl": ("warp", WARP, WARP),
-        "bend": ("warp", WARP, WARP),
-        "scale": ("size", *SCALES),
-        "blend": ("deep", SCALES[1], SCALES[1]),
-    },
-    3: {
-        **ALIKE,
-        **dict.fromkeys(("twirl", "bend", "twist"), ("warp", SOLID_WARP, SOLID_WARP)),
-        "scale": ("size", *SIDES),
-        "blend": ("deep", SIDES[1], SIDES[1]),
-        "displace": ("amount", 1.0, 1.0),
-    },
-}
-"""By dimension, quantity of a manifest -> the probe that varies it, and what its values are multiplied by at
-either end."""
+WARP_OF, SCALES_OF = {2: WARP, 3: SOLID_WARP}, {2: SCALES, 3: SIDES}
+
+
+def quantities(dimension: int) -> dict[str, tuple[str, float, float]]:
+    """Quantity of a manifest -> the probe that varies it, and by what either end of its values is multiplied.
+
+    Of solids the ratio of scales says little: what is thinner than 0.01 may be passed over, at any size.
+    """
+    most, scales = WARP_OF[dimension], SCALES_OF[dimension]
+    warp = "warp", most, most
+    solid = {"twist": warp, "displace": ("amount", 1.0, 1.0)}
+    return {
+        "objects": ("objects", 1.0, 1.0),
+        "smooth": ("blends", 1.0, 1.0),
+        "twirl": warp,
+        "bend": warp,
+        "scale": ("size", *scales),
+        **({"thin": ("thin", 1.0, 1.0)} if dimension == 2 else solid),
+        "blend": ("deep", scales[1], scales[1]),
+    }
+
+
 FROM_NOTHING = {
     "smooth": 0.0,
     "blend": 0.0,
@@ -62,7 +61,7 @@ def measured_ranges(
     """
     ranges: dict[str, list[float]] = {}
     lines: dict[str, str] = {}
-    for quantity, (name, low_unit, high_unit) in QUANTITIES[dimension].items():
+    for quantity, (name, low_unit, high_unit) in quantities(dimension).items():
         probe = found["probes"].get(name)
         if probe is None:
             continue

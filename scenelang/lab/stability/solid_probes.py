@@ -20,11 +20,14 @@ MOST = {"operators": 6, "blends": 8, "size": 4, "thin": 100, "shear": 4, "canvas
 """Of probes of both dimensions, beyond which the exact picture of solids takes too long, or is empty."""
 
 
+MORE = {"warp": (5.0,)}
+
+
 def _within(name: str, probe: Probe) -> Probe:
     most = MOST.get(name, math.inf)
     return replace(
         probe,
-        values=tuple(takewhile(lambda value: value <= most, probe.values)),
+        values=(*takewhile(lambda value: value <= most, probe.values), *MORE.get(name, ())),
         healthy=128 if name == "canvas" else probe.healthy,
     )
 
@@ -32,7 +35,7 @@ def _within(name: str, probe: Probe) -> Probe:
 PROBES: dict[str, Probe] = {
     **{name: _within(name, probe) for name, probe in common(solids.scene, solids.deformed, WARP).items()},
     "objects": Probe(
-        "objects of a scene, the smaller the more", "objects", (1, 2, 4, 16, 64), 4, solids.crowd
+        "objects of a scene, the smaller the more", "objects", (1, 2, 4, 16, 64, 100), 4, solids.crowd
     ),
     "width": Probe(
         "widths of a blend", "k", (0.01, 0.05, 0.15, 0.3, 0.6, 1.2), BLEND,
