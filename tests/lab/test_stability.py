@@ -165,7 +165,7 @@ def test_recorded_bounds_hold(of: str, name: str, request: pytest.FixtureRequest
         assert found >= row["psnr"]["worst"] - 0.5, row["value"]
 
 
-@pytest.mark.parametrize("of", RECORDED)
+@pytest.mark.parametrize("of", [of for of in RECORDED if RECORDED[of]["invariants"]])
 def test_recorded_invariants_hold(of: str) -> None:
     invariants = RECORDED[of]["invariants"]
     assert invariants["order_of_disjoint"]["largest_difference"] < 1 / 255
