@@ -56,7 +56,7 @@ COMPILING = (
 SOLIDS = "tests/lab/test_closed.py", "tests/renderers/test_solids.py", "tests/backend/test_solids.py"
 TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/renderers/solid/*.py": SOLIDS,
-    "scenelang/reference/solid/*.py": ("tests/reference/test_solid.py",),
+    "scenelang/reference/solid/*.py": ("tests/lab/test_closed.py", "tests/reference/test_solid.py"),
     "scenelang/renderers/draw.py": DRAWING,
     "scenelang/renderers/frame*.py": DRAWING,
     "scenelang/renderers/coverage.py": DRAWING,
