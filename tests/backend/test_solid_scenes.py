@@ -40,3 +40,20 @@ def test_the_network_draws_what_the_reference_does(name: str) -> None:
 def test_the_stages_farthest_numbers_are_drawn_without_a_warning(text: str, backend: str) -> None:
     solids = "sphere { scale(0.5); } torus { translate(1, 0, 0); material volumetric; }"
     assert np.isfinite(nsg.render(nsg.loads(f"canvas(9, 6); {text} {solids}"), backend=backend)).all()
+
+
+@pytest.mark.parametrize("canvas", ["1, 1", "1, 300", "300, 1"])
+def test_thin_canvases_have_the_view_of_their_shorter_side(canvas: str) -> None:
+    text = f"canvas({canvas}); sphere {{ scale(0.5); }} torus {{ material volumetric; }}"
+    ours, exact = (np.asarray(nsg.render(nsg.loads(text), backend=by)) for by in ("neural", "reference"))
+    assert abs(ours - exact).mean() < 3e-3
+
+
+def test_an_animation_names_the_object_that_its_camera_enters() -> None:
+    text = "animate(1, 10); camera([0, 0, 3 - 0.4 * frame], [0, 0, -9]); sphere { scale(0.5); }"
+    for frame in (6, 9):
+        assert nsg.compile(nsg.loads(text, frame=frame)).tokens.tolist() in ([0], [])
+    with pytest.raises(nsg.SceneError) as caught:
+        nsg.compile(nsg.loads(text, frame=7))
+    (found,) = caught.value.diagnostics
+    assert (found.code, "`sphere`" in found.message) == ("E0408", True)
