@@ -77,7 +77,7 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
     if samples == "one":
         every = np.array(rows)[:, None] + 0.5
         return _shade(lighting, canvas, np.arange(width) + 0.5, every)
-    if samples != "four":
+    if samples != "four" and min(canvas) > 1:  # a line of pixels shows too little of what changes
         near = range(max(rows.start - 1, 0), min(rows.stop + 1, height))
         once, work = _shade(lighting, canvas, np.arange(width) + 0.5, np.array(near)[:, None] + 0.5)
         band = slice(rows.start - near.start, rows.stop - near.start)
