@@ -286,7 +286,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
             made[f"{name}.png"] = lambda model=model: frontier(model)
     made |= experiments()
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
-    made["worst-solids.png"] = lambda: worst_cases("media", 6, "solids3d", "solids3d")
+    made["worst-solids.png"] = lambda: worst_cases("booleans", 6, "solids3d", "solids3d")
     return made
 
 

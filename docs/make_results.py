@@ -58,7 +58,7 @@ def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
     """The Markdown table of the sets of a folder that were measured; of solids also what no cap hides."""
     heads = ["set", "what", "scenes", "PSNR, dB", "5th percentile", "worst"]
     heads += ["SSIM", "FLIP", "FLIP, 95th percentile", *(["PSNR without the cap"] if folder else [])]
-    rows, said = [], ""
+    rows, said, drawn = [], "", set[str]()
     for name, words in what.items():
         path = HERE / "results" / folder / f"{name}.json"
         if not path.exists():
@@ -69,11 +69,11 @@ def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
         cells += [f"{s['mean']:.4f}", f"{f['mean']:.4f}", f"{f['p5']:.4f}"]
         cells += [f"{d['psnr_uncapped']['mean']:.1f}"] if folder else []
         rows.append([f"`{name}`", words, f"{d['scenes']:,}", *cells])
-        said = (
-            f"\n\nSeed {d['seed']}, weights `{d['weights'][:8]}…`, revision `{d['revision'][:8]}`."
-            if folder
-            else ""
-        )
+        if folder:
+            drawn.add(f"`{d['revision'][:8]}`")
+            said = (
+                f"\n\nSeed {d['seed']}, weights `{d['weights'][:8]}…`, revision {' or '.join(sorted(drawn))}."
+            )
     return markdown(heads, rows) + said
 
 
