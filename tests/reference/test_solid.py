@@ -11,7 +11,7 @@ from scenelang.graph.nodes import Fold
 from scenelang.graph.stage import Camera, Ground, Light, Stage
 from scenelang.graph.steps import Displace, Twist, Warp
 from scenelang.reference.solid import image, rays
-from scenelang.reference.solid.body import Body
+from scenelang.reference.solid.body import Body, Turn
 from scenelang.reference.solid.image import solid_image
 from tests.pictures import psnr_db
 from tests.reference import solid_oracle
@@ -250,3 +250,16 @@ def test_an_empty_scene_is_sky_and_ground() -> None:
     image = np.asarray(solid_image(fold(), Stage(ground=None, transparent=True), (4, 4)))
     assert not image.any()
     assert np.asarray(solid_image(fold(), Stage(camera=Camera(eye=(0.0, 3.0, 0.0))), (4, 4))).min() > 0.3
+
+
+@pytest.mark.parametrize(
+    "turn", [Turn(1, 0.0, (0.8, 0.0, 0.0)), Turn(2, 0.0, (0.0, 1.5, 0.0)), Turn(1, 1.2, (0, 0, 0))]
+)
+def test_a_turn_stretches_no_more_than_it_says(turn: Turn) -> None:
+    """And about as much somewhere in the ball."""
+    p = np.random.default_rng(7).normal(size=(3, 20000))
+    p *= 0.7 / np.linalg.norm(p, axis=0)
+    h = 1e-6
+    columns = [(turn(p + h * e) - turn(p - h * e)) / (2 * h) for e in AXES]
+    most = np.linalg.norm(np.moveaxis(np.array(columns), 2, 0), 2, axis=(1, 2)).max()
+    assert most <= turn.stretch(0.7) + 1e-6 <= 1.01 * most
