@@ -22,7 +22,8 @@ def solid_config(config: Any) -> SolidConfig:
         found = SolidConfig(**config["network"])
     except (KeyError, TypeError) as error:
         raise ModelError(f"bad network sizes: {error}") from None
-    if any(type(v) is not int or not 1 <= v <= MOST_SIZE for v in astuple(found)):
+    *sizes, segment = astuple(found)
+    if any(type(v) is not int or not 1 <= v <= MOST_SIZE for v in (*sizes, segment or 1)):
         raise ModelError("a network size is out of range")
     return found
 

@@ -64,6 +64,7 @@ class SolidsConfig:
     cell: int
     leaves: int
     polish: int  # Gauss-Newton steps for each leaf, a multiple of 20
+    segments: int  # steps of Adam for the answers for whole segments
     network: SolidConfig  # sizes
 
 

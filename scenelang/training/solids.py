@@ -3,7 +3,8 @@
 The decoders of all leaves are fitted together through the codes by Adam, then each by the Gauss-Newton method
 (Levenberg 1944, Marquardt 1963) in float64, which is what brings distances to 1e-4; what that found goes back
 into the weights by the smallest change of them that the codes turn into it. The cell learns the fold from
-random pairs of distances, close to equal at all scales so that gates become steep. Everything is drawn anew
+random pairs of distances, close to equal at all scales so that gates become steep. Answers for whole segments
+come last and change none of the others. Everything is drawn anew
 at every step, and the exact reference defines what is right.
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import torch
@@ -20,69 +21,18 @@ from torch import Tensor
 from torch.func import grad_and_value, jacrev, vmap
 
 from scenelang.files import write_whole
-from scenelang.reference.field import TORUS, combine, leaf_distance
-from scenelang.renderers.solid.network import BLEND, RADIUS, Wanted
+from scenelang.reference.field import combine
+from scenelang.renderers.solid.network import BLEND, Wanted
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.training.checkpoint import load_tensors, save_tensors
 from scenelang.training.config import SolidsConfig
+from scenelang.training.leaves import LEAVES, Points, half_rays, leaf_points
 from scenelang.training.loop import Report, revision
 from scenelang.words import TOKENS
 
-LEAVES = ("sphere", "torus")
 MATERIALS = {"diffuse": (1.0, 1.0, 1.0, 0.0), "volumetric": (1.0, 1.0, 1.0, 1.0)}  # albedo and medium
 BEGINNINGS = 6  # of the cell
 ROUND = 20  # Gauss-Newton steps between checkpoints
-
-
-@dataclass(frozen=True, slots=True)
-class Points:
-    """Points on and around a leaf.
-
-    Args:
-        q: (P, 3).
-        distance: exact (P,).
-        gradient: of it (P, 3).
-        weight: of the errors of distance and gradient (P, 4).
-    """
-
-    q: Tensor
-    distance: Tensor
-    gradient: Tensor
-    weight: Tensor
-
-
-def leaf_points(leaf: str, count: int, g: torch.Generator, kind: torch.dtype) -> Points:
-    """Half of the points near the surface at all scales, a quarter in its ball, a quarter farther out."""
-    if leaf == "sphere":
-        normal = _directions(count // 2, g)
-        near = normal
-    else:
-        u, v = math.tau * torch.rand((2, count // 2), generator=g)
-        ring = TORUS[0] + TORUS[1] * v.cos()
-        near = torch.stack([ring * u.cos(), TORUS[1] * v.sin(), ring * u.sin()], 1)
-    near = near + torch.randn(near.shape, generator=g) * 10 ** (
-        2.5 * torch.rand((len(near), 1), generator=g) - 3.5
-    )
-    far = _directions(count - len(near), g) * torch.rand((count - len(near), 1), generator=g) ** (1 / 3)
-    far[::2] *= 1.3
-    far[1::2] *= RADIUS
-    q = torch.cat([near, far]).to(kind).requires_grad_()
-    with torch.enable_grad():
-        distance = leaf_distance(leaf, q.T)
-        (gradient,) = torch.autograd.grad(distance.sum(), q)
-    distance = distance.detach()
-    by_value = torch.where(distance < -0.15, 0.2, 1.0) / (distance.abs() + 0.02)
-    by_gradient = 0.003 / (distance.square() + 0.01)
-    bent = gradient.isnan().any(1) | (
-        distance < -0.9 * TORUS[1]
-    )  # next to a centre, where there is no gradient
-    by_gradient = torch.where(bent, 0.0, by_gradient)
-    weight = torch.cat([by_value[:, None], by_gradient[:, None].expand(-1, 3)], 1)
-    return Points(q.detach(), distance, gradient.nan_to_num(), weight)
-
-
-def _directions(count: int, g: torch.Generator) -> Tensor:
-    return torch.nn.functional.normalize(torch.randn((count, 3), generator=g))
 
 
 def fit_decoders(
@@ -122,8 +72,6 @@ def polish_decoders(network: Solids, steps: int, g: torch.Generator, points: int
             weights = torch.cat([part.double().reshape(-1) for layer in layers for part in layer])
             weights, found[leaf] = _gauss_newton(leaf, weights, shapes, steps, points, g)
             wanted.append(weights)
-        one = torch.cat([network.codes, torch.ones(len(LEAVES), 1)], 1).double()
-        inverse = torch.linalg.pinv(one)  # (C + 1, leaves)
         start = 0
         for w, b in zip(network.decoder_w, network.decoder_b, strict=True):
             for part, turned in ((w, True), (b, False)):
@@ -132,9 +80,49 @@ def polish_decoders(network: Solids, steps: int, g: torch.Generator, points: int
                 if turned:  # decoders hold (out, in), parameters (in, out)
                     goal = goal.view(-1, part.shape[2], part.shape[1]).mT.reshape(len(goal), -1)
                 start += size
-                old = part.double().reshape(len(part), -1)
-                part.copy_((old + inverse @ (goal - one @ old)).view(part.shape))
+                _write(network, part, goal)
     return found
+
+
+def _write(network: Solids, part: Tensor, goal: Tensor) -> None:
+    """Change weights (C + 1, …) as little as makes those of the leaves (leaves, …) out of their codes."""
+    one = torch.cat([network.codes, torch.ones(len(LEAVES), 1)], 1).double()
+    old = part.double().reshape(len(part), -1)
+    goal = goal.double().reshape(len(goal), -1)
+    part.copy_((old + torch.linalg.pinv(one) @ (goal - one @ old)).view(part.shape))
+
+
+def fit_segments(network: Solids, steps: int, g: torch.Generator, points: int = 2048) -> float:
+    """Fit the answers for whole segments of all leaves; returns the mean squared error of the last tenth."""
+    chunks = [[half_rays(leaf, 20_000, g) for leaf in LEAVES] for _ in range(min(10, 1 + steps // 100))]
+    told = torch.cat([torch.stack([x.T for x, _ in chunk]) for chunk in chunks], 1)  # (leaves, M, 5)
+    length = torch.cat([torch.stack([y for _, y in chunk]) for chunk in chunks], 1)
+    parts = [*network.segment_w, *network.segment_b]
+    sizes = [(len(LEAVES), *part.shape[1:]) for part in parts]
+    fitted = [
+        (torch.randn(size, generator=g) * (size[1] ** -0.5 if len(size) > 2 else 0.3)).requires_grad_()
+        for size in sizes
+    ]
+    optimiser = torch.optim.Adam(fitted, lr=0.01, betas=(0.9, 0.99), fused=True)
+    last, error = max(1, steps // 10), 0.0
+    for step in range(steps):
+        optimiser.param_groups[0]["lr"] = 0.01 * _schedule(step, steps)
+        some = torch.randint(0, told.shape[1], (points,), generator=g)
+        x = told[:, some]
+        for i, (w, b) in enumerate(zip(fitted[:3], fitted[3:], strict=True)):
+            x = torch.baddbmm(b[:, None], x, w)
+            if i < 2:
+                x = torch.nn.functional.silu(x)
+        loss = (x[..., 0] - length[:, some]).square().mean(1).sum()
+        optimiser.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        optimiser.step()
+        if step >= steps - last:
+            error += loss.item() / len(LEAVES) / last
+    with torch.no_grad():
+        for part, goal in zip(parts, fitted, strict=True):
+            _write(network, part, goal)
+    return error
 
 
 def _gauss_newton(
@@ -269,6 +257,7 @@ def train_solids(
         (config.cell, lambda steps, g: {"cell": fit_cell(network, steps, g)}),
         (config.leaves, lambda steps, g: {"leaves": fit_decoders(network, steps, g)}),
         *[(ROUND, lambda steps, g: polish_decoders(network, steps, g))] * (config.polish // ROUND),
+        (config.segments, lambda steps, g: {"segments": fit_segments(network, steps, g)}),
     ]
     done, spent_s = 0, 0.0
     checkpoint = folder / "checkpoint.safetensors"

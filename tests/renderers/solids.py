@@ -39,6 +39,14 @@ def network() -> SolidArrays:
     return solid_arrays(shipped_weights("solids3d"), len(LEAVES), len(MATERIALS))
 
 
+def weights() -> dict[str, np.ndarray]:
+    """Of the shipped network, by their names in its file."""
+    net = network()
+    named = {k: v for k, v in vars(net).items() if isinstance(v, np.ndarray)}
+    groups = ("decoder_w", "decoder_b", "segment_w", "segment_b")
+    return named | {f"{group}.{i}": getattr(net, group)[i] for group in groups for i in range(3)}
+
+
 def moved(x: float, y: float, z: float) -> Affine:
     return Affine((1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z))
 

@@ -30,6 +30,7 @@ from tests.renderers.solids import (
     scaled,
     turned,
     vector,
+    weights,
 )
 
 rng = np.random.default_rng(7)
@@ -275,12 +276,6 @@ def test_objects_meet_in_the_cell_alone() -> None:
         wanted = everywhere(field([ball, ring._replace(token=other)]), p)
         assert swapped.distance == pytest.approx(wanted.distance, abs=1e-6)
         assert swapped.register == pytest.approx(wanted.register, abs=1e-6)
-
-
-def weights() -> dict[str, np.ndarray]:
-    net = network()
-    named = {k: v for k, v in vars(net).items() if isinstance(v, np.ndarray)}
-    return named | {f"decoder_{k}.{i}": getattr(net, f"decoder_{k}")[i] for k in "wb" for i in range(3)}
 
 
 def test_nothing_is_an_empty_stage() -> None:

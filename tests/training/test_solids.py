@@ -12,9 +12,10 @@ from scenelang.models.solid import solid_arrays
 from scenelang.renderers.solid.network import SolidConfig
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.training.config import SolidsConfig, config_data, is_solids, read_solids_config
-from scenelang.training.solids import fit_cell, fit_decoders, polish_decoders, train_solids
+from scenelang.training.leaves import half_rays
+from scenelang.training.solids import fit_cell, fit_decoders, fit_segments, polish_decoders, train_solids
 
-TINY = SolidsConfig("solids3d", 3, 4, 4, 20, SolidConfig(width=4))
+TINY = SolidsConfig("solids3d", 3, 4, 4, 20, 4, SolidConfig(width=4, segment=4))
 
 
 def test_a_stopped_training_goes_on_as_if_it_had_not(tmp_path: Path) -> None:
@@ -28,8 +29,9 @@ def test_a_stopped_training_goes_on_as_if_it_had_not(tmp_path: Path) -> None:
     )
     assert (one.codes == two.codes).all()
     assert (one.decoder_w[1] == two.decoder_w[1]).all()
-    assert told[0] == (0, 28)
-    assert told[-1] == (28, 28)
+    assert (one.segment_w[1] == two.segment_w[1]).all()
+    assert told[0] == (0, 32)
+    assert told[-1] == (32, 32)
     with pytest.raises(ValueError, match="another configuration"):
         train_solids(replace(TINY, seed=4), tmp_path / "one")
 
@@ -45,6 +47,27 @@ def test_every_part_of_the_training_learns() -> None:
     assert all(last[leaf] < 0.5 * first[leaf] for leaf in first)
 
 
+def test_half_rays_are_as_long_in_a_sphere_as_in_closed_form() -> None:
+    told, length = half_rays("sphere", 500, torch.Generator().manual_seed(1))
+    p = torch.stack([told[0], 0 * told[0], told[1]])
+    ahead = (p * told[2:]).sum(0)
+    chord = (ahead.square() - p.square().sum(0) + 1).clip(0.0).sqrt() - ahead
+    assert (length - chord).abs().max() < 1e-4
+
+
+def test_answers_for_segments_learn_and_change_nothing_else() -> None:
+    torch.manual_seed(1)
+    network, g = Solids(SolidConfig(segment=16), 2, 2), torch.Generator().manual_seed(1)
+    before = {name: value.clone() for name, value in network.state_dict().items()}
+    assert fit_segments(network, 800, g) < 0.2 * fit_segments(Solids(SolidConfig(segment=16), 2, 2), 1, g)
+    same = {name for name, value in network.state_dict().items() if (value == before[name]).all()}
+    assert same == {name for name in before if not name.startswith("segment")}
+    with torch.no_grad():  # out of the codes come the answers that were fitted
+        told, length = half_rays("torus", 500, g)
+        found = network.field(told, network.segment(network.codes[1]), False)[0]
+        assert (found - length).square().mean() < 0.3 * length.var()
+
+
 def test_the_shipped_configuration_is_known() -> None:
     assert is_solids(config_data("solids3d"))
-    assert read_solids_config("solids3d").network == SolidConfig()
+    assert read_solids_config("solids3d").network == SolidConfig(segment=32)

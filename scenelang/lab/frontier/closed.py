@@ -22,7 +22,7 @@ class ClosedForms(SolidArrays):
     """
 
     def __init__(self, model: str) -> None:
-        self.__dict__.update(vars(load_arrays(model).network))
+        self.__dict__.update(vars(load_arrays(model).network) | {"segment_w": []})
         manifest = load_manifest(model)
         self.geometries = manifest.geometries
         self.media = np.array([material == "volumetric" for material in manifest.materials], np.float32)

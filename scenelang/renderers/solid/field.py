@@ -14,7 +14,7 @@ import numpy as np
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.field import SMOOTH, UNION
 from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted
-from scenelang.renderers.solid.passes import BEGIN, END, OBJECT, WAY, Passes, find_passes, read_solids
+from scenelang.renderers.solid.passes import BEGIN, END, OBJECT, SLACK, WAY, Passes, find_passes, read_solids
 
 _ROWS = (1, 2, 5)  # of a point's memory, by `Wanted`
 
@@ -92,6 +92,10 @@ class SolidField:
         matrix = table(m[:, layout.colour].T, 3, 4)
         colour = (matrix[:, :3] * look[:3]).sum(1) + matrix[:, 3]
         self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
+        plain = table([s.draws and s.radius <= 1 + SLACK and not s.frame.steps for s in self.solids])
+        self.asked = plain * (self.looks[3] > 0.5)  # 1 where `segments.py` may answer
+        known = len(network.segment_w) and float(self.asked.sum())
+        self.segments = [network.segment(xp.array(code, network.codes)) for code in codes] if known else []
         self.empty = xp.full((), EMPTY, network.codes)
         self.smooth = table(self.tokens == SMOOTH) > 0 if SMOOTH in self.tokens else None
         keys = [(solid.token, solid.frame.blend if solid.token == SMOOTH else BLEND) for solid in self.solids]

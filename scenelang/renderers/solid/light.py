@@ -198,7 +198,7 @@ class Lighting:
         edge[: len(soft)] = soft
         edge = xp.take(edge, lit) > 0
         limit = r - CLEAR * ~edge
-        trail = march(self.field, self.lamp, way / r.clip(1e-9), limit, 0, self.pace.gap)
+        trail = march(self.field, self.lamp, way / r.clip(1e-9), limit, 0, self.pace.gap, whole=True)
         clear = (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length)
         inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
         if len(inside):  # rays may have ended before they met what is opaque there

@@ -17,6 +17,7 @@ from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.solid.field import Meeting, SolidField
 from scenelang.renderers.solid.network import Wanted
 from scenelang.renderers.solid.passes import BEGIN, END, INF, OBJECT, RATE, Passes, placed
+from scenelang.renderers.solid.segments import known, lengths
 
 TOUCH = 1e-5  # world units: so near counts as met
 STEPS = 400  # of a ray at most
@@ -113,6 +114,7 @@ def march(
     limit: Array,
     halvings: int = HALVINGS,
     gap: float = CAREFUL.gap,
+    whole: bool = False,
 ) -> Trail:
     """Follow rays.
 
@@ -123,13 +125,21 @@ def march(
         limit: how far to go (M,).
         halvings: of the interval in which a medium gives way to a solid; none where only that it does counts.
         gap: as of `Pace`.
+        whole: whether nobody asks where media begin and end, so that `segments.py` may answer.
     """
     xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
     ids, passes = solids.passes(origin, way, limit)
     trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes, near=len(ids))
+    if whole and solids.segments and len(ids):
+        sure = known(solids, passes)
+        some, rest = xp.where(sure), xp.where(~sure)
+        if len(some):
+            answers, trail.met = lengths(solids, passes.at(xp, some))
+            xp.put(length, xp.take(ids, some), answers)
+        ids, passes = xp.take(ids, rest), passes.at(xp, rest)
     if len(ids):
-        rays = _Rays(solids, trail, ids, gap)
+        rays = _Rays(solids, trail, ids, passes, gap)
         for _ in range(STEPS):
             if not len(rays.ids):
                 break
@@ -141,9 +151,9 @@ def march(
 class _Rays:
     """Rays under way."""
 
-    def __init__(self, solids: SolidField, trail: Trail, ids: Array, gap: float) -> None:
+    def __init__(self, solids: SolidField, trail: Trail, ids: Array, passes: Passes, gap: float) -> None:
         self.solids, self.xp, self.trail, self.gap = solids, solids.xp, trail, gap
-        self.ids, self.passes = ids, trail.passes
+        self.ids, self.passes = ids, passes
         slots = self.passes.slots
         self.never = self.xp.full((), INF, slots)
         self.wanted = Wanted.KIND if solids.mixed else Wanted.DISTANCE

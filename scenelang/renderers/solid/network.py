@@ -1,21 +1,23 @@
 """The solids' network: what it computes, from top to bottom, for parameters of either library.
 
-Letters: N objects, M points, C = `code`, G = `width`, L = `paint_lines`, K = `kind_lines`. Distances are in
-world units, leaf coordinates in leaf units, points lie last, as in `network.py`, whose two learned parts are
-these too:
+Letters: N objects, M points, C = `code`, G = `width`, S = `segment`, L = `paint_lines`, K = `kind_lines`.
+Distances are in world units, leaf coordinates in leaf units, points lie last, as in `network.py`, whose two
+learned parts are these too:
 
 1. The decoder turns leaf coordinates into a distance. Its weights are a linear function of the object's code.
    Light shows normals, so its units are smooth: SiLU (Elfwing et al. 2018).
 2. The cell is an LSTM whose gates are clamped lines in the object's distance and the distance so far, chosen
    by the boolean token. Its register carries colour and medium, the latter under a gate of its own.
 
-Both say how their answers change with what they are asked, written by hand: a surface's normal is the
-gradient of the distance behind the last object.
+A third answers for whole segments (`segments.py`): how long the half of a ray is in a leaf.
+
+The first two say how their answers change with what they are asked, written by hand: a surface's normal is
+the gradient of the distance behind the last object.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, ClassVar, NamedTuple
@@ -29,6 +31,7 @@ from scenelang.renderers.network import TOKENS
 EMPTY = 100.0  # world units: the distance where nothing has been met
 RADIUS = 3.0  # leaf units: the decoder sees points in this ball, farther ones at its rim
 BLEND = 0.15  # world units: the width of the blends that the cell is trained on
+SEGMENT = 5  # numbers that tell a ray in a leaf, see `folded`
 BLOCK = 2048  # points that go through the decoder at once
 
 
@@ -40,6 +43,7 @@ class SolidConfig:
         code, material_code: entries of the codes.
         width: hidden units of the decoder's two layers.
         paint_lines, kind_lines: lines of which the highest opens the gate of colour and that of medium.
+        segment: hidden units of the two layers that answer for whole segments; 0: there are none.
     """
 
     code: int = 4
@@ -47,6 +51,7 @@ class SolidConfig:
     width: int = 8
     paint_lines: int = 2
     kind_lines: int = 2
+    segment: int = 0
 
 
 class Cell(NamedTuple):
@@ -78,6 +83,8 @@ class SolidNetwork:
     albedo: Any  # (material_code + 1, 4): colour and medium
     decoder_w: Any  # (C + 1, 3, G), (C + 1, G, G), (C + 1, G, 1)
     decoder_b: Any  # (C + 1, G), (C + 1, G), (C + 1, 1)
+    segment_w: Any  # (C + 1, 5, S), (C + 1, S, S), (C + 1, S, 1), or none
+    segment_b: Any  # (C + 1, S), (C + 1, S), (C + 1, 1), or none
     cell_lines: Any  # (TOKENS, 2, 1 + L + K)
     cell_gain: Any  # (TOKENS, 1 + L + K): a logarithm
     cell_bias: Any  # (TOKENS, 1 + L + K)
@@ -86,10 +93,17 @@ class SolidNetwork:
 
     def decoder(self, code: Array) -> Layers:
         """The decoder of a code (C,): each weight is linear in (code, 1)."""
+        return self._layers(code, self.decoder_w, self.decoder_b)
+
+    def segment(self, code: Array) -> Layers:
+        """What answers for whole segments of a code (C,), likewise; nothing where the network has none."""
+        return self._layers(code, self.segment_w, self.segment_b)
+
+    def _layers(self, code: Array, weights: Sequence[Array], biases: Sequence[Array]) -> Layers:
         one = self.xp.concat([code, self.xp.full((1,), 1.0, code)], 0)
         return [
             (self.xp.packed((one @ w.reshape(len(w), -1)).reshape(w.shape[1:]).swapaxes(0, 1)), one @ b)
-            for w, b in zip(self.decoder_w, self.decoder_b, strict=True)
+            for w, b in zip(weights, biases, strict=True)
         ]
 
     def cell(self, token: int, width: float) -> tuple[Cell, ...]:
@@ -110,7 +124,10 @@ class SolidNetwork:
         return material_code @ self.albedo[:-1] + self.albedo[-1]
 
     def field(self, q: Array, layers: Layers, gradient: bool) -> Array:
-        """Distances of leaf coordinates (3, M), leaf units: (1, M), or with their gradients (4, M)."""
+        """Distances of leaf coordinates (3, M), leaf units: (1, M), or with their gradients (4, M).
+
+        Of rays (5, M), as `folded` tells them, and a segment's layers: their lengths (1, M).
+        """
         ask = self._slopes if gradient else self._values
         count = q.shape[1]
         if count <= BLOCK:
@@ -182,23 +199,50 @@ class SolidArrays(SolidNetwork):
 
     def __init__(self, config: SolidConfig, arrays: Mapping[str, np.ndarray]) -> None:
         self.config = config
+        self.segment_w: list[np.ndarray] = []
+        self.segment_b: list[np.ndarray] = []
         for name, value in arrays.items():
-            setattr(self, name, value)
-        self.decoder_w, self.decoder_b = ([arrays[f"decoder_{k}.{i}"] for i in range(3)] for k in "wb")
+            group, _, index = name.partition(".")
+            setattr(self, group, [*getattr(self, group, ()), value] if index else value)
 
 
 def solid_shapes(c: SolidConfig, geometries: int, materials: int) -> dict[str, tuple[int, ...]]:
     """Shapes of a network's parameters in a file, by name."""
-    sizes, rows = [3, c.width, c.width, 1], 1 + c.paint_lines + c.kind_lines
+    rows = 1 + c.paint_lines + c.kind_lines
     return {
         "codes": (geometries, c.code),
         "material_codes": (materials, c.material_code),
         "albedo": (c.material_code + 1, 4),
-        **{f"decoder_w.{i}": (c.code + 1, *sizes[i : i + 2]) for i in range(3)},
-        **{f"decoder_b.{i}": (c.code + 1, sizes[i + 1]) for i in range(3)},
+        **_layer_shapes("decoder", c.code, 3, c.width),
         "cell_lines": (TOKENS, 2, rows),
         "cell_gain": (TOKENS, rows),
         "cell_bias": (TOKENS, rows),
         "candidate": (TOKENS,),
         "bump": (TOKENS,),
+        **(_layer_shapes("segment", c.code, SEGMENT, c.segment) if c.segment else {}),
     }
+
+
+def _layer_shapes(name: str, code: int, inputs: int, width: int) -> dict[str, tuple[int, ...]]:
+    sizes = [inputs, width, width, 1]
+    weights = {f"{name}_w.{i}": (code + 1, *sizes[i : i + 2]) for i in range(3)}
+    return {**weights, **{f"{name}_b.{i}": (code + 1, sizes[i + 1]) for i in range(3)}}
+
+
+def folded(xp: Arrays, q: Array, way: Array) -> Array:
+    """Numbers (5, M) that tell a ray in a leaf, up to turns about y and the mirrors, which change no leaf.
+
+    Args:
+        xp: functions of the arrays' library.
+        q: points (3, M).
+        way: unit directions (3, M).
+
+    Returns:
+        Distances of the points from the axis and from the plane across it; how fast the ray goes away from
+        the axis, about it, and away from the plane.
+    """
+    rho = xp.sqrt(q[0] * q[0] + q[2] * q[2])
+    a, c = q[0] / rho.clip(1e-9), q[2] / rho.clip(1e-9)
+    up = xp.select(q[1] < 0, 0 * rho - 1, 0 * rho + 1)
+    parts = (rho, up * q[1], a * way[0] + c * way[2], abs(a * way[2] - c * way[0]), up * way[1])
+    return xp.stack(parts, 0)

@@ -23,16 +23,18 @@ class Solids(nn.Module, SolidNetwork):
     def __init__(self, config: SolidConfig, geometries: int, materials: int) -> None:
         super().__init__()
         self.config = config
-        made: dict[str, list[nn.Parameter]] = {"decoder_w": [], "decoder_b": []}
+        made: dict[str, list[nn.Parameter]] = {"segment_w": [], "segment_b": []}
         for name, shape in solid_shapes(config, geometries, materials).items():
             group, _, index = name.partition(".")
             fan = (config.code + 1) * (shape[1] if index in ("1", "2") else 1)
-            value = torch.randn(shape) * {"decoder_w": fan**-0.5, "decoder_b": 0.3}.get(group, 1.0)
+            value = torch.randn(shape)
             if index:
-                made[group].append(nn.Parameter(value))
+                scale = fan**-0.5 if group.endswith("w") else 0.3
+                made.setdefault(group, []).append(nn.Parameter(value * scale))
             else:
                 setattr(self, name, nn.Parameter(value))
-        self.decoder_w, self.decoder_b = (nn.ParameterList(made[name]) for name in made)
+        for name, layers in made.items():
+            setattr(self, name, nn.ParameterList(layers))
         with torch.no_grad():  # gates begin in their linear range
             self.cell_lines.mul_(0.3)
             self.cell_gain.zero_()
