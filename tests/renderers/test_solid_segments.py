@@ -24,6 +24,7 @@ from tests.renderers.solids import Object, field, moved, network, psnr, scaled, 
 LAMP = np.array([1.5, 2.6, 1.8], np.float32)
 PLACE = (scaled(0.6, 0.5, 0.8), turned(0.7), moved(0.2, 0.1, -0.1))
 MIST = Object("torus", PLACE, "volumetric", (0.9, 0.5, 0.2))
+BETWEEN = (scaled(0.5, 0.5, 0.5), moved(*(0.6 * LAMP).tolist()))  # the light and the mist
 FAR = Object("sphere", (scaled(0.3, 0.4, 0.3), moved(-1.1, -0.3, 0.9)), "volumetric", (0.2, 0.5, 0.9))
 
 
@@ -77,7 +78,9 @@ def more(*steps: Step) -> list[Object]:
     [
         more(Twist(0.5)),
         more(Displace(0.05, 5.0)),
-        [MIST._replace(leaf="sphere", steps=(scaled(9.0, 9.0, 9.0), *PLACE))],  # the light is in its ball
+        [MIST._replace(steps=(turned(1.5), scaled(3.0, 3.0, 3.0), *BETWEEN))],  # the light is in its ball
+        [MIST, Object("sphere", BETWEEN, "volumetric", token="subtract")],
+        [MIST, Object("torus", (scaled(2.0, 2.0, 2.0), *BETWEEN))],
         [MIST, Object("sphere", (scaled(1.2, 1.2, 1.2),), "volumetric", token="intersect")],
         [MIST, MIST._replace(token="smooth")],
         [MIST, Object("sphere", (scaled(1.1, 1.1, 1.1),), "volumetric")],
