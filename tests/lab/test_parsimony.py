@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+import scenelang as nsg
 from scenelang.lab.experiments.runs import ablation_runs
 from scenelang.lab.parsimony import (
     WAYS,
@@ -196,11 +197,12 @@ def test_what_passes_took_away_is_counted() -> None:
 
 
 def test_the_page_says_what_the_records_say() -> None:
-    """`python docs/make_parsimony.py` would change nothing, and every example is in it."""
+    """`python docs/make_parsimony.py` would change nothing, and every example of the plane is in it."""
     page = (ROOT / "docs/parsimony.md").read_text("utf-8")
     assert SCRIPT.filled(page, SCRIPT.tables()) == page
     plans = json.loads((ROOT / "docs/results/plans.json").read_text("utf-8"))["plans"]
-    assert [plan["file"] for plan in plans] == sorted(path.name for path in EXAMPLES.glob("*.nsg"))
+    flat = {path.name for path in EXAMPLES.glob("*.nsg") if nsg.compile(nsg.load(path)).stage is None}
+    assert {plan["file"] for plan in plans} >= flat
 
 
 def test_a_page_without_a_place_is_refused() -> None:
