@@ -36,6 +36,7 @@ from scenelang.backend.neural import draw_program, open_model, usable_cores
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
+from scenelang.image import encoded
 from scenelang.lab.frontier.closed import ClosedForms
 from scenelang.measure.metrics import flip
 from scenelang.models.framed import load_arrays
@@ -43,7 +44,7 @@ from scenelang.models.manifest import load_manifest
 from scenelang.program.program import Program
 from scenelang.reference.samples import sample_points
 from scenelang.reference.solid.field import Field
-from scenelang.reference.solid.image import encoded, radiance, solid_image
+from scenelang.reference.solid.image import radiance, solid_image
 from scenelang.renderers.draw import Drawing, draw_objects
 from scenelang.renderers.solid.network import BLOCK
 from tests.reference import mitsuba_scenes, povray
