@@ -7,7 +7,7 @@ from typing import Final
 
 Triple = tuple[float, float, float]
 MOST: Final = 1e12
-"""Numbers of a stage are no larger: float32 holds what is computed of them."""
+"""The largest number of a stage: float32 holds what is computed of it."""
 
 
 def camera_fault(eye: Triple, target: Triple, fov_rad: float) -> tuple[str, str] | None:

@@ -34,3 +34,11 @@ def turned(angle_rad: float, *axis: float) -> Affine:
 
 def sheared(axes: str, k: float) -> Affine:
     return Affine(affine.shearing(axes, k))
+
+
+GOLD, SKY, RED = (0.8, 0.53, 0.12), (0.07, 0.21, 1.0), (0.7, 0.05, 0.04)
+USUAL = fold(
+    leaf("sphere", "diffuse", GOLD, scaled(0.6), moved(0, 0.6, 0)),
+    leaf("torus", "diffuse", SKY, scaled(1.2, 1.2, 0.4), turned(1.22, 1, 0, 0)),
+    leaf("sphere", "diffuse", RED, scaled(0.9, 0.2, 0.5), sheared("xy", 0.6), moved(0.5, -0.8, 0.5)),
+)

@@ -16,23 +16,18 @@ from scenelang.reference.solid.image import solid_image
 from tests.pictures import psnr_db
 from tests.reference import solid_oracle
 from tests.reference.povray import povray, povray_picture
-from tests.reference.solid_scenes import fold, leaf, moved, scaled, sheared, turned
+from tests.reference.solid_scenes import GOLD, RED, SKY, USUAL, fold, leaf, moved, scaled, sheared, turned
 
 pytestmark = [
     pytest.mark.oracle,
     pytest.mark.skipif(povray() is None, reason="POV-Ray is not installed (the package povray)"),
 ]
 
-GOLD, SKY, RED = (0.8, 0.53, 0.12), (0.07, 0.21, 1.0), (0.7, 0.05, 0.04)
 BENT = Warp(0.8, (0.0, 0.0)), Warp(0.0, (0.5, 0.0)), Twist(0.8)
 
 SCENES: dict[str, tuple[Fold, Stage, tuple[int, int], float]] = {
     "usual": (
-        fold(
-            leaf("sphere", "diffuse", GOLD, scaled(0.6), moved(0, 0.6, 0)),
-            leaf("torus", "diffuse", SKY, scaled(1.2, 1.2, 0.4), turned(1.22, 1, 0, 0)),
-            leaf("sphere", "diffuse", RED, scaled(0.9, 0.2, 0.5), sheared("xy", 0.6), moved(0.5, -0.8, 0.5)),
-        ),
+        USUAL,
         Stage(),
         (120, 120),
         65,

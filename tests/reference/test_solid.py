@@ -15,20 +15,15 @@ from scenelang.reference.solid.body import Body, Turn
 from scenelang.reference.solid.image import solid_image
 from tests.pictures import psnr_db
 from tests.reference import solid_oracle
-from tests.reference.solid_scenes import fold, leaf, moved, scaled, sheared, turned
+from tests.reference.solid_scenes import GOLD, RED, SKY, USUAL, fold, leaf, moved, scaled, sheared, turned
 
-GOLD, SKY, RED = (0.8, 0.53, 0.12), (0.07, 0.21, 1.0), (0.7, 0.05, 0.04)
 SIDE = Camera(eye=(-2.0, 2.0, 4.5), target=(0.1, 0.2, 0.0), fov_rad=0.5)
 TWIRL, BEND = Warp(0.8, (0.0, 0.0)), Warp(0.0, (0.8, 0.0))
 AXES = np.eye(3)[:, :, None]
 
 SCENES: dict[str, tuple[Fold, Stage]] = {
     "diffuse": (
-        fold(
-            leaf("sphere", "diffuse", GOLD, scaled(0.6), moved(0, 0.6, 0)),
-            leaf("torus", "diffuse", SKY, scaled(1.2, 1.2, 0.4), turned(1.22, 1, 0, 0)),
-            leaf("sphere", "diffuse", RED, scaled(0.9, 0.2, 0.5), sheared("xy", 0.6), moved(0.5, -0.8, 0.5)),
-        ),
+        USUAL,
         Stage(),
     ),
     "media": (
