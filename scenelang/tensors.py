@@ -8,6 +8,7 @@ fill the file without a gap.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -45,7 +46,7 @@ class Tensor:
 class TensorFile:
     """A file whose layout was checked."""
 
-    header: dict[str, Any]  # our own, of format 1
+    header: dict[str, Any]  # our own
     tensors: dict[str, Tensor]  # by name
     body: memoryview  # the tensors' bytes
 
@@ -66,7 +67,7 @@ class TensorFile:
         return flat.reshape(tensor.shape)
 
 
-def read_tensors(data: bytes, most_bytes: int) -> TensorFile:
+def read_tensors(data: bytes, most_bytes: int, formats: Collection[int] = (FORMAT,)) -> TensorFile:
     """The tensors and the header in the bytes of a file, or in its first ``most_bytes`` + 1.
 
     Raises:
@@ -84,8 +85,8 @@ def read_tensors(data: bytes, most_bytes: int) -> TensorFile:
     if not isinstance(text := metadata["scenelang"], str):
         raise TensorError("its metadata are not text")
     header = _object(text.encode("utf-8", "surrogatepass"), "the header")
-    if type(found := header.get("format")) is not int or found != FORMAT:
-        raise TensorError(f"not of format {FORMAT}")
+    if type(found := header.get("format")) is not int or found not in formats:
+        raise TensorError(f"not of format {' or '.join(map(str, formats))}")
     body = memoryview(data)[8 + length :]
     tensors = {name: _tensor(name, entry) for name, entry in outer.items()}
     end = 0

@@ -1,0 +1,1 @@
+"""What users bring: shapes that are data, in files that scenes import."""
