@@ -16,7 +16,8 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.program.compile import compile_scene
-from scenelang.program.program import parse_program, program_bytes
+from scenelang.program.program import program_bytes
+from scenelang.program.reading import parse_program
 from scenelang.scene.schema import Scene
 from scenelang.syntax import nodes
 

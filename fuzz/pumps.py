@@ -21,7 +21,8 @@ from scenelang.evaluate.session import Defines
 from scenelang.formatting import format_text
 from scenelang.interchange.gltf import import_gltf
 from scenelang.interchange.gltf_file import GltfError, parse_gltf
-from scenelang.program.program import ProgramError, parse_program
+from scenelang.program.program import ProgramError
+from scenelang.program.reading import parse_program
 
 NUMBER: Final = "¤"
 """Stands in a unit for the number of the repetition, so that pieces may differ."""

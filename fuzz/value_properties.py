@@ -20,7 +20,8 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.formatting import format_text
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.weights import load_codes
-from scenelang.program.program import WIDTH, Place, Program, ProgramError, parse_program, program_bytes
+from scenelang.program.program import WIDTH, Place, Program, ProgramError, program_bytes
+from scenelang.program.reading import parse_program
 from scenelang.scene.schema import Scene
 from tests.strategies import scenes
 

@@ -15,7 +15,8 @@ from scenelang.backend.render import render
 from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.evaluation import loads
 from scenelang.program.compile import compile_scene
-from scenelang.program.program import Program, ProgramError, parse_program, program_bytes
+from scenelang.program.program import Program, ProgramError, program_bytes
+from scenelang.program.reading import parse_program
 
 SIDE_PX = 12
 MOST_DRAWN = 40

@@ -20,7 +20,8 @@ from typing import Any
 from scenelang.animation.painting import paint
 from scenelang.animation.store import put_frame
 from scenelang.backend.options import RenderError
-from scenelang.program.program import Program, parse_program, program_bytes
+from scenelang.program.program import Program, program_bytes
+from scenelang.program.reading import parse_program
 from scenelang.renderers.draw import Kept
 
 AHEAD = 2  # frames that wait for each process, so that none is idle and few are held

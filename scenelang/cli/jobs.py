@@ -117,7 +117,8 @@ def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> tu
 
 
 def _stored(name: str, request: Request, clock: Clock) -> Job:
-    from scenelang.program.program import ProgramError, load_program
+    from scenelang.program.program import ProgramError
+    from scenelang.program.reading import load_program
 
     try:
         with clock("load program"):

@@ -34,6 +34,8 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
         raise ProgramError(f"model `{manifest.name}` needs the lifting `{manifest.lifting}`")
     rows = graph.rows()
     leaves = [leaf for _, leaf in rows]
+    listed = sorted({leaf.geometry for leaf in leaves} & graph.elements.keys())
+    forms = {name: at for at, name in enumerate(listed)}
     return Program(
         vectors=_blended(_vectors(leaves, manifest, codes), graph, manifest),
         tokens=np.array([TOKENS[op] for op, _ in rows], dtype=np.int8),
@@ -46,6 +48,8 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
         objects=tuple([leaf.geometry for leaf in leaves]),
         places=places_of([leaf.span for leaf in leaves]),
         numbers=tuple([leaf.number or at for at, leaf in enumerate(leaves, 1)]),
+        elements=tuple([graph.elements[name] for name in listed]),
+        forms=np.array([forms.get(leaf.geometry, -1) for leaf in leaves], dtype=np.int32),
     )
 
 
@@ -84,7 +88,9 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
     else:
         layout, space = LAYOUTS[manifest.layout], SPACES[manifest.dimension]
         levels = [split_levels(chain, manifest.limits, space) for chain in chains]
-        geometry = lift_many(levels, [codes.geometry[leaf.geometry] for leaf in leaves], layout)
+        nothing = (0.0,) * layout.code  # an element is told by its row
+        shapes = [codes.geometry.get(leaf.geometry, nothing) for leaf in leaves]
+        geometry = lift_many(levels, shapes, layout)
         material = lift_colours(colours, [codes.material[leaf.look.material] for leaf in leaves], layout)
     vectors = np.concatenate([geometry, material], 1)
     if (width := vectors.shape[1]) != WIDTH:

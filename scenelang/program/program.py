@@ -4,6 +4,8 @@ Its file is safetensors with a JSON header, read as if a stranger had written it
 (N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the header's ``geometries``,
 ``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line, end column), all -1 where
 unknown, ``numbers`` I32 (N,) unless 1 to N. The header is metadata ``scenelang``, with a stage of solids.
+Programs with elements have format 2: the header lists these, ``forms`` I32 (N,) has the index of each
+row's, and ``element.0`` and so on are their bytes.
 """
 
 from __future__ import annotations
@@ -17,10 +19,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import read_regular, write_output
-from scenelang.graph.stage import Stage, read_stage, stage_data
+from scenelang.elements.zoo import Element, entry_of
+from scenelang.files import write_output
+from scenelang.graph.stage import Stage, stage_data
 from scenelang.notebook import bundle
-from scenelang.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
+from scenelang.tensors import FORMAT
 from scenelang.words import TOKENS
 
 MOST_OBJECTS = 100_000
@@ -60,6 +63,8 @@ class Program:
         places: where each row was written; None where that is unknown.
         stage: camera, light, ground and sky of a scene of solids; None in the plane.
         numbers: of each row's object in the scene as written, from 1; by default the rows'.
+        elements: what users brought.
+        forms: int32 (N,), which of these a row shows; -1 for a geometry of the model. None stands for all -1.
 
     Raises:
         ProgramError: anything is not as above.
@@ -76,15 +81,20 @@ class Program:
     places: tuple[Place | None, ...] = field(repr=False)
     stage: Stage | None = None
     numbers: tuple[int, ...] = field(default=(), repr=False)
+    elements: tuple[Element, ...] = ()
+    forms: npt.NDArray[np.int32] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         count = len(self.objects)
         if count > MOST_OBJECTS:
             raise ProgramError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
+        if self.forms is None:
+            object.__setattr__(self, "forms", np.full(count, -1, np.int32))
         for name, dtype, shape in (
             ("vectors", np.float32, (count, WIDTH)),
             ("tokens", np.int8, (count,)),
             ("bounds", np.float32, (count, 4)),
+            ("forms", np.int32, (count,)),
         ):
             object.__setattr__(self, name, _frozen(name, getattr(self, name), dtype, shape))
         if len(self.places) != count:
@@ -108,10 +118,17 @@ class Program:
         settings: tuple[object, ...] = (tuple(self.canvas), colour, self.model, self.weights, len(self))
         if self.stage is not None:
             settings = (*settings, repr(self.stage))
+        if self.elements:
+            settings = (*settings, *[element and element.digest for element in self.brought()])
         total = hashlib.sha256(repr(settings).encode())
         for array, kind in ((self.vectors, "<f4"), (self.tokens, "i1"), (self.bounds, "<f4")):
             total.update(array.astype(kind).tobytes())
         return total.hexdigest()
+
+    def brought(self) -> list[Element | None]:
+        """Each row's element, None for a geometry of the model."""
+        assert self.forms is not None
+        return [self.elements[at] if at >= 0 else None for at in self.forms.tolist()]
 
     def check_weights(self, digest: str) -> None:
         """Raise ProgramError where it was compiled for other weights than those of a digest."""
@@ -150,6 +167,8 @@ def program_bytes(program: Program) -> bytes:
     }
     if program.stage is not None:
         header["stage"] = stage_data(program.stage)
+    if program.elements:
+        header |= {"format": 2, "elements": [[e.name, entry_of(e)] for e in program.elements]}
     tensors: dict[str, npt.NDArray[Any]] = {
         "vectors": program.vectors,
         "tokens": program.tokens,
@@ -159,6 +178,9 @@ def program_bytes(program: Program) -> bytes:
     }
     if program.numbers != tuple(range(1, len(program) + 1)):
         tensors["numbers"] = np.array(program.numbers, dtype=np.int32)
+    if program.elements and program.forms is not None:
+        tensors["forms"] = program.forms
+        tensors |= {f"element.{at}": np.frombuffer(e.data, np.uint8) for at, e in enumerate(program.elements)}
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data
@@ -183,6 +205,13 @@ def _check_rows(program: Program) -> None:
     if not known.all():
         row = int(np.argmin(known))
         raise ProgramError(f"token {int(program.tokens[row])} of object {row}, where 0 to 3 are known")
+    forms = program.forms
+    assert forms is not None
+    if ((forms < -1) | (forms >= len(program.elements))).any():
+        raise ProgramError("an object of an element that is not listed")
+    dimension = 2 if program.stage is None else 3
+    if any(element.dimension != dimension for element in program.elements):
+        raise ProgramError(f"an element that is not of dimension {dimension}")
     if len(program) and program.tokens[0] != 0:
         raise ProgramError(f"token {int(program.tokens[0])} of the first object, which is always 0")
     if program.stage is not None:
@@ -205,113 +234,3 @@ def _check_settings(program: Program) -> None:
         raise ProgramError("no model is named")
     if len(program.weights) != 64 or not set(program.weights) <= set("0123456789abcdef"):
         raise ProgramError("the digest of the weights is not 64 hexadecimal digits")
-
-
-MOST_BYTES = MOST_HEADER + 8 + MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4)
-
-_LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
-    "vectors": ("F32", (WIDTH,)),
-    "tokens": ("I8", ()),
-    "bounds": ("F32", (4,)),
-    "objects": ("I32", ()),
-    "places": ("I32", (5,)),
-    "numbers": ("I32", ()),
-}
-_HEADER: dict[str, Any] = {
-    "background": list | None,
-    "canvas": list,
-    "files": list,
-    "format": int,
-    "geometries": list,
-    "model": str,
-    "weights": str,
-}
-
-
-def load_program(path: str | Path, *, weights: str | None = None) -> Program:
-    """Read a Program that was saved.
-
-    Args:
-        path: the file.
-        weights: SHA-256 of the weights it is to be drawn with, hex; by default those shipped for its model.
-
-    Raises:
-        ProgramError: the file is damaged, foreign or hostile, or was compiled for other weights.
-        OSError: the file cannot be read.
-    """
-    program = parse_program(read_regular(path, MOST_BYTES))
-    program.check_weights(weights if weights is not None else _shipped(program.model))
-    return program
-
-
-def parse_program(data: bytes) -> Program:
-    """The Program that a file's bytes hold; everything in them is checked but the weights' digest.
-
-    Raises:
-        ProgramError: they hold none.
-    """
-    try:
-        file = read_tensors(data, MOST_BYTES)
-        count = _count(file)
-        tensors = file.arrays()
-    except TensorError as error:
-        raise ProgramError(f"not a program: {error}") from None
-    header = file.header
-    if header.keys() - {"stage"} != _HEADER.keys() or not all(
-        isinstance(header[k], _HEADER[k]) for k in _HEADER
-    ):
-        raise ProgramError("the header has missing, unknown or damaged fields")
-    geometries, files = header["geometries"], header["files"]
-    if not all(isinstance(name, str) for name in (*geometries, *files)):
-        raise ProgramError("names in the header that are not text")
-    objects, places = tensors["objects"], tensors["places"]
-    known = places[:, 0] >= 0
-    if count and not 0 <= objects.min() <= objects.max() < len(geometries):
-        raise ProgramError("`objects` name what the header does not list")
-    if (places[known, 0] >= len(files)).any() or (places[known, 1:] < 1).any():
-        raise ProgramError("places that no file has")
-    background, stage = header["background"], header.get("stage")
-    try:
-        staged = None if stage is None else read_stage(stage)
-    except ValueError as error:
-        raise ProgramError(f"a damaged stage: {error}") from None
-    return Program(
-        vectors=tensors["vectors"],
-        tokens=tensors["tokens"],
-        bounds=tensors["bounds"],
-        canvas=tuple(header["canvas"]),
-        background=None if background is None else tuple(background),
-        model=header["model"],
-        weights=header["weights"],
-        objects=tuple(geometries[index] for index in objects.tolist()),
-        places=tuple(Place(files[at], *rest) if at >= 0 else None for at, *rest in places.tolist()),
-        stage=staged,
-        numbers=tuple(tensors["numbers"].tolist()) if "numbers" in tensors else (),
-    )
-
-
-def _count(file: TensorFile) -> int:
-    """Objects of a file whose tensors are those of a Program."""
-    if file.tensors.keys() | {"numbers"} != _LAYOUT.keys():
-        raise TensorError("it holds other tensors")
-    count = (*file.tensors["vectors"].shape, 0)[0]
-    if count > MOST_OBJECTS:
-        raise TensorError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
-    for name, tensor in file.tensors.items():
-        kind, rest = _LAYOUT[name]
-        if tensor.type != kind or tensor.shape != (count, *rest):
-            raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")
-    return count
-
-
-def _shipped(model: str) -> str:
-    """Digest of the weights shipped for a model."""
-    from scenelang.models.manifest import available
-    from scenelang.models.weights import load_codes
-
-    if model not in available():
-        raise ProgramError(f"unknown model `{model}`; the models are {', '.join(available())}")
-    try:
-        return load_codes(model).digest
-    except FileNotFoundError:
-        raise ProgramError(f"model `{model}` has no weights here") from None

@@ -13,7 +13,8 @@ from PIL import Image as pillow
 import scenelang as nsg
 from scenelang.backend.options import RenderError
 from scenelang.image import save_outputs
-from scenelang.program.program import parse_program, program_bytes
+from scenelang.program.program import program_bytes
+from scenelang.program.reading import parse_program
 
 BACKENDS = pytest.mark.parametrize("backend", ["neural", "reference"])
 ALL = ("depth", "normal", "object", "alpha")

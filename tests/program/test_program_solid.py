@@ -20,7 +20,8 @@ from scenelang.models.weights import load_codes
 from scenelang.passes import PASSES
 from scenelang.passes.context import Context
 from scenelang.program.emit import emit
-from scenelang.program.program import Program, ProgramError, parse_program, program_bytes
+from scenelang.program.program import Program, ProgramError, program_bytes
+from scenelang.program.reading import parse_program
 from scenelang.reference.solid.body import Body
 from tests.renderers.solids import MIXED, Object, graph, moved, network, scaled, turned, vector
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from test_program_compile import CHAIN, compiled
 
-from scenelang.program.program import ProgramError, load_program, parse_program, program_bytes
+from scenelang.program.program import ProgramError, program_bytes
+from scenelang.program.reading import load_program, parse_program
 
 
 @pytest.fixture(scope="module")

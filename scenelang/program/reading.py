@@ -1,0 +1,146 @@
+"""Programs out of files, whose layout `scenelang.program.program` tells; they are read as a stranger's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from scenelang.elements.zoo import MOST_BYTES as MOST_ELEMENT_BYTES
+from scenelang.elements.zoo import Element, read_elements
+from scenelang.files import read_regular
+from scenelang.graph.stage import read_stage
+from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
+from scenelang.tensors import MOST_HEADER, TensorError, TensorFile, read_tensors
+
+MOST_BYTES = MOST_HEADER + 8 + MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4) + MOST_ELEMENT_BYTES
+
+_LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
+    "vectors": ("F32", (WIDTH,)),
+    "tokens": ("I8", ()),
+    "bounds": ("F32", (4,)),
+    "objects": ("I32", ()),
+    "places": ("I32", (5,)),
+}
+_OPTIONAL: dict[str, tuple[str, tuple[int, ...]]] = {"numbers": ("I32", ()), "forms": ("I32", ())}
+_HEADER: dict[str, Any] = {
+    "background": list | None,
+    "canvas": list,
+    "files": list,
+    "format": int,
+    "geometries": list,
+    "model": str,
+    "weights": str,
+}
+
+
+def load_program(path: str | Path, *, weights: str | None = None) -> Program:
+    """Read a Program that was saved.
+
+    Args:
+        path: the file.
+        weights: SHA-256 of the weights it is to be drawn with, hex; by default those shipped for its model.
+
+    Raises:
+        ProgramError: the file is damaged, foreign or hostile, or was compiled for other weights.
+        OSError: the file cannot be read.
+    """
+    program = parse_program(read_regular(path, MOST_BYTES))
+    program.check_weights(weights if weights is not None else _shipped(program.model))
+    return program
+
+
+def parse_program(data: bytes) -> Program:
+    """The Program that a file's bytes hold; everything in them is checked but the weights' digest.
+
+    Raises:
+        ProgramError: they hold none.
+    """
+    try:
+        file = read_tensors(data, MOST_BYTES, (1, 2))
+        elements = _read_elements(file)
+        count = _count(file)
+        tensors = file.arrays()
+    except TensorError as error:
+        raise ProgramError(f"not a program: {error}") from None
+    header = file.header
+    if header.keys() - {"stage", "elements"} != _HEADER.keys() or not all(
+        isinstance(header[k], _HEADER[k]) for k in _HEADER
+    ):
+        raise ProgramError("the header has missing, unknown or damaged fields")
+    geometries, files = header["geometries"], header["files"]
+    if not all(isinstance(name, str) for name in (*geometries, *files)):
+        raise ProgramError("names in the header that are not text")
+    objects, places = tensors["objects"], tensors["places"]
+    known = places[:, 0] >= 0
+    if count and not 0 <= objects.min() <= objects.max() < len(geometries):
+        raise ProgramError("`objects` name what the header does not list")
+    if (places[known, 0] >= len(files)).any() or (places[known, 1:] < 1).any():
+        raise ProgramError("places that no file has")
+    background, stage = header["background"], header.get("stage")
+    try:
+        staged = None if stage is None else read_stage(stage)
+    except ValueError as error:
+        raise ProgramError(f"a damaged stage: {error}") from None
+    return Program(
+        vectors=tensors["vectors"],
+        tokens=tensors["tokens"],
+        bounds=tensors["bounds"],
+        canvas=tuple(header["canvas"]),
+        background=None if background is None else tuple(background),
+        model=header["model"],
+        weights=header["weights"],
+        objects=tuple(geometries[index] for index in objects.tolist()),
+        places=tuple(Place(files[at], *rest) if at >= 0 else None for at, *rest in places.tolist()),
+        stage=staged,
+        numbers=tuple(tensors["numbers"].tolist()) if "numbers" in tensors else (),
+        elements=elements,
+        forms=tensors.get("forms"),
+    )
+
+
+def _read_elements(file: TensorFile) -> tuple[Element, ...]:
+    """The elements of a file of format 2; their tensors are taken out of it."""
+    if file.header["format"] == 1:
+        if "elements" in file.header:
+            raise TensorError("elements in a file of format 1")
+        return ()
+    listed = file.header.get("elements")
+    if not isinstance(listed, list) or not all(
+        isinstance(item, list) and len(item) == 2 and isinstance(item[0], str) for item in listed
+    ):
+        raise TensorError("its list of elements is damaged")
+    found = []
+    for at, (name, entry) in enumerate(listed):
+        if (tensor := file.tensors.pop(f"element.{at}", None)) is None:
+            raise TensorError(f"element {at} has no bytes")
+        found.append((name, entry, tensor))
+    return read_elements(found, file.body)
+
+
+def _count(file: TensorFile) -> int:
+    """Objects of a file whose tensors are those of a Program."""
+    if not _LAYOUT.keys() <= file.tensors.keys() <= _LAYOUT.keys() | _OPTIONAL.keys():
+        raise TensorError("it holds other tensors")
+    if ("forms" in file.tensors) != (file.header["format"] == 2):
+        raise TensorError("only a program of format 2 says which elements its objects are")
+    count = (*file.tensors["vectors"].shape, 0)[0]
+    if count > MOST_OBJECTS:
+        raise TensorError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
+    for name, tensor in file.tensors.items():
+        kind, rest = (_LAYOUT | _OPTIONAL)[name]
+        if tensor.type != kind or tensor.shape != (count, *rest):
+            raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")
+    return count
+
+
+def _shipped(model: str) -> str:
+    """Digest of the weights shipped for a model."""
+    from scenelang.models.manifest import available
+    from scenelang.models.weights import load_codes
+
+    if model not in available():
+        raise ProgramError(f"unknown model `{model}`; the models are {', '.join(available())}")
+    try:
+        return load_codes(model).digest
+    except FileNotFoundError:
+        raise ProgramError(f"model `{model}` has no weights here") from None
