@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from scenelang.program.program import Place as Place
     from scenelang.program.program import Program as Program
     from scenelang.program.program import ProgramError as ProgramError
-    from scenelang.program.program import load_program as load_program
+    from scenelang.program.reading import load_program as load_program
     from scenelang.scene.schema import Animation as Animation
     from scenelang.scene.schema import Bend as Bend
     from scenelang.scene.schema import Boolean as Boolean
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from scenelang.scene.schema import Chain as Chain
     from scenelang.scene.schema import Color as Color
     from scenelang.scene.schema import Displace as Displace
+    from scenelang.scene.schema import Elements as Elements
     from scenelang.scene.schema import Flip as Flip
     from scenelang.scene.schema import Grayscale as Grayscale
     from scenelang.scene.schema import Ground as Ground
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     from scenelang.scene.schema import Translate as Translate
     from scenelang.scene.schema import Twirl as Twirl
     from scenelang.scene.schema import Twist as Twist
+    from scenelang.scene.schema import load_elements as load_elements
 
 # Module -> public names it defines. A new public name is added here and above.
 _HOME: Final = {
@@ -76,10 +78,11 @@ _HOME: Final = {
     "scenelang.measure.metrics": "compare",
     "scenelang.program.check": "check check_text fix_text",
     "scenelang.program.compile": "compile",
-    "scenelang.program.program": "Place Program ProgramError load_program",
+    "scenelang.program.program": "Place Program ProgramError",
+    "scenelang.program.reading": "load_program",
     "scenelang.scene.schema": (
-        "Animation Bend Boolean Camera Chain Color Displace Flip Grayscale Ground Group Hue Light Link "
-        "Material Matrix Object Rotate Scale Scene Shear Translate Twirl Twist"
+        "Animation Bend Boolean Camera Chain Color Displace Elements Flip Grayscale Ground Group Hue Light "
+        "Link Material Matrix Object Rotate Scale Scene Shear Translate Twirl Twist load_elements"
     ),
 }
 _MODULE: Final = {name: module for module, names in _HOME.items() for name in names.split()}

@@ -85,18 +85,19 @@ def read_input(
             fact = f"frame {request.frame} of a scene from JSON, which is one frame"
             found.diagnostics.add("E0337", fact, None, help="convert that frame of the animation to JSON")
         with clock("read"):
-            scene, spans = load_json(source, Scene, found.diagnostics)
+            folder = Path(request.root or ("." if path is None else path.parent))
+            scene, spans = load_json(source, Scene, found.diagnostics, folder)
     else:
         with clock("parse"):
             found.tree = tree = parse(source, found.diagnostics)
-        folder = request.root if request.root is not None else "." if path is None else None
+        root = request.root if request.root is not None else "." if path is None else None
         with clock("evaluate"):
             found.evaluation = evaluation = Evaluation(
                 tree,
                 diagnostics=found.diagnostics,
                 defines=request.defines,
                 model=request.model,
-                root=None if folder is None else Path(folder),
+                root=None if root is None else Path(root),
                 path=path,
                 frame=request.frame,
                 replays=True,

@@ -148,6 +148,7 @@ class Evaluation:
             "background": settings.background,
             **{word: settings.stage.get(word, "default") for word in STAGE},
             "animation": settings.animation,
+            "elements": tuple(session.elements.values()),
             "nodes": tuple(out.children),
         }
         scene = make(Scene, fields)

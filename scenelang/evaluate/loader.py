@@ -11,12 +11,14 @@ from typing import Final
 from scenelang.diagnostics.diagnostic import Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import listing
+from scenelang.elements.zoo import SUFFIX, Zoo, load_zoo
 from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.evaluate.session import Session
 from scenelang.files import read_regular
 from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.syntax import nodes, parse
+from scenelang.tensors import TensorError
 
 MAX_IMPORTS: Final = 1000
 MAX_IMPORT_DEPTH: Final = 100
@@ -72,6 +74,7 @@ class Loader(Record, frozen=False):
     sites: list[Span] = field(default_factory=list)
     """Where the imports of that chain are written."""
     parsed: dict[Path, nodes.File] = field(default_factory=dict)
+    zoos: dict[Path, Zoo] = field(default_factory=dict)
     wanted: dict[Path, None] = field(default_factory=dict)
     """All files that were asked for inside the root, there or not, as written and resolved."""
     count: int = 0
@@ -79,7 +82,7 @@ class Loader(Record, frozen=False):
 
     def load(
         self, stmt: nodes.Import, importer: Path | None, session: Session
-    ) -> tuple[Path, nodes.File] | None:
+    ) -> tuple[Path, nodes.File | Zoo] | None:
         """The file that an import in the file ``importer`` means, parsed; None after a report."""
         span = stmt.path.span
         try:
@@ -91,6 +94,10 @@ class Loader(Record, frozen=False):
                 raise session.halt("E0324", f"more than {MAX_IMPORTS:,} imports", span)
             if len(self.chain) > MAX_IMPORT_DEPTH:
                 raise session.halt("E0324", f"imports nested deeper than {MAX_IMPORT_DEPTH}", span)
+            if path.suffix == SUFFIX:
+                if path not in self.zoos:
+                    self.zoos[path] = self._read_zoo(path, stmt.path.value)
+                return path, self.zoos[path]
             if path not in self.parsed:
                 self.parsed[path] = parse(self._read(path, stmt.path), session.report.diagnostics)
         except Unreadable as error:
@@ -132,6 +139,15 @@ class Loader(Record, frozen=False):
             raise Unreadable("E0215", f"`{text}` lies outside the import root", help)
         self.wanted.update({Path(os.path.abspath(folder / text)): None, path: None})
         return path
+
+    def _read_zoo(self, path: Path, text: str) -> Zoo:
+        try:
+            return load_zoo(path)
+        except TensorError as error:
+            help = "`scenelang learn` makes files of elements"
+            raise Unreadable("E0217", f"`{text}` is not a file of elements: {error}", help) from None
+        except OSError as error:
+            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}") from None
 
     def _read(self, path: Path, written: nodes.String) -> SourceFile:
         text, span = written.value, written.span

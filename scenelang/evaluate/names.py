@@ -93,12 +93,13 @@ class Binding(Record, frozen=False):
     Args:
         span: where; None for the language's own names.
         slots: what holds its slot.
-        value: a `Definition`, an imported file, or the value of a ``let`` that never changes.
+        value: a `Definition`, an imported file, what a Scene calls an element, or the value of a ``let`` that
+            never changes.
         known: whether ``value`` is that of such a ``let``.
         needs: what the value of a ``let`` depends on.
     """
 
-    kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "poison"]
+    kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "element", "poison"]
     span: Span | None = None
     slots: Slots | None = None
     slot: int = 0

@@ -17,7 +17,7 @@ from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.models.manifest import Manifest
 from scenelang.records import Record
-from scenelang.scene.schema import Animation
+from scenelang.scene.schema import Animation, Elements
 from scenelang.scene.spans import SpanMap
 from scenelang.scene.stage import Unsaid
 
@@ -51,6 +51,7 @@ class Session(Record, frozen=False):
         replays: run what no frame changes once; the evaluation is for several frames.
         roots: the live slots of every file.
         needs: collects what the statement being prepared depends on.
+        elements: files of elements that were imported, by their places.
         zeros: where an angle was a 0 without a unit that frames may change.
         watch: called with the place of each name and its value, and of each statement and its node.
     """
@@ -72,6 +73,7 @@ class Session(Record, frozen=False):
     replays: bool = False
     roots: list[list[Any]] = field(default_factory=list)
     needs: Needs = field(default_factory=Needs)
+    elements: dict[Path, Elements] = field(default_factory=dict)
     zeros: dict[tuple[SourceFile, Span], Span] = field(default_factory=dict)
     watch: Watch | None = None
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import Span
+from scenelang.elements.zoo import Element
 from scenelang.graph import affine
 from scenelang.graph.looks import WHITE, Look
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
@@ -17,6 +18,7 @@ from scenelang.graph.stage import stage_of
 from scenelang.graph.steps import Affine, Displace, Rows, Step, Twist, Warp
 from scenelang.models.manifest import Manifest
 from scenelang.scene import schema
+from scenelang.scene.elements import elements_of
 from scenelang.words import BLEND, STAGE, Combine
 
 
@@ -111,13 +113,15 @@ def lower(
             diagnostics.add(*refusal, place, help="leave it out, or draw with another model")
     space = replace(SPACES[manifest.dimension], outlines=manifest.outlines)
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
-    lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {})
+    brought = elements_of(scene.elements)
+    lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {}, brought)
     root = lowering.run(scene)
     if memory is not None and lowering.kept is not None:
         memory.leaves, memory.model = lowering.kept, manifest.name
     stage = stage_of(scene) if space.dimension == 3 else None
     background = WHITE if scene.background == "default" else scene.background
-    return Graph(root, scene.canvas, background, space, stage)
+    elements = {name: element for name, element in brought.items() if element is not None}
+    return Graph(root, scene.canvas, background, space, stage, elements)
 
 
 def _check_canvas(
@@ -171,6 +175,7 @@ class _Lowering:
     diagnostics: Diagnostics
     old: Leaves
     kept: Leaves | None
+    brought: Mapping[str, Element | None]
     objects: int = 0
     looks: dict[int, Look] = field(default_factory=dict)
     said: set[tuple[str, str]] = field(default_factory=set)
@@ -216,7 +221,9 @@ class _Lowering:
         if seen and seen[0] is node and seen[1] is material and seen[2].number == number:
             leaf = seen[2]
         else:
-            if node.geometry not in self.manifest.geometries:
+            if "." in node.geometry:
+                self.check_element(node)
+            elif node.geometry not in self.manifest.geometries:
                 self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
             look = Look(self.manifest.default_material) if material is None else self.look(material)
             notes: dict[Any, Any] | None = None if self.kept is None else {}
@@ -224,6 +231,17 @@ class _Lowering:
         if self.kept is not None:
             self.kept[id(node)] = node, material, leaf
         return leaf
+
+    def check_element(self, node: schema.Object) -> None:
+        """Say where the model does not draw an element, or nothing is known of it."""
+        name, model = node.geometry, f"model `{self.manifest.name}`"
+        file, known = name.partition(".")[0], self.brought
+        if name not in known and file in known:
+            self.say("E0214", f"the file of `{name}` has not been read", node, "load the scene with a root")
+        elif name not in known:
+            self.say("E0501", f"no file of elements has `{name}`", node, "list its file in `elements`")
+        elif (element := known[name]) and element.kind not in self.manifest.elements:
+            self.say("E0501", f"{model} does not draw `{name}`, an {element.kind}", node)
 
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
         found = []

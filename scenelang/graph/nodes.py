@@ -8,11 +8,13 @@ new graph. Walks are without recursion, so that depth costs memory and never the
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import field
 from math import inf
 from operator import attrgetter
 from typing import Any, TypeVar, cast
 
 from scenelang.diagnostics.span import Span
+from scenelang.elements.zoo import Element
 from scenelang.graph.looks import Look
 from scenelang.graph.space import Box, Space
 from scenelang.graph.stage import Stage
@@ -104,6 +106,7 @@ class Graph(Record):
         root: the top level, a fold of kind ``scene``; after `linearise` all its children are leaves.
         background: colour in [0, 1] as written, or None for transparency.
         stage: of a scene of solids, None in the plane.
+        elements: geometries that users brought, by name.
     """
 
     root: Fold
@@ -111,10 +114,11 @@ class Graph(Record):
     background: tuple[float, float, float] | None
     space: Space
     stage: Stage | None = None
+    elements: dict[str, Element] = field(default_factory=dict)
 
     def rooted(self, root: Fold) -> Graph:
         """The same scene with another root."""
-        return Graph(root, self.canvas, self.background, self.space, self.stage)
+        return Graph(root, self.canvas, self.background, self.space, self.stage, self.elements)
 
     def rows(self) -> list[tuple[Combine, Leaf]]:
         """Operators and leaves of a graph that is one stream."""

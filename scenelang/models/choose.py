@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from scenelang.models.manifest import Manifest
+from scenelang.scene.elements import elements_of
 from scenelang.scene.schema import Boolean, Chain, Object, Scene, SceneNode
 from scenelang.words import BLEND, STAGE
 
@@ -79,6 +80,7 @@ def uses(scene: Scene) -> Iterator[Use]:
     for word in (*STAGE, "background"):
         if getattr(scene, word) != "default":
             yield word, "settings", getattr(scene, word)
+    brought = elements_of(scene.elements)
     seen: set[tuple[str, str]] = set()
     stack: list[SceneNode] = list(reversed(scene.nodes))
     while stack:
@@ -88,7 +90,11 @@ def uses(scene: Scene) -> Iterator[Use]:
             found.append((node.material.name, "materials", node.material))
             found += [(op.kind, "material_ops", op) for op in node.material.ops]
         if isinstance(node, Object):
-            found.insert(0, (node.geometry, "geometries", node))
+            element = brought.get(node.geometry)
+            if element is not None:
+                found.insert(0, (element.kind, "elements", node))
+            elif "." not in node.geometry:
+                found.insert(0, (node.geometry, "geometries", node))
         elif isinstance(node, Chain):
             stack.extend(link.node for link in reversed(node.children))
             found += [("smooth(k)", "settings", link.node) for link in node.children if link.k != BLEND]

@@ -133,6 +133,11 @@ class Manifest:
         blend = ("smooth(k)",) if self.any_blend else ()
         return *(word for word in (*STAGE, "background") if not self.refusal(word)), *blend
 
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """What it draws of what users bring."""
+        return {"framed": ("element of the plane",), "solid": ("element of space",)}.get(self.renderer, ())
+
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
         value = self.measured.get("sets", {}).get(self.set, {}).get("flip", 1.0)

@@ -22,8 +22,8 @@ _DISTANCES: Final[dict[str, Callable[[float, float, float], float]]] = {
 def check_eye(graph: Graph, context: Context) -> Graph:
     """Report an eye inside an opaque object; in a medium it sees.
 
-    The exact fold at that one point, by its definition; geometries that are not known by a formula are taken
-    as far away.
+    The exact fold at that one point, by its definition. Geometries that are not known by a formula are taken
+    as far away, and as leaving nothing where they cut.
 
     Before: STREAM. After: unchanged.
     """
@@ -33,6 +33,8 @@ def check_eye(graph: Graph, context: Context) -> Graph:
     for link in graph.root.links:
         leaf = link.node
         if not isinstance(leaf, Leaf) or leaf.geometry not in _DISTANCES:
+            if link.op in ("subtract", "intersect"):
+                depth = inf
             continue
         steps = leaf.steps
         d = _distance(leaf.geometry, steps, eye) * graph.space.stretches(composed(steps))[0]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenelang.graph.nodes import Graph
+from scenelang.graph.nodes import Graph, leaves
 from scenelang.image import Image, from_samples
 from scenelang.reference.field import evaluate
 from scenelang.reference.samples import sample_points
@@ -28,8 +28,11 @@ def reference_image(graph: Graph, *, per_side: int = 2) -> Image:
         (H, W, 3), or (H, W, 4) with straight alpha where the background is none.
 
     Raises:
-        ValueError: the eye is inside something opaque.
+        ValueError: the eye is inside something opaque, or a shape is known only by what was made of it.
     """
+    brought = next((leaf.geometry for leaf in leaves(graph.root) if leaf.geometry in graph.elements), None)
+    if brought is not None:
+        raise ValueError(f"the exact shape of `{brought}` is not known")
     if graph.stage is not None:
         return solid_image(graph.root, graph.stage, graph.canvas, per_side=per_side)
     width, height = graph.canvas

@@ -6,13 +6,16 @@ the network meets them. Nothing here knows a pixel.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from scenelang.elements.zoo import Element
+from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array
 from scenelang.renderers.frames import FAR, ObjectFrame, local_points, read_frame
+from scenelang.renderers.grid import GridShape, grid_shape
 from scenelang.renderers.network import EMPTY, Cell, Decoder, FramedNetwork
 
 UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
@@ -28,6 +31,7 @@ class Row:
     Args:
         token: how it joins what came before.
         colour: (R, 1).
+        shape: of its leaf, learned or brought by a user.
         reach: leaf units from its origin beyond which it changes nothing; inf where it concerns every point.
         cell: the weights of its token and of the width of its blend.
     """
@@ -35,7 +39,8 @@ class Row:
     frame: ObjectFrame
     token: int
     colour: Array
-    decoder: Decoder
+    shape: Decoder | GridShape
+    brought: Element | None
     reach: float
     cell: Cell
 
@@ -52,9 +57,10 @@ class Field:
         network: trained parameters, on any device.
         vectors: (N, 64) float32, geometry and material vectors.
         frames: of geometry vectors that were read before, by their bytes.
+        brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
 
     Raises:
-        ProgramError: an object's vector holds no way from the world to a leaf.
+        ProgramError: an object's vector holds no way from the world to a leaf, or an element cannot be drawn.
     """
 
     def __init__(
@@ -64,6 +70,7 @@ class Field:
         tokens: np.ndarray,
         *,
         frames: Mapping[bytes, ObjectFrame] | None = None,
+        brought: Sequence[Element | None] | None = None,
     ) -> None:
         self.network, self.xp = network, network.xp
         self.vectors = vectors
@@ -82,9 +89,9 @@ class Field:
             """Growth of the margin per world unit."""
             self.widest = BLEND
             """Of the blends, at least the usual one."""
-            self.rows = self._rows(vectors, tokens)
+            self.rows = self._rows(vectors, tokens, brought or [None] * len(tokens))
 
-    def _rows(self, vectors: np.ndarray, tokens: np.ndarray) -> list[Row]:
+    def _rows(self, vectors: np.ndarray, tokens: np.ndarray, brought: Sequence[Element | None]) -> list[Row]:
         if not len(vectors):
             return []
         xp, layout = self.xp, self.layout
@@ -95,6 +102,9 @@ class Field:
             tuple(code): Decoder([(xp.packed(w[i]), b[i]) for w, b in layers], far)
             for i, code in enumerate(self.codes.tolist())
         }
+        grids = {element: grid_shape(element, xp, like) for element in {*brought} if element is not None}
+        if grids and self.network.config.features != 1:
+            raise ProgramError("elements for a network that knows more than distances")
         codes_m = xp.array(m[:, layout.material_code].copy(), like)
         albedo = self.network.object_albedo(codes_m)
         albedo = xp.concat([albedo, xp.full((len(g), 1), 1.0, like)], 1)
@@ -116,8 +126,10 @@ class Field:
                 # The fold of s d and s D is s D', so that the cell's own width is that of any other.
                 scale = BLEND / float(widths[i])
                 cell = Cell(cell.lines * scale, cell.bias, cell.candidate, cell.bump / scale)
-            decoder = shapes[tuple(g[i, : layout.code].tolist())]
-            rows.append(Row(frame, token, colours[i], decoder, float(reach), cell))
+            element = brought[i]
+            learned = shapes[tuple(g[i, : layout.code].tolist())]
+            shape = learned if element is None else grids[element]
+            rows.append(Row(frame, token, colours[i], shape, element, float(reach), cell))
         return rows
 
     def empty(self, count: int) -> Array:
@@ -142,7 +154,10 @@ class Field:
             State and register, and a bound (M,) on how far the object's outline is, world units.
         """
         s = self.network.config.state
-        features = self.network.decode(q, radius, row.frame.scale, row.decoder)
+        if isinstance(row.shape, GridShape):
+            features = row.shape.distance(q)[None] * row.frame.scale
+        else:
+            features = self.network.decode(q, radius, row.frame.scale, row.shape)
         if row.frame.wild:
             features = features.clip(-FAR, FAR)
         new = self.network.step(features, memory[:s], memory[s:], row.colour, row.cell)

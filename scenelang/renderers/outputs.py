@@ -24,7 +24,7 @@ def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, 
         ProgramError: no compiled scene has such numbers.
     """
     if program.stage is not None:
-        solids = SolidField(network, program.vectors, program.tokens)  # type: ignore[arg-type]
+        solids = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
         found = solid_outputs(solids, program.stage, program.canvas, threads=threads)
     else:
         found = _plane(network, program)  # type: ignore[arg-type]
@@ -35,7 +35,7 @@ def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, 
 def _plane(network: FramedNetwork, program: Program) -> Outputs:
     width, height = program.canvas
     image = draw(network, replace(program, background=None)).image
-    coverage = Coverage(Field(network, program.vectors, program.tokens))
+    coverage = Coverage(Field(network, program.vectors, program.tokens, brought=program.brought()))
     rows, px = max(1, TILE // width), 2 / min(width, height)
     x = (np.arange(width) + 0.5 - width / 2) * px
     found = np.zeros((height, width), np.int32)

@@ -52,12 +52,15 @@ Opaque = Annotated[
 ]
 
 
-Word = Annotated[
-    str,
-    Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", json_schema_extra={"not": {"enum": list(RESERVED)}}),
-    AfterValidator(lambda word: _checked(word, word in RESERVED, f"`{word}` is a word of the language")),
-]
+_NOT_RESERVED: Final = AfterValidator(
+    lambda word: _checked(word, word in RESERVED, f"`{word}` is a word of the language")
+)
+_WORD: Final = "[A-Za-z_][A-Za-z0-9_]*"
+_SPELT: Final[dict[str, Any]] = {"json_schema_extra": {"not": {"enum": list(RESERVED)}}}
+Word = Annotated[str, Field(pattern=f"^{_WORD}$", **_SPELT), _NOT_RESERVED]
 """A name that text can spell."""
+Geometry = Annotated[str, Field(pattern=rf"^{_WORD}(\.{_WORD})?$", **_SPELT), _NOT_RESERVED]
+"""The same, or that of an element behind the name of its file."""
 
 
 def _whole(value: Any) -> Any:
@@ -113,7 +116,7 @@ def _kind_is_required(schema: dict[str, Any]) -> None:
         schema["required"] = ["kind", *schema.get("required", ())]
 
 
-_SEVERAL = frozenset(("children", "nodes", "ops", "transforms"))
+_SEVERAL = frozenset(("children", "elements", "nodes", "ops", "transforms"))
 
 
 _COLOURS = frozenset(("background", "color", "rgb"))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
@@ -80,22 +81,33 @@ def _laid_out(value: Any, margin: str) -> str:
     return f"{start}\n{inner}" + f",\n{inner}".join(parts) + f"\n{margin}{end}"
 
 
-def from_json(text: str | bytes, kind: type[S]) -> S:
-    """A Scene of class ``kind`` from JSON.
+def from_json(text: str | bytes, kind: type[S], root: Path | None = None) -> S:
+    """A Scene of class ``kind`` from JSON, with its files of elements if their folder is given.
 
     Raises:
-        SceneError: text that is not JSON, or not a Scene.
+        SceneError: text that is not JSON, or not a Scene, or a file that cannot be read.
     """
     if isinstance(text, bytes):
         try:
             text = text.decode("utf-8-sig")
         except UnicodeDecodeError as error:
             raise _failure(f"not UTF-8 text: byte {error.start}") from None
-    return _read(SourceFile("<json>", text), kind)
+    source = SourceFile("<json>", text)
+    scene, found = _read(source, kind), Diagnostics()
+    if root is not None and scene.elements:
+        _read_elements(scene, root, source, read_places(text), found)
+    if found.errors:
+        raise SceneError(found)
+    return scene
 
 
-def load_json(source: SourceFile, kind: type[S], diagnostics: Diagnostics) -> tuple[S | None, SpanMap]:
-    """A Scene from JSON text, or None after reports of E0313, and where its nodes are written there."""
+def load_json(
+    source: SourceFile, kind: type[S], diagnostics: Diagnostics, root: Path | None = None
+) -> tuple[S | None, SpanMap]:
+    """A Scene from JSON text, or None after reports, and where its nodes are written there.
+
+    Its files of elements are read from the folder ``root``, if there is one.
+    """
     spans = SpanMap()
     try:
         scene = _read(source, kind)
@@ -103,8 +115,20 @@ def load_json(source: SourceFile, kind: type[S], diagnostics: Diagnostics) -> tu
         for d in error.diagnostics:
             diagnostics.add(d.code, d.message, d.span, help=d.help)
         return None, spans
-    record_places(scene, read_places(source.text), source, spans)
+    places = read_places(source.text)
+    record_places(scene, places, source, spans)
+    if root is not None:
+        _read_elements(scene, root, source, places, diagnostics)
     return scene, spans
+
+
+def _read_elements(
+    scene: SceneData, root: Path, source: SourceFile, places: Value, diagnostics: Diagnostics
+) -> None:
+    for at, file in enumerate(scene.elements):
+        if (fault := file.read(root)) is not None:
+            value, _ = follow(places, ("elements", at, "path"))
+            diagnostics.add(*fault, value.span(source))
 
 
 def _read(source: SourceFile, kind: type[S]) -> S:

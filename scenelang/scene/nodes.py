@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, overload
 
 from pydantic import Field, field_validator, model_validator
 
+from scenelang.scene.elements import Elements
 from scenelang.scene.fields import (
     Finite,
     Frozen,
+    Geometry,
     Opaque,
     Pixels,
     Version,
@@ -40,7 +42,7 @@ class Object(Frozen):
     """A leaf geometry, its transforms nearest the leaf first, and its material."""
 
     kind: Literal["object"] = "object"
-    geometry: Annotated[Word, Field(description="a leaf geometry of the model")]
+    geometry: Annotated[Geometry, Field(description="a leaf geometry of the model, or an element's")]
     transforms: Transforms = ()
     material: Material | None = None
 
@@ -207,6 +209,7 @@ class SceneData(Frozen):
     animation: Annotated[
         Animation | None, Field(description="the animation that this Scene is one frame of")
     ] = None
+    elements: Annotated[tuple[Elements, ...], Field(description="files of elements")] = ()
     nodes: Annotated[tuple[SceneNode, ...], Field(description="a union, the last on top")] = ()
 
     if TYPE_CHECKING:
@@ -222,6 +225,7 @@ class SceneData(Frozen):
             light: Light | Unsaid = "default",
             ground: Ground | Unsaid | None = "default",
             animation: Animation | None = None,
+            elements: Iterable[Elements] | Elements = (),
             nodes: Iterable[SceneNode] | SceneNode = (),
         ) -> None: ...
 

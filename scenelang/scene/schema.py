@@ -6,8 +6,12 @@ live here: the evaluator returns a `SpanMap` beside the Scene, keyed by `id()` o
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
+from scenelang.scene.elements import Elements as Elements
+from scenelang.scene.elements import load_elements as load_elements
 from scenelang.scene.modifiers import Bend as Bend
 from scenelang.scene.modifiers import Color as Color
 from scenelang.scene.modifiers import Displace as Displace
@@ -68,15 +72,20 @@ class Scene(SceneData):
         return to_json(self)
 
     @classmethod
-    def from_json(cls, text: str | bytes) -> Scene:
+    def from_json(cls, text: str | bytes, root: str | os.PathLike[str] | None = None) -> Scene:
         """Read JSON; like `model_validate_json`, and for scenes of any depth.
 
+        Args:
+            text: the JSON.
+            root: the folder of its files of elements, which are not read without it.
+
         Raises:
-            SceneError: text that is not JSON, or not a Scene; it names each place.
+            SceneError: text that is not JSON, not a Scene, or has elements that cannot be read; it names each
+                place.
         """
         from scenelang.scene.json import from_json
 
-        return from_json(text, cls)
+        return from_json(text, cls, None if root is None else Path(root))
 
 
 def same_nodes(a: Scene, b: Scene) -> bool:

@@ -33,6 +33,7 @@ def to_nsg(scene: SceneData, notes: Mapping[int, str] | None = None) -> str:
     lines = ["nsg 1;"]
     if scene.model is not None:
         lines.append(f'model "{scene.model}";')
+    lines += [f'import "{file.path}" as {file.name};' for file in scene.elements]
     if scene.canvas != (256, 256):
         lines.append(f"canvas({scene.canvas[0]}, {scene.canvas[1]});")
     if scene.background is None:

@@ -44,6 +44,8 @@ def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
         return None
     if binding.kind == "module":
         return prepare_module_call(stmt, binding.value, place)
+    if binding.kind == "element":
+        return prepare_object(stmt, place, binding.value)
     if binding.kind in VALUES:
         return prepare_value_use(stmt, binding, place)
     _skim(stmt, place)

@@ -62,8 +62,8 @@ def _join_child(node: Any, where: Written, out: Builder, session: Session) -> No
 # ---------------------------------------------------------------- objects
 
 
-def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
-    """``GEOMETRY { … }`` with a geometry that the model has."""
+def prepare_object(stmt: nodes.Call, place: Place, geometry: str | None = None) -> Action | None:
+    """``GEOMETRY { … }`` with a geometry that the model has, or one of its own."""
     name, session, where = stmt.name.text, place.session, Written(stmt.name.span, stmt.span)
     fits = _holds_children(place, where.name, "object `{}`", name)
     body = prepare_inner(stmt.body, place.inner("object"))
@@ -85,7 +85,7 @@ def prepare_object(stmt: nodes.Call, place: Place) -> Action | None:
         session.count_objects(1, where.name)
         fields = {
             "kind": "object",
-            "geometry": name,
+            "geometry": geometry or name,
             "transforms": tuple(inside.transforms),
             "material": inside.material,
         }

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.fixes import removal
-from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import did_you_mean, listing
+from scenelang.elements.zoo import Zoo
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.file_context import Action, FileContext, Place
 from scenelang.evaluate.names import Binding, Env
@@ -22,7 +24,7 @@ from scenelang.evaluate.values.functions import angle, number
 from scenelang.evaluate.values.transforms import color, vector
 from scenelang.evaluate.values.value import POISON, Problem, Time, Vec, show, unexpected
 from scenelang.scene.faults import MOST, camera_fault, light_fault
-from scenelang.scene.schema import MAX_FRAMES, Animation, Camera, Ground, Light
+from scenelang.scene.schema import MAX_FRAMES, Animation, Camera, Elements, Ground, Light
 from scenelang.scene.spans import Written
 from scenelang.syntax import nodes
 from scenelang.words import SETTINGS, STAGE
@@ -238,6 +240,9 @@ def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
     if found is None or not good:
         return None
     path, file = found
+    if isinstance(file, Zoo):
+        binding.value = _elements(path, file, stmt, context)
+        return None
     prefix = f"{context.prefix}{alias.text}."
     brought = FileContext(file.span.source, context.session, loader, context.defines, path, prefix)
     loader.chain.append(path)
@@ -254,6 +259,24 @@ def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
             act(brought.env, Builder())
 
     return action
+
+
+def _elements(path: Path, zoo: Zoo, stmt: nodes.Import, context: FileContext) -> FileContext:
+    """An imported file of elements as a file whose names they are."""
+    session, root = context.session, context.loader.root
+    if path not in session.elements:
+        taken, name, count = {e.name for e in session.elements.values()}, stmt.alias.text, 1
+        while name in taken:  # the alias of another file, elsewhere
+            count += 1
+            name = f"{stmt.alias.text}_{count}"
+        written = path.relative_to(root).as_posix() if root is not None else stmt.path.value
+        session.elements[path] = Elements.of(name, written, zoo)
+    known = session.elements[path].name
+    source = SourceFile(stmt.path.value, "")
+    brought = FileContext(source, session, context.loader, context.defines, path)
+    names = {name: Binding("element", stmt.alias.span, value=f"{known}.{name}") for name in zoo.elements}
+    brought.scope.names.update(names)
+    return brought
 
 
 def prepare_file(context: FileContext, file: nodes.File, *, imported: bool = False) -> Body:

@@ -7,12 +7,15 @@ objects in, one by one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from scenelang.renderers.arrays import Array, Arrays
+from scenelang.elements.zoo import Element
+from scenelang.renderers.arrays import Array, Arrays, Layers
 from scenelang.renderers.field import SMOOTH, UNION
+from scenelang.renderers.grid import GridShape, grid_shape
 from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted
 from scenelang.renderers.solid.passes import BEGIN, END, OBJECT, SLACK, WAY, Passes, find_passes, read_solids
 
@@ -48,16 +51,24 @@ class SolidField:
         network: trained parameters, on any device.
         vectors: (N, 64) float32, geometry and material vectors.
         tokens: (N,) boolean tokens 0 to 3.
+        brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
 
     Raises:
-        ProgramError: an object's vector holds no way from the world to a leaf.
+        ProgramError: an object's vector holds no way from the world to a leaf, or an element is damaged.
     """
 
-    def __init__(self, network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) -> None:
+    def __init__(
+        self,
+        network: SolidNetwork,
+        vectors: np.ndarray,
+        tokens: np.ndarray,
+        brought: Sequence[Element | None] | None = None,
+    ) -> None:
         self.network, self.xp, self.tokens = network, network.xp, tokens
         with self.xp.inference():
             self.solids = read_solids(network, vectors, tokens)
             self._tables(vectors)
+            self._decoders(vectors, brought or [None] * len(vectors))
         kinds = self.xp.to_numpy(self.looks)[3] > 0.5
         self.draws = all(solid.draws for solid in self.solids)
         """Whether all objects draw."""
@@ -71,15 +82,12 @@ class SolidField:
     def _tables(self, vectors: np.ndarray) -> None:
         """What pairs of points and objects look up: arrays (…, N)."""
         xp, network, layout = self.xp, self.network, self.network.layout
-        g, m = vectors[:, : layout.geometry], vectors[:, layout.geometry :]
+        m = vectors[:, layout.geometry :]
         frames, count = [solid.frame for solid in self.solids], len(vectors)
 
         def table(values: object, *shape: int) -> Array:
             return xp.array(np.array(values, np.float32).reshape(*shape, count), network.codes)
 
-        codes, decoders = np.unique(g[:, : layout.code], axis=0, return_inverse=True)
-        self.decoders = [network.decoder(xp.array(code, network.codes)) for code in codes]
-        self.decoder = table(decoders)
         self.scale, self.amount, self.frequency = (
             table([getattr(frame, name) for frame in frames]) for name in ("scale", "amount", "frequency")
         )
@@ -106,6 +114,23 @@ class SolidField:
             Cell(*(xp.concat(list(part), 1) for part in zip(*each, strict=True)))
             for each in zip(*cells, strict=True)
         ]
+
+    def _decoders(self, vectors: np.ndarray, brought: Sequence[Element | None]) -> None:
+        """What tells distances, and which of them is each object's."""
+        xp, network = self.xp, self.network
+        codes = vectors[:, : network.layout.code]
+        keys = [
+            code.tobytes() if element is None else element
+            for code, element in zip(codes, brought, strict=True)
+        ]
+        known = {key: at for at, key in enumerate(dict.fromkeys(keys))}
+        self.decoders: list[Layers | GridShape] = [
+            grid_shape(key, xp, network.codes)
+            if isinstance(key, Element)
+            else network.decoder(xp.array(np.frombuffer(key, np.float32).copy(), network.codes))
+            for key in known
+        ]
+        self.decoder = xp.array(np.array([known[key] for key in keys], np.float32), network.codes)
 
     def passes(self, origin: Array, way: Array, limit: Array) -> tuple[Array, Passes]:
         """As `find_passes`, of unit directions way (3, M)."""
@@ -236,15 +261,20 @@ class SolidField:
 
     def _decoded(self, q: Array, objects: Array, gradient: bool) -> Array:
         """What decoders say at leaf coordinates (3, P): distances (1, P), or these and gradients (4, P)."""
-        xp, network = self.xp, self.network
+        xp = self.xp
         if len(self.decoders) == 1:
-            return network.field(q, self.decoders[0], gradient)
+            return self._field(q, self.decoders[0], gradient)
         found, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
         for i, layers in enumerate(self.decoders):
             index = xp.where(which == i)
             if len(index):
-                xp.put(found, index, network.field(xp.take(q, index), layers, gradient))
+                xp.put(found, index, self._field(xp.take(q, index), layers, gradient))
         return found
+
+    def _field(self, q: Array, decoder: Layers | GridShape, gradient: bool) -> Array:
+        if isinstance(decoder, GridShape):
+            return decoder.field(q, gradient)
+        return self.network.field(q, decoder, gradient)
 
 
 def _part(xp: Arrays, whole: Array, index: Array | None) -> Array:
