@@ -302,6 +302,8 @@ class _Maker:
                 for name in "xyzrgb":
                     yield Item(name, Kind.Field)
             return
+        for name, element in self.docs.elements(self.document, symbol.node).items():
+            yield Item(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, element.told(), True)
         library = self.docs.imported(self.document, symbol.node.path.value)
         if library is None:
             return

@@ -93,6 +93,9 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             return next((_model(m) for m in vocabulary_of(document).models if m.name == text), None)
         case "argument":
             return _argument(use)
+        case "member" if use.symbol is not None and isinstance(use.symbol.node, nodes.Import):
+            element = docs.elements(document, use.symbol.node).get(text.partition(".")[0])
+            return None if element is None else f"```text\n{element.told().replace('`', chr(39))}\n```"
         case "path":
             library = docs.imported(document, text)
             return f"`{library.path}`" if library is not None else "no such file"

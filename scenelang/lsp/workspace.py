@@ -18,6 +18,7 @@ from pygls.uris import from_fs_path, to_fs_path
 from scenelang.diagnostics.diagnostic import Diagnostic, Fix, Label
 from scenelang.diagnostics.diagnostic import Edit as Change
 from scenelang.diagnostics.span import SourceFile, Span
+from scenelang.elements.zoo import SUFFIX, Element, load_zoo
 from scenelang.evaluate.loader import Unreadable, read_source
 from scenelang.lsp.text import Encoding, Lines, applied
 from scenelang.resolve.names import Names, Symbol, Use
@@ -26,6 +27,7 @@ from scenelang.syntax import nodes
 from scenelang.syntax.incremental import Edit, Parsed, parse_edited, parse_whole
 from scenelang.syntax.lexer import Tokens
 from scenelang.syntax.tables import END
+from scenelang.tensors import TensorError
 
 if TYPE_CHECKING:
     from lsprotocol import types
@@ -199,10 +201,24 @@ class Workspace:
         """The document that an import's path means."""
         if library.is_reserved(text):
             return self.by_path(library.find(text))
+        return self.by_path(self._place(document, text))
+
+    def elements(self, document: Document, stmt: nodes.Import) -> dict[str, Element]:
+        """The elements that an import brings, by name; none where its file is scene text or damaged."""
+        path = self._place(document, stmt.path.value)
+        if path is None or path.suffix != SUFFIX:
+            return {}
+        try:
+            return load_zoo(path).elements
+        except (OSError, TensorError):
+            return {}
+
+    def _place(self, document: Document, text: str) -> Path | None:
+        """The file that a path in a document means."""
         folder = document.path.parent if document.path is not None else next(iter(self.folders), None)
         if folder is None or not text or "\0" in text or os.path.isabs(text) or PureWindowsPath(text).drive:
             return None
-        return self.by_path(_resolved(folder / text))
+        return _resolved(folder / text)
 
     def definition(self, document: Document, use: Use) -> tuple[Document, Symbol] | None:
         """Where what a use means is defined, over as many files as it takes."""
