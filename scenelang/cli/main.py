@@ -34,6 +34,7 @@ COMMANDS: Final = {
     "dump": "Show what a scene is after each stage.",
     "graph": "Draw the graph of a scene.",
     "models": "List models, or tell about one.",
+    "learn": "Make meshes and drawings elements of scenes.",
     "train": "Train a model's weights.",
     "lab": "Measure models and compare designs: the laboratory.",
 }

@@ -1,0 +1,158 @@
+"""The smallest pyramid of distances that is as near as asked.
+
+Pyramids of two kinds of coarsest grid grow level by level, the smaller one first, and each is measured as it
+is drawn: what it says at points of the true surface, and how its normals lie there.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.elements.pyramid import Grid, packed, refine, unpacked
+from scenelang.elements.zoo import MOST_SIDE, Element
+from scenelang.fitting.mesh import FitError, Points
+from scenelang.renderers.arrays import NUMPY
+from scenelang.renderers.grid import GridShape
+
+CELLS: Final = (4, 6)  # of the coarsest grids, along an axis
+FEWEST: Final = {2: 25, 3: 13}  # nodes along an axis of what is measured, by dimension
+BAND: Final = 4.5  # cells from the surface within which distances are true; farther ones are expected
+SAMPLES: Final = 20_000
+NEAR: Final = {2: 1e-4, 3: 5e-4}  # mean distance off that is near enough, by dimension
+
+
+class Shape(Protocol):
+    """What is to be made an element, in the unit ball or disc."""
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+
+    @property
+    def centre(self) -> tuple[float, ...]:
+        """Of the ball, in the file's own coordinates."""
+
+    @property
+    def size(self) -> float:
+        """Radius of the ball there."""
+
+    def distances(self, p: Points) -> Points:
+        """Signed distances (M,) of points (M, d), negative inside."""
+
+    def surface(self, count: int) -> tuple[Points, Points]:
+        """Points (K, d) of the surface, at most ``count``, and outward normals."""
+
+
+class Rung(NamedTuple):
+    """One pyramid that was tried.
+
+    Args:
+        side: nodes along an axis of its finest grid.
+        error: mean distance off at the surface, in leaf units.
+        worst: what one point of a hundred exceeds.
+        normal_deg: median angle between normals.
+    """
+
+    side: int
+    bytes: int
+    error: float
+    worst: float
+    normal_deg: float
+
+
+@dataclass(slots=True)
+class _Pyramid:
+    """A pyramid as far as it has grown."""
+
+    cells: int
+    grid: Grid | None = None
+    steps: list[npt.NDArray[np.int8]] = field(default_factory=list)
+
+    @property
+    def next_side(self) -> int:
+        return (self.cells << len(self.steps)) + 1
+
+    def grow(self, shape: Shape) -> None:
+        side = self.next_side
+        axis = np.linspace(-1, 1, side)
+
+        def true(expected: Grid) -> Grid:
+            found = expected.reshape(-1).copy()
+            near = abs(found) < BAND * 2 / (side - 1) if len(self.steps) > 1 else found < np.inf
+            at = np.stack(np.unravel_index(np.nonzero(near)[0], expected.shape), 1)
+            found[near] = shape.distances(axis[at])
+            return found.reshape(expected.shape)
+
+        self.grid, steps = refine(self.grid, side, shape.dimension, true)
+        self.steps.append(steps)
+
+
+def fit(
+    shape: Shape,
+    name: str,
+    *,
+    max_error: float | None = None,
+    budget_s: float = np.inf,
+    steps: int | None = None,
+    about: dict[str, str | float] | None = None,
+    report: Callable[[Rung], None] = lambda rung: None,
+) -> tuple[Element, list[Rung]]:
+    """The smallest element whose mean error is at most ``max_error``, or the nearest that was tried.
+
+    Args:
+        max_error: in leaf units; `NEAR` if left out.
+        budget_s: no further pyramid is begun after so many seconds.
+        steps: how many are tried at most, whatever the time; the same number gives the same bytes.
+        about: what the element says of itself, beside its figures.
+        report: called with each that was tried.
+
+    Raises:
+        FitError: the shape encloses nothing.
+    """
+    started = time.monotonic()
+    points, normals = shape.surface(SAMPLES)
+    growing = [_Pyramid(cells) for cells in CELLS]
+    best: tuple[float, Element] | None = None
+    tried: list[Rung] = []
+    while steps is None or len(tried) < steps:
+        pyramid = min(growing, key=lambda p: p.next_side)
+        late = steps is None and time.monotonic() - started > budget_s
+        if late or pyramid.next_side > MOST_SIDE[shape.dimension]:
+            break
+        pyramid.grow(shape)
+        if pyramid.next_side // 2 + 1 < FEWEST[shape.dimension]:
+            continue
+        element = packed(name, pyramid.cells, pyramid.steps, {})
+        rung = measured(element, points, normals)
+        tried.append(rung)
+        report(rung)
+        if best is None or rung.error < best[0]:
+            best = rung.error, element
+        if rung.error <= (max_error or NEAR[shape.dimension]):
+            break
+    if best is None:
+        raise FitError("no time to try anything")
+    error, kept = best
+    said = {**(about or {}), "error": error, "steps": len(tried), "size": shape.size}
+    said |= dict(zip("xyz", shape.centre, strict=False))
+    return Element(name, shape.dimension, kept.cells, kept.levels, kept.data, said), tried
+
+
+def measured(element: Element, points: Points, normals: Points) -> Rung:
+    """How far an element is off at points (M, 3) of the true surface and their normals."""
+    grid = unpacked(element)
+    drawn = GridShape(NUMPY, grid.reshape(-1), len(grid), grid.ndim)
+    off, *slope = drawn.field(np.ascontiguousarray(points.T, np.float32), gradient=True)
+    length = np.maximum(np.linalg.norm(slope, axis=0), 1e-9)
+    facing = np.clip((np.array(slope) * normals.T).sum(0) / length, -1, 1)
+    away = abs(off)
+    angle = float(np.degrees(np.median(np.arccos(facing))))
+    return Rung(
+        element.sides[-1], len(element.data), float(away.mean()), float(np.quantile(away, 0.99)), angle
+    )

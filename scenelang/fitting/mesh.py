@@ -1,0 +1,184 @@
+"""Triangle meshes as solids: read, put into the unit ball, and asked for distances.
+
+Needs trimesh, which reads, and libigl, which measures. Every file is taken for a stranger's: what libigl
+would not survive is refused here.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.files import read_regular
+
+Points = npt.NDArray[np.float64]  # (M, 3)
+Sign = Literal["winding", "closed"]
+SUFFIXES: Final = (".obj", ".ply", ".stl", ".glb")
+MOST_BYTES: Final = 1 << 30
+MOST_TRIANGLES: Final = 4_000_000
+_ENCLOSED: Final = 0.5  # share of a surface that has to have an inside
+_BESIDE: Final = 2e-3  # leaf units from a surface to where its sides are asked
+
+
+class FitError(ValueError):
+    """What cannot be made an element, and why."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """A solid in the unit ball: the midpoint of its bounding box is the origin, its farthest point at 1.
+
+    Args:
+        vertices: (V, 3).
+        triangles: (F, 3) indices.
+        closed: tell inside by the nearest surface's normal, otherwise by winding numbers.
+        centre, size: of the ball in the file's own coordinates.
+        notes: what was found and mended.
+    """
+
+    vertices: Points
+    triangles: npt.NDArray[np.int64]
+    closed: bool
+    centre: tuple[float, float, float]
+    size: float
+    notes: tuple[str, ...] = ()
+    dimension: ClassVar[int] = 3
+
+    def distances(self, p: Points) -> Points:
+        """Signed distances (M,) of points, negative inside."""
+        igl = _igl()
+        p = np.ascontiguousarray(p)
+        if not len(p):
+            return np.zeros(0)
+        if self.closed:
+            kind = igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
+            return np.asarray(igl.signed_distance(p, self.vertices, self.triangles, sign_type=kind)[0])
+        kind = igl.SIGNED_DISTANCE_TYPE_UNSIGNED
+        away = igl.signed_distance(p, self.vertices, self.triangles, sign_type=kind)[0]
+        winding = igl.fast_winding_number(self.vertices, self.triangles, p)
+        return np.asarray(np.where(abs(winding) > 0.5, -away, away), float)
+
+    def surface(self, count: int) -> tuple[Points, Points]:
+        """Points (K, 3) spread evenly on the outside of the solid, K at most ``count``, and normals there.
+
+        Raises:
+            FitError: most of the surface has no inside.
+        """
+        random = np.random.default_rng(1)
+        corners = self.vertices[self.triangles]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(across, axis=1)
+        at = random.choice(len(area), count, p=area / area.sum())
+        u, v = random.random((2, count, 1))
+        u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+        a, b, c = corners[at].swapaxes(0, 1)
+        points, normals = a + u * (b - a) + v * (c - a), across[at] / area[at, None]
+        sides = [self.distances(points + way * _BESIDE * normals) < 0 for way in (1, -1)]
+        outer = sides[0] != sides[1]
+        if outer.mean() < _ENCLOSED:
+            share = f"{100 * (1 - outer.mean()):.0f} % of the surface has no inside"
+            raise FitError(f"{share} {_BESIDE:g} radii below it: it encloses no solid")
+        turned = np.where(sides[0], -1.0, 1.0)[:, None]
+        return points[outer], (normals * turned)[outer]
+
+
+def _igl() -> Any:
+    with needed("libigl"):
+        import igl
+    return igl
+
+
+@contextmanager
+def needed(name: str) -> Iterator[None]:
+    """Say which package is missing where an import fails."""
+    try:
+        yield
+    except ImportError as error:
+        message = f"this needs {name}, which is not installed; pip install 'scenelang[learn]'"
+        raise FitError(message) from error
+
+
+def load_mesh(path: str | Path, sign: Sign = "winding") -> Mesh:
+    """Read a mesh.
+
+    Args:
+        sign: what tells inside: ``winding`` numbers, which take any mesh, or normals, for ``closed`` ones
+            whose surface nowhere passes through itself.
+
+    Raises:
+        OSError: the file cannot be read.
+        FitError: it is damaged, empty or too large, or encloses nothing.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise FitError(f"not one of {', '.join(SUFFIXES)}")
+    data = read_regular(path, MOST_BYTES)
+    if len(data) > MOST_BYTES:
+        raise FitError(f"more than {MOST_BYTES >> 20:,} MB")
+    with needed("trimesh"):
+        import trimesh
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
+    try:  # a reader of many formats, which a stranger's file may break in many ways
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            file, kind = io.BytesIO(data), suffix[1:]
+            found = trimesh.load_scene(file, file_type=kind, resolver=None, skip_materials=True).to_mesh()
+        vertices, triangles = np.asarray(found.vertices, float), np.asarray(found.faces, np.int64)
+    except Exception as error:
+        raise FitError(f"damaged or not a mesh: {str(error) or type(error).__name__}"[:200]) from error
+    return mesh_of(vertices, triangles, sign)
+
+
+def mesh_of(vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "winding") -> Mesh:
+    """The solid that triangles enclose; as `load_mesh`."""
+    with needed("trimesh"):
+        import trimesh
+    notes = []
+    if vertices.ndim != 2 or triangles.ndim != 2 or not len(triangles):
+        raise FitError("it holds no triangles")
+    if len(triangles) > MOST_TRIANGLES:
+        raise FitError(f"{len(triangles):,} triangles, at most {MOST_TRIANGLES:,}")
+    if not np.isfinite(vertices).all() or not abs(vertices).max() < 1e100:
+        raise FitError("a vertex is not finite")
+    used = vertices[np.unique(triangles)]
+    low, high = used.min(0), used.max(0)
+    centre = (low + high) / 2
+    size = float(np.linalg.norm(used - centre, axis=1).max())
+    if not size > 1e-12 * (1 + abs(centre).max()):
+        raise FitError("all of its vertices lie at one point")
+    mesh = trimesh.Trimesh((vertices - centre) / size, triangles, process=False)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    sound = mesh.area_faces > 1e-12
+    if not sound.any():
+        raise FitError("all of its triangles are flat")
+    if not sound.all():
+        notes.append(f"{(~sound).sum():,} flat triangles left out")
+        mesh.update_faces(sound)
+    closed = bool(mesh.is_watertight and mesh.is_winding_consistent)
+    if sign == "closed" and not closed:
+        raise FitError("it is not closed; tell inside by winding numbers: --sign winding")
+    by_normals = sign == "closed"
+    if by_normals and mesh.volume < 0:
+        notes.append("inside out, turned")
+        mesh.invert()
+    told = "normals" if by_normals else "winding numbers"
+    kind = "closed" if closed else "not closed"
+    notes = [f"{len(mesh.faces):,} triangles", kind, *notes, f"inside by {told}"]
+    return Mesh(
+        np.ascontiguousarray(mesh.vertices, float),
+        np.ascontiguousarray(mesh.faces, np.int64),
+        by_normals,
+        (float(centre[0]), float(centre[1]), float(centre[2])),
+        size,
+        tuple(notes),
+    )

@@ -1,0 +1,271 @@
+"""Outlines as flat shapes: read from drawings and pictures, put into the unit disc, and asked for distances.
+
+Needs svgelements, which reads drawings, and scipy. A shape is a union of layers: filled areas, and strokes as
+wide as they are drawn, with round joins and ends.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.files import read_regular
+from scenelang.fitting.mesh import FitError, Points, needed
+
+SUFFIXES: Final = (".svg", ".png")
+MOST_BYTES: Final = 10_000_000
+MOST_EDGES: Final = 200_000
+MOST_PIXELS: Final = 16_000_000
+PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
+_CURVE: Final = 48  # edges of a curve
+_BLOCK: Final = 1 << 22  # pairs of points and edges at a time
+_BESIDE: Final = 1e-4  # leaf units from an edge to where its sides are asked
+Edges = npt.NDArray[np.float64]  # (E, 2, 2): edges, ends, coordinates
+Inside = Callable[[Points], npt.NDArray[np.bool_]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layer:
+    """What lies on one side of edges, or near them.
+
+    Args:
+        edges: (E, 2, 2).
+        inside: tells of points (M, 2) whether the layer covers them; None of a stroke.
+        half: of a stroke's width.
+    """
+
+    edges: Edges
+    inside: Inside | None
+    half: float = 0.0
+
+    def pieces(self) -> Edges:
+        """Edges cut to `PIECE`, of a filled area those with just one side in it."""
+        length = np.linalg.norm(self.edges[:, 1] - self.edges[:, 0], axis=1)
+        counts = np.maximum(1, np.ceil(length / PIECE)).astype(int)
+        if counts.sum() > 20 * MOST_EDGES:
+            raise FitError("its outline is too long")
+        at = np.repeat(np.arange(len(counts)), counts)
+        step = np.arange(len(at)) - np.repeat(np.cumsum(counts) - counts, counts)
+        a, b = self.edges[at, 0], self.edges[at, 1]
+        ends = [a + ((step + k) / counts[at])[:, None] * (b - a) for k in (0, 1)]
+        found = np.stack(ends, 1)
+        if self.inside is None:
+            return found
+        middle, beside = found.mean(1), _BESIDE * _normals(found)
+        return np.asarray(found[self.inside(middle + beside) != self.inside(middle - beside)])
+
+
+def _normals(edges: Edges) -> Points:
+    along = edges[:, 1] - edges[:, 0]
+    length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    return np.asarray(np.stack([along[:, 1], -along[:, 0]], 1) / length)
+
+
+class Outline:
+    """A flat shape in the unit disc: the midpoint of its bounding box is the origin, its farthest point at 1.
+
+    Raises:
+        FitError: the layers cover nothing.
+    """
+
+    dimension = 2
+
+    def __init__(self, layers: list[Layer], notes: tuple[str, ...] = ()) -> None:
+        from scipy.spatial import cKDTree
+
+        self.notes = notes
+        if not layers or sum(len(layer.edges) for layer in layers) == 0:
+            raise FitError("it draws nothing")
+        if sum(len(layer.edges) for layer in layers) > MOST_EDGES:
+            raise FitError(f"an outline of more than {MOST_EDGES:,} edges")
+        ends = np.concatenate([layer.edges.reshape(-1, 2) for layer in layers])
+        halves = np.concatenate([np.full(2 * len(layer.edges), layer.half) for layer in layers])[:, None]
+        low, high = (ends - halves).min(0), (ends + halves).max(0)
+        if not np.isfinite([low, high]).all():
+            raise FitError("a point is not finite")
+        middle = (low + high) / 2
+        self.size = float((np.linalg.norm(ends - middle, axis=1) + halves[:, 0]).max())
+        self.centre = (float(middle[0]), float(middle[1]))
+        if not self.size > 1e-12 * (1 + abs(middle).max()):
+            raise FitError("all of it lies at one point")
+        self._layers = []
+        for layer in layers:
+            moved = replace(
+                layer,
+                edges=(layer.edges - middle) / self.size,
+                inside=None if layer.inside is None else _moved(layer.inside, middle, self.size),
+                half=layer.half / self.size,
+            )
+            if len(pieces := moved.pieces()):
+                self._layers.append((moved, pieces, cKDTree(pieces.mean(1))))
+        if not self._layers:
+            raise FitError("it covers nothing")
+
+    def distances(self, p: Points) -> Points:
+        """Signed distances (M,) of points (M, 2), negative inside."""
+        found = np.full(len(p), np.inf)
+        for layer, pieces, tree in self._layers:
+            _, near = tree.query(p, k=min(4, len(pieces)))
+            ends = pieces[near.reshape(len(p), -1)]  # (M, k, 2, 2)
+            a, along = ends[:, :, 0], ends[:, :, 1] - ends[:, :, 0]
+            share = ((p[:, None] - a) * along).sum(2) / np.maximum((along * along).sum(2), 1e-30)
+            away = np.linalg.norm(a + share.clip(0, 1)[..., None] * along - p[:, None], axis=2).min(1)
+            if layer.inside is None:
+                away -= layer.half
+            else:
+                away[layer.inside(p)] *= -1
+            found = np.minimum(found, away)
+        return found
+
+    def surface(self, count: int) -> tuple[Points, Points]:
+        """Points (K, 2) spread evenly on the outline, K at most ``count``, and outward normals."""
+        random, points, normals = np.random.default_rng(1), [], []
+        for layer, pieces, _ in self._layers:
+            way = _normals(pieces)
+            sides = (1, -1) if layer.inside is None else (1,)
+            for side in sides:
+                points.append(pieces.mean(1) + side * layer.half * way)
+                normals.append(side * way)
+        all_points, all_normals = np.concatenate(points), np.concatenate(normals)
+        chosen = random.choice(len(all_points), min(count, len(all_points)), replace=False)
+        at, way = all_points[chosen], all_normals[chosen]
+        sides_in = [self.distances(at + sign * _BESIDE * way) < 0 for sign in (1, -1)]
+        outer = sides_in[0] != sides_in[1]
+        turned = np.where(sides_in[0], -1.0, 1.0)[:, None]
+        return at[outer], (way * turned)[outer]
+
+
+def _moved(inside: Inside, middle: Points, size: float) -> Inside:
+    return lambda p: inside(p * size + middle)
+
+
+def winding(edges: Edges, odd: bool) -> Inside:
+    """Whether points lie within closed polygons, by the rule ``nonzero`` or ``evenodd``."""
+
+    def inside(p: Points) -> npt.NDArray[np.bool_]:
+        total = np.zeros(len(p), np.int64)
+        (ax, ay), (bx, by) = edges[:, 0].T, edges[:, 1].T
+        block = max(1, _BLOCK // max(1, len(edges)))
+        for first in range(0, len(p), block):
+            x, y = p[first : first + block].T[..., None]
+            up, down = (ay <= y) & (by > y), (ay > y) & (by <= y)
+            left = (bx - ax) * (y - ay) - (x - ax) * (by - ay) > 0
+            total[first : first + block] = (up & left).sum(1) - (down & ~left).sum(1)
+        return np.asarray(total % 2 != 0 if odd else total != 0)
+
+    return inside
+
+
+def load_outline(path: str | Path) -> Outline:
+    """Read a drawing (.svg), or the dark or opaque part of a picture (.png).
+
+    Raises:
+        OSError: the file cannot be read.
+        FitError: it is damaged, empty or too large, or draws nothing.
+    """
+    path = Path(path)
+    data = read_regular(path, MOST_BYTES)
+    if len(data) > MOST_BYTES:
+        raise FitError(f"more than {MOST_BYTES // 1_000_000} MB")
+    return Outline(*(_drawing(data) if path.suffix.lower() == ".svg" else _picture(data)))
+
+
+def _drawing(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
+    with needed("svgelements"):
+        import svgelements
+    try:  # a reader of a large format, which a stranger's file may break in many ways
+        parsed = svgelements.SVG.parse(io.BytesIO(data), reify=True)
+        shapes = [e for e in parsed.elements() if isinstance(e, svgelements.Shape)]
+        others = {type(e).__name__.lower() for e in parsed.elements()} & {"text", "image"}
+        layers = [layer for shape in shapes for layer in _layers(shape, svgelements)]
+    except Exception as error:
+        raise FitError(f"damaged or not a drawing: {str(error) or type(error).__name__}"[:200]) from error
+    strokes = sum(layer.inside is None for layer in layers)
+    notes = f"{len(layers) - strokes:,} areas, {strokes:,} strokes"
+    return layers, (notes, *(f"{name} left out" for name in sorted(others)))
+
+
+def _layers(shape: Any, svg: Any) -> Iterator[Layer]:
+    """What a shape of a drawing paints, y up."""
+    open_edges, closing = [], []
+    for part in svg.Path(shape).as_subpaths():
+        points = [at for segment in svg.Path(part) for at in _ends(segment, svg)]
+        if len(points) > 1:
+            line = np.array(points) * (1.0, -1.0)
+            open_edges.append(np.stack([line[:-1], line[1:]], 1))
+            closing.append(np.stack([line[-1:], line[:1]], 1))
+    if not open_edges:
+        return
+    edges, closed = np.concatenate(open_edges), np.concatenate([*open_edges, *closing])
+    if shape.fill is not None and shape.fill.value is not None and shape.fill.alpha:
+        yield Layer(closed, winding(closed, shape.values.get("fill-rule") == "evenodd"))
+    if shape.stroke is not None and shape.stroke.value is not None and shape.stroke.alpha:
+        width = float(shape.stroke_width or 0.0)
+        if width > 0:
+            yield Layer(edges, None, width / 2)
+
+
+def _ends(segment: Any, svg: Any) -> list[tuple[float, float]]:
+    """Points of a segment, its last one among them."""
+    if segment.end is None:
+        return []
+    if isinstance(segment, svg.Move | svg.Line | svg.Close):
+        return [(segment.end.x, segment.end.y)]
+    found = [segment.point(at) for at in np.linspace(0, 1, _CURVE + 1)[1:]]
+    return [(point.x, point.y) for point in found]
+
+
+def _picture(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(data), formats=["PNG"]) as opened:
+                if opened.width * opened.height > MOST_PIXELS:
+                    raise FitError(f"a picture of more than {MOST_PIXELS:,} pixels")
+                pixels = np.asarray(opened.convert("RGBA"), float) / 255
+    except FitError:
+        raise
+    except Exception as error:
+        raise FitError(f"damaged or not a picture: {error}"[:200]) from error
+    opaque = bool((pixels[..., 3] < 0.5).any())
+    luma = pixels[..., :3] @ (0.2126, 0.7152, 0.0722)
+    value = pixels[..., 3] if opaque else 1 - luma
+    value = np.pad(value, 1)[::-1]  # y up, and nothing outside
+    note = "its opaque part" if opaque else "its dark part"
+    edges = _contour(value)
+    return [Layer(edges, winding(edges, odd=True))], (note,)
+
+
+def _contour(value: npt.NDArray[np.float64]) -> Edges:
+    """Where a picture is a half: one or two edges across each square of four pixels (marching squares)."""
+    up = value > 0.5
+    corners = np.stack([up[:-1, :-1], up[:-1, 1:], up[1:, 1:], up[1:, :-1]])
+    y, x = np.nonzero(corners.any(0) & ~corners.all(0))
+    held = np.stack([value[y, x], value[y, x + 1], value[y + 1, x + 1], value[y + 1, x]])
+    at = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+    crossings = []
+    for k in range(4):
+        a, b = held[k], held[(k + 1) % 4]
+        crosses = (a > 0.5) != (b > 0.5)
+        share = np.where(crosses, (0.5 - a) / np.where(crosses, b - a, 1.0), np.nan)[:, None]
+        crossings.append(at[k] + share * (at[(k + 1) % 4] - at[k]) + np.stack([x, y], 1))
+    found = np.stack(crossings, 1)  # (cells, 4 sides, 2), nan where a side is not crossed
+    edges = []
+    count = np.isfinite(found[..., 0]).sum(1)
+    two = found[count == 2]
+    edges.append(two[np.isfinite(two[..., 0])].reshape(-1, 2, 2))
+    four = found[count == 4]
+    high = (held[0][count == 4] > 0.5) == (held.mean(0)[count == 4] > 0.5)  # which corners the middle joins
+    for joined in ((0, 1, 2, 3), (1, 2, 3, 0)):
+        part = four[high if joined[0] == 0 else ~high][:, list(joined)]
+        edges.append(part.reshape(-1, 2, 2))
+    return np.concatenate(edges)
