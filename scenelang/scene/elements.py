@@ -24,7 +24,9 @@ class Elements(Frozen):
     """A file of elements; objects have its geometries as ``name.geometry``."""
 
     name: Word
-    path: Annotated[str, Field(min_length=1, description="of the file, from the scene's folder")]
+    path: Annotated[
+        str, Field(pattern=r'^[^"\\\x00-\x1f]+$', description="of the file, from the scene's folder")
+    ]
     digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of the file")]
     _held: _Held = PrivateAttr(default_factory=_Held)
 

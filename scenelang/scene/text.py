@@ -14,6 +14,7 @@ from scenelang.deep import deep_stack
 from scenelang.diagnostics.error import SceneError
 from scenelang.formatting import format_text
 from scenelang.records import Record
+from scenelang.scene.elements import Elements
 from scenelang.scene.fields import Frozen, Rgb
 from scenelang.scene.modifiers import MaterialOp, Transform
 from scenelang.scene.nodes import Boolean, Link, Material, Object, SceneData, SceneNode
@@ -229,6 +230,9 @@ class _Maker(Record, frozen=False):
         if not isinstance(value, Frozen):
             plain = f'"{value}"' if isinstance(value, str) else value
             return f"{head}{number(value) if isinstance(value, float) else plain}", 0
+        if isinstance(value, Elements):
+            given = (f'"{value.path}"', f'name="{value.name}"')
+            return _Call(f"{head}nsg.load_elements", given), 0
         parts, height, name = [], 0, f"nsg.{type(value).__name__}"
         for key, item in value.__repr_args__():
             code, inner = self.code("" if key in _UNNAMED else f"{key}=", item)

@@ -20,6 +20,7 @@ from scenelang.program.compile import compile_scene, find_model
 from scenelang.program.program import program_bytes
 from scenelang.program.reading import parse_program
 from tests.elements.shapes import ball, element, square, torus
+from tests.test_architecture import loaded_by
 
 RING = "zoo.ring { scale(0.9); rotate(40deg, axis = X); translate(0.2, 0, 0); }"
 PURE = RING.replace("zoo.ring", "torus")
@@ -183,6 +184,7 @@ def test_json_has_the_file_and_its_digest(folder: Path) -> None:
         ({"path": "../zoo.safetensors"}, "outside the import root"),
         ({"path": "/etc/passwd"}, "outside the import root"),
         ({"path": "none"}, "no such file"),
+        ({"path": 'a"; sphere { } //'}, "not a possible name"),
         ({"digest": "0" * 64}, "not the file that the scene was made with"),
     ],
 )
@@ -198,6 +200,20 @@ def test_python_makes_the_same_scene(folder: Path) -> None:
     made = nsg.Scene(elements=zoo, nodes=nsg.Object("zoo.ring", nsg.Scale(0.5)))
     text = good(folder, IMPORT + "zoo.ring { scale(0.5); }")
     assert compile_scene(made).digest() == compile_scene(text).digest()
+
+
+def test_code_for_python_reads_the_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = good(folder, IMPORT + RING)
+    monkeypatch.chdir(folder)
+    names: dict[str, Any] = {}
+    exec(scene.to_python(), names)
+    assert names["scene"] == scene
+    assert compile_scene(names["scene"]).digest() == compile_scene(scene).digest()
+
+
+def test_checking_needs_no_numpy(folder: Path) -> None:
+    good(folder, IMPORT + RING)
+    assert not loaded_by("check", str(folder / "scene.nsg")) & {"torch", "numpy"}
 
 
 def test_programs_carry_their_elements(folder: Path) -> None:
