@@ -19,7 +19,8 @@ from scenelang.elements.zoo import MOST_SIDE, Element
 
 Grid = npt.NDArray[np.float32]
 FINE: Final = 24.0  # steps of a cell's side near the surface
-COARSE: Final = 8.0  # steps of the distance, far from it
+FAR: Final = 8.0  # steps of the distance, far from it, and
+FIRST: Final = 400.0  # more of them by this over the nodes along an axis, as coarse grids shape blends
 FARTHEST: Final = 4.0  # more than a distance in the cube can be
 
 
@@ -46,8 +47,8 @@ def between(grid: Grid) -> Grid:
 
 def _widths(expected: Grid) -> Grid:
     """How much a step is at each node."""
-    side = np.float32(2 / (len(expected) - 1) / FINE)
-    return np.asarray(np.maximum(side, abs(expected) / np.float32(COARSE)), np.float32)
+    near, far = np.float32(2 / (len(expected) - 1) / FINE), np.float32(FAR + FIRST / len(expected))
+    return np.asarray(np.maximum(near, abs(expected) / far), np.float32)
 
 
 def _stepped(expected: Grid, steps: npt.NDArray[np.int8]) -> Grid:
