@@ -100,10 +100,6 @@ class SolidField:
         matrix = table(m[:, layout.colour].T, 3, 4)
         colour = (matrix[:, :3] * look[:3]).sum(1) + matrix[:, 3]
         self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
-        plain = table([s.draws and s.radius <= 1 + SLACK and not s.frame.steps for s in self.solids])
-        self.asked = plain * (self.looks[3] > 0.5)  # 1 where `segments.py` may answer
-        known = len(network.segment_w) and float(self.asked.sum())
-        self.segments = [network.segment(xp.array(code, network.codes)) for code in codes] if known else []
         self.empty = xp.full((), EMPTY, network.codes)
         self.smooth = table(self.tokens == SMOOTH) > 0 if SMOOTH in self.tokens else None
         keys = [(solid.token, solid.frame.blend if solid.token == SMOOTH else BLEND) for solid in self.solids]
@@ -123,14 +119,27 @@ class SolidField:
             code.tobytes() if element is None else element
             for code, element in zip(codes, brought, strict=True)
         ]
-        known = {key: at for at, key in enumerate(dict.fromkeys(keys))}
-        self.decoders: list[Layers | GridShape] = [
-            grid_shape(key, xp, network.codes)
-            if isinstance(key, Element)
-            else network.decoder(xp.array(np.frombuffer(key, np.float32).copy(), network.codes))
-            for key in known
+        # codes first, whose numbers are those of their segments
+        ordered = sorted(dict.fromkeys(keys), key=lambda key: isinstance(key, Element))
+        number = {key: at for at, key in enumerate(ordered)}
+        learned = [
+            xp.array(np.frombuffer(key, np.float32).copy(), network.codes)
+            for key in ordered
+            if isinstance(key, bytes)
         ]
-        self.decoder = xp.array(np.array([known[key] for key in keys], np.float32), network.codes)
+        self.decoders: list[Layers | GridShape] = [
+            *map(network.decoder, learned),
+            *(grid_shape(key, xp, network.codes) for key in ordered if isinstance(key, Element)),
+        ]
+        self.decoder = xp.array(np.array([number[key] for key in keys], np.float32), network.codes)
+        plain = [
+            element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps
+            for element, s in zip(brought, self.solids, strict=True)
+        ]
+        self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[3] > 0.5)
+        """1 where `segments.py` may answer."""
+        known = len(network.segment_w) and float(self.asked.sum())
+        self.segments = [network.segment(code) for code in learned] if known else []
 
     def passes(self, origin: Array, way: Array, limit: Array) -> tuple[Array, Passes]:
         """As `find_passes`, of unit directions way (3, M)."""
