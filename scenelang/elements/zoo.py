@@ -169,15 +169,16 @@ def _element(name: str, entry: Any, tensor: Tensor, body: memoryview) -> Element
     if cells * 2 ** (levels - 1) >= MOST_SIDE[dimension]:
         raise TensorError(f"element `{name}` has more than {MOST_SIDE[dimension]} nodes along an axis")
     about = entry["about"]
-    if not isinstance(about, dict) or not all(map(_is_said, about, about.values())):
+    if not isinstance(about, dict) or not all(k.isidentifier() and is_said(v) for k, v in about.items()):
         raise TensorError(f"what element `{name}` says of itself is not text and numbers")
     return Element(name, dimension, cells, levels, bytes(body[tensor.first : tensor.last]), about)
 
 
-def _is_said(key: str, value: Any) -> bool:
+def is_said(value: Any) -> bool:
+    """Whether an element may say this of itself: text of a bounded length, or a finite number."""
     if isinstance(value, str):
         return len(value) <= _MOST_TEXT and value.replace("\n", " ").isprintable()
-    return key.isidentifier() and type(value) in (int, float)
+    return type(value) in (int, float) and abs(value) < 1e300
 
 
 def entry_of(element: Element) -> dict[str, Any]:

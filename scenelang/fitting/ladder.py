@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from scenelang.elements.pyramid import Grid, packed, refine, unpacked
 from scenelang.elements.zoo import MOST_SIDE, Element
-from scenelang.fitting.mesh import FitError, Points
+from scenelang.fitting.mesh import Points
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.grid import GridShape
 
@@ -24,6 +24,7 @@ CELLS: Final = (4, 6)  # of the coarsest grids, along an axis
 FEWEST: Final = {2: 25, 3: 13}  # nodes along an axis of what is measured, by dimension
 BAND: Final = 4.5  # cells from the surface within which distances are true; farther ones are expected
 SAMPLES: Final = 20_000
+BLOCK: Final = 100_000  # points that are asked for at a time
 NEAR: Final = {2: 1e-4, 3: 5e-4}  # mean distance off that is near enough, by dimension
 
 
@@ -78,7 +79,7 @@ class _Pyramid:
     def next_side(self) -> int:
         return (self.cells << len(self.steps)) + 1
 
-    def grow(self, shape: Shape) -> None:
+    def grow(self, shape: Shape, progress: Callable[[int, float], None]) -> None:
         side = self.next_side
         axis = np.linspace(-1, 1, side)
 
@@ -86,7 +87,10 @@ class _Pyramid:
             found = expected.reshape(-1).copy()
             near = abs(found) < BAND * 2 / (side - 1) if len(self.steps) > 1 else found < np.inf
             at = np.stack(np.unravel_index(np.nonzero(near)[0], expected.shape), 1)
-            found[near] = shape.distances(axis[at])
+            for first in range(0, len(at), BLOCK):
+                progress(side, first / len(at))
+                part = at[first : first + BLOCK]
+                found[np.ravel_multi_index(tuple(part.T), expected.shape)] = shape.distances(axis[part])
             return found.reshape(expected.shape)
 
         self.grid, steps = refine(self.grid, side, shape.dimension, true)
@@ -102,15 +106,17 @@ def fit(
     steps: int | None = None,
     about: dict[str, str | float] | None = None,
     report: Callable[[Rung], None] = lambda rung: None,
+    progress: Callable[[int, float], None] = lambda side, share: None,
 ) -> tuple[Element, list[Rung]]:
     """The smallest element whose mean error is at most ``max_error``, or the nearest that was tried.
 
     Args:
         max_error: in leaf units; `NEAR` if left out.
-        budget_s: no further pyramid is begun after so many seconds.
+        budget_s: no further pyramid is begun after so many seconds; one is tried in any case.
         steps: how many are tried at most, whatever the time; the same number gives the same bytes.
         about: what the element says of itself, beside its figures.
         report: called with each that was tried.
+        progress: called with nodes along an axis of what grows, and the share of it that is done.
 
     Raises:
         FitError: the shape encloses nothing.
@@ -120,12 +126,15 @@ def fit(
     growing = [_Pyramid(cells) for cells in CELLS]
     best: tuple[float, Element] | None = None
     tried: list[Rung] = []
-    while steps is None or len(tried) < steps:
+    ended = "steps"
+    while best is None or (
+        len(tried) < steps if steps is not None else time.monotonic() - started < budget_s
+    ):
         pyramid = min(growing, key=lambda p: p.next_side)
-        late = steps is None and time.monotonic() - started > budget_s
-        if late or pyramid.next_side > MOST_SIDE[shape.dimension]:
+        if pyramid.next_side > MOST_SIDE[shape.dimension]:
+            ended = "largest grid"
             break
-        pyramid.grow(shape)
+        pyramid.grow(shape, progress)
         if pyramid.next_side // 2 + 1 < FEWEST[shape.dimension]:
             continue
         element = packed(name, pyramid.cells, pyramid.steps, {})
@@ -135,11 +144,11 @@ def fit(
         if best is None or rung.error < best[0]:
             best = rung.error, element
         if rung.error <= (max_error or NEAR[shape.dimension]):
+            ended = "near enough"
             break
-    if best is None:
-        raise FitError("no time to try anything")
+    assert best is not None
     error, kept = best
-    said = {**(about or {}), "error": error, "steps": len(tried), "size": shape.size}
+    said = {**(about or {}), "error": error, "steps": len(tried), "ended": ended, "size": shape.size}
     said |= dict(zip("xyz", shape.centre, strict=False))
     return Element(name, shape.dimension, kept.cells, kept.levels, kept.data, said), tried
 

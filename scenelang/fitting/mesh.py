@@ -12,18 +12,14 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import read_regular
-
 Points = npt.NDArray[np.float64]  # (M, 3)
-Sign = Literal["winding", "closed"]
-SUFFIXES: Final = (".obj", ".ply", ".stl", ".glb")
-MOST_BYTES: Final = 1 << 30
+Sign = Literal["auto", "winding", "closed"]
+MOST_OF: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
 MOST_TRIANGLES: Final = 4_000_000
 _ENCLOSED: Final = 0.5  # share of a surface that has to have an inside
 _BESIDE: Final = 2e-3  # leaf units from a surface to where its sides are asked
@@ -107,24 +103,16 @@ def needed(name: str) -> Iterator[None]:
         raise FitError(message) from error
 
 
-def load_mesh(path: str | Path, sign: Sign = "winding") -> Mesh:
-    """Read a mesh.
+def read_mesh(data: bytes, suffix: str, sign: Sign = "auto") -> Mesh:
+    """The mesh in the bytes of a file with a suffix of `MOST_OF`.
 
     Args:
         sign: what tells inside: ``winding`` numbers, which take any mesh, or normals, for ``closed`` ones
-            whose surface nowhere passes through itself.
+            whose surface nowhere passes through itself; ``auto`` is ``winding``.
 
     Raises:
-        OSError: the file cannot be read.
         FitError: it is damaged, empty or too large, or encloses nothing.
     """
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise FitError(f"not one of {', '.join(SUFFIXES)}")
-    data = read_regular(path, MOST_BYTES)
-    if len(data) > MOST_BYTES:
-        raise FitError(f"more than {MOST_BYTES >> 20:,} MB")
     with needed("trimesh"):
         import trimesh
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
@@ -139,8 +127,8 @@ def load_mesh(path: str | Path, sign: Sign = "winding") -> Mesh:
     return mesh_of(vertices, triangles, sign)
 
 
-def mesh_of(vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "winding") -> Mesh:
-    """The solid that triangles enclose; as `load_mesh`."""
+def mesh_of(vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "auto") -> Mesh:
+    """The solid that triangles enclose; as `read_mesh`."""
     with needed("trimesh"):
         import trimesh
     notes = []

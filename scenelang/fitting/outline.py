@@ -10,17 +10,14 @@ import io
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import read_regular
 from scenelang.fitting.mesh import FitError, Points, needed
 
-SUFFIXES: Final = (".svg", ".png")
-MOST_BYTES: Final = 10_000_000
+MOST_OF: Final = {".svg": 10 << 20, ".png": 10 << 20}  # bytes of a file
 MOST_EDGES: Final = 200_000
 MOST_PIXELS: Final = 16_000_000
 PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
@@ -163,18 +160,13 @@ def winding(edges: Edges, odd: bool) -> Inside:
     return inside
 
 
-def load_outline(path: str | Path) -> Outline:
-    """Read a drawing (.svg), or the dark or opaque part of a picture (.png).
+def read_outline(data: bytes, suffix: str) -> Outline:
+    """A drawing (.svg), or the dark or opaque part of a picture (.png), in the bytes of a file.
 
     Raises:
-        OSError: the file cannot be read.
         FitError: it is damaged, empty or too large, or draws nothing.
     """
-    path = Path(path)
-    data = read_regular(path, MOST_BYTES)
-    if len(data) > MOST_BYTES:
-        raise FitError(f"more than {MOST_BYTES // 1_000_000} MB")
-    return Outline(*(_drawing(data) if path.suffix.lower() == ".svg" else _picture(data)))
+    return Outline(*(_drawing(data) if suffix == ".svg" else _picture(data)))
 
 
 def _drawing(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:

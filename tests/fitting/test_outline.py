@@ -14,16 +14,15 @@ pytest.importorskip("scipy")
 
 from scenelang.fitting.ladder import fit
 from scenelang.fitting.mesh import FitError
-from scenelang.fitting.outline import Outline, load_outline
+from scenelang.fitting.outline import Outline, read_outline
 from tests.elements.shapes import square
 
 POINTS = np.random.default_rng(0).uniform(-1, 1, (2000, 2))
 
 
-def drawn(folder: Path, body: str) -> Outline:
+def drawn(body: str) -> Outline:
     text = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">{body}</svg>'
-    (folder / "a.svg").write_text(text, "utf-8")
-    return load_outline(folder / "a.svg")
+    return read_outline(text.encode(), ".svg")
 
 
 def disc(p: np.ndarray, radius: float = 1.0) -> np.ndarray:
@@ -51,16 +50,16 @@ def frame(p: np.ndarray) -> np.ndarray:
         ('<path d="M0 0h8v8h-8z M2 2v4h4v-4z"/>', frame),
     ],
 )
-def test_drawings(body: str, formula: Callable[[np.ndarray], np.ndarray], tmp_path: Path) -> None:
-    shape = drawn(tmp_path, body)
+def test_drawings(body: str, formula: Callable[[np.ndarray], np.ndarray]) -> None:
+    shape = drawn(body)
     true, found = formula(POINTS), shape.distances(POINTS)
     outside = true > 0  # inside of an unfilled corner a formula of maxima says less than the distance
     assert abs(found - true)[outside].max() < 0.003
     assert ((found < 0) == (true < 0))[abs(true) > 0.003].all()
 
 
-def test_up_is_up_and_layers_are_a_union(tmp_path: Path) -> None:
-    shape = drawn(tmp_path, '<rect width="10" height="2"/><rect x="4" width="2" height="10" fill="#0f0"/>')
+def test_up_is_up_and_layers_are_a_union() -> None:
+    shape = drawn('<rect width="10" height="2"/><rect x="4" width="2" height="10" fill="#0f0"/>')
     stem, bar = shape.distances(np.array([[0, -0.5], [0.5, 0.6]])), shape.distances(np.array([[0.5, -0.5]]))
     assert (stem < 0).all()
     assert bar > 0
@@ -75,39 +74,37 @@ def test_pictures(opaque: bool, tmp_path: Path) -> None:
     pixels[..., :3] = (1 - cover)[..., None] if not opaque else 0.5
     pixels[..., 3] = cover if opaque else 1
     Image.fromarray((255 * pixels).astype(np.uint8), "RGBA").save(tmp_path / "a.png")
-    shape = load_outline(tmp_path / "a.png")
+    shape = read_outline((tmp_path / "a.png").read_bytes(), ".png")
     assert shape.size == pytest.approx(40, abs=0.1)
     assert abs(shape.distances(POINTS) - disc(POINTS)).max() < 0.01
 
 
-def test_what_becomes_of_a_drawing_is_small(tmp_path: Path) -> None:
+def test_what_becomes_of_a_drawing_is_small() -> None:
     star = "M50 0 L61 35 98 35 68 57 79 91 50 70 21 91 32 57 2 35 39 35Z"
-    element, _ = fit(drawn(tmp_path, f'<path d="{star}"/>'), "star")
+    element, _ = fit(drawn(f'<path d="{star}"/>'), "star")
     assert element.about["error"] <= 1e-4  # type: ignore[operator]
     assert (element.dimension, len(element.data) < 5000) == (2, True)
 
 
 @pytest.mark.parametrize(
-    ("name", "data", "words"),
+    ("suffix", "data", "words"),
     [
-        ("a.svg", b"", "damaged|draws nothing"),
-        ("a.svg", b"<svg", "damaged|draws nothing"),
-        ("a.svg", b'<svg><rect width="1" height="1" fill="none"/></svg>', "draws nothing"),
-        ("a.svg", b'<svg><path d="M1 1z"/></svg>', "draws nothing|one point|covers nothing"),
-        ("a.svg", b'<svg><path d="M0 0h5"/></svg>', "covers nothing"),
-        ("a.svg", b'<svg><path d="M0 0h1e999v5z"/></svg>', "finite|damaged"),
-        ("a.png", b"no picture", "damaged"),
+        (".svg", b"", "damaged|draws nothing"),
+        (".svg", b"<svg", "damaged|draws nothing"),
+        (".svg", b'<svg><rect width="1" height="1" fill="none"/></svg>', "draws nothing"),
+        (".svg", b'<svg><path d="M1 1z"/></svg>', "draws nothing|one point|covers nothing"),
+        (".svg", b'<svg><path d="M0 0h5"/></svg>', "covers nothing"),
+        (".svg", b'<svg><path d="M0 0h1e999v5z"/></svg>', "finite|damaged"),
+        (".png", b"no picture", "damaged"),
     ],
 )
-def test_what_is_no_outline(name: str, data: bytes, words: str, tmp_path: Path) -> None:
-    (tmp_path / name).write_bytes(data)
+def test_what_is_no_outline(suffix: str, data: bytes, words: str) -> None:
     with pytest.raises(FitError, match=words):
-        load_outline(tmp_path / name)
+        read_outline(data, suffix)
 
 
-def test_an_entity_bomb_ends(tmp_path: Path) -> None:
+def test_an_entity_bomb_ends() -> None:
     lines = ['<!ENTITY a0 "M0 0h1v1z ">'] + [f'<!ENTITY a{k} "{f"&a{k - 1};" * 10}">' for k in range(1, 10)]
     bomb = f"<!DOCTYPE svg [{''.join(lines)}]><svg><path d='&a9;'/></svg>"
-    (tmp_path / "a.svg").write_text(bomb)
     with pytest.raises(FitError, match="damaged"):
-        load_outline(tmp_path / "a.svg")
+        read_outline(bomb.encode(), ".svg")

@@ -1,0 +1,38 @@
+"""Small pictures of elements, drawn by numpy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from scenelang.backend.small import draw_small
+from scenelang.elements.zoo import Element, Zoo
+from scenelang.image import Image
+from scenelang.program.compile import compile_scene
+from scenelang.scene.schema import Color, Elements, Material, Object, Rotate, Scale, Scene
+
+_TURN: Final = Rotate.degrees(30, axis=(0, 1, 0))
+
+
+def thumbnail(element: Element, side: int = 128) -> Image:
+    """An element alone on a square canvas (side, side, 3), one of space lit and turned a little."""
+    zoo = Elements.of("zoo", "zoo.safetensors", Zoo({element.name: element}, "0" * 64))
+    solid = element.dimension == 3
+    moves = (_TURN, Scale(1.0)) if solid else (Scale(0.9),)
+    look = Material("diffuse" if solid else "flat", (Color("#c96" if solid else "#222"),))
+    shown = Object(f"zoo.{element.name}", moves, look)
+    return draw_small(compile_scene(Scene(elements=(zoo,), nodes=(shown,), canvas=(side, side)))).image
+
+
+def sheet(elements: Sequence[Element], side: int = 256) -> Image:
+    """Elements in rows of about as many, in order, on white."""
+    columns = math.ceil(math.sqrt(len(elements)))
+    rows = math.ceil(len(elements) / columns)
+    picture = np.ones((rows * side, columns * side, 3), np.float32)
+    for at, element in enumerate(elements):
+        y, x = side * (at // columns), side * (at % columns)
+        picture[y : y + side, x : x + side] = thumbnail(element, side)
+    return picture.view(Image)
