@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 
 from scenelang.backend.small import draw_small
-from scenelang.elements.zoo import Element, Zoo
+from scenelang.elements.element import Element
+from scenelang.elements.zoo import Zoo
 from scenelang.image import Image
 from scenelang.program.compile import compile_scene
 from scenelang.scene.schema import Color, Elements, Material, Object, Rotate, Scale, Scene
@@ -19,7 +20,7 @@ _TURN: Final = Rotate.degrees(30, axis=(0, 1, 0))
 
 def thumbnail(element: Element, side: int = 128) -> Image:
     """An element alone on a square canvas (side, side, 3), one of space lit and turned a little."""
-    zoo = Elements.of("zoo", "zoo.safetensors", Zoo({element.name: element}, "0" * 64))
+    zoo = Elements.of("zoo", "zoo.safetensors", Zoo.of([element]))
     solid = element.dimension == 3
     moves = (_TURN, Scale(1.0)) if solid else (Scale(0.9),)
     look = Material("diffuse" if solid else "flat", (Color("#c96" if solid else "#222"),))

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.elements.zoo import MOST_SIDE, Element
+from scenelang.elements.element import MOST_SIDE, Element
 
 Grid = npt.NDArray[np.float32]
 FINE: Final = 24.0  # steps of a cell's side near the surface
@@ -77,7 +77,7 @@ def packed(
 ) -> Element:
     """The element of a pyramid's steps."""
     data = zlib.compress(b"".join(grid.tobytes() for grid in steps), 9)
-    return Element(name, steps[0].ndim, cells, len(steps), data, about)
+    return Element(name, "pyramid", (steps[0].ndim, cells, len(steps)), "deflate", data, about)
 
 
 def unpacked(element: Element) -> Grid:

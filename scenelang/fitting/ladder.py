@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.elements.element import MOST_SIDE, Element
 from scenelang.elements.pyramid import Grid, packed, refine, unpacked
-from scenelang.elements.zoo import MOST_SIDE, Element
 from scenelang.fitting.mesh import Points
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.grid import GridShape
@@ -150,7 +150,7 @@ def fit(
     error, kept = best
     said = {**(about or {}), "error": error, "steps": len(tried), "ended": ended, "size": shape.size}
     said |= dict(zip("xyz", shape.centre, strict=False))
-    return Element(name, shape.dimension, kept.cells, kept.levels, kept.data, said), tried
+    return replace(kept, about=said), tried
 
 
 def measured(element: Element, points: Points, normals: Points) -> Rung:

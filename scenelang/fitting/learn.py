@@ -7,12 +7,13 @@ import hashlib
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from scenelang.elements.zoo import MOST_BYTES, Element, is_said, read_zoo, zoo_bytes
+from scenelang.elements.element import Element
+from scenelang.elements.zoo import MOST_BYTES, is_said, read_zoo, zoo_bytes
 from scenelang.files import NotWritten, output_place, read_regular, write_output
 from scenelang.fitting import mesh, outline
 from scenelang.fitting.ladder import NEAR, Rung, fit
@@ -98,7 +99,8 @@ def learn(
     troubles = []
     for file, called in zip(map(Path, files), names, strict=True):
         try:
-            element, found = _learned(file, called, wish, read_elements(out).get(called), say, progress)
+            known = read_elements(out).get((called, False))
+            element, found = _learned(file, called, wish, known, say, progress)
             if found:
                 add_elements(out, [element])
             made.append(element)
@@ -148,28 +150,32 @@ def _writable(out: str | os.PathLike[str]) -> None:
     read_elements(out)
 
 
-def read_elements(out: str | os.PathLike[str]) -> dict[str, Element]:
-    """What a file of elements holds that is to be written again; nothing where there is none.
+def read_elements(out: str | os.PathLike[str]) -> dict[tuple[str, bool], Element]:
+    """What a file of elements holds that is to be written again, by name and whether it is a material.
 
     Raises:
         OSError: it cannot be read, or is something else.
     """
     try:
         with open(out, "rb") as file:
-            return read_zoo(file.read(MOST_BYTES + 1)).elements
+            return _named(read_zoo(file.read(MOST_BYTES + 1)).elements)
     except FileNotFoundError:
         return {}
     except TensorError as error:
         raise NotWritten(errno.EINVAL, f"it is not a file of elements: {error}", os.fspath(out)) from None
 
 
+def _named(elements: Iterable[Element]) -> dict[tuple[str, bool], Element]:
+    return {(element.name, element.material): element for element in elements}
+
+
 def add_elements(out: str | os.PathLike[str], made: Sequence[Element]) -> None:
-    """Put elements into a file, in place of those of their names, whole or not at all.
+    """Put elements into a file, in place of the geometries and materials of their names, whole or not at all.
 
     Raises:
         OSError: it cannot be written, or would be more than can be read.
     """
-    data = zoo_bytes((read_elements(out) | {element.name: element for element in made}).values())
+    data = zoo_bytes((read_elements(out) | _named(made)).values())
     try:
         read_zoo(data)
     except TensorError as error:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import Span
-from scenelang.elements.zoo import Element
+from scenelang.elements.element import Element
 from scenelang.graph import affine
 from scenelang.graph.looks import WHITE, Look
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move

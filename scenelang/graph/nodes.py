@@ -14,7 +14,7 @@ from operator import attrgetter
 from typing import Any, TypeVar, cast
 
 from scenelang.diagnostics.span import Span
-from scenelang.elements.zoo import Element
+from scenelang.elements.element import Element
 from scenelang.graph.looks import Look
 from scenelang.graph.space import Box, Space
 from scenelang.graph.stage import Stage

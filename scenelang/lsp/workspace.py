@@ -18,7 +18,8 @@ from pygls.uris import from_fs_path, to_fs_path
 from scenelang.diagnostics.diagnostic import Diagnostic, Fix, Label
 from scenelang.diagnostics.diagnostic import Edit as Change
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.elements.zoo import SUFFIX, Element, load_zoo
+from scenelang.elements.element import Element
+from scenelang.elements.zoo import SUFFIX, load_zoo
 from scenelang.evaluate.loader import Unreadable, read_source
 from scenelang.lsp.text import Encoding, Lines, applied
 from scenelang.resolve.names import Names, Symbol, Use
@@ -209,7 +210,7 @@ class Workspace:
         if path is None or path.suffix != SUFFIX:
             return {}
         try:
-            return load_zoo(path).elements
+            return load_zoo(path).geometries
         except (OSError, TensorError):
             return {}
 

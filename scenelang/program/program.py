@@ -5,7 +5,8 @@ Its file is safetensors with a JSON header, read as if a stranger had written it
 ``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line, end column), all -1 where
 unknown, ``numbers`` I32 (N,) unless 1 to N. The header is metadata ``scenelang``, with a stage of solids.
 Programs with elements have format 2: the header lists these, ``forms`` I32 (N,) has the index of each
-row's, and ``element.0`` and so on are their bytes.
+row's geometry, and ``element.0`` and so on are their bytes. Where some are materials it is format 3, with a
+table of paints (`scenelang.program.paints`) and ``worn`` I32 (N,), the index of each row's paint or -1.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.elements.zoo import Element, entry_of
+from scenelang.elements.element import Element
+from scenelang.elements.zoo import entry_of
 from scenelang.files import write_output
 from scenelang.graph.stage import Stage, stage_data
 from scenelang.notebook import bundle
+from scenelang.program.paints import Paint, paint_fault, paint_tensors
 from scenelang.tensors import FORMAT
 from scenelang.words import TOKENS
 
@@ -65,6 +68,8 @@ class Program:
         numbers: of each row's object in the scene as written, from 1; by default the rows'.
         elements: what users brought.
         forms: int32 (N,), which of these a row shows; -1 for a geometry of the model. None stands for all -1.
+        palette: their materials as rows wear them.
+        worn: int32 (N,), which of these a row wears; -1 for the colour of its vector. None stands for all -1.
 
     Raises:
         ProgramError: anything is not as above.
@@ -83,18 +88,22 @@ class Program:
     numbers: tuple[int, ...] = field(default=(), repr=False)
     elements: tuple[Element, ...] = ()
     forms: npt.NDArray[np.int32] | None = field(default=None, repr=False)
+    palette: tuple[Paint, ...] = field(default=(), repr=False)
+    worn: npt.NDArray[np.int32] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         count = len(self.objects)
         if count > MOST_OBJECTS:
             raise ProgramError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
-        if self.forms is None:
-            object.__setattr__(self, "forms", np.full(count, -1, np.int32))
+        for name in ("forms", "worn"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.full(count, -1, np.int32))
         for name, dtype, shape in (
             ("vectors", np.float32, (count, WIDTH)),
             ("tokens", np.int8, (count,)),
             ("bounds", np.float32, (count, 4)),
             ("forms", np.int32, (count,)),
+            ("worn", np.int32, (count,)),
         ):
             object.__setattr__(self, name, _frozen(name, getattr(self, name), dtype, shape))
         if len(self.places) != count:
@@ -120,6 +129,11 @@ class Program:
             settings = (*settings, repr(self.stage))
         if self.elements:
             settings = (*settings, *[element and element.digest for element in self.brought()])
+        if self.palette:
+            settings = (
+                *settings,
+                *[paint and (paint.element.digest, paint.steps) for paint in self.paints()],
+            )
         total = hashlib.sha256(repr(settings).encode())
         for array, kind in ((self.vectors, "<f4"), (self.tokens, "i1"), (self.bounds, "<f4")):
             total.update(array.astype(kind).tobytes())
@@ -129,6 +143,11 @@ class Program:
         """Each row's element, None for a geometry of the model."""
         assert self.forms is not None
         return [self.elements[at] if at >= 0 else None for at in self.forms.tolist()]
+
+    def paints(self) -> list[Paint | None]:
+        """Each row's material that a user brought, None where its vector has the colour."""
+        assert self.worn is not None
+        return [self.palette[at] if at >= 0 else None for at in self.worn.tolist()]
 
     def check_weights(self, digest: str) -> None:
         """Raise ProgramError where it was compiled for other weights than those of a digest."""
@@ -181,6 +200,9 @@ def program_bytes(program: Program) -> bytes:
     if program.elements and program.forms is not None:
         tensors["forms"] = program.forms
         tensors |= {f"element.{at}": np.frombuffer(e.data, np.uint8) for at, e in enumerate(program.elements)}
+    if program.palette and program.worn is not None:
+        header["format"] = 3
+        tensors |= {"worn": program.worn, **paint_tensors(program.palette, program.elements)}
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data
@@ -205,13 +227,20 @@ def _check_rows(program: Program) -> None:
     if not known.all():
         row = int(np.argmin(known))
         raise ProgramError(f"token {int(program.tokens[row])} of object {row}, where 0 to 3 are known")
-    forms = program.forms
-    assert forms is not None
-    if ((forms < -1) | (forms >= len(program.elements))).any():
-        raise ProgramError("an object of an element that is not listed")
+    for index, listed, what in (
+        (program.forms, program.elements, "an element"),
+        (program.worn, program.palette, "a paint"),
+    ):
+        assert index is not None
+        if ((index < -1) | (index >= len(listed))).any():
+            raise ProgramError(f"an object of {what} that is not listed")
+    if any(element is not None and element.material for element in program.brought()):
+        raise ProgramError("an object whose geometry is a material")
     dimension = 2 if program.stage is None else 3
-    if any(element.dimension != dimension for element in program.elements):
+    if any(element.dimension != dimension for element in program.elements if not element.material):
         raise ProgramError(f"an element that is not of dimension {dimension}")
+    if (fault := paint_fault(program.palette, program.elements, dimension)) is not None:
+        raise ProgramError(fault)
     if len(program) and program.tokens[0] != 0:
         raise ProgramError(f"token {int(program.tokens[0])} of the first object, which is always 0")
     if program.stage is not None:

@@ -5,14 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from scenelang.elements.element import Element
 from scenelang.elements.zoo import MOST_BYTES as MOST_ELEMENT_BYTES
-from scenelang.elements.zoo import Element, read_elements
+from scenelang.elements.zoo import read_elements
 from scenelang.files import read_regular
 from scenelang.graph.stage import read_stage
+from scenelang.program.paints import read_paints
 from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
 from scenelang.tensors import MOST_HEADER, TensorError, TensorFile, read_tensors
 
-MOST_BYTES = MOST_HEADER + 8 + MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4) + MOST_ELEMENT_BYTES
+_MOST_STEPS = 10 * MOST_OBJECTS  # of all paints
+MOST_BYTES = MOST_HEADER + 8 + MOST_ELEMENT_BYTES + 16 * _MOST_STEPS
+MOST_BYTES += MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4 + 4 + 8)
 
 _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
     "vectors": ("F32", (WIDTH,)),
@@ -21,7 +25,12 @@ _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
     "objects": ("I32", ()),
     "places": ("I32", (5,)),
 }
-_OPTIONAL: dict[str, tuple[str, tuple[int, ...]]] = {"numbers": ("I32", ()), "forms": ("I32", ())}
+_OPTIONAL: dict[str, tuple[str, tuple[int, ...]]] = {
+    "numbers": ("I32", ()),
+    "forms": ("I32", ()),
+    "worn": ("I32", ()),
+}
+_TABLES: dict[str, tuple[str, tuple[int, ...]]] = {"paints": ("I32", (2,)), "steps": ("F32", (4,))}
 _HEADER: dict[str, Any] = {
     "background": list | None,
     "canvas": list,
@@ -56,10 +65,11 @@ def parse_program(data: bytes) -> Program:
         ProgramError: they hold none.
     """
     try:
-        file = read_tensors(data, MOST_BYTES, (1, 2))
+        file = read_tensors(data, MOST_BYTES, (1, 2, 3))
         elements = _read_elements(file)
         count = _count(file)
         tensors = file.arrays()
+        palette = read_paints(tensors["paints"], tensors["steps"], elements) if "worn" in tensors else ()
     except TensorError as error:
         raise ProgramError(f"not a program: {error}") from None
     header = file.header
@@ -95,11 +105,13 @@ def parse_program(data: bytes) -> Program:
         numbers=tuple(tensors["numbers"].tolist()) if "numbers" in tensors else (),
         elements=elements,
         forms=tensors.get("forms"),
+        palette=palette,
+        worn=tensors.get("worn"),
     )
 
 
 def _read_elements(file: TensorFile) -> tuple[Element, ...]:
-    """The elements of a file of format 2; their tensors are taken out of it."""
+    """The elements of a file of format 2 or 3; their tensors are taken out of it."""
     if file.header["format"] == 1:
         if "elements" in file.header:
             raise TensorError("elements in a file of format 1")
@@ -119,16 +131,20 @@ def _read_elements(file: TensorFile) -> tuple[Element, ...]:
 
 def _count(file: TensorFile) -> int:
     """Objects of a file whose tensors are those of a Program."""
-    if not _LAYOUT.keys() <= file.tensors.keys() <= _LAYOUT.keys() | _OPTIONAL.keys():
-        raise TensorError("it holds other tensors")
-    if ("forms" in file.tensors) != (file.header["format"] == 2):
-        raise TensorError("only a program of format 2 says which elements its objects are")
+    format = file.header["format"]
+    newer = ({"forms"} if format > 1 else set()) | ({"worn", *_TABLES} if format > 2 else set())
+    if not _LAYOUT.keys() | newer <= file.tensors.keys() <= _LAYOUT.keys() | newer | {"numbers"}:
+        raise TensorError(f"it holds other tensors than a program of format {format}")
     count = (*file.tensors["vectors"].shape, 0)[0]
     if count > MOST_OBJECTS:
         raise TensorError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
     for name, tensor in file.tensors.items():
-        kind, rest = (_LAYOUT | _OPTIONAL)[name]
-        if tensor.type != kind or tensor.shape != (count, *rest):
+        kind, rest = (_LAYOUT | _OPTIONAL | _TABLES)[name]
+        rows = count
+        if name in _TABLES:
+            most = _MOST_STEPS if name == "steps" else MOST_OBJECTS
+            rows = min((*tensor.shape, 0)[0], most)
+        if tensor.type != kind or tensor.shape != (rows, *rest):
             raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")
     return count
 

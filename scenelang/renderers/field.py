@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenelang.elements.zoo import Element
+from scenelang.elements.element import Element
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array
 from scenelang.renderers.frames import FAR, ObjectFrame, local_points, read_frame

@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from scenelang.elements.element import Element
 from scenelang.elements.pyramid import unpacked
-from scenelang.elements.zoo import Element
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.tensors import TensorError

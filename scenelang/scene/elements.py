@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, PrivateAttr
 
-from scenelang.elements.zoo import Element, Zoo, load_zoo
+from scenelang.elements.element import Element
+from scenelang.elements.zoo import Zoo, load_zoo
 from scenelang.scene.fields import Frozen, Word
 from scenelang.tensors import TensorError
 
@@ -71,7 +72,7 @@ def elements_of(files: tuple[Elements, ...]) -> dict[str, Element | None]:
         if file.zoo is None:
             found[file.name] = None
         else:
-            found |= {f"{file.name}.{name}": element for name, element in file.zoo.elements.items()}
+            found |= {f"{file.name}.{name}": element for name, element in file.zoo.geometries.items()}
     return found
 
 

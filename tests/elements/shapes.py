@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from scenelang.elements.element import Element
+from scenelang.elements.picture import painted
 from scenelang.elements.pyramid import Grid, packed, refine
-from scenelang.elements.zoo import Element
 
 Formula = Callable[..., np.ndarray]
 
@@ -37,3 +38,9 @@ def element(formula: Formula, name: str = "made", *, cells: int = 4, levels: int
         grid, found = refine(grid, len(axis), d, lambda _, true=true: true)
         steps.append(found)
     return packed(name, cells, steps, {"license": "none needed"})
+
+
+def noise(*shape: int, name: str = "bark", seed: int = 0) -> Element:
+    """A picture (h, w), or colours of space (n, n, n), at random."""
+    colours = np.random.default_rng(seed).integers(0, 256, (*shape, 3), np.uint8)
+    return painted(name, colours, {"license": "none needed"})

@@ -7,8 +7,8 @@ import zlib
 import numpy as np
 import pytest
 
+from scenelang.elements.element import Element
 from scenelang.elements.pyramid import between, unpacked
-from scenelang.elements.zoo import Element
 from tests.elements.shapes import Formula, ball, element, torus
 
 
@@ -43,6 +43,6 @@ def test_smooth_shapes_are_small() -> None:
 @pytest.mark.parametrize("value", [1, 127, 128, 129, 255])
 def test_any_bytes_are_distances(value: int) -> None:
     count = sum((4 * 2**level + 1) ** 3 for level in range(5))
-    grid = unpacked(Element("x", 3, 4, 5, zlib.compress(bytes([value]) * count)))
+    grid = unpacked(Element("x", "pyramid", (3, 4, 5), "deflate", zlib.compress(bytes([value]) * count)))
     assert grid.shape == (129, 129, 129)
     assert abs(grid).max() < 8

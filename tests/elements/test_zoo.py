@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from safetensors.numpy import save
 
-from scenelang.elements.zoo import Element, entry_of, load_zoo, read_zoo, zoo_bytes
+from scenelang.elements.element import Element
+from scenelang.elements.zoo import entry_of, load_zoo, read_zoo, zoo_bytes
 from scenelang.tensors import TensorError
 from tests.elements.shapes import ball, element, torus
 
@@ -21,8 +22,8 @@ def test_elements_come_back(tmp_path: Path) -> None:
     made = [element(torus, "ring"), element(ball, "ball", cells=6, levels=3)]
     (tmp_path / "zoo.safetensors").write_bytes(zoo_bytes(made))
     zoo = load_zoo(tmp_path / "zoo.safetensors")
-    assert list(zoo.elements.values()) == sorted(made, key=lambda e: e.name)
-    assert zoo.elements["ring"].about == {"license": "none needed"}
+    assert list(zoo.elements) == sorted(made, key=lambda e: e.name)
+    assert zoo.geometries["ring"].about == {"license": "none needed"}
     assert zoo_bytes(made[::-1]) == zoo_bytes(made)
 
 
@@ -52,7 +53,7 @@ def written(entry: dict[str, Any] | None = None, name: str = "ring", **header: A
         (written({"dimension": 4}), "sizes out of range"),
         (written({"levels": True}), "sizes out of range"),
         (written({"cells": 2.5}), "sizes out of range"),
-        (written({"cells": 8, "levels": 6}), "more than 193 nodes"),
+        (written({"cells": 8, "levels": 6}), "sizes out of range"),
         (written({"levels": 3}), "does not hold"),
         (written({"levels": 1}), "does not hold"),
         (written({"about": {"license": "x" * 3000}}), "says of itself"),
@@ -67,7 +68,7 @@ def test_damaged_files(data: bytes, words: str) -> None:
 
 
 def packed_as(data: bytes) -> bytes:
-    return zoo_bytes([Element("ring", 3, 4, 2, data)])
+    return zoo_bytes([Element("ring", "pyramid", (3, 4, 2), "deflate", data)])
 
 
 RING = element(torus, levels=2).data
@@ -87,7 +88,7 @@ def test_bytes_that_would_inflate_to_more_are_left_deflated() -> None:
 
 def test_many_elements_hold_no_more_than_one_file_may() -> None:
     whole = b"\0" * sum((6 * 2**level + 1) ** 3 for level in range(6))
-    large = Element("a", 3, 6, 6, zlib.compress(whole, 9))
+    large = Element("a", "pyramid", (3, 6, 6), "deflate", zlib.compress(whole, 9))
     listed = [replace(large, name=f"a{at}") for at in range(5)]
-    with pytest.raises(TensorError, match="more than 33,554,432 nodes"):
+    with pytest.raises(TensorError, match="more than 33,554,432 bytes"):
         read_zoo(zoo_bytes(listed))

@@ -40,11 +40,11 @@ def run(*arguments: Any) -> tuple[int, str]:
 def test_learn_adds_to_a_file_and_a_scene_draws_it(folder: Path) -> None:
     about = ("--license", "CC0", "--source", "https://example.org")
     assert run("a-ball.ply", "-o", "zoo.safetensors", *about)[0] == 0
-    before = load_zoo("zoo.safetensors").elements["a_ball"]
+    before = load_zoo("zoo.safetensors").geometries["a_ball"]
     asked = ("--max-error", "0.01", "--preview", "preview.png")
     code, output = run("2 boxes.stl", "star.svg", "-o", "zoo.safetensors", *asked)
     assert (code, Path("preview.png").stat().st_size > 1000) == (0, True), output
-    zoo = load_zoo("zoo.safetensors").elements
+    zoo = load_zoo("zoo.safetensors").geometries
     assert list(zoo) == ["_2_boxes", "a_ball", "star"]
     assert (zoo["a_ball"], zoo["a_ball"].about) == (before, before.about)
     assert (before.about["license"], before.about["source"]) == ("CC0", "https://example.org")
@@ -75,7 +75,7 @@ def test_what_was_finished_is_kept_and_not_made_again(folder: Path, monkeypatch:
     files, stops = ["star.svg", "a-ball.ply"], "a_ball"
     with pytest.raises(KeyboardInterrupt):
         learn(files, "z.safetensors")
-    assert list(load_zoo("z.safetensors").elements) == ["star"]
+    assert list(load_zoo("z.safetensors").geometries) == ["star"]
     stops = ""
     learn(files, "z.safetensors")
     assert fitted == ["star", "a_ball", "a_ball"]
@@ -109,7 +109,7 @@ def test_a_file_that_fails_does_not_stop_the_others(folder: Path) -> None:
         "Error: notes.txt: not one of .obj, .ply",
     ):
         assert line in output
-    assert list(load_zoo("z.safetensors").elements) == ["star"]
+    assert list(load_zoo("z.safetensors").geometries) == ["star"]
 
 
 @pytest.mark.parametrize(
@@ -153,7 +153,7 @@ main(["learn", "star.svg", "2 boxes.stl", "-o", "z.safetensors"])
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
     assert done.returncode == -9, done.stderr
-    assert list(load_zoo("z.safetensors").elements) == ["star"]
+    assert list(load_zoo("z.safetensors").geometries) == ["star"]
     assert run("star.svg", "2 boxes.stl", "-o", "z.safetensors")[1].count("made before") == 1
     assert sorted(path.name for path in folder.iterdir() if "safetensors" in path.name) == [
         "bad.safetensors",

@@ -19,7 +19,7 @@ from tests.elements.shapes import ball, element, torus
 
 
 def compiled() -> Program:
-    zoo = nsg.Elements.of("zoo", "z", Zoo({"ring": element(torus, "ring", levels=2)}, "0" * 64))
+    zoo = nsg.Elements.of("zoo", "z", Zoo.of([element(torus, "ring", levels=2)]))
     objects = [nsg.Object("zoo.ring"), nsg.Object("sphere", nsg.Translate(1, 1))]
     return compile_scene(nsg.Scene(elements=zoo, nodes=objects))
 
@@ -41,12 +41,13 @@ def test_nothing_changed() -> None:
     ("change", "words"),
     [
         (lambda h, t: h.update(format=1), "elements in a file of format 1"),
-        (lambda h, t: h.update(format=3), "not of format 1 or 2"),
+        (lambda h, t: h.update(format=3), "other tensors than a program of format 3"),
+        (lambda h, t: h.update(format=4), "not of format 1 or 2 or 3"),
         (lambda h, t: h.pop("elements"), "list of elements is damaged"),
         (lambda h, t: h.update(elements=[["ring"]]), "list of elements is damaged"),
         (lambda h, t: h.update(elements=[]), "other tensors"),
         (lambda h, t: t.pop("element.0"), "has no bytes"),
-        (lambda h, t: t.pop("forms"), "says which elements"),
+        (lambda h, t: t.pop("forms"), "other tensors"),
         (lambda h, t: t.update(forms=np.array([1, -1], np.int32)), "not listed"),
         (lambda h, t: t.update(forms=np.array([0, -2], np.int32)), "not listed"),
         (lambda h, t: t.update(forms=np.array([0.0, 1.0], np.float32)), "`forms` is F32"),

@@ -274,7 +274,7 @@ def _elements(path: Path, zoo: Zoo, stmt: nodes.Import, context: FileContext) ->
     known = session.elements[path].name
     source = SourceFile(stmt.path.value, "")
     brought = FileContext(source, session, context.loader, context.defines, path)
-    names = {name: Binding("element", stmt.alias.span, value=f"{known}.{name}") for name in zoo.elements}
+    names = {name: Binding("element", stmt.alias.span, value=f"{known}.{name}") for name in zoo.geometries}
     brought.scope.names.update(names)
     return brought
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenelang.elements.zoo import Element
+from scenelang.elements.element import Element
 from scenelang.renderers.arrays import Array, Arrays, Layers
 from scenelang.renderers.field import SMOOTH, UNION
 from scenelang.renderers.grid import GridShape, grid_shape

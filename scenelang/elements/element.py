@@ -1,0 +1,133 @@
+"""Elements: what users bring, as bytes with a few sizes. Nothing here needs numpy."""
+
+from __future__ import annotations
+
+import hashlib
+import zlib
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from scenelang.tensors import TensorError
+
+MOST_SIDE: Final = {2: 1025, 3: 193}  # nodes along an axis, by dimension
+MOST_PIXELS: Final = 2048  # along a side of a picture
+
+
+class Form(NamedTuple):
+    """What an element can be.
+
+    Args:
+        sizes: its numbers, as headers call them.
+        codings: of its bytes; the first is meant where a header says none.
+        kinds: what manifests call its like, by dimension.
+    """
+
+    sizes: tuple[str, ...]
+    codings: tuple[str, ...]
+    kinds: dict[int, str]
+
+
+FORMS: Final = {
+    # a geometry: grids of distances over [-1, 1]^d (`scenelang.elements.pyramid`)
+    "pyramid": Form(
+        ("dimension", "cells", "levels"), ("deflate",), {2: "element of the plane", 3: "element of space"}
+    ),
+    # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.elements.picture`)
+    "picture": Form(("height", "width"), ("png", "webp", "jpeg"), {2: "texture"}),
+    # a material: colours over [-1, 1]^3, at nodes on its faces too
+    "colours": Form(("side",), ("deflate",), {3: "colouring of space"}),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """A geometry in the unit ball of its own space, or a material, that a user brought.
+
+    Args:
+        name: what scenes call it, behind the name of the import.
+        form: one of `FORMS`.
+        sizes: its numbers, as the form has them. A pyramid has its dimension (2 or 3), the cells of its
+            coarsest grid along an axis, and grids, each of twice as many cells as the one before; a picture
+            height and width in texels; colours their nodes along an axis.
+        coding: of its bytes, one of the form's.
+        data: the bytes.
+        about: what its maker says of it: license, source, errors; text and numbers by their names.
+        digest: SHA-256, hex, of all that decides its shape or its colours.
+    """
+
+    name: str
+    form: str
+    sizes: tuple[int, ...]
+    coding: str
+    data: bytes = field(repr=False)
+    about: dict[str, str | float] = field(default_factory=dict, hash=False, compare=False)
+    digest: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        words = (self.form, *self.sizes, *((self.coding,) if self.material else ()))
+        said = "".join(f"{word} " for word in words).encode()
+        object.__setattr__(self, "digest", hashlib.sha256(said + self.data).hexdigest())
+
+    @property
+    def material(self) -> bool:
+        """Whether it is a material, and no geometry."""
+        return self.form != "pyramid"
+
+    @property
+    def dimension(self) -> int:
+        """Of the space that it fills."""
+        return self.sizes[0] if self.form == "pyramid" else 2 if self.form == "picture" else 3
+
+    @property
+    def kind(self) -> str:
+        """What manifests call its like."""
+        return FORMS[self.form].kinds[self.dimension]
+
+    def told(self) -> str:
+        """What there is to say of it, a line each."""
+        sides = self.sizes[::-1] if self.form == "picture" else (self.sides[-1],) * self.dimension
+        what = "colours" if self.material else "distances"
+        lines = [f"{self.kind}: {' × '.join(map(str, sides))} {what}, {len(self.data):,} bytes"]
+        return "\n".join([*lines, *(f"{key}: {value}" for key, value in self.about.items())])
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """Nodes along an axis of each grid."""
+        if self.form == "pyramid":
+            _, cells, levels = self.sizes
+            return tuple(cells * 2**level + 1 for level in range(levels))
+        return self.sizes
+
+    @property
+    def held(self) -> int:
+        """Bytes that it takes unpacked, one a distance or a channel."""
+        if self.form == "picture":
+            return 3 * self.sizes[0] * self.sizes[1]
+        nodes: int = sum(side**self.dimension for side in self.sides)
+        return 3 * nodes if self.material else nodes
+
+    def inflated(self) -> bytes:
+        """The bytes of all nodes, of a coding that deflates them.
+
+        Raises:
+            TensorError: they are damaged, fewer or more.
+        """
+        inflate = zlib.decompressobj()
+        try:
+            found = inflate.decompress(self.data, self.held + 1)
+        except zlib.error as error:
+            raise TensorError(f"element `{self.name}` is damaged: {error}") from None
+        if len(found) != self.held or not inflate.eof or inflate.unused_data:
+            raise TensorError(f"element `{self.name}` does not hold {self.held:,} bytes")
+        return found
+
+
+def in_range(form: str, sizes: tuple[int, ...]) -> bool:
+    """Whether sizes are ones that a form takes."""
+    if form == "picture":
+        return all(1 <= side <= MOST_PIXELS for side in sizes)
+    if form == "colours":
+        return 2 <= sizes[0] <= MOST_SIDE[3]
+    dimension, cells, levels = sizes
+    fits = dimension in MOST_SIDE and 2 <= cells <= 8 and 1 <= levels <= 9
+    return fits and cells * 2 ** (levels - 1) < MOST_SIDE[dimension]

@@ -1,0 +1,79 @@
+"""Materials that users bring: pictures of the plane, and grids of colours of space.
+
+A picture's bytes are those of a file that Pillow reads, of the one kind which its coding names. Colours of
+space are 8 bits, red, green and blue of node after node, z first to change, deflated.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import warnings
+from typing import TYPE_CHECKING, Final
+
+from scenelang.elements.element import Element
+from scenelang.tensors import TensorError
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+_FILES: Final = {"png": "PNG", "webp": "WEBP", "jpeg": "JPEG"}
+"""Codings of pictures, and what Pillow calls their files; no other opener is tried."""
+
+
+def pixels(element: Element) -> bytes:
+    """Red, green and blue, 8 bits, of each texel of a picture, row after row from the top.
+
+    Raises:
+        TensorError: the bytes are damaged, or those of another picture than the sizes tell.
+    """
+    from PIL import Image
+
+    height, width = element.sizes
+    bombs = Image.DecompressionBombError, Image.DecompressionBombWarning
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(element.data), formats=[_FILES[element.coding]]) as image:
+                if image.size != (width, height):
+                    raise ValueError(f"a picture of {image.size[0]} x {image.size[1]}")
+                if image.info.get("progressive") or getattr(image, "n_frames", 1) > 1:
+                    raise ValueError("a picture of several scans")  # a few bytes each, and all texels
+                return image.convert("RGB").tobytes()
+    except (OSError, ValueError, SyntaxError, EOFError, struct.error, *bombs) as error:
+        raise TensorError(f"element `{element.name}` is damaged: {error}") from None
+
+
+def texels(element: Element) -> npt.NDArray[np.float32]:
+    """Colours of a material as they are in its file, sRGB-encoded, in [0, 1].
+
+    Returns:
+        (h, w, 3) of a picture, the first row at the top; (n, n, n, 3) of colours of space, by x, y and z.
+
+    Raises:
+        TensorError: the element is damaged.
+    """
+    import numpy as np
+
+    if element.form == "picture":
+        flat, shape = pixels(element), (*element.sizes, 3)
+    else:
+        flat, shape = element.inflated(), (*element.sizes * 3, 3)
+    return np.frombuffer(flat, np.uint8).reshape(shape).astype(np.float32) / np.float32(255)
+
+
+def painted(
+    name: str, colours: npt.NDArray[np.uint8], about: dict[str, str | float] | None = None
+) -> Element:
+    """The element of a picture (h, w, 3) or of colours of space (n, n, n, 3), without loss."""
+    if colours.ndim == 4:
+        import zlib
+
+        data = zlib.compress(colours.tobytes(), 9)
+        return Element(name, "colours", colours.shape[:1], "deflate", data, about or {})
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(colours).save(file, "PNG", optimize=True)
+    return Element(name, "picture", colours.shape[:2], "png", file.getvalue(), about or {})
