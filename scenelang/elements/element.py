@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bz2
 import hashlib
 import zlib
 from dataclasses import dataclass, field
@@ -34,8 +35,8 @@ FORMS: Final = {
     ),
     # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.elements.picture`)
     "picture": Form(("height", "width"), ("png", "webp", "jpeg"), {2: "texture"}),
-    # a material: colours over [-1, 1]^3, at nodes on its faces too
-    "colours": Form(("side",), ("deflate",), {3: "colouring of space"}),
+    # a material: colours over [-1, 1]^3, at nodes on its faces too (`scenelang.elements.colours`)
+    "colours": Form(("side",), ("bzip2",), {3: "colouring of space"}),
 }
 
 
@@ -96,7 +97,12 @@ class Element:
         if self.form == "pyramid":
             _, cells, levels = self.sizes
             return tuple(cells * 2**level + 1 for level in range(levels))
-        return self.sizes
+        if self.form == "picture":
+            return self.sizes
+        found = list(self.sizes)
+        while found[0] % 2 and found[0] >= 9:  # halved as far as that leaves 4 cells
+            found.insert(0, found[0] // 2 + 1)
+        return tuple(found)
 
     @property
     def held(self) -> int:
@@ -107,15 +113,15 @@ class Element:
         return 3 * nodes if self.material else nodes
 
     def inflated(self) -> bytes:
-        """The bytes of all nodes, of a coding that deflates them.
+        """The bytes of all nodes, of a form that has such.
 
         Raises:
             TensorError: they are damaged, fewer or more.
         """
-        inflate = zlib.decompressobj()
+        inflate = bz2.BZ2Decompressor() if self.coding == "bzip2" else zlib.decompressobj()
         try:
             found = inflate.decompress(self.data, self.held + 1)
-        except zlib.error as error:
+        except (zlib.error, OSError, EOFError) as error:
             raise TensorError(f"element `{self.name}` is damaged: {error}") from None
         if len(found) != self.held or not inflate.eof or inflate.unused_data:
             raise TensorError(f"element `{self.name}` does not hold {self.held:,} bytes")

@@ -1,7 +1,7 @@
 """Materials that users bring: pictures of the plane, and grids of colours of space.
 
-A picture's bytes are those of a file that Pillow reads, of the one kind which its coding names. Colours of
-space are 8 bits, red, green and blue of node after node, z first to change, deflated.
+A picture's bytes are those of a file that Pillow reads, of the one kind which its coding names.
+`scenelang.elements.colours` has those of colours of space.
 """
 
 from __future__ import annotations
@@ -56,22 +56,18 @@ def texels(element: Element) -> npt.NDArray[np.float32]:
     """
     import numpy as np
 
-    if element.form == "picture":
-        flat, shape = pixels(element), (*element.sizes, 3)
-    else:
-        flat, shape = element.inflated(), (*element.sizes * 3, 3)
-    return np.frombuffer(flat, np.uint8).reshape(shape).astype(np.float32) / np.float32(255)
+    if element.form == "colours":
+        from scenelang.elements.colours import unpacked
+
+        return np.moveaxis(unpacked(element), 0, -1)
+    flat = np.frombuffer(pixels(element), np.uint8).reshape((*element.sizes, 3))
+    return flat.astype(np.float32) / np.float32(255)
 
 
 def painted(
     name: str, colours: npt.NDArray[np.uint8], about: dict[str, str | float] | None = None
 ) -> Element:
-    """The element of a picture (h, w, 3) or of colours of space (n, n, n, 3), without loss."""
-    if colours.ndim == 4:
-        import zlib
-
-        data = zlib.compress(colours.tobytes(), 9)
-        return Element(name, "colours", colours.shape[:1], "deflate", data, about or {})
+    """The element of a picture (h, w, 3), without loss."""
     from PIL import Image
 
     file = io.BytesIO()

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from scenelang.elements.colours import packed as packed_colours
 from scenelang.elements.element import Element
 from scenelang.elements.picture import painted
 from scenelang.elements.pyramid import Grid, packed, refine
@@ -43,4 +44,7 @@ def element(formula: Formula, name: str = "made", *, cells: int = 4, levels: int
 def noise(*shape: int, name: str = "bark", seed: int = 0) -> Element:
     """A picture (h, w), or colours of space (n, n, n), at random."""
     colours = np.random.default_rng(seed).integers(0, 256, (*shape, 3), np.uint8)
+    if len(shape) == 3:
+        grid = np.moveaxis(colours, -1, 0) / np.float32(255)
+        return packed_colours(name, grid, np.ones(shape, bool), {"license": "none needed"})
     return painted(name, colours, {"license": "none needed"})
