@@ -81,10 +81,10 @@ def exact_outputs(
     from scenelang.program.emit import places_of
     from scenelang.reference.outputs import graph_outputs
 
-    graph = exact_graph(scene, spans, model)
+    graph, brought = exact_graph(scene, spans, model)
     _check(wanted, graph.stage is None)
     try:
-        found = graph_outputs(graph)
+        found = graph_outputs(graph, brought)
     except ValueError as error:
         raise RenderError(str(error)) from None
     objects = list(leaves(graph.root))

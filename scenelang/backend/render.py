@@ -11,14 +11,17 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.scene.schema import Scene
 
 if TYPE_CHECKING:
+    from scenelang.fitting.ladder import Shape
     from scenelang.graph.lower import Spans
     from scenelang.graph.nodes import Graph
     from scenelang.image import Image
     from scenelang.program.program import Program
 
 
-def exact_graph(scene: Scene, spans: Spans | None = None, model: str | None = None) -> Graph:
-    """The graph of a scene as written; raises `SceneError` where it uses what its model does not have."""
+def exact_graph(
+    scene: Scene, spans: Spans | None = None, model: str | None = None
+) -> tuple[Graph, dict[str, Shape]]:
+    """The graph of a scene as written, and true shapes of its elements; raises as `draw_exact`."""
     from scenelang.graph.lower import lower
     from scenelang.program.compile import find_model
 
@@ -27,7 +30,15 @@ def exact_graph(scene: Scene, spans: Spans | None = None, model: str | None = No
     graph = lower(scene, manifest, spans, found) if manifest is not None else None
     if graph is None or found.errors:
         raise SceneError(found)
-    return graph
+    if not graph.elements:
+        return graph, {}
+    from scenelang.fitting.mesh import FitError
+    from scenelang.fitting.originals import originals_of
+
+    try:
+        return graph, originals_of(scene, graph)
+    except (FitError, OSError) as error:
+        raise RenderError(str(error)) from None
 
 
 def draw_exact(scene: Scene, *, spans: Spans | None = None, model: str | None = None) -> Image:
@@ -38,13 +49,13 @@ def draw_exact(scene: Scene, *, spans: Spans | None = None, model: str | None = 
 
     Raises:
         SceneError: the scene uses what its model does not have.
-        RenderError: there is no picture from where the eye is.
+        RenderError: there is no picture from where the eye is, or no original of an element.
     """
     from scenelang.reference.image import reference_image
 
-    graph = exact_graph(scene, spans, model)
+    graph, brought = exact_graph(scene, spans, model)
     try:
-        return reference_image(graph)
+        return reference_image(graph, brought=brought)
     except ValueError as error:
         raise RenderError(str(error)) from None
 
@@ -86,7 +97,8 @@ def render(
     Raises:
         SceneError: the Scene cannot be compiled.
         RenderError: there is no such device, the model's weights are missing or not those the Program was
-            compiled for, it does not draw in this way, or the reference was given a Program.
+            compiled for, it does not draw in this way, the reference was given a Program, or it has no
+            original of an element.
         ValueError: an argument is none of the above.
     """
     if samples not in get_args(Samples):

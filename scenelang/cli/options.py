@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 from functools import wraps
@@ -38,6 +39,11 @@ def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
             raise click.BadParameter(f"`{value}` is not NAME=value", ctx, param)
         found[name.strip()] = text.strip()
     return Defines(found)
+
+
+def _originals(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
+    if value is not None:  # as every process that draws frames sees it
+        os.environ["SCENELANG_ORIGINALS"] = value
 
 
 def choice(*names: str, words: str, help: str | None = None) -> Callable[..., Any]:
@@ -89,6 +95,14 @@ color = choice(
 strict = click.option("--strict", is_flag=True, help="Count warnings as errors.")
 backend = choice(
     "--backend", words="neural reference", help="Draw with the trained network, or by the exact definition."
+)
+originals = click.option(
+    "--originals",
+    type=click.Path(exists=True, file_okay=False),
+    metavar="FOLDER",
+    expose_value=False,
+    callback=_originals,
+    help="Where the exact picture finds the files that elements were made from; by default beside these.",
 )
 device = choice(
     "--device",

@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -36,6 +36,7 @@ class Zoo:
     geometries: dict[str, Element]
     digest: str  # SHA-256 of the file, hex
     materials: dict[str, Element] = field(default_factory=dict)
+    folder: Path | None = field(default=None, compare=False)  # where it lies
 
     @staticmethod
     def of(elements: Iterable[Element], digest: str = "0" * 64) -> Zoo:
@@ -64,7 +65,7 @@ def load_zoo(path: str | Path) -> Zoo:
 @lru_cache(maxsize=16)
 def _load(path: str, *version: int) -> Zoo:
     """The elements of a version of a file, which editors and animations ask for again and again."""
-    return read_zoo(read_regular(path, MOST_BYTES))
+    return replace(read_zoo(read_regular(path, MOST_BYTES)), folder=Path(path).parent)
 
 
 _TABLES: Final = {"elements": "", "materials": "material."}

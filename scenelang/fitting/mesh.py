@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
@@ -23,13 +24,14 @@ MOST_OF: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # byt
 MOST_TRIANGLES: Final = 4_000_000
 _ENCLOSED: Final = 0.5  # share of a surface that has to have an inside
 _BESIDE: Final = 2e-3  # leaf units from a surface to where its sides are asked
+_TOUCHING: Final = 1e-6  # leaf units from a surface to where its normals are those of its triangles
 
 
 class FitError(ValueError):
     """What cannot be made an element, and why."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Mesh:
     """A solid in the unit ball: the midpoint of its bounding box is the origin, its farthest point at 1.
 
@@ -49,19 +51,41 @@ class Mesh:
     notes: tuple[str, ...] = ()
     dimension: ClassVar[int] = 3
 
+    @cached_property
+    def _trees(self) -> tuple[Any, Any]:
+        """What finds the nearest triangle, and winding numbers."""
+        igl = _igl()
+        boxes, windings = igl.AABB(), igl.FastWindingNumberBVH()
+        boxes.init(self.vertices, self.triangles)
+        windings.init(self.vertices, self.triangles)
+        return boxes, windings
+
     def distances(self, p: Points) -> Points:
         """Signed distances (M,) of points, negative inside."""
-        igl = _igl()
-        p = np.ascontiguousarray(p)
+        return self._nearest(p)[0]
+
+    def slopes(self, p: Points) -> Points:
+        """Gradients (M, 3) of `distances`."""
+        d, triangle, at = self._nearest(p)
+        a, b, c = self.vertices[self.triangles[triangle]].swapaxes(0, 1)
+        normal, off = np.cross(b - a, c - a), p - at
+        normal *= np.sign((normal * off).sum(1))[:, None]  # to the side that the point is on
+        way = np.where(abs(d)[:, None] < _TOUCHING, normal, off)
+        way *= np.where(d < 0, -1.0, 1.0)[:, None] / np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
+        return np.asarray(way, float)
+
+    def _nearest(self, p: Points) -> tuple[Points, npt.NDArray[np.int64], Points]:
+        """Signed distances (M,) of points, the nearest triangle (M,) and the nearest point (M, 3) on it."""
         if not len(p):
-            return np.zeros(0)
+            return np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3))
+        igl, mesh, p = _igl(), (self.vertices, self.triangles), np.ascontiguousarray(p, float)
         if self.closed:
             kind = igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-            return np.asarray(igl.signed_distance(p, self.vertices, self.triangles, sign_type=kind)[0])
-        kind = igl.SIGNED_DISTANCE_TYPE_UNSIGNED
-        away = igl.signed_distance(p, self.vertices, self.triangles, sign_type=kind)[0]
-        winding = igl.fast_winding_number(self.vertices, self.triangles, p)
-        return np.asarray(np.where(abs(winding) > 0.5, -away, away), float)
+            d, triangle, at, _ = igl.signed_distance(p, *mesh, sign_type=kind)
+            return d, triangle, at
+        boxes, windings = self._trees
+        square, triangle, at = boxes.squared_distance(*mesh, p)
+        return np.where(abs(windings.winding_number(p)) > 0.5, -1.0, 1.0) * np.sqrt(square), triangle, at
 
     def surface(self, count: int) -> tuple[Points, Points]:
         """Points (K, 3) spread evenly on the outside of the solid, K at most ``count``, and normals there.

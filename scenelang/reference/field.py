@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import reduce
 from operator import add, mul
 from typing import Any
@@ -31,6 +31,10 @@ SECTORS: dict[str, tuple[int, float, float, float]] = {
     "star": (5, math.pi / 2, 1.0, 0.381966),
     "pentagon": (5, math.pi / 2, 1.0, math.cos(math.pi / 5)),
 }
+
+Brought = Mapping[str, Any]
+"""True shapes of elements by geometry: each answers points (M, d) of the leaf's own space with signed
+``distances`` (M,), and in space with their gradients ``slopes`` (M, 3)."""
 
 TORUS = (0.7, 0.3)  # radii of the circle about y and of the tube
 
@@ -66,12 +70,15 @@ def sector_distance(p: Array, n: Array, phase: Array, outer: Array, inner: Array
     return xp.where(edge_u * v - edge_v * u < 0, distance, -distance)
 
 
-def leaf_distance(geometry: str, p: Array) -> Array:
+def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Array:
     """Exact Euclidean signed distance of a leaf in its own space; raises KeyError if unknown.
 
     Args:
         p: points in leaf units, (2, …), or (3, …) for the sphere and the torus.
+        brought: shapes of elements, whose points are (d, M).
     """
+    if brought and geometry in brought:
+        return brought[geometry].distances(np.transpose(p))
     if geometry in ("sphere", "torus"):
         x, y, z = p
         xp = namespace(x)
@@ -181,22 +188,31 @@ def distance_scale(steps: Sequence[Step], dimension: int = 2) -> float:
     return float(np.linalg.svd(linear, compute_uv=False)[-1])
 
 
-def evaluate(node: Node, p: Array, outer: tuple[Step, ...] = (), *, owners: bool = False) -> tuple[Any, Any]:
+def evaluate(
+    node: Node,
+    p: Array,
+    outer: tuple[Step, ...] = (),
+    *,
+    owners: bool = False,
+    brought: Brought | None = None,
+) -> tuple[Any, Any]:
     """Distance D (M,) and colour C (M, 3) of a node at world points.
 
     Args:
         p: world points (d, M), float64.
         outer: steps of the folds around it, nearest first.
         owners: in place of the colour the number (M, 1) of the object that paints; in a blend the nearer one.
+        brought: shapes of elements.
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
-        d = leaf_distance(node.geometry, carry_back(steps, p)) * distance_scale(steps, len(p))
+        own = leaf_distance(node.geometry, carry_back(steps, p), brought)
+        d = own * distance_scale(steps, len(p))
         paint = np.asarray((node.number,) if owners else node.look.colour(), np.float64)
         return d, np.broadcast_to(paint, (*d.shape, len(paint)))
     big_d, big_c = np.full(p[0].shape, np.inf), np.zeros((*p[0].shape, 1 if owners else 3))
     for index, link in enumerate(node.links):
-        d, c = evaluate(link.node, p, steps, owners=owners)
+        d, c = evaluate(link.node, p, steps, owners=owners, brought=brought)
         empty = isinstance(link.node, Fold) and not link.node.links
         if index == 0:
             big_d, big_c = d, c

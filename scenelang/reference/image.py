@@ -10,19 +10,20 @@ import numpy as np
 
 from scenelang.graph.nodes import Graph, leaves
 from scenelang.image import Image, from_samples
-from scenelang.reference.field import evaluate
+from scenelang.reference.field import Brought, evaluate
 from scenelang.reference.samples import sample_points
 from scenelang.reference.solid.image import solid_image
 
 TILE = 1 << 18  # samples at a time
 
 
-def reference_image(graph: Graph, *, per_side: int = 2) -> Image:
+def reference_image(graph: Graph, *, per_side: int = 2, brought: Brought | None = None) -> Image:
     """Draw the exact picture of a lowered graph.
 
     Args:
         graph: from `lower`; passes keep its picture.
         per_side: samples along each side of a pixel; 2 is the definition (4 spp).
+        brought: shapes of elements.
 
     Returns:
         (H, W, 3), or (H, W, 4) with straight alpha where the background is none.
@@ -30,18 +31,16 @@ def reference_image(graph: Graph, *, per_side: int = 2) -> Image:
     Raises:
         ValueError: the eye is inside something opaque, or a shape is known only by what was made of it.
     """
-    brought = next((leaf.geometry for leaf in leaves(graph.root) if leaf.geometry in graph.elements), None)
-    if brought is not None:
-        raise ValueError(f"the exact shape of `{brought}` is not known")
+    check_shapes(graph, brought)
     if graph.stage is not None:
-        return solid_image(graph.root, graph.stage, graph.canvas, per_side=per_side)
+        return solid_image(graph.root, graph.stage, graph.canvas, per_side=per_side, brought=brought)
     width, height = graph.canvas
     step = max(1, TILE // (width * per_side * per_side))
     colour = np.empty((height, width, 3))
     alpha = np.empty((height, width))
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
-        d, c = evaluate(graph.root, sample_points(graph.canvas, rows, per_side))
+        d, c = evaluate(graph.root, sample_points(graph.canvas, rows, per_side), brought=brought)
         inside = (d < 0).reshape(len(rows), per_side, width, per_side)
         shown = np.where(inside[..., None], c.reshape(*inside.shape, 3), 0.0)
         colour[top : rows.stop] = shown.mean((1, 3))
@@ -49,3 +48,11 @@ def reference_image(graph: Graph, *, per_side: int = 2) -> Image:
     if graph.background is None:
         return from_samples(colour, alpha)
     return from_samples(colour + (1 - alpha)[..., None] * np.asarray(graph.background), None)
+
+
+def check_shapes(graph: Graph, brought: Brought | None) -> None:
+    """Raise `ValueError` where a graph shows an element whose true shape is not given."""
+    unknown = graph.elements.keys() - (brought or {}).keys()
+    name = next((leaf.geometry for leaf in leaves(graph.root) if leaf.geometry in unknown), None)
+    if name is not None:
+        raise ValueError(f"the exact shape of `{name}` is not known")

@@ -7,34 +7,40 @@ import numpy as np
 from scenelang.graph.nodes import Graph
 from scenelang.graph.stage import EXTINCTION, Stage
 from scenelang.outputs import DEEP, Outputs
-from scenelang.reference.field import Array, evaluate
-from scenelang.reference.image import TILE
+from scenelang.reference.field import Array, Brought, evaluate
+from scenelang.reference.image import TILE, check_shapes
 from scenelang.reference.samples import sample_points
 from scenelang.reference.solid.field import OPAQUE, Field
 from scenelang.reference.solid.image import TILE as SOLID_TILE
 from scenelang.reference.solid.image import facing, seen_along, ways
 
 
-def graph_outputs(graph: Graph) -> Outputs:
+def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
     """All outputs that a lowered graph has.
 
+    Args:
+        brought: shapes of elements.
+
     Raises:
-        ValueError: the eye is inside something opaque.
+        ValueError: as `reference_image`.
     """
+    check_shapes(graph, brought)
     width, height = graph.canvas
     solid = graph.stage is not None
     found = np.zeros((6, height, width))  # depth, normal, object and alpha
     step = max(1, (SOLID_TILE if solid else TILE) // (4 * width))
-    field = Field(graph.root) if solid else None
+    field = Field(graph.root, brought) if solid else None
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
         if graph.stage is not None and field is not None:
             centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
             alpha = _covered(field, graph.stage, ways(graph.stage, graph.canvas, rows, 2))
         else:
-            d, owner = evaluate(graph.root, sample_points(graph.canvas, rows, 1), owners=True)
+            d, owner = evaluate(
+                graph.root, sample_points(graph.canvas, rows, 1), owners=True, brought=brought
+            )
             centres = np.where(d < 0, owner[:, 0], 0)
-            alpha = evaluate(graph.root, sample_points(graph.canvas, rows, 2))[0] < 0
+            alpha = evaluate(graph.root, sample_points(graph.canvas, rows, 2), brought=brought)[0] < 0
         found[0 if solid else 4 : 5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
         found[5, rows.start : rows.stop] = alpha.reshape(len(rows), 2, width, 2).mean((1, 3))
     depth, normal, owner, alpha = found[0], np.moveaxis(found[1:4], 0, 2), found[4], found[5]

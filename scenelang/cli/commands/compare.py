@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 @click.argument("scene", metavar="SCENE")
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Picture; by default SCENE-compare.png.")
 @options.request
+@options.originals
 @options.device
 @options.threads
 @click.pass_context

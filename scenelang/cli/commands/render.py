@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     metavar="E",
     help="Choose the fastest way to draw whose promised FLIP error is at most so large.",
 )
+@options.originals
 @options.device
 @options.threads
 @options.strict

@@ -13,7 +13,7 @@ import numpy as np
 
 from scenelang.graph.nodes import Leaf
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
-from scenelang.reference.field import TORUS, Array, distance_scale, leaf_distance
+from scenelang.reference.field import TORUS, Array, Brought, distance_scale, leaf_distance
 
 _REACH = 0.15
 _TINY = 1e-300  # added to lengths that something is divided by
@@ -118,10 +118,13 @@ class Body:
         leaf: its own look and geometry; colours are linear.
         steps: nearest the leaf first.
         margin: the ball holds every point whose distance is below it, in world units.
+        brought: shapes of elements.
     """
 
-    def __init__(self, leaf: Leaf, steps: Sequence[Step], margin: float) -> None:
-        self.geometry = leaf.geometry
+    def __init__(
+        self, leaf: Leaf, steps: Sequence[Step], margin: float, brought: Brought | None = None
+    ) -> None:
+        self.geometry, self.brought = leaf.geometry, brought or {}
         self.rgb = np.reshape(leaf.look.colour(), (3, 1))
         self.medium = leaf.look.material == "volumetric"
         first = steps[0] if steps else None
@@ -163,7 +166,7 @@ class Body:
         for step in self.back:
             stretch = step.stretch(length(p) + far)
             rate, far, p = rate * stretch, far * stretch, step(p)
-        d = leaf_distance(self.geometry, p)
+        d = leaf_distance(self.geometry, p, self.brought)
         if self.displace:
             x, y, z = np.sin(self.displace.frequency * p)
             d = d + self.displace.amount * x * y * z
@@ -176,7 +179,9 @@ class Body:
         for step in back:
             points.append(step(points[-1]))
         x, y, z = q = points[-1]
-        if self.geometry == "sphere":
+        if self.geometry in self.brought:
+            g = self.brought[self.geometry].slopes(q.T).T
+        elif self.geometry == "sphere":
             g = q / (length(q) + _TINY)
         else:
             around = np.sqrt(x * x + z * z) + _TINY
@@ -186,7 +191,7 @@ class Body:
         if self.displace:
             f = self.displace.frequency
             (sx, sy, sz), (cx, cy, cz) = np.sin(f * q), np.cos(f * q)
-            g += self.displace.amount * f * np.stack([cx * sy * sz, sx * cy * sz, sx * sy * cz])
+            g = g + self.displace.amount * f * np.stack([cx * sy * sz, sx * cy * sz, sx * sy * cz])
         for step, at in zip(reversed(back), reversed(points[:-1]), strict=True):
             g = step.pull(at, g)
         return g * self.scale

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from scenelang.graph.nodes import Fold, Leaf, Node
 from scenelang.graph.steps import Step
-from scenelang.reference.field import Array
+from scenelang.reference.field import Array, Brought
 from scenelang.reference.solid.body import Body
 
 FAR = 1e9  # distance to what is not there
@@ -78,9 +78,12 @@ class Field:
     """The objects of a graph's root, with every step into the world.
 
     Folds may nest; the boolean rule is not needed.
+
+    Args:
+        brought: shapes of elements.
     """
 
-    def __init__(self, root: Fold) -> None:
+    def __init__(self, root: Fold, brought: Brought | None = None) -> None:
         self.root = root
         found = list(_leaves(root))
         # A leaf far from a point changes no sign there if it is further than all blends together can reach,
@@ -88,7 +91,7 @@ class Field:
         blends = 1.25 * sum(_blends(root))
         deep = max((Body(leaf, steps, 0.0).deep for leaf, steps, _ in found), default=0.0)
         self.bodies = [
-            Body(leaf, steps, _MARGIN + blends + (deep if blends and taken else 0.0))
+            Body(leaf, steps, _MARGIN + blends + (deep if blends and taken else 0.0), brought)
             for leaf, steps, taken in found
         ]
         kinds = {body.medium for body in self.bodies}

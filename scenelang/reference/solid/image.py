@@ -7,7 +7,7 @@ import numpy as np
 from scenelang.graph.nodes import Fold
 from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Ground, Light, Stage
 from scenelang.image import Image, from_light
-from scenelang.reference.field import Array
+from scenelang.reference.field import Array, Brought
 from scenelang.reference.samples import sample_points
 from scenelang.reference.solid.body import length
 from scenelang.reference.solid.field import OPAQUE, Field, State
@@ -23,7 +23,14 @@ _INSIDE = 1e-7  # how far behind a surface its colour is asked for
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4) + np.array([[1.0], [0.0]])
 
 
-def solid_image(root: Fold, stage: Stage, canvas: tuple[int, int], *, per_side: int = 2) -> Image:
+def solid_image(
+    root: Fold,
+    stage: Stage,
+    canvas: tuple[int, int],
+    *,
+    per_side: int = 2,
+    brought: Brought | None = None,
+) -> Image:
     """Draw the exact picture of a scene of solids.
 
     Args:
@@ -31,6 +38,7 @@ def solid_image(root: Fold, stage: Stage, canvas: tuple[int, int], *, per_side: 
         stage: the rest of the scene.
         canvas: width and height in pixels.
         per_side: samples along each side of a pixel; 2 is the definition (4 spp).
+        brought: shapes of elements.
 
     Returns:
         (H, W, 3), or (H, W, 4) with straight alpha where the stage is transparent.
@@ -40,7 +48,7 @@ def solid_image(root: Fold, stage: Stage, canvas: tuple[int, int], *, per_side: 
     """
     if fault := stage.camera.fault() or stage.light.fault():
         raise ValueError(fault)
-    field = Field(root)
+    field = Field(root, brought)
     width, height = canvas
     step = max(1, TILE // (width * per_side * per_side))
     picture = np.empty((4, height, width))
