@@ -3,7 +3,8 @@
 Such a zoo is a file of tensors (`scenelang.tensors`), one of bytes for each element. The header's
 ``elements`` say of each geometry what it is made of, whose tensor has its name, and in files of format 2
 ``materials`` likewise, with tensors named ``material.NAME``: a geometry and a material may share a name.
-`scenelang.elements.element` has what an element can be.
+`scenelang.elements.element` has what an element can be. There ``groups`` may be too
+(`scenelang.elements.groups`).
 """
 
 from __future__ import annotations
@@ -11,13 +12,15 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
 from scenelang.elements.element import FORMS, Element, in_range
+from scenelang.elements.groups import Group, read_group
+from scenelang.elements.groups import entry_of as group_entry
 from scenelang.elements.picture import pixels
 from scenelang.files import read_regular
 from scenelang.tensors import Tensor, TensorError, read_tensors
@@ -36,11 +39,12 @@ class Zoo:
     geometries: dict[str, Element]
     digest: str  # SHA-256 of the file, hex
     materials: dict[str, Element] = field(default_factory=dict)
+    groups: dict[str, Group] = field(default_factory=dict)
     folder: Path | None = field(default=None, compare=False)  # where it lies
 
     @staticmethod
     def of(elements: Iterable[Element], digest: str = "0" * 64) -> Zoo:
-        """The zoo of elements."""
+        """The zoo of elements, without groups."""
         listed = list(elements)
         geometries = {element.name: element for element in listed if not element.material}
         return Zoo(geometries, digest, {element.name: element for element in listed if element.material})
@@ -79,10 +83,11 @@ def read_zoo(data: bytes) -> Zoo:
         TensorError: the bytes are not those of such a file.
     """
     file = read_tensors(data, MOST_BYTES, (1, 2))
-    known = {"format", "elements"} | ({"materials"} if file.header["format"] > 1 else set())
+    known = {"format", "elements"} | ({"materials", "groups"} if file.header["format"] > 1 else set())
     tables = {key: file.header.get(key) for key in sorted(known - {"format"})}
     if file.header.keys() != known or not all(isinstance(table, dict) for table in tables.values()):
         raise TensorError("not a file of elements")
+    listed_groups = tables.pop("groups", None) or {}
     entries = [(key, name, entry) for key, table in tables.items() for name, entry in (table or {}).items()]
     tensors = [_TABLES[key] + name for key, name, _ in entries]
     if len(set(tensors)) < len(tensors) or {*tensors} != file.tensors.keys():
@@ -93,7 +98,11 @@ def read_zoo(data: bytes) -> Zoo:
     found = read_elements(listed, file.body)
     if any(e.material != (key == "materials") for (key, *_), e in zip(entries, found, strict=True)):
         raise TensorError("a material among its geometries, or a geometry among its materials")
-    return Zoo.of(found, hashlib.sha256(data).hexdigest())
+    zoo = Zoo.of(found, hashlib.sha256(data).hexdigest())
+    if len(listed_groups) > MOST_ELEMENTS:
+        raise TensorError(f"more than {MOST_ELEMENTS:,} groups")
+    held = zoo.geometries, zoo.materials
+    return replace(zoo, groups={name: read_group(name, e, *held) for name, e in listed_groups.items()})
 
 
 def read_elements(listed: Iterable[tuple[str, Any, Tensor]], body: memoryview) -> tuple[Element, ...]:
@@ -149,15 +158,17 @@ def entry_of(element: Element) -> dict[str, Any]:
     return {"form": element.form, **sizes, **coding, "about": element.about}
 
 
-def zoo_bytes(elements: Iterable[Element]) -> bytes:
-    """The file of elements; equal elements give equal bytes."""
+def zoo_bytes(elements: Iterable[Element], groups: Mapping[str, Group] | None = None) -> bytes:
+    """The file of elements and groups; equal ones give equal bytes."""
     import numpy as np
     from safetensors.numpy import save
 
     zoo = Zoo.of(sorted(elements, key=lambda element: element.name))
-    tables = {"elements": zoo.geometries} | ({"materials": zoo.materials} if zoo.materials else {})
-    entries = {key: {e.name: entry_of(e) for e in table.values()} for key, table in tables.items()}
-    header = {"format": len(tables), **entries}
+    tables = {"elements": zoo.geometries} | ({"materials": zoo.materials} if zoo.materials or groups else {})
+    header: dict[str, Any] = {"format": len(tables)}
+    header |= {key: {e.name: entry_of(e) for e in table.values()} for key, table in tables.items()}
+    if len(tables) > 1:
+        header["groups"] = {name: group_entry(group) for name, group in (groups or {}).items()}
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     tensors = {
         _TABLES[key] + element.name: np.frombuffer(element.data, np.uint8)
