@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from PIL import Image as Pillow
 
 from scenelang.backend.small import draw_small
 from scenelang.elements.element import Element
+from scenelang.elements.picture import pixels
 from scenelang.elements.zoo import Zoo
 from scenelang.image import Image
 from scenelang.program.compile import compile_scene
@@ -19,7 +21,14 @@ _TURN: Final = Rotate.degrees(30, axis=(0, 1, 0))
 
 
 def thumbnail(element: Element, side: int = 128) -> Image:
-    """An element alone on a square canvas (side, side, 3), one of space lit and turned a little."""
+    """An element alone on a square canvas (side, side, 3), one of space lit and turned a little.
+
+    A texture fills the canvas.
+    """
+    if element.form == "picture":
+        colours = np.frombuffer(pixels(element), np.uint8).reshape(*element.sizes, 3)
+        shown = Pillow.fromarray(colours).resize((side, side))
+        return (np.asarray(shown, np.float32) / np.float32(255)).view(Image)
     zoo = Elements.of("zoo", "zoo.safetensors", Zoo.of([element]))
     solid = element.dimension == 3
     moves = (_TURN, Scale(1.0)) if solid else (Scale(0.9),)

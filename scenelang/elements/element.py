@@ -12,6 +12,7 @@ from scenelang.tensors import TensorError
 
 MOST_SIDE: Final = {2: 1025, 3: 193}  # nodes along an axis, by dimension
 MOST_PIXELS: Final = 2048  # along a side of a picture
+TEXELS: Final = 256  # along the longer side of one that is learned, where nothing else is asked
 
 
 class Form(NamedTuple):
@@ -34,7 +35,7 @@ FORMS: Final = {
         ("dimension", "cells", "levels"), ("deflate",), {2: "element of the plane", 3: "element of space"}
     ),
     # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.elements.picture`)
-    "picture": Form(("height", "width"), ("png", "webp", "jpeg"), {2: "texture"}),
+    "picture": Form(("height", "width"), ("webp", "av1"), {2: "texture"}),
     # a material: colours over [-1, 1]^3, at nodes on its faces too (`scenelang.elements.colours`)
     "colours": Form(("side",), ("bzip2",), {3: "colouring of space"}),
 }

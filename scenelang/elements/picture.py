@@ -1,7 +1,7 @@
 """Materials that users bring: pictures of the plane, and grids of colours of space.
 
-A picture's bytes are those of a file that Pillow reads, of the one kind which its coding names.
-`scenelang.elements.colours` has those of colours of space.
+A picture's bytes are those of a WebP file, made without loss, or an AV1 still picture
+(`scenelang.elements.still`). `scenelang.elements.colours` has those of colours of space.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ import warnings
 from typing import TYPE_CHECKING, Final
 
 from scenelang.elements.element import Element
+from scenelang.elements.still import contained
 from scenelang.tensors import TensorError
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-_FILES: Final = {"png": "PNG", "webp": "WEBP", "jpeg": "JPEG"}
+_FILES: Final = {"webp": "WEBP", "av1": "AVIF"}
 """Codings of pictures, and what Pillow calls their files; no other opener is tried."""
 
 
@@ -35,11 +36,12 @@ def pixels(element: Element) -> bytes:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(io.BytesIO(element.data), formats=[_FILES[element.coding]]) as image:
+            data = contained(element.data) if element.coding == "av1" else element.data
+            with Image.open(io.BytesIO(data), formats=[_FILES[element.coding]]) as image:
                 if image.size != (width, height):
                     raise ValueError(f"a picture of {image.size[0]} x {image.size[1]}")
-                if image.info.get("progressive") or getattr(image, "n_frames", 1) > 1:
-                    raise ValueError("a picture of several scans")  # a few bytes each, and all texels
+                if getattr(image, "n_frames", 1) > 1:
+                    raise ValueError("more than one frame")
                 return image.convert("RGB").tobytes()
     except (OSError, ValueError, SyntaxError, EOFError, struct.error, *bombs) as error:
         raise TensorError(f"element `{element.name}` is damaged: {error}") from None
@@ -71,5 +73,5 @@ def painted(
     from PIL import Image
 
     file = io.BytesIO()
-    Image.fromarray(colours).save(file, "PNG", optimize=True)
-    return Element(name, "picture", colours.shape[:2], "png", file.getvalue(), about or {})
+    Image.fromarray(colours).save(file, "WEBP", lossless=True, quality=100, method=6)
+    return Element(name, "picture", colours.shape[:2], "webp", file.getvalue(), about or {})

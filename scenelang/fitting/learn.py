@@ -10,17 +10,17 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
-from scenelang.elements.element import Element
+from scenelang.elements.element import TEXELS, Element
 from scenelang.elements.zoo import MOST_BYTES, is_said, read_zoo, zoo_bytes
 from scenelang.files import NotWritten, output_place, read_regular, write_output
-from scenelang.fitting import mesh, outline
+from scenelang.fitting import mesh, outline, picture
 from scenelang.fitting.ladder import NEAR, Rung, fit
 from scenelang.fitting.mesh import FitError, Sign
 from scenelang.tensors import TensorError
 
-MOST_OF: Final = {suffix: most for kind in (mesh, outline) for suffix, most in kind.MOST_OF.items()}
+MOST_OF: Final = {**mesh.MOST_OF, **outline.MOST_OF, **picture.MOST_OF}
 """Bytes of a file, by the suffixes that are read."""
 Progress = Callable[[str, float, float], None]
 
@@ -31,11 +31,14 @@ class Wish:
 
     Args:
         sign: what tells inside of a mesh.
-        max_error: mean distance off that is near enough, in leaf units; `NEAR` if left out.
+        max_error: mean distance off that is near enough, in leaf units, `NEAR` if left out; of textures root
+            mean square off of channels in [0, 1], `NEAR_COLOUR` if left out.
         budget_s: for each file; nothing new is begun after it.
-        steps: grids that are tried at most, whatever the time; the same number gives the same bytes.
+        steps: forms that are tried at most, whatever the time; the same number gives the same bytes.
         license: of the originals.
         source: where they are from.
+        pictures: what they become.
+        texels: most of a texture along its longer side.
     """
 
     sign: Sign = "auto"
@@ -44,6 +47,8 @@ class Wish:
     steps: int | None = None
     license: str | None = None
     source: str | None = None
+    pictures: Literal["texture", "outline"] = "texture"
+    texels: int = TEXELS
 
     def __post_init__(self) -> None:
         for text in (self.license, self.source):
@@ -56,7 +61,12 @@ class Wish:
         said = {"license": self.license, "source": self.source, "original": name}
         said |= {"sha256": hashlib.sha256(data).hexdigest()}
         asked = {"sign": None if self.sign == "auto" else self.sign, "max_error": self.max_error}
+        asked |= {"texels": None if self.texels == TEXELS else self.texels}
         return {key: value for key, value in (said | asked).items() if value is not None}
+
+    def paints(self, suffix: str) -> bool:
+        """Whether files of a suffix become textures."""
+        return self.pictures == "texture" and suffix.lower() in picture.MOST_OF
 
     def made(self, element: Element, about: dict[str, str | float]) -> bool:
         """Whether an element is what would be made again."""
@@ -65,7 +75,7 @@ class Wish:
         return ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
 
 
-ASKED: Final = frozenset(("license", "source", "sign", "max_error"))
+ASKED: Final = frozenset(("license", "source", "sign", "max_error", "texels"))
 
 
 def learn(
@@ -99,7 +109,7 @@ def learn(
     troubles = []
     for file, called in zip(map(Path, files), names, strict=True):
         try:
-            known = read_elements(out).get((called, False))
+            known = read_elements(out).get((called, wish.paints(file.suffix)))
             element, found = _learned(file, called, wish, known, say, progress)
             if found:
                 add_elements(out, [element])
@@ -198,6 +208,8 @@ def _learned(
         say(f"{name}: made before of this file")
         return known, False
     progress(name, 0.0, 1.0)
+    if wish.paints(suffix):
+        return _texture(data, name, wish, about, started, say), True
     flat = suffix in outline.MOST_OF
     shape = outline.read_outline(data, suffix) if flat else mesh.read_mesh(data, suffix, wish.sign)
     say(f"{name}: {', '.join(shape.notes)}")
@@ -223,3 +235,29 @@ def _learned(
     shown = f"{element.sides[-1]} distances a side, {len(element.data):,} bytes, error {off:.5f}{short}"
     say(f"{name}: {shown}; {len(tried)} grids tried")
     return element, True
+
+
+def _texture(
+    data: bytes,
+    name: str,
+    wish: Wish,
+    about: dict[str, str | float],
+    started: float,
+    say: Callable[[str], None],
+) -> Element:
+    """The element of a picture."""
+    found = picture.read_picture(data, wish.texels)
+    say(f"{name}: {', '.join(found.notes)}")
+    element, tried = picture.fit_picture(
+        found,
+        name,
+        max_error=wish.max_error,
+        budget_s=wish.budget_s - (time.monotonic() - started),
+        steps=wish.steps,
+        about=about,
+        report=lambda coded: say(f"  {coded.form:>12} {coded.bytes:>8,} bytes  error {coded.error:.4f}"),
+    )
+    height, width = element.sizes
+    shown = f"{width} × {height} texels, {len(element.data):,} bytes, error {element.about['error']:.4f}"
+    say(f"{name}: {shown}; {len(tried)} forms tried")
+    return element

@@ -7,7 +7,6 @@ wide as they are drawn, with round joins and ends.
 from __future__ import annotations
 
 import io
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -16,8 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.fitting.mesh import FitError, Points, needed
+from scenelang.fitting.picture import opened
 
-MOST_OF: Final = {".svg": 10 << 20, ".png": 10 << 20}  # bytes of a file
+MOST_OF: Final = dict.fromkeys((".svg", ".png", ".jpg", ".jpeg"), 10 << 20)  # bytes of a file
 MOST_EDGES: Final = 200_000
 MOST_PIXELS: Final = 16_000_000
 PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
@@ -161,7 +161,7 @@ def winding(edges: Edges, odd: bool) -> Inside:
 
 
 def read_outline(data: bytes, suffix: str) -> Outline:
-    """A drawing (.svg), or the dark or opaque part of a picture (.png), in the bytes of a file.
+    """A drawing (.svg), or the dark or opaque part of a picture, in the bytes of a file.
 
     Raises:
         FitError: it is damaged, empty or too large, or draws nothing.
@@ -215,19 +215,8 @@ def _ends(segment: Any, svg: Any) -> list[tuple[float, float]]:
 
 
 def _picture(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
-    from PIL import Image
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(io.BytesIO(data), formats=["PNG"]) as opened:
-                if opened.width * opened.height > MOST_PIXELS:
-                    raise FitError(f"a picture of more than {MOST_PIXELS:,} pixels")
-                pixels = np.asarray(opened.convert("RGBA"), float) / 255
-    except FitError:
-        raise
-    except Exception as error:
-        raise FitError(f"damaged or not a picture: {error}"[:200]) from error
+    with opened(data, MOST_PIXELS) as file:
+        pixels = np.asarray(file.convert("RGBA"), float) / 255
     opaque = bool((pixels[..., 3] < 0.5).any())
     luma = pixels[..., :3] @ (0.2126, 0.7152, 0.0722)
     value = pixels[..., 3] if opaque else 1 - luma

@@ -7,8 +7,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 
 pytest.importorskip("igl")
 trimesh = pytest.importorskip("trimesh")
@@ -53,6 +55,21 @@ def test_learn_adds_to_a_file_and_a_scene_draws_it(folder: Path) -> None:
     assert [element.about for element in program.elements] == [before.about]
     pictures = [nsg.render(nsg.load("scene.nsg")), nsg.render(nsg.loads("sphere { scale(0.5); }"))]
     assert abs(pictures[0] - pictures[1]).mean() < 2e-3
+
+
+def test_a_picture_becomes_a_texture_or_an_outline(folder: Path) -> None:
+    """Both under one name, a material and a geometry; a second time neither is made again."""
+    shades = np.linspace(0, 255, 300 * 200 * 3).reshape(200, 300, 3).astype(np.uint8)
+    Image.fromarray(shades).save("wall.png")
+    for given in ((), ("--as", "outline", "--steps", "1")):
+        code, output = run("wall.png", "-o", "zoo.safetensors", *given, "--preview", "preview.png")
+        assert (code, Path("preview.png").stat().st_size > 100) == (0, True), output
+        assert "made before" in run("wall.png", "-o", "zoo.safetensors", *given)[1]
+    zoo = load_zoo("zoo.safetensors")
+    assert zoo.materials["wall"].sizes == (171, 256)
+    assert zoo.geometries["wall"].dimension == 2
+    assert run("wall.png", "-o", "zoo.safetensors", "--texels", "64")[0] == 0
+    assert load_zoo("zoo.safetensors").materials["wall"].sizes == (43, 64)
 
 
 def test_a_budget_is_recorded_as_steps(folder: Path) -> None:

@@ -1,10 +1,10 @@
-"""``scenelang learn``: elements from meshes and drawings, into a file that scenes import."""
+"""``scenelang learn``: elements from meshes, drawings and pictures, into a file that scenes import."""
 
 from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -13,6 +13,7 @@ from scenelang.cli.main import Trouble
 from scenelang.cli.outputs import targets
 from scenelang.cli.progress import Bar
 from scenelang.cli.say import say_trouble
+from scenelang.elements.element import MOST_PIXELS, TEXELS
 
 if TYPE_CHECKING:
     from scenelang.fitting.mesh import Sign
@@ -25,6 +26,20 @@ if TYPE_CHECKING:
 )
 @click.option("--name", metavar="NAME", help="Of the element, instead of the file's.")
 @options.choice(
+    "--as",
+    "pictures",
+    words="texture outline",
+    help="What a picture becomes: a material, or the flat shape of its opaque or, without transparency, dark "
+    "part.",
+)
+@click.option(
+    "--texels",
+    type=click.IntRange(1, MOST_PIXELS),
+    default=TEXELS,
+    show_default=True,
+    help="Of a texture along its longer side, at most; larger pictures are made smaller.",
+)
+@options.choice(
     "--sign",
     words="auto winding closed",
     help="What tells inside: winding numbers, of any mesh, or normals, of a closed one that nowhere passes "
@@ -34,7 +49,8 @@ if TYPE_CHECKING:
     "--max-error",
     type=click.FloatRange(0, min_open=True),
     metavar="SHARE",
-    help="Mean distance off at the surface, in radii of the shape; 0.0005 of solids, 0.0001 of flat shapes.",
+    help="Mean distance off at the surface, in radii of the shape: 0.0005 of solids, 0.0001 of flat shapes; "
+    "root mean square off of a texture's colours: 0.01.",
 )
 @click.option(
     "--budget",
@@ -44,7 +60,7 @@ if TYPE_CHECKING:
     help="Begin nothing new after this time, for each file.",
 )
 @click.option(
-    "--steps", type=click.IntRange(1), metavar="N", help="Try so many grids at most, whatever the time."
+    "--steps", type=click.IntRange(1), metavar="N", help="Try so many forms at most, whatever the time."
 )
 @click.option("--license", metavar="TEXT", help="Of the originals; kept in the file.")
 @click.option("--source", metavar="TEXT", help="Where they are from; kept in the file.")
@@ -53,6 +69,8 @@ def command(
     files: tuple[str, ...],
     out: str,
     name: str | None,
+    pictures: Literal["texture", "outline"],
+    texels: int,
     sign: Sign,
     max_error: float | None,
     budget: float,
@@ -63,11 +81,12 @@ def command(
 ) -> None:
     """Make meshes and drawings elements, which scenes import.
 
-    Meshes (.obj, .ply, .stl, .glb) become solids. What a drawing (.svg) paints and what is opaque or, without
-    transparency, dark in a picture (.png) becomes a flat shape.
+    Meshes (.obj, .ply, .stl, .glb) become solids, what a drawing (.svg) paints a flat shape, and pictures
+    (.png, .jpg) textures.
 
-    What comes out is a grid of distances, no network: the smallest that is as near as asked. The shape lies
-    in the unit ball or disc, the middle of its bounding box at the origin. A file of elements that exists
+    What comes out is no network: a grid of distances, or a compressed picture, the smallest that is as near
+    as asked. A shape lies in the unit ball or disc, the middle of its bounding box at the origin; a texture
+    fills the square [-1, 1]², whatever its sides. A file of elements that exists
     gets the new ones beside its own, each when it is done. The same command again takes up what was
     interrupted.
 
@@ -83,7 +102,7 @@ def command(
         targets(["preview"], preview)
     try:
         names_of(files, name)
-        wish = Wish(sign, max_error, budget, steps, license, source)
+        wish = Wish(sign, max_error, budget, steps, license, source, pictures, texels)
     except ValueError as error:
         raise click.UsageError(f"{error}.") from None
     try:
