@@ -3,6 +3,8 @@
 python docs/make_textures.py               writes scenelang/models/textures2d/textures.safetensors
 python docs/make_textures.py --sheet OUT   draws all of them, one beside another
 
+Bytes are the same again with the same numpy and Pillow; texels are with others too.
+
 Each is a function of points of a unit square, x to the right and y down, that repeats with period 1, drawn
 at 16 points a texel and averaged. Random numbers are seeded by the texture's name.
 """
@@ -11,12 +13,17 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image as Pillow
 
+from scenelang.elements.picture import painted
+from scenelang.elements.zoo import zoo_bytes
+from scenelang.files import write_whole
+from scenelang.models.manifest import ROOT
+
+ABOUT: dict[str, str | float] = {"license": "MIT", "source": "docs/make_textures.py of scenelang"}
 SIDE = 256  # texels
 FINE = 4  # points along a side of one
 Array = npt.NDArray[np.float64]
@@ -120,7 +127,9 @@ def bricks(rng: Rng, x: Array, y: Array) -> Array:
 def dots(rng: Rng, x: Array, y: Array) -> Array:
     row = np.floor(8 * y)
     u, v, dot = cells(x + 0.0625 * (row % 2), y, 8, 8)
-    return over(plain(x, "#f2d9c9"), np.hypot(u - 0.5, v - 0.5) < 0.33, tinted(rng, dot, rgb(CLAY, PLUM, GOLD), 0))
+    return over(
+        plain(x, "#f2d9c9"), np.hypot(u - 0.5, v - 0.5) < 0.33, tinted(rng, dot, rgb(CLAY, PLUM, GOLD), 0)
+    )
 
 
 def stripes(rng: Rng, x: Array, y: Array) -> Array:
@@ -165,10 +174,10 @@ LETTERS = {
 
 def letters(rng: Rng, x: Array, y: Array) -> Array:
     u, v, cell = cells(x, y, 3, 3)
-    out = tinted(rng, cell, rgb(CREAM, "#efe3c8", "#f7f1e3"), 0)
+    out = rgb(CREAM, "#e8dcc0")[cell % 2]
     for k, strokes in enumerate(LETTERS.values()):
         ink = rgb(INK, CLAY, TEAL)[(k + k // 3) % 3]
-        px, py = (u - 0.5) * 7 + 1, (v - 0.5) * 7 + 2
+        px, py = (u - 0.5) * 6 + 1, (v - 0.5) * 6 + 2
         away = np.min([segment(px, py, *stroke) for stroke in strokes], 0)
         out = over(out, (cell == k) & (away < 0.36), ink)
     return out
@@ -210,7 +219,9 @@ def arrows(rng: Rng, x: Array, y: Array) -> Array:
 def leaves(rng: Rng, x: Array, y: Array) -> Array:
     out = plain(x, "#eef0df")
     middles = scattered(rng, 26)
-    for (px, py), turn, kind in zip(middles, rng.uniform(0, 6.2832, 26), rng.integers(4, size=26), strict=True):
+    for (px, py), turn, kind in zip(
+        middles, rng.uniform(0, 6.2832, 26), rng.integers(4, size=26), strict=True
+    ):
         dx, dy = (x - px + 0.5) % 1 - 0.5, (y - py + 0.5) % 1 - 0.5
         u, v = np.cos(turn) * dx + np.sin(turn) * dy, np.cos(turn) * dy - np.sin(turn) * dx
         inside = (abs(u) < 0.1) & (abs(v) < 0.42 * (0.1 - u) * (u + 0.1) / 0.1 * (1 - 2.5 * u))
@@ -226,8 +237,13 @@ def terrazzo(rng: Rng, x: Array, y: Array) -> Array:
     for px, py in scattered(rng, 70):
         size, colour = rng.uniform(0.016, 0.052), colours[rng.integers(len(colours))]
         dx, dy = (x - px + 0.5) % 1 - 0.5, (y - py + 0.5) % 1 - 0.5
-        turns = rng.uniform(0, 1.5708) + np.array([0, 1.2566, 2.5133, 3.7699, 5.0265]) + rng.uniform(-0.4, 0.4, 5)
-        sides = [np.cos(a) * dx + np.sin(a) * dy < size * r for a, r in zip(turns, rng.uniform(0.6, 1.1, 5), strict=True)]
+        turns = (
+            rng.uniform(0, 1.5708) + np.array([0, 1.2566, 2.5133, 3.7699, 5.0265]) + rng.uniform(-0.4, 0.4, 5)
+        )
+        sides = [
+            np.cos(a) * dx + np.sin(a) * dy < size * r
+            for a, r in zip(turns, rng.uniform(0.6, 1.1, 5), strict=True)
+        ]
         out = over(out, np.all(sides, 0), colour)
     return out
 
@@ -243,7 +259,12 @@ def plaid(rng: Rng, x: Array, y: Array) -> Array:
 def hexagons(rng: Rng, x: Array, y: Array) -> Array:
     rows, across = 6, 5
     points = [((i + 0.5 * (j % 2)) / across, j / rows) for j in range(rows) for i in range(across)]
-    colours = np.array([rgb(TEAL, "#3c938f", CREAM, "#1f5f66", GOLD)[rng.choice(5, p=(0.3, 0.25, 0.2, 0.15, 0.1))] for _ in points])
+    colours = np.array(
+        [
+            rgb(TEAL, "#3c938f", CREAM, "#1f5f66", GOLD)[rng.choice(5, p=(0.3, 0.25, 0.2, 0.15, 0.1))]
+            for _ in points
+        ]
+    )
     first, second, which = nearest(x, y, np.array(points))
     return over(colours[which], second - first < 0.014, "#f7f3e8")
 
@@ -252,8 +273,12 @@ def cobbles(rng: Rng, x: Array, y: Array) -> Array:
     points = scattered(rng, 60)
     first, second, which = nearest(x, y, points)
     shades = rng.uniform(0.82, 1.1, len(points))
-    stone = rgb("#8f979c", "#a39f96", "#7f8b96", "#b0a99b")[rng.integers(4, size=len(points))] * shades[:, None]
-    lit = ((x - points[which, 0] + 0.5) % 1 - 0.5 + (y - points[which, 1] + 0.5) % 1 - 0.5) < -0.5 * (second - first)
+    stone = (
+        rgb("#8f979c", "#a39f96", "#7f8b96", "#b0a99b")[rng.integers(4, size=len(points))] * shades[:, None]
+    )
+    lit = ((x - points[which, 0] + 0.5) % 1 - 0.5 + (y - points[which, 1] + 0.5) % 1 - 0.5) < -0.5 * (
+        second - first
+    )
     out = np.clip(stone[which] * np.where(lit, 1.07, 1.0)[..., None], 0, 1)
     return over(out, second - first < 0.02, "#4a4e50")
 
@@ -289,7 +314,10 @@ def drawn(name: str) -> npt.NDArray[np.uint8]:
 
 def sheet() -> Pillow.Image:
     """All textures, four in a row, each once and a half so that seams show."""
-    rows = [[np.tile(drawn(name), (2, 2, 1))[:320, :320] for name in list(TEXTURES)[k : k + 4]] for k in range(0, 16, 4)]
+    rows = [
+        [np.tile(drawn(name), (2, 2, 1))[:320, :320] for name in list(TEXTURES)[k : k + 4]]
+        for k in range(0, 16, 4)
+    ]
     padded = [[np.pad(p, ((4, 4), (4, 4), (0, 0)), constant_values=255) for p in row] for row in rows]
     return Pillow.fromarray(np.concatenate([np.concatenate(row, 1) for row in padded], 0))
 
@@ -297,3 +325,6 @@ def sheet() -> Pillow.Image:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--sheet"]:
         sheet().save(sys.argv[2])
+    else:
+        made = [painted(name, drawn(name), ABOUT) for name in TEXTURES]
+        write_whole(ROOT / "textures2d" / "textures.safetensors", zoo_bytes(made))
