@@ -27,8 +27,8 @@ def thumbnail(element: Element, side: int = 128) -> Image:
     """
     if element.form == "picture":
         colours = np.frombuffer(pixels(element), np.uint8).reshape(*element.sizes, 3)
-        shown = Pillow.fromarray(colours).resize((side, side))
-        return (np.asarray(shown, np.float32) / np.float32(255)).view(Image)
+        small = Pillow.fromarray(colours).resize((side, side))
+        return (np.asarray(small, np.float32) / np.float32(255)).view(Image)
     zoo = Elements.of("zoo", "zoo.safetensors", Zoo.of([element]))
     solid = element.dimension == 3
     moves = (_TURN, Scale(1.0)) if solid else (Scale(0.9),)
