@@ -31,6 +31,7 @@ class Arrays:
     cos: ClassVar[Any] = np.cos
     sin: ClassVar[Any] = np.sin
     sqrt: ClassVar[Any] = np.sqrt
+    floor: ClassVar[Any] = np.floor
     minimum: ClassVar[Any] = np.minimum
     maximum: ClassVar[Any] = np.maximum
     select: ClassVar[Any] = staticmethod(np.where)  # (mask, where it holds, elsewhere)

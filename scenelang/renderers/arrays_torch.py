@@ -28,7 +28,8 @@ class Torch(Arrays):
     stack = staticmethod(torch.stack)
     packed = staticmethod(Tensor.contiguous)
     where = staticmethod(_where)
-    exp, log, cos, sin, sqrt = torch.exp, torch.log, torch.cos, torch.sin, torch.sqrt
+    exp, log, cos, sin = torch.exp, torch.log, torch.cos, torch.sin
+    sqrt, floor = torch.sqrt, torch.floor
     minimum, maximum, select = torch.minimum, torch.maximum, torch.where
 
     def array(self, values: np.ndarray, like: Tensor) -> Tensor:

@@ -2,8 +2,8 @@
 
 A pixel is the mean of four samples at a quarter of a pixel from its centre. Most pixels have no outline
 near them and one look at the centre is as good; only pixels that the network says are near one are
-sampled four times. An object is met only by the points that it can reach. Both rules look at a pixel
-alone, so that tiles and threads change nothing.
+sampled four times. Elsewhere only textures are looked up at all four. An object is met only by the points
+that it can reach. These rules look at a pixel alone, so that tiles and threads change nothing.
 """
 
 from __future__ import annotations
@@ -13,13 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenelang.renderers.arrays import Array
-from scenelang.renderers.field import Field, Row
+from scenelang.renderers.field import SMOOTH, Field, Row
 from scenelang.renderers.network import RADIUS
 
 CHUNK = 4096  # points that go through the network at once; their activations stay in the L2 cache
 NEAR = 0.85  # pixels: farther from an outline a pixel has one colour
 CORNER = 0.36  # pixels from the centre to a sample, a little rounded up
+NARROW = 1 / 16  # of a pixel by the width of a blend: above it colours change much across the pixel
+LEAST = 1e-4  # of a colour, that counts as part of what a point shows
+NOBODY = -1.0  # in place of an object's number
 _ROUNDING = 1e-6  # world units
+_FOUR = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)  # pixels
 
 
 @dataclass(slots=True)
@@ -111,7 +115,8 @@ class Coverage:
             shade = self._four(points, centres[1], px)
             met = int(shade.met.reshape(-1, 4).any(1).sum())
             return Tile(xp.to_numpy(_means(shade)).T, shade.evaluated, centres.shape[1], met)
-        shade = self.shade(points, CORNER * px if refine else 0.0, PixelRows(-centres[1]))
+        pad, spread = (CORNER * px, px) if refine else (0.0, 0.0)
+        shade = self.shade(points, pad, PixelRows(-centres[1]), spread)
         pairs, refined = shade.evaluated, 0
         if refine and (refined := len(near := xp.where(shade.edge < NEAR * px))):
             closer = self._four(xp.take(points, near), centres[1][xp.to_numpy(near)], px)
@@ -121,20 +126,21 @@ class Coverage:
 
     def _four(self, p: Array, y: np.ndarray, px: float) -> Shade:
         """The four samples, side by side, of pixels centred at points (2, M), whose y are (M,)."""
-        quarter = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)
-        samples = p[:, :, None] + self.xp.array(quarter * np.float32(px), p)[:, None]  # (2, M, 4)
+        samples = p[:, :, None] + self.xp.array(_FOUR * np.float32(px), p)[:, None]  # (2, M, 4)
         return self.shade(samples.reshape(2, -1), 0.0, PixelRows(-y, 4, 0.3 * px))
 
-    def shade(self, p: Array, pad: float = 0.0, rows: PixelRows | None = None) -> Shade:
+    def shade(self, p: Array, pad: float = 0.0, rows: PixelRows | None = None, spread: float = 0.0) -> Shade:
         """Draw at world points.
 
         Args:
             p: (2, M).
             pad: objects that come within so many world units of a point meet it.
             rows: how the points lie in rows; saves an object the look at points above and below it.
+            spread: side of the pixels for which textures are looked up four times, world units; 0: once.
         """
         field, xp, count = self.field, self.xp, p.shape[1]
         with xp.inference():
+            worn = Worn(field, p, spread) if field.textured else None
             memory = field.empty(count)  # state and register of each point
             edge = xp.full((count,), float("inf"), p)
             touched = edge < 0  # what nothing was drawn on stays empty whatever follows
@@ -146,15 +152,22 @@ class Coverage:
                 for start in range(0, met, CHUNK):
                     at = slice(start, start + CHUNK)
                     points, lengths = q[:, at], None if radius is None else radius[at]
+                    part = at if index is None else index[at]
+                    before = memory[:, at] if index is None else xp.take(memory, part)
+                    new, d = field.meet(row, points, lengths, before)
+                    near = abs(d) / row.frame.stretch
+                    if worn is not None:
+                        worn.note(
+                            row, xp.where(edge == edge)[part] if index is None else part, before, new, d
+                        )
                     if index is None:
-                        memory[:, at], near = field.meet(row, points, lengths, memory[:, at])
-                        edge[at] = xp.minimum(edge[at], near)
+                        memory[:, at], edge[at] = new, xp.minimum(edge[at], near)
                         continue
-                    part = index[at]
-                    new, near = field.meet(row, points, lengths, xp.take(memory, part))
                     xp.put(memory, part, new)
                     xp.put(edge, part, xp.minimum(xp.take(edge, part), near))
             edge = xp.minimum(edge, abs(memory[0]) / field.unit)
+            if worn is not None:
+                edge = worn.look(memory, edge)
             met = touched if self.skip else touched | bool(field.rows)
             return Shade(field.picture(memory), edge, evaluated, met)
 
@@ -195,6 +208,85 @@ class Coverage:
         if row.draws:
             touched[index] = True
         return index, xp.take(q, kept), xp.take(radius, kept) if reach > RADIUS else None
+
+
+class Worn:
+    """Which textures M points show; they are looked up when all objects are met, where they are seen.
+
+    The register says how much of a point's colour is a texture's, and here is whose. Where one blends with
+    another, the first is looked up at once, or, where blends are narrow, the point is called near an outline.
+
+    Args:
+        field: with textures.
+        p: the points (2, M).
+        spread: as `Coverage.shade` takes it.
+    """
+
+    def __init__(self, field: Field, p: Array, spread: float) -> None:
+        self._field, self._xp, self._p, self._spread = field, field.xp, p, spread
+        self._four = self._xp.array(_FOUR * np.float32(spread), p)[:, :, None]
+        self._number = 0 * p[0] + NOBODY
+        self._mixed = p[0] != p[0]
+        self._rows: dict[int, Row] = {}
+
+    def note(self, row: Row, index: Array, before: Array, memory: Array, d: Array) -> None:
+        """Note what points (k,) show behind an object.
+
+        Args:
+            before: their memory (S + R, k) before it.
+            memory: and behind it, which is brought up to date.
+            d: its distances (k,).
+        """
+        xp, share, gate = self._xp, memory[-2], memory[-1]
+        taken = gate > LEAST
+        mixed = xp.where(taken & (gate < 1 - LEAST))
+        mixed = xp.take(mixed, xp.where(xp.take(share, mixed) > LEAST))
+        if row.token == SMOOTH and self._spread > NARROW * row.width:
+            gap = row.width + CORNER * self._spread * (1 + row.frame.stretch)
+            blends = abs(before[0] / self._field.unit - d) < gap
+            if row.texture is None:
+                blends = blends & (before[-2] > LEAST)
+            self._mixed[xp.take(index, xp.where(blends))] = True
+        elif row.texture is not None and len(mixed):
+            left = share - gate  # of the texture before
+            numbers = xp.take(self._number, xp.take(index, mixed))
+            for number in {*numbers.tolist()} - {NOBODY}:
+                some = xp.take(mixed, xp.where(numbers == number))
+                self._add(self._rows[number], memory, some, xp.take(index, some), left)
+        if row.texture is not None:
+            self._rows[row.number] = row
+            self._number[xp.take(index, xp.where(taken))] = row.number
+            xp.put(share, mixed, xp.take(gate, mixed))
+        memory[-1] = 0.0
+
+    def look(self, memory: Array, edge: Array) -> Array:
+        """Add to memories (S + R, M) the textures that are seen; the least distances (M,) to an outline, and
+        0 where colours mix.
+        """
+        xp, field = self._xp, self._field
+        seen = memory[0] * field.slope < 0.5
+        edge = xp.select(self._mixed & seen, 0 * edge, edge)
+        seen = seen & (memory[-2] > LEAST)
+        if self._spread:  # the others are looked at again
+            seen = seen & (edge >= NEAR * self._spread)
+        for number, row in self._rows.items():
+            whole = xp.where(seen & (self._number == number))
+            for start in range(0, len(whole), CHUNK):
+                some = whole[start : start + CHUNK]
+                self._add(row, memory, some, some, memory[-2])
+        return edge
+
+    def _add(self, row: Row, memory: Array, some: Array, index: Array, share: Array) -> None:
+        """Add an object's texture at points of an index to some of the memories, as large as a share (k,)."""
+        xp, field, s = self._xp, self._field, self._field.network.config.state
+        spots = xp.take(self._p, index)
+        if self._spread:
+            found = field.texture(row, (spots[:, None] + self._four).reshape(2, -1)).reshape(3, 4, -1)
+            found = (found[:, 0] + found[:, 1] + found[:, 2] + found[:, 3]) / 4
+        else:
+            found = field.texture(row, spots)
+        colour = memory[s : s + 3]
+        xp.put(colour, some, xp.take(colour, some) + found * xp.take(share, some))
 
 
 def _means(shade: Shade) -> Array:

@@ -57,7 +57,8 @@ class Kept:
             box = row.frame.box(row.reach + _ROOM_PX * px * row.frame.growth)
             spans.append((-np.inf, np.inf) if row.reach == float("inf") else box[1::2])
             colour = scene.xp.to_numpy(row.colour).tobytes()
-            rest = repr((row.token, row.reach, row.brought and row.brought.digest)).encode()
+            paint = row.paint and (row.paint.element.digest, row.paint.steps)
+            rest = repr((row.token, row.reach, row.brought and row.brought.digest, paint)).encode()
             found.append(hashlib.sha256(codes + vector.tobytes() + colour + rest).digest())
         rows = np.frombuffer(b"".join(found), np.uint8).reshape(len(found), 32)
         low, high = np.array(spans, np.float64).reshape(-1, 2).T
@@ -177,8 +178,8 @@ def draw(
             proportion; no compiled scene has such.
     """
     width, height = program.canvas
-    known, brought = kept.frames if kept is not None else None, program.brought()
-    field = Field(network, program.vectors, program.tokens, frames=known, brought=brought)
+    known = kept.frames if kept is not None else None
+    field = Field(network, program.vectors, program.tokens, program.brought(), program.paints(), frames=known)
     coverage = Coverage(field, skip=skip)
     rows = max(1, min(tile // width, -(-height // (split or threads))))
     tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]

@@ -12,11 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenelang.elements.element import Element
+from scenelang.program.paints import Paint
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array
 from scenelang.renderers.frames import FAR, ObjectFrame, local_points, read_frame
 from scenelang.renderers.grid import GridShape, grid_shape
 from scenelang.renderers.network import EMPTY, Cell, Decoder, FramedNetwork
+from scenelang.renderers.texture import Texture
 
 UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
@@ -29,19 +31,26 @@ class Row:
     """One object, ready to be met.
 
     Args:
+        number: of the object, from 0.
         token: how it joins what came before.
-        colour: (R, 1).
+        colour: (R, 1): three numbers, and where some object has a texture, whether this one has, and 1.
         shape: of its leaf, learned or brought by a user.
+        paint, texture: in place of the colour, what users brought.
         reach: leaf units from its origin beyond which it changes nothing; inf where it concerns every point.
-        cell: the weights of its token and of the width of its blend.
+        width: of the blend by which it joins.
+        cell: the weights of its token and of that width.
     """
 
     frame: ObjectFrame
+    number: int
     token: int
     colour: Array
     shape: Decoder | GridShape
     brought: Element | None
+    paint: Paint | None
+    texture: Texture | None
     reach: float
+    width: float
     cell: Cell
 
     @property
@@ -56,8 +65,9 @@ class Field:
     Args:
         network: trained parameters, on any device.
         vectors: (N, 64) float32, geometry and material vectors.
-        frames: of geometry vectors that were read before, by their bytes.
         brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
+        paints: likewise, None where a row has the colour of its vector.
+        frames: of geometry vectors that were read before, by their bytes.
 
     Raises:
         ProgramError: an object's vector holds no way from the world to a leaf, or an element cannot be drawn.
@@ -68,9 +78,10 @@ class Field:
         network: FramedNetwork,
         vectors: np.ndarray,
         tokens: np.ndarray,
+        brought: Sequence[Element | None] | None = None,
+        paints: Sequence[Paint | None] | None = None,
         *,
         frames: Mapping[bytes, ObjectFrame] | None = None,
-        brought: Sequence[Element | None] | None = None,
     ) -> None:
         self.network, self.xp = network, network.xp
         self.vectors = vectors
@@ -89,9 +100,18 @@ class Field:
             """Growth of the margin per world unit."""
             self.widest = BLEND
             """Of the blends, at least the usual one."""
-            self.rows = self._rows(vectors, tokens, brought or [None] * len(tokens))
+            none = [None] * len(tokens)
+            self.textured = any(paints or none)
+            """Whether some object has a texture."""
+            self.rows = self._rows(vectors, tokens, brought or none, paints or none)
 
-    def _rows(self, vectors: np.ndarray, tokens: np.ndarray, brought: Sequence[Element | None]) -> list[Row]:
+    def _rows(
+        self,
+        vectors: np.ndarray,
+        tokens: np.ndarray,
+        brought: Sequence[Element | None],
+        paints: Sequence[Paint | None],
+    ) -> list[Row]:
         if not len(vectors):
             return []
         xp, layout = self.xp, self.layout
@@ -114,6 +134,7 @@ class Field:
         # the widest of the smooth unions from each row on, 0 for none
         blends_after = np.maximum.accumulate(np.where(tokens == SMOOTH, widths, 0.0)[::-1])[::-1]
         self.widest = max(BLEND, float(blends_after[0]))
+        textures: dict[tuple[Paint, bytes], Texture] = {}
         rows = []
         for i, token in enumerate(tokens.tolist()):
             frame = self.frames[g[i].tobytes()]
@@ -129,14 +150,28 @@ class Field:
             element = brought[i]
             learned = shapes[tuple(g[i, : layout.code].tolist())]
             shape = learned if element is None else grids[element]
-            rows.append(Row(frame, token, colours[i], shape, element, float(reach), cell))
+            texture, paint, colour = None, paints[i], colours[i]
+            if paint is not None and token in (UNION, SMOOTH):  # the others leave colours as they are
+                texture = textures.get(key := (paint, m[i, :6].tobytes()))
+                texture = textures[key] = texture or Texture(xp, paint, m[i, :6], like, light=False)
+            if self.textured:
+                worn = [0.0 * colour, 0.0 * colour[:1] + 1.0] if texture else [colour, 0.0 * colour[:1]]
+                colour = xp.concat([*worn, 0.0 * colour[:1] + 1.0], 0)
+            looks = colour, shape, element, paint, texture
+            rows.append(Row(frame, i, token, *looks, float(reach), float(widths[i]), cell))
         return rows
 
     def empty(self, count: int) -> Array:
-        """State and register (S + 3, M) of points that have met nothing."""
-        memory = self.xp.full((self.network.config.state + 3, count), 0.0, self.network.codes)
+        """State and register (S + R, M) of points that have met nothing."""
+        rows = self.network.config.state + (5 if self.textured else 3)
+        memory = self.xp.full((rows, count), 0.0, self.network.codes)
         memory[0] = EMPTY * self.widest / BLEND
         return memory
+
+    def texture(self, row: Row, p: Array) -> Array:
+        """Colours (3, M) of an object with a texture at world points (d, M)."""
+        assert row.texture is not None
+        return row.texture.at(self.local(row, p))
 
     def local(self, row: Row, p: Array) -> Array:
         """Leaf coordinates of world points, both (d, M)."""
@@ -148,10 +183,10 @@ class Field:
         Args:
             q: their leaf coordinates (d, M).
             radius: the lengths of those (M,); None where none is beyond `RADIUS`.
-            memory: state and register (S + 3, M).
+            memory: state and register (S + R, M).
 
         Returns:
-            State and register, and a bound (M,) on how far the object's outline is, world units.
+            State and register, and the object's distances (M,), world units.
         """
         s = self.network.config.state
         if isinstance(row.shape, GridShape):
@@ -161,9 +196,10 @@ class Field:
         if row.frame.wild:
             features = features.clip(-FAR, FAR)
         new = self.network.step(features, memory[:s], memory[s:], row.colour, row.cell)
-        return self.xp.concat(new, 0), abs(features[0]) / row.frame.stretch
+        return self.xp.concat(new, 0), features[0]
 
     def picture(self, memory: Array) -> Array:
         """Premultiplied colour and coverage (4, M), in [0, 1], of points that have met all objects."""
         coverage = (0.5 - memory[0] * self.slope).clip(0.0, 1.0)
-        return self.xp.concat([memory[self.network.config.state :] * coverage, coverage[None]], 0)
+        s = self.network.config.state
+        return self.xp.concat([memory[s : s + 3] * coverage, coverage[None]], 0)

@@ -35,7 +35,7 @@ def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, 
 def _plane(network: FramedNetwork, program: Program) -> Outputs:
     width, height = program.canvas
     image = draw(network, replace(program, background=None)).image
-    coverage = Coverage(Field(network, program.vectors, program.tokens, brought=program.brought()))
+    coverage = Coverage(Field(network, program.vectors, program.tokens, program.brought()))
     rows, px = max(1, TILE // width), 2 / min(width, height)
     x = (np.arange(width) + 0.5 - width / 2) * px
     found = np.zeros((height, width), np.int32)
