@@ -111,6 +111,17 @@ class Mesh:
         return points[outer], (normals * turned)[outer]
 
 
+def _once(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+    """Which of triangles (F, 3) are the first with their corners in their order round."""
+    first = triangles.argmin(1)[:, None]
+    turned = np.take_along_axis(triangles, (first + np.arange(3)) % 3, 1)
+    order = np.lexsort(turned.T)
+    same = (np.diff(turned[order], axis=0) == 0).all(1)
+    found = np.ones(len(triangles), bool)
+    found[order[1:][same]] = False
+    return found
+
+
 def _igl() -> Any:
     with needed("libigl"):
         import igl
@@ -176,6 +187,9 @@ def mesh_of(vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "au
     if not sound.all():
         notes.append(f"{(~sound).sum():,} flat triangles left out")
         mesh.update_faces(sound)
+    if not (once := _once(mesh.faces)).all():  # many at one place would all be asked, for each point
+        notes.append(f"{(~once).sum():,} triangles that are there twice left out")
+        mesh.update_faces(once)
     closed = bool(mesh.is_watertight and mesh.is_winding_consistent)
     if sign == "closed" and not closed:
         raise FitError("it is not closed; tell inside by winding numbers: --sign winding")

@@ -11,7 +11,7 @@ from typing import Final
 from scenelang.elements.element import Element
 from scenelang.files import read_regular
 from scenelang.fitting.ladder import Shape
-from scenelang.fitting.learn import MOST_OF
+from scenelang.fitting.making import MOST_OF
 from scenelang.fitting.mesh import FitError, read_mesh
 from scenelang.fitting.outline import MOST_OF as DRAWINGS
 from scenelang.fitting.outline import read_outline

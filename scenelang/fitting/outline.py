@@ -22,7 +22,7 @@ MOST_EDGES: Final = 200_000
 MOST_PIXELS: Final = 16_000_000
 PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
 _CURVE: Final = 48  # edges of a curve
-_BLOCK: Final = 1 << 22  # pairs of points and edges at a time
+_STRIP: Final = 64  # points of neighbouring heights
 _BESIDE: Final = 1e-4  # leaf units from an edge to where its sides are asked
 Edges = npt.NDArray[np.float64]  # (E, 2, 2): edges, ends, coordinates
 Inside = Callable[[Points], npt.NDArray[np.bool_]]
@@ -146,15 +146,17 @@ def _moved(inside: Inside, middle: Points, size: float) -> Inside:
 def winding(edges: Edges, odd: bool) -> Inside:
     """Whether points lie within closed polygons, by the rule ``nonzero`` or ``evenodd``."""
 
+    low, high = edges[..., 1].min(1), edges[..., 1].max(1)
+
     def inside(p: Points) -> npt.NDArray[np.bool_]:
-        total = np.zeros(len(p), np.int64)
-        (ax, ay), (bx, by) = edges[:, 0].T, edges[:, 1].T
-        block = max(1, _BLOCK // max(1, len(edges)))
-        for first in range(0, len(p), block):
-            x, y = p[first : first + block].T[..., None]
+        total, order = np.zeros(len(p), np.int64), np.argsort(p[:, 1])
+        for first in range(0, len(p), _STRIP):  # points of a strip, and the edges that reach into it
+            at = order[first : first + _STRIP]
+            x, y = p[at].T[..., None]
+            (ax, ay), (bx, by) = edges[(low <= y[-1]) & (high >= y[0])].swapaxes(0, 1).swapaxes(1, 2)
             up, down = (ay <= y) & (by > y), (ay > y) & (by <= y)
             left = (bx - ax) * (y - ay) - (x - ax) * (by - ay) > 0
-            total[first : first + block] = (up & left).sum(1) - (down & ~left).sum(1)
+            total[at] = (up & left).sum(1) - (down & ~left).sum(1)
         return np.asarray(total % 2 != 0 if odd else total != 0)
 
     return inside

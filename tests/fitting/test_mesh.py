@@ -73,6 +73,15 @@ def test_an_open_surface_closes_itself() -> None:
         mesh_of(*arrays(ball), "closed")
 
 
+def test_what_is_there_many_times_counts_once() -> None:
+    """Where many triangles lie at one place, each of them is asked for every point near it."""
+    vertices, triangles = arrays(box(1, 1, 1))
+    turned = [np.roll(triangles, k, 1) for k in range(3)] * 20
+    mesh = mesh_of(vertices, np.concatenate([*turned, triangles[:, ::-1]]))
+    assert len(mesh.triangles) == 24
+    assert any(note.startswith("708 triangles that are there twice") for note in mesh.notes)
+
+
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
 
 

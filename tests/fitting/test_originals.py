@@ -14,7 +14,8 @@ trimesh = pytest.importorskip("trimesh")
 
 import scenelang as nsg  # noqa: E402
 from scenelang.elements.zoo import load_zoo, zoo_bytes  # noqa: E402
-from scenelang.fitting.learn import Wish, learn  # noqa: E402
+from scenelang.fitting.learn import learn  # noqa: E402
+from scenelang.fitting.making import Wish  # noqa: E402
 from scenelang.fitting.mesh import mesh_of  # noqa: E402
 from scenelang.fitting.originals import FOLDER  # noqa: E402
 from scenelang.reference.image import reference_image  # noqa: E402

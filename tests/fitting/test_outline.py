@@ -14,7 +14,7 @@ pytest.importorskip("scipy")
 
 from scenelang.fitting.ladder import fit
 from scenelang.fitting.mesh import FitError
-from scenelang.fitting.outline import Outline, read_outline
+from scenelang.fitting.outline import Outline, read_outline, winding
 from tests.elements.shapes import square
 
 POINTS = np.random.default_rng(0).uniform(-1, 1, (2000, 2))
@@ -64,6 +64,25 @@ def test_up_is_up_and_layers_are_a_union() -> None:
     assert (stem < 0).all()
     assert bar > 0
     assert shape.distances(np.array([[0, 0.6]])) < -0.05  # where both lie there is no edge between
+
+
+@pytest.mark.parametrize("odd", [False, True])
+def test_inside_agrees_with_a_loop(odd: bool) -> None:
+    """Also at the heights of corners, where an edge counts at one of its ends."""
+    random = np.random.default_rng(0)
+    corners = random.integers(0, 12, (40, 2)).astype(float)
+    edges = np.stack([corners, np.roll(corners, -1, 0)], 1)
+    points = np.concatenate([random.uniform(-1, 13, (300, 2)), random.integers(0, 12, (100, 2))])
+    counts = []
+    for x, y in points:
+        turns = 0
+        for (ax, ay), (bx, by) in edges:
+            if (ay <= y) != (by <= y):
+                left = (bx - ax) * (y - ay) - (x - ax) * (by - ay) > 0
+                turns += (1 if left else 0) if by > ay else (0 if left else -1)
+        counts.append(turns)
+    found = winding(edges, odd)(points)
+    assert found.tolist() == [turns % 2 != 0 if odd else turns != 0 for turns in counts]
 
 
 @pytest.mark.parametrize("opaque", [False, True])

@@ -93,7 +93,8 @@ def command(
     A scene says: import "zoo.safetensors" as zoo; zoo.cow { … }
     """
     from scenelang.elements.zoo import SUFFIX
-    from scenelang.fitting.learn import Wish, learn, names_of
+    from scenelang.fitting.learn import learn, names_of
+    from scenelang.fitting.making import Wish
     from scenelang.fitting.mesh import FitError
 
     if not out.endswith(SUFFIX):
@@ -101,8 +102,8 @@ def command(
     if preview is not None:
         targets(["preview"], preview)
     try:
-        names_of(files, name)
         wish = Wish(sign, max_error, budget, steps, license, source, pictures, texels)
+        names_of(files, wish, name)
     except ValueError as error:
         raise click.UsageError(f"{error}.") from None
     try:

@@ -1,0 +1,151 @@
+"""A process of its own for libraries that read strangers' files: bounded in memory and time, with no network.
+
+A request is a line of JSON and bytes; answers are lines of JSON, the last of which says what went wrong or
+how many bytes follow. Whatever a file does to the process, it is an error of that file alone.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from types import TracebackType
+from typing import IO, Any, Final
+
+from scenelang.fitting.mesh import FitError
+
+MEMORY: Final = 6 << 30  # bytes that the process may hold, where the system can bound them
+CPU_S: Final = 300.0  # of processor time for one file
+_CODE: Final = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from scenelang.fitting import apart, making
+apart.serve(making.make)
+"""
+_REFUSED: Final = (
+    "socket.connect",
+    "socket.getaddrinfo",
+    "socket.sendto",
+    "subprocess.",
+    "os.system",
+    "os.exec",
+)
+Hear = Callable[..., None]
+
+
+class Apart:
+    """The process; it begins when it is first asked, and anew after it has ended."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Apart:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._end()
+
+    def __call__(self, request: Mapping[str, Any], data: bytes, hear: Mapping[str, Hear]) -> bytes:
+        """What `serve` makes of a request and bytes.
+
+        Args:
+            request: JSON data; its ``cpu_s`` is the processor time that this may take.
+            hear: called with what is told meanwhile, by the first word of the telling.
+
+        Raises:
+            FitError: it cannot be made, takes more memory or time, or a library has failed.
+        """
+        process = self._begun()
+        assert process.stdin is not None
+        assert process.stdout is not None
+        with suppress(BrokenPipeError):
+            process.stdin.write(json.dumps({**request, "bytes": len(data)}).encode() + b"\n")
+            process.stdin.write(data)
+            process.stdin.flush()
+        while line := process.stdout.readline():
+            kind, *told = json.loads(line)
+            if kind == "made":
+                return process.stdout.read(*told)
+            if kind == "error":
+                raise FitError(*told)
+            hear[kind](*told)
+        raise FitError(_ended(self._end(), request["cpu_s"]))
+
+    def _begun(self) -> subprocess.Popen[bytes]:
+        if self._process is None:
+            self._process = subprocess.Popen(
+                [sys.executable, "-I", "-c", _CODE, json.dumps(sys.path)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+                start_new_session=True,  # an interruption is ours to tell it
+            )
+        return self._process
+
+    def _end(self) -> int:
+        process, self._process = self._process, None
+        assert process is not None
+        process.communicate()
+        return process.returncode
+
+
+def _ended(status: int, cpu_s: float) -> str:
+    import signal
+
+    if -status == getattr(signal, "SIGXCPU", None):
+        return f"it takes more than {cpu_s:g} s of processor time"
+    return f"a library that reads it has failed ({f'signal {-status}' if status < 0 else f'status {status}'})"
+
+
+def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -> None:
+    """Answer requests until there are none; to be called in a process of its own."""
+    out = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print
+    sys.addaudithook(_refuse)
+    while line := sys.stdin.buffer.readline():
+        request = json.loads(line)
+        _bound(request["cpu_s"])
+        data = sys.stdin.buffer.read(request["bytes"])
+        try:
+            made = make(request, data, lambda *told: _tell(out, *told))
+        except FitError as error:
+            _tell(out, "error", str(error))
+        except MemoryError:
+            _tell(out, "error", f"it takes more than {MEMORY >> 30} GiB of memory")
+        else:
+            _tell(out, "made", len(made), then=made)
+
+
+def _tell(out: IO[bytes], *told: Any, then: bytes = b"") -> None:
+    out.write(json.dumps(told).encode() + b"\n" + then)
+    out.flush()
+
+
+def _refuse(event: str, arguments: object) -> None:
+    if event.startswith(_REFUSED):
+        raise PermissionError(f"{event} is not allowed here")
+
+
+def _bound(cpu_s: float) -> None:
+    """Bound memory, and the processor time from now on, where the system does such."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    spent = resource.getrusage(resource.RUSAGE_SELF)
+    for kind, most in (
+        (resource.RLIMIT_DATA, MEMORY),
+        (resource.RLIMIT_CPU, int(spent.ru_utime + spent.ru_stime + cpu_s) + 1),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        hard = resource.getrlimit(kind)[1]
+        with suppress(ValueError, OSError):
+            resource.setrlimit(kind, (most if hard < 0 else min(most, hard), hard))

@@ -1,0 +1,64 @@
+"""The process that reads strangers' files: its bounds, and that nothing leaves it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from typing import Any
+
+import pytest
+
+pytest.importorskip("igl")
+
+from scenelang.fitting import apart
+from scenelang.fitting.apart import Apart
+from scenelang.fitting.mesh import FitError
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="has no such bounds")
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """What code makes of bytes in such a process."""
+
+    def ask(code: str, cpu_s: float = 60.0) -> tuple[bytes, list[Any]]:
+        start = (
+            "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from scenelang.fitting import apart\n"
+        )
+        wrapped = f"def make(request, data, tell):\n    import os\n    {code}\n"
+        monkeypatch.setattr(apart, "_CODE", f"{start}{wrapped}apart.serve(make)\n")
+        heard: list[Any] = []
+        with Apart() as process:
+            answers = [process({"cpu_s": cpu_s}, b"abc", {"say": heard.append}) for _ in range(2)]
+        assert answers[0] == answers[1]
+        return answers[0], heard
+
+    return ask
+
+
+def test_answers(made: Any) -> None:
+    assert made("print('noise', flush=True); tell('say', 'a'); return data * 2") == (b"abcabc", ["a", "a"])
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        ("while True: pass", "more than 1 s of processor time"),
+        ("return bytes(apart.MEMORY)", "more than 6 GiB of memory"),
+        (f"os.kill(os.getpid(), {int(signal.SIGSEGV)})", f"has failed .signal {int(signal.SIGSEGV)}"),
+        ("os._exit(3)", "has failed .status 3"),
+        ("raise apart.FitError('what is wrong')", "^what is wrong$"),
+        ("import socket; socket.create_connection(('127.0.0.1', 9))", "has failed .status 1"),
+        ("os.system('true')", "has failed .status 1"),
+    ],
+)
+def test_what_ends_it_is_an_error_of_the_file(made: Any, code: str, words: str) -> None:
+    with pytest.raises(FitError, match=words):
+        made(code, 1.0)
+
+
+def test_it_ends_with_ours(made: Any) -> None:
+    pid = int(made("return str(os.getpid()).encode()")[0])
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
