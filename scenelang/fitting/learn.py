@@ -48,7 +48,7 @@ def learn(
     _writable(out)
     made: list[Element] = []
     troubles = []
-    hear = {"say": say, "progress": progress}
+    hear: dict[str, Hear] = {"say": say, "progress": progress}
     with Apart() as apart:
         for file, called in zip(map(Path, files), names, strict=True):
             try:

@@ -157,6 +157,8 @@ def read_mesh(data: bytes, suffix: str, sign: Sign = "auto") -> Mesh:
             file, kind = io.BytesIO(data), suffix[1:]
             found = trimesh.load_scene(file, file_type=kind, resolver=None, skip_materials=True).to_mesh()
         vertices, triangles = np.asarray(found.vertices, float), np.asarray(found.faces, np.int64)
+    except MemoryError:
+        raise
     except Exception as error:
         raise FitError(f"damaged or not a mesh: {str(error) or type(error).__name__}"[:200]) from error
     return mesh_of(vertices, triangles, sign)
