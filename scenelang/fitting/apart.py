@@ -102,7 +102,7 @@ def _ended(status: int, cpu_s: float) -> str:
 
     if -status == getattr(signal, "SIGXCPU", None):
         return f"it takes more than {cpu_s:g} s of processor time"
-    return f"a library that reads it has failed ({f'signal {-status}' if status < 0 else f'status {status}'})"
+    return f"what reads it has failed ({f'signal {-status}' if status < 0 else f'status {status}'})"
 
 
 def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -> None:
@@ -120,6 +120,9 @@ def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -
             _tell(out, "error", str(error))
         except MemoryError:
             _tell(out, "error", f"it takes more than {MEMORY >> 30} GiB of memory")
+        except Exception as error:
+            said = " ".join(f"{type(error).__name__}: {error}".split())
+            _tell(out, "error", f"what reads it has failed ({said[:200]})")
         else:
             _tell(out, "made", len(made), then=made)
 

@@ -122,7 +122,11 @@ class Outline:
         return found
 
     def surface(self, count: int) -> tuple[Points, Points]:
-        """Points (K, 2) spread evenly on the outline, K at most ``count``, and outward normals."""
+        """Points (K, 2) spread evenly on the outline, K at most ``count``, and outward normals.
+
+        Raises:
+            FitError: nothing is thick enough to have an outline.
+        """
         random, points, normals = np.random.default_rng(1), [], []
         for layer, pieces, _ in self._layers:
             way = _normals(pieces)
@@ -135,6 +139,8 @@ class Outline:
         at, way = all_points[chosen], all_normals[chosen]
         sides_in = [self.distances(at + sign * _BESIDE * way) < 0 for sign in (1, -1)]
         outer = sides_in[0] != sides_in[1]
+        if not outer.any():
+            raise FitError(f"it is nowhere thicker than {_BESIDE:g} of its radius")
         turned = np.where(sides_in[0], -1.0, 1.0)[:, None]
         return at[outer], (way * turned)[outer]
 

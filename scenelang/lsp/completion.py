@@ -302,15 +302,18 @@ class _Maker:
                 for name in "xyzrgb":
                     yield Item(name, Kind.Field)
             return
-        for name, element in self.docs.elements(self.document, symbol.node).items():
-            yield Item(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, element.told(), True)
+        for found in self.docs.elements(self.document, symbol.node):
+            if found.material == ("material" in before[-4:-2]):
+                yield Item(
+                    found.name, Kind.Class, f"{found.name} {{ $0 }}", "a", found.kind, found.told(), True
+                )
         library = self.docs.imported(self.document, symbol.node.path.value)
         if library is None:
             return
         statement = len(before) == 2 or (len(before) == 3 and before[0] in COMBINE)
-        for found in library.names.exported():
-            if not statement or found.kind in ("module", "let"):
-                yield self._symbol(found, statement=statement)
+        for known in library.names.exported():
+            if not statement or known.kind in ("module", "let"):
+                yield self._symbol(known, statement=statement)
 
 
 def _item(word: words.Word, kind: Kind, rank: str) -> Item:

@@ -10,6 +10,7 @@ from lsprotocol import types
 from pygls.exceptions import JsonRpcException
 
 from scenelang.diagnostics.error import SceneError
+from scenelang.elements.element import Element
 from scenelang.lsp import actions, callees, completion, hover, navigation, tokens
 from scenelang.lsp.server import Server, Settings
 from scenelang.lsp.workspace import Document, path_of
@@ -139,7 +140,7 @@ _SESSION: Final[dict[str, Callable[..., Any]]] = {
 _AT_PLACE: Final[dict[str, Callable[[Server, Document, int], Any]]] = {
     types.TEXT_DOCUMENT_COMPLETION: _completion,
     types.TEXT_DOCUMENT_SIGNATURE_HELP: lambda s, d, at: callees.signature_help(s.docs, d, at),
-    types.TEXT_DOCUMENT_HOVER: lambda s, d, at: hover.hover(s.docs, d, at),
+    types.TEXT_DOCUMENT_HOVER: lambda s, d, at: hover.hover(s.docs, d, at, s.thumbnail),
     types.TEXT_DOCUMENT_DEFINITION: lambda s, d, at: navigation.definition(s.docs, d, at),
     types.TEXT_DOCUMENT_PREPARE_RENAME: lambda s, d, at: navigation.prepare_rename(s.docs, d, at),
 }
@@ -213,9 +214,13 @@ def _handler(method: str) -> Callable[[Server, Any], Any]:
     return handle
 
 
-def make_server() -> Server:
-    """A server with all its features."""
-    server = Server()
+def make_server(draw: Callable[[Element], bytes] | None = None) -> Server:
+    """A server with all its features.
+
+    Args:
+        draw: makes a small PNG of an element.
+    """
+    server = Server(draw)
     for method in (*_SESSION, *_AT_PLACE, *_OF_FILE, *_LISTS):
         server.feature(method, _OPTIONS.get(method))(_handler(method))
     return server

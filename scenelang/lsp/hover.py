@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
 from lsprotocol import types
 
 from scenelang import words
+from scenelang.elements.element import Element
 from scenelang.lsp import values
 from scenelang.lsp.callees import find_symbol, word_of
 from scenelang.lsp.check import Seen
@@ -31,11 +32,17 @@ _TABLES: Final = {
 }
 
 
-def hover(docs: Workspace, document: Document, offset: int) -> types.Hover | None:
-    """What there is to say about an offset."""
+def hover(
+    docs: Workspace, document: Document, offset: int, picture: Callable[[Element], str] = lambda element: ""
+) -> types.Hover | None:
+    """What there is to say about an offset.
+
+    Args:
+        picture: of an element, in Markdown.
+    """
     use = document.names.at(offset)
     if use is not None:
-        text = _use(docs, document, use)
+        text = _elements(docs, document, use, picture) or _use(docs, document, use)
         return _answer(document, use.start, use.end, text) if text else None
     path = path_to(document.parsed, offset)
     for node in reversed(path):
@@ -93,14 +100,21 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             return next((_model(m) for m in vocabulary_of(document).models if m.name == text), None)
         case "argument":
             return _argument(use)
-        case "member" if use.symbol is not None and isinstance(use.symbol.node, nodes.Import):
-            element = docs.elements(document, use.symbol.node).get(text.partition(".")[0])
-            return None if element is None else f"```text\n{element.told().replace('`', chr(39))}\n```"
         case "path":
             library = docs.imported(document, text)
             return f"`{library.path}`" if library is not None else "no such file"
         case _:
             return None
+
+
+def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[Element], str]) -> str | None:
+    """The geometry and the material of an imported file that have a name, as they are shown and told of."""
+    if use.role != "member" or use.symbol is None or not isinstance(use.symbol.node, nodes.Import):
+        return None
+    name = use.text.partition(".")[0]
+    found = [element for element in docs.elements(document, use.symbol.node) if element.name == name]
+    told = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in found]
+    return "\n\n".join(told)
 
 
 def _argument(use: Use) -> str | None:

@@ -11,6 +11,7 @@ import logging
 import re
 import sys
 import threading
+from base64 import b64encode
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
@@ -23,6 +24,7 @@ from pygls.lsp.server import LanguageServer
 from pygls.protocol import LanguageServerProtocol
 from pygls.protocol.language_server import lsp_method
 
+from scenelang.elements.element import Element
 from scenelang.lsp.actions import to_diagnostic
 from scenelang.lsp.check import Checked, Superseded, check
 from scenelang.lsp.workspace import Document, Workspace, path_of
@@ -31,6 +33,7 @@ from scenelang.records import Record
 log = logging.getLogger("scenelang.lsp")
 _DEEP: Final = 10_000  # trees are up to 200 levels deep, walks take a few calls a level
 MAX_PAUSE_MS: Final = 60_000
+MAX_DRAWN: Final = 100  # thumbnails that are kept
 _LENGTH: Final = re.compile(rb"Content-Length: *(\d+)\r\n\Z")
 _MOST_DIGITS: Final = 8  # below 100 MB: the largest text there may be, each character escaped
 _CHUNK: Final = 1 << 16
@@ -136,9 +139,11 @@ class Protocol(LanguageServerProtocol):
 class Server(LanguageServer):
     """One client, its documents, and the checks that run for it."""
 
-    def __init__(self) -> None:
+    def __init__(self, draw: Callable[[Element], bytes] | None = None) -> None:
         super().__init__("scenelang", version("scenelang"), protocol_cls=Protocol)
         self.docs = Workspace()
+        self._draw = draw
+        self._drawn: dict[str, str] = {}  # what `thumbnail` says, by digest
         self.settings = Settings()
         self.was_shut_down = False
         self._timers: dict[str, asyncio.TimerHandle] = {}
@@ -155,6 +160,23 @@ class Server(LanguageServer):
         known = [folder.resolve() for folder in folders if folder is not None]
         self.docs = Workspace(encoding, known)  # type: ignore[arg-type]
         self.settings = Settings.read(params.initialization_options)
+
+    def thumbnail(self, element: Element) -> str:
+        """An element's picture in Markdown; empty where the client shows none or it cannot be drawn."""
+        general = self.client_capabilities.general
+        markdown = general.markdown if general is not None else None
+        if self._draw is None or markdown is None or "img" not in (markdown.allowed_tags or ()):
+            return ""
+        if element.digest not in self._drawn:
+            if len(self._drawn) >= MAX_DRAWN:
+                self._drawn.clear()
+            try:
+                data = b64encode(self._draw(element)).decode()
+                self._drawn[element.digest] = f"\n\n![{element.name}](data:image/png;base64,{data})"
+            except Exception:
+                log.exception("cannot draw element %s", element.name)
+                self._drawn[element.digest] = ""
+        return self._drawn[element.digest]
 
     def serve(self, source: BinaryIO, answers: BinaryIO) -> None:
         """Answer one client until it is gone."""

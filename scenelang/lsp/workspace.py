@@ -204,15 +204,15 @@ class Workspace:
             return self.by_path(library.find(text))
         return self.by_path(self._place(document, text))
 
-    def elements(self, document: Document, stmt: nodes.Import) -> dict[str, Element]:
-        """The elements that an import brings, by name; none where its file is scene text or damaged."""
+    def elements(self, document: Document, stmt: nodes.Import) -> tuple[Element, ...]:
+        """The elements that an import brings; none where its file is scene text or damaged."""
         path = self._place(document, stmt.path.value)
         if path is None or path.suffix != SUFFIX:
-            return {}
+            return ()
         try:
-            return load_zoo(path).geometries
+            return load_zoo(path).elements
         except (OSError, TensorError):
-            return {}
+            return ()
 
     def _place(self, document: Document, text: str) -> Path | None:
         """The file that a path in a document means."""

@@ -49,8 +49,9 @@ def test_answers(made: Any) -> None:
         (f"os.kill(os.getpid(), {int(signal.SIGSEGV)})", f"has failed .signal {int(signal.SIGSEGV)}"),
         ("os._exit(3)", "has failed .status 3"),
         ("raise apart.FitError('what is wrong')", "^what is wrong$"),
-        ("import socket; socket.create_connection(('127.0.0.1', 9))", "has failed .status 1"),
-        ("os.system('true')", "has failed .status 1"),
+        ("return 1 / 0", "has failed .ZeroDivisionError: division by zero"),
+        ("import socket; socket.create_connection(('127.0.0.1', 9))", "has failed .PermissionError: socket"),
+        ("os.system('true')", "has failed .PermissionError: os.system"),
     ],
 )
 def test_what_ends_it_is_an_error_of_the_file(made: Any, code: str, words: str) -> None:

@@ -114,12 +114,17 @@ def test_what_becomes_of_a_drawing_is_small() -> None:
         (".svg", b'<svg><path d="M1 1z"/></svg>', "draws nothing|one point|covers nothing"),
         (".svg", b'<svg><path d="M0 0h5"/></svg>', "covers nothing"),
         (".svg", b'<svg><path d="M0 0h1e999v5z"/></svg>', "finite|damaged"),
+        (
+            ".svg",
+            b'<svg><path d="M0 0h9" fill="none" stroke="red" stroke-width="1e-9"/></svg>',
+            "nowhere thicker",
+        ),
         (".png", b"no picture", "damaged"),
     ],
 )
 def test_what_is_no_outline(suffix: str, data: bytes, words: str) -> None:
     with pytest.raises(FitError, match=words):
-        read_outline(data, suffix)
+        read_outline(data, suffix).surface(100)
 
 
 def test_an_entity_bomb_ends() -> None:

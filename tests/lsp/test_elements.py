@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from base64 import b64decode
+from io import BytesIO
 from pathlib import Path
 
+import numpy as np
+import pytest
+from PIL import Image
+
 from scenelang.elements.zoo import zoo_bytes
-from tests.elements.shapes import ball, element, torus
-from tests.lsp.client import Client
+from tests.elements.shapes import ball, element, square, torus
+from tests.lsp.client import CAPABILITIES, Client
 from tests.lsp.test_completion import labels
 from tests.lsp.test_hover import hover
 
@@ -19,3 +25,32 @@ def test_elements_are_proposed_and_told_of(client: Client, uri: str) -> None:
     told = hover(client, client.at(uri, "zoo.ring", 5))
     assert "element of space: 33 × 33 × 33 distances" in told
     assert "license: none needed" in told
+
+
+@pytest.mark.parametrize("shows", [True, False])
+def test_elements_are_shown_where_the_editor_shows_pictures(
+    shows: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if shows:
+        markdown = {"parser": "marked", "allowedTags": ["p", "img"]}
+        monkeypatch.setitem(CAPABILITIES["general"], "markdown", markdown)
+    (tmp_path / "zoo.safetensors").write_bytes(
+        zoo_bytes([element(torus, "ring"), element(square, "tile", d=2)])
+    )
+    client = Client(tmp_path)
+    try:
+        text = 'import "zoo.safetensors" as zoo;\nzoo.ring { }\nzoo.tile { }\n'
+        uri = client.open((tmp_path / "a.nsg").as_uri(), text)
+        told = [hover(client, client.at(uri, name, 5)) for name in ("zoo.ring", "zoo.tile", "zoo.ring")]
+    finally:
+        client.kill()
+    pictures = [text.partition("(data:image/png;base64,")[2].partition(")")[0] for text in told]
+    assert pictures[0] == pictures[2]
+    assert [bool(picture) for picture in pictures] == [shows] * 3
+    if shows:
+        ring, tile = (np.asarray(Image.open(BytesIO(b64decode(picture)))) for picture in pictures[:2])
+        assert ring.shape == tile.shape == (96, 96, 3)
+        assert max(map(len, pictures)) < 20_000
+        assert tile[48, 48].tolist() == [34, 34, 34]
+        assert tile[2, 2].tolist() == [255, 255, 255]
+        assert np.ptp(ring[40:56, 40:56, 0]) > 40  # lit

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from scenelang.cli.main import Trouble
+
+if TYPE_CHECKING:
+    from scenelang.elements.element import Element
 
 
 @click.command("lsp")
@@ -38,7 +43,7 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
     )
     if not log:  # requests that are refused are answered as such; the library would print a trace
         logging.getLogger("pygls").setLevel(logging.CRITICAL)
-    server = make_server()
+    server = make_server(_thumbnail)
     if tcp is None:
         server.serve(sys.stdin.buffer, sys.stdout.buffer)
     else:
@@ -48,3 +53,10 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
             server.serve(source, answers)
     if not server.was_shut_down:  # the protocol: an exit that was not announced is a failure
         raise click.exceptions.Exit(1)
+
+
+def _thumbnail(element: Element) -> bytes:
+    """A small PNG; numpy and the rest are imported when the first is asked for."""
+    from scenelang.backend.thumbnail import thumbnail
+
+    return thumbnail(element, 96).encode()
