@@ -31,6 +31,7 @@ class FileContext:
         prefix: how the first file calls its params: empty, or ``lib.``.
         weight: half evaluation steps of what has been prepared of the block at hand.
         damage: what syntax mistakes leave unknown of it.
+        materials: what a Scene calls those of a file of elements.
     """
 
     source: SourceFile
@@ -45,6 +46,7 @@ class FileContext:
     weight: int = 0
     first: nodes.Stmt | None = None
     damage: Damage = NONE
+    materials: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.scope = Scope(Slots(root=self.env))

@@ -38,13 +38,15 @@ class Vocabulary:
 
     geometries = _offered("geometries")
     materials = _offered("materials")
+    textures = _offered("textures")
     transforms = _offered("transforms")
     material_ops = _offered("material_ops")
 
     def owner(self, name: str) -> str | None:
         """The first model at hand but the chosen one that has a geometry, material or operation ``name``."""
         for m in self.models:
-            if m is not self.chosen and name in (*m.geometries, *m.materials, *m.transforms, *m.material_ops):
+            known = (*m.geometries, *m.materials, *m.textures, *m.transforms, *m.material_ops)
+            if m is not self.chosen and name in known:
                 return m.name
         return None
 

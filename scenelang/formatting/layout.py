@@ -176,8 +176,11 @@ class Layout(ExpressionLayout):
     def import_(self, word: int, path: int, as_: int, alias: Part, last: int) -> Part:
         return self._ended([self.word(word), " ", self.string(path), " ", self.word(as_), " ", alias], last)
 
-    def material_use(self, word: int, name: Part, last: int | Block) -> Part:
-        return self._use([self.word(word), " ", name], last)
+    def material_use(self, word: int, *rest: Any) -> Part:
+        return self._use(self._material(word, rest[:-1]), rest[-1])
+
+    def _material(self, word: int, names: Sequence[Part]) -> list[Part]:
+        return [self.word(word), *[part for name in names for part in (" ", name)]]
 
     def call(self, name: Part, *rest: Any) -> Part:
         return self._use([name, *rest[:-1]], rest[-1])
@@ -249,9 +252,9 @@ class Layout(ExpressionLayout):
         stmt = Statement(joined(parts), lambda: sequence(parts), child.depth, child.simple)
         return ends_of(stmt, op, child)
 
-    def material(self, word: int, name: Part, *body: Block) -> Part:
-        head = [self.word(word), " ", name]
-        if not body:
-            return sequence(head)
-        stmt = self._blocked(head, body[0], structure=False)
+    def material(self, word: int, *rest: Any) -> Part:
+        body = rest[-1]
+        if not isinstance(body, Block):
+            return sequence(self._material(word, rest))
+        stmt = self._blocked(self._material(word, rest[:-1]), body, structure=False)
         return ends_of(Bracketed(stmt.flat, stmt.maker), stmt, stmt)

@@ -10,23 +10,25 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import Span
 from scenelang.elements.element import Element
 from scenelang.graph import affine
-from scenelang.graph.looks import WHITE, Look
+from scenelang.graph.looks import MOST_STEPS, WHITE, Look, colour_steps, normal
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
 from scenelang.graph.space import REACH, SINGULAR, Refusal, Space
 from scenelang.graph.spaces import PLANE, SPACES
 from scenelang.graph.stage import stage_of
-from scenelang.graph.steps import Affine, Displace, Rows, Step, Twist, Warp
-from scenelang.models.manifest import Manifest
+from scenelang.graph.steps import IDENTITY, Affine, Displace, Rows, Step, Twist, Warp
+from scenelang.models.manifest import Manifest, load_textures
 from scenelang.scene import schema
-from scenelang.scene.elements import elements_of
+from scenelang.scene.elements import Brought
 from scenelang.words import BLEND, STAGE, Combine
 
 
-def step_of(transform: schema.Transform, space: Space) -> Step | Refusal:
+def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | Refusal:
     """The step that a transform stands for, or why there is none.
 
     In the plane nothing may leave it, and scales along z drop out.
     """
+    if isinstance(transform, schema.Flip):
+        return Affine(affine.scaling(-1.0, 1.0))
     if isinstance(transform, schema.Twirl):
         return Warp(transform.k, (0.0, 0.0))
     if isinstance(transform, schema.Bend):
@@ -113,15 +115,14 @@ def lower(
             diagnostics.add(*refusal, place, help="leave it out, or draw with another model")
     space = replace(SPACES[manifest.dimension], outlines=manifest.outlines)
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
-    brought = elements_of(scene.elements)
+    brought = Brought.of(scene.elements)
     lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {}, brought)
     root = lowering.run(scene)
     if memory is not None and lowering.kept is not None:
         memory.leaves, memory.model = lowering.kept, manifest.name
     stage = stage_of(scene) if space.dimension == 3 else None
     background = WHITE if scene.background == "default" else scene.background
-    elements = {name: element for name, element in brought.items() if element is not None}
-    return Graph(root, scene.canvas, background, space, stage, elements)
+    return Graph(root, scene.canvas, background, space, stage, brought.geometries)
 
 
 def _check_canvas(
@@ -175,7 +176,7 @@ class _Lowering:
     diagnostics: Diagnostics
     old: Leaves
     kept: Leaves | None
-    brought: Mapping[str, Element | None]
+    brought: Brought
     objects: int = 0
     looks: dict[int, Look] = field(default_factory=dict)
     said: set[tuple[str, str]] = field(default_factory=set)
@@ -222,7 +223,7 @@ class _Lowering:
             leaf = seen[2]
         else:
             if "." in node.geometry:
-                self.check_element(node)
+                self.element(node.geometry, self.brought.geometries, node, "E0501")
             elif node.geometry not in self.manifest.geometries:
                 self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
             look = Look(self.manifest.default_material) if material is None else self.look(material)
@@ -232,16 +233,19 @@ class _Lowering:
             self.kept[id(node)] = node, material, leaf
         return leaf
 
-    def check_element(self, node: schema.Object) -> None:
-        """Say where the model does not draw an element, or nothing is known of it."""
-        name, model = node.geometry, f"model `{self.manifest.name}`"
-        file, known = name.partition(".")[0], self.brought
-        if name not in known and file in known:
+    def element(self, name: str, known: Mapping[str, Element], node: object, code: str) -> Element | None:
+        """What a file of elements has; says where the model does not draw it, or nothing is known of it."""
+        element, model = known.get(name), f"model `{self.manifest.name}`"
+        if element is not None and element.kind not in self.manifest.elements:
+            kind = f"an {element.kind}" if element.kind.startswith("e") else f"a {element.kind}"
+            self.say(code, f"{model} does not draw `{name}`, {kind}", node)
+        elif element is None and name.partition(".")[0] in self.brought.unread:
             self.say("E0214", f"the file of `{name}` has not been read", node, "load the scene with a root")
-        elif name not in known:
-            self.say("E0501", f"no file of elements has `{name}`", node, "list its file in `elements`")
-        elif (element := known[name]) and element.kind not in self.manifest.elements:
-            self.say("E0501", f"{model} does not draw `{name}`, an {element.kind}", node)
+        elif element is None:
+            what = "material" if known is self.brought.materials else "geometry"
+            fact = f"no file of elements has a {what} `{name}`"
+            self.say(code, fact, node, "list its file in `elements`")
+        return element
 
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
         found = []
@@ -269,15 +273,46 @@ class _Lowering:
         known = self.looks.get(id(material))
         if known is not None:
             return known
-        if material.name not in self.manifest.materials:
-            self.refuse("E0502", "material", material.name, self.manifest.materials, material)
+        name, manifest, element = material.name, self.manifest, None
+        shading = material.shading or manifest.default_material
+        if "." in name:
+            element = self.element(name, self.brought.materials, material, "E0502")
+        elif name in manifest.textures:
+            element = load_textures(manifest)[name]
+        else:
+            shading = name
+            if material.shading is not None:
+                self.say("E0502", f"`{name}` is not a texture", material, f"leave `{material.shading}` out")
+        if shading not in manifest.materials:
+            offered = manifest.looks if shading is name else manifest.materials
+            self.refuse("E0502", "material", shading, offered, material)
+        moves = tuple(self.texture_moves(material, element))
+        colours = colour_steps(map(self.space.inked, material.ops))
+        if len(normal(colours)) > MOST_STEPS and element is not None:
+            self.say("E0320", f"more than {MOST_STEPS:,} operations on the colours of `{name}`", material)
+        look = self.looks[id(material)] = Look(shading, colours, element=element, texture=moves)
+        return look
+
+    def texture_moves(self, material: schema.Material, element: Element | None) -> Iterator[Affine]:
+        """The moves of a texture, which a constant material has as well and colours of space have not."""
+        rows = IDENTITY
         for op in material.ops:
             if op.kind not in self.manifest.material_ops:
                 self.refuse("E0504", "material operation", op.kind, self.manifest.material_ops, op)
-            elif isinstance(op, schema.Scale) and not PLANE.usable(affine.scaling(op.x, op.y)):
-                self.say("E0312", "`scale` of a texture is singular", op, "use factors other than 0")
-        look = self.looks[id(material)] = Look.of(material.name, map(self.space.inked, material.ops))
-        return look
+            elif isinstance(op, schema.Color | schema.Grayscale | schema.Hue):
+                continue
+            elif element is not None and element.dimension == 3:
+                fact = f"`{op.kind}` moves a texture, and `{material.name}` is a {element.kind}"
+                self.say("E0504", fact, op, "its colours lie on the shape: leave the move out")
+            elif isinstance(step := step_of(op, PLANE), Refusal):
+                if step.code == "E0312" or element is not None:
+                    self.say(step.code, step.message, op, step.help)
+            elif isinstance(step, Affine):
+                rows = affine.compose(step.rows, rows)
+                yield step
+        if not PLANE.usable(rows):
+            fact = f"the moves of the texture `{material.name}` compose to a singular one"
+            self.say("E0406", fact, material, "scale less along one direction, or less often")
 
     def refuse(self, code: str, what: str, name: str, known: Sequence[str], node: object) -> None:
         from difflib import get_close_matches

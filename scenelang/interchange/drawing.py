@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.looks import coloured
+from scenelang.graph.looks import colour_steps, coloured
 from scenelang.graph.nodes import Fold, Graph, Leaf, Node
 from scenelang.graph.space import Space
 from scenelang.graph.spaces import SPACES
@@ -94,7 +94,7 @@ def _scene_box(node: schema.SceneNode, inner: schema.Material | None, space: Spa
     own = [] if node.material is None else [material(node.material).rstrip(";")]
     if isinstance(node, schema.Object):
         ops = () if inner is None else map(space.inked, inner.ops)
-        fill = None if inner is None else hex_text(space.written(coloured(ops)))
+        fill = None if inner is None else hex_text(space.written(coloured(colour_steps(ops))))
         return Box((node.geometry, *_short([*own, *steps])), fill, leaf=True)
     name = node.op if isinstance(node, schema.Boolean) else node.kind
     return Box((name, *_short([*own, *steps])))

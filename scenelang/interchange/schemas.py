@@ -109,8 +109,9 @@ def manifest_schema() -> dict[str, Any]:
             "fixed_stage": {"description": "whether camera and light are its own", "type": "boolean"},
             "any_blend": {"description": "whether it blends over any width", "type": "boolean"},
             "white": {"description": "whether it draws over white alone", "type": "boolean"},
+            "textures": {**words, "description": "materials that are elements in textures.safetensors"},
         },
-        optional=("layout", "set", "sizes", "white", "outlines", "fixed_stage", "any_blend"),
+        optional=("layout", "set", "sizes", "white", "outlines", "fixed_stage", "any_blend", "textures"),
         title="Manifest",
         description="What a model states about itself.",
     )

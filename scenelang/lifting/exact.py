@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from scenelang.graph.chain import Levels, slots
-from scenelang.graph.steps import Rows, Turn
+from scenelang.graph.steps import IDENTITY, Rows, Turn
 from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH, Layout
 
 
@@ -94,15 +94,22 @@ def _slots(turns: tuple[Turn, ...], count: int, layout: Layout) -> list[float]:
 
 
 def lift_colours(
-    colours: Sequence[Sequence[float]], codes: Sequence[Sequence[float]], layout: Layout = PLANE_LAYOUT
+    colours: Sequence[Sequence[float]],
+    codes: Sequence[Sequence[float]],
+    layout: Layout = PLANE_LAYOUT,
+    moved: Sequence[Rows] = (),
 ) -> np.ndarray:
-    """Material vectors (N, 64 - layout.geometry) in float64 of objects whose material is one colour.
+    """Material vectors (N, 64 - layout.geometry) in float64.
 
     Args:
         colours: what multiplies the albedo, (r, g, b) in [0, 1].
+        moved: what each one's texture is moved by, as maps of the plane; by default nothing.
     """
     out = np.zeros((len(colours), WIDTH - layout.geometry))
     out[:, :6] = PLANE_LAYOUT.identity  # textures lie in a plane
+    for row, map in zip(out, moved, strict=False):
+        if map is not IDENTITY:
+            row[:6] = inverse_frame(map, 2)
     for channel in range(3):
         out[:, layout.colour.start + 5 * channel] = [c[channel] for c in colours]
     out[:, layout.material_code] = np.asarray(codes, dtype=np.float64).reshape(len(colours), -1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from scenelang.models.manifest import Manifest
-from scenelang.scene.elements import elements_of
+from scenelang.scene.elements import Brought
 from scenelang.scene.schema import Boolean, Chain, Object, Scene, SceneNode
 from scenelang.words import BLEND, STAGE
 
@@ -51,7 +51,7 @@ def paints(model: Manifest, scene: Scene) -> bool:
 
 
 def _size(model: Manifest) -> tuple[int, int, int, float, str]:
-    others = len(model.materials) + len(model.transforms) + len(model.material_ops)
+    others = len(model.looks) + len(model.transforms) + len(model.material_ops)
     return model.dimension, len(model.geometries), others, model.flip(), model.name
 
 
@@ -80,17 +80,23 @@ def uses(scene: Scene) -> Iterator[Use]:
     for word in (*STAGE, "background"):
         if getattr(scene, word) != "default":
             yield word, "settings", getattr(scene, word)
-    brought = elements_of(scene.elements)
+    brought = Brought.of(scene.elements)
     seen: set[tuple[str, str]] = set()
     stack: list[SceneNode] = list(reversed(scene.nodes))
     while stack:
         node = stack.pop()
         found: list[Use] = [(t.kind, "transforms", t) for t in node.transforms]
-        if node.material is not None:
-            found.append((node.material.name, "materials", node.material))
-            found += [(op.kind, "material_ops", op) for op in node.material.ops]
+        if (worn := node.material) is not None:
+            element = brought.materials.get(worn.name)
+            if element is not None:
+                found.append((element.kind, "elements", worn))
+            elif "." not in worn.name:
+                found.append((worn.name, "looks", worn))
+            if worn.shading is not None:
+                found.append((worn.shading, "materials", worn))
+            found += [(op.kind, "material_ops", op) for op in worn.ops]
         if isinstance(node, Object):
-            element = brought.get(node.geometry)
+            element = brought.geometries.get(node.geometry)
             if element is not None:
                 found.insert(0, (element.kind, "elements", node))
             elif "." not in node.geometry:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from scenelang.elements.element import Element
+from scenelang.elements.zoo import load_zoo
 from scenelang.files import read_json, read_regular
 from scenelang.words import STAGE
 
@@ -17,6 +19,14 @@ _MOST_BYTES: Final = 1 << 20
 _LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
 """Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""
 _RANGES: Final = {"objects", "smooth", "twirl", "bend", "twist", "scale", "thin", "blend", "displace"}
+
+
+_DRAWN: Final = {
+    "framed": ("element of the plane", "texture"),
+    "solid": ("element of space", "texture", "colouring of space"),
+}
+"""What renderers draw of what users bring, of an exact lifting."""
+TEXTURES: Final = "textures.safetensors"
 
 
 class Outline(NamedTuple):
@@ -57,6 +67,7 @@ class Manifest:
         outlines: of its geometries, for bounds; see `Outline`.
         fixed_stage: whether camera, light, ground and sky are its own.
         any_blend: whether it draws `smooth` of any width k.
+        textures: materials of its own that are elements, in a file `TEXTURES` beside its weights.
     """
 
     name: str
@@ -79,6 +90,7 @@ class Manifest:
     outlines: dict[str, Outline] = field(default_factory=dict)
     fixed_stage: bool = False
     any_blend: bool = False
+    textures: tuple[str, ...] = ()
 
     @staticmethod
     def from_json(text: str | bytes) -> Manifest:
@@ -101,6 +113,7 @@ class Manifest:
             "outlines": {},
             "fixed_stage": False,
             "any_blend": False,
+            "textures": [],
             **data,
         }
         if data.keys() != _KINDS.keys():
@@ -110,7 +123,10 @@ class Manifest:
                 raise ValueError(f"field `{key}` does not hold what it should")
         if data["default_material"] not in data["materials"]:
             raise ValueError("the default material is not one of the materials")
-        lists = {key: tuple(data[key]) for key in ("geometries", "materials", "transforms", "material_ops")}
+        if set(data["textures"]) & set(data["materials"]):
+            raise ValueError("a texture with the name of a material")
+        words = ("geometries", "materials", "transforms", "material_ops", "textures")
+        lists = {key: tuple(data[key]) for key in words}
         trained = {key: (float(low), float(high)) for key, (low, high) in data["trained"].items()}
         sizes = tuple((width, height) for width, height in data["sizes"])
         outlines = {
@@ -136,7 +152,12 @@ class Manifest:
     @property
     def elements(self) -> tuple[str, ...]:
         """What it draws of what users bring."""
-        return {"framed": ("element of the plane",), "solid": ("element of space",)}.get(self.renderer, ())
+        return _DRAWN.get(self.renderer, ()) if self.lifting == "exact" else ()
+
+    @property
+    def looks(self) -> tuple[str, ...]:
+        """All materials that it has itself."""
+        return *self.materials, *self.textures
 
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
@@ -221,6 +242,7 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "outlines": _are(lambda _, value: _is_outline(value)),
     "fixed_stage": lambda value: type(value) is bool,
     "any_blend": lambda value: type(value) is bool,
+    "textures": _are_words,
 }
 """What each field may hold."""
 
@@ -242,4 +264,17 @@ def load_manifest(name: str) -> Manifest:
     found = Manifest.from_json(read_regular(ROOT / name / "manifest.json", _MOST_BYTES))
     if found.name != name:
         raise ValueError(f"the manifest of `{name}` calls itself `{found.name[:40]}`")
+    return found
+
+
+def load_textures(manifest: Manifest) -> dict[str, Element]:
+    """The textures of a shipped model, by name.
+
+    Raises:
+        OSError: their file cannot be read.
+        ValueError: it is damaged, or has other names than the manifest.
+    """
+    found = load_zoo(ROOT / manifest.name / TEXTURES).materials if manifest.textures else {}
+    if found.keys() != {*manifest.textures}:
+        raise ValueError(f"the textures of `{manifest.name}` are not those of its manifest")
     return found

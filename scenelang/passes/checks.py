@@ -155,7 +155,8 @@ def _check_blends(
             continue
         largest = max(largest, leaf.noted("measures", measures)[0][1])
         rgb = leaf.look.colour()
-        low, high = list(map(min, low, rgb)), list(map(max, high, rgb))
+        dark = rgb if leaf.look.element is None else (0.0, 0.0, 0.0)  # a texture may have any colour
+        low, high = list(map(min, low, dark)), list(map(max, high, rgb))
         if op == "smooth":
             contrast = max(max(c - a, b - c) for a, b, c in zip(low, high, rgb, strict=True))
             if worst is None or contrast * largest > worst[0]:

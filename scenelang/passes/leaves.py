@@ -64,7 +64,8 @@ def _tidy(node: Node, outward: Moves) -> Moves:
 def fold_looks(graph: Graph, context: Context) -> Graph:
     """Apply the colour operations of constant materials to their white, and drop moves of their textures.
 
-    Objects that share a look still share it afterwards.
+    The moves of a texture compose to one, and its colour operations take their normal form. Objects that
+    share a look still share it afterwards.
 
     Before: any graph. After: LOOKS.
     """

@@ -18,6 +18,7 @@ from scenelang.lifting.layout import LAYOUTS, WIDTH
 from scenelang.lifting.learned import lift_geometry, lift_material
 from scenelang.models.manifest import Manifest
 from scenelang.models.weights import Codes
+from scenelang.program.paints import Paint
 from scenelang.program.program import Place, Program, ProgramError
 from scenelang.words import TOKENS
 
@@ -36,6 +37,8 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     leaves = [leaf for _, leaf in rows]
     listed = sorted({leaf.geometry for leaf in leaves} & graph.elements.keys())
     forms = {name: at for at, name in enumerate(listed)}
+    palette, worn = _palette(leaves)
+    materials = dict.fromkeys(paint.element for paint in palette)
     return Program(
         vectors=_blended(_vectors(leaves, manifest, codes), graph, manifest),
         tokens=np.array([TOKENS[op] for op, _ in rows], dtype=np.int8),
@@ -48,9 +51,23 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
         objects=tuple([leaf.geometry for leaf in leaves]),
         places=places_of([leaf.span for leaf in leaves]),
         numbers=tuple([leaf.number or at for at, leaf in enumerate(leaves, 1)]),
-        elements=tuple([graph.elements[name] for name in listed]),
+        elements=(*[graph.elements[name] for name in listed], *materials),
         forms=np.array([forms.get(leaf.geometry, -1) for leaf in leaves], dtype=np.int32),
+        palette=palette,
+        worn=worn,
     )
+
+
+def _palette(leaves: list[Leaf]) -> tuple[tuple[Paint, ...], npt.NDArray[np.int32]]:
+    """The paints that rows wear, each once in the order of its first row, and which of them each wears."""
+    found: dict[Paint, int] = {}
+    known: dict[int, int] = {}
+    for look in {id(leaf.look): leaf.look for leaf in leaves}.values():
+        known[id(look)] = -1
+        if look.element is not None:
+            steps = [(kind, *np.asarray(numbers, np.float32).tolist()) for kind, *numbers in look.colours]
+            known[id(look)] = found.setdefault(Paint(look.element, tuple(steps)), len(found))
+    return tuple(found), np.array([known[id(leaf.look)] for leaf in leaves], np.int32)
 
 
 def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
@@ -91,7 +108,8 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
         nothing = (0.0,) * layout.code  # an element is told by its row
         shapes = [codes.geometry.get(leaf.geometry, nothing) for leaf in leaves]
         geometry = lift_many(levels, shapes, layout)
-        material = lift_colours(colours, [codes.material[leaf.look.material] for leaf in leaves], layout)
+        painted = [codes.material[leaf.look.material] for leaf in leaves]
+        material = lift_colours(colours, painted, layout, [leaf.look.moved for leaf in leaves])
     vectors = np.concatenate([geometry, material], 1)
     if (width := vectors.shape[1]) != WIDTH:
         raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")

@@ -9,12 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.elements.element import Element
+from scenelang.graph.looks import MOST_STEPS, ColourStep
 from scenelang.tensors import TensorError
 
-Step = tuple[str, *tuple[float, ...]]
 STEPS: Final = {"color": 3, "grayscale": 1, "hue": 1}
 """Operations on a colour and how many numbers each has; in files they are told by their place here."""
-MOST_STEPS: Final = 1000  # of a paint
 
 
 class Paint(NamedTuple):
@@ -27,7 +26,7 @@ class Paint(NamedTuple):
     """
 
     element: Element
-    steps: tuple[Step, ...] = ()
+    steps: tuple[ColourStep, ...] = ()
 
 
 def paint_tensors(paints: tuple[Paint, ...], elements: tuple[Element, ...]) -> dict[str, npt.NDArray[Any]]:

@@ -8,9 +8,9 @@ import numpy as np
 
 from scenelang.elements.element import Element
 from scenelang.elements.picture import texels
-from scenelang.graph.looks import LUMA
+from scenelang.graph.looks import LUMA, ColourStep
 from scenelang.image import decoded
-from scenelang.program.paints import Paint, Step
+from scenelang.program.paints import Paint
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.frames import Affine
@@ -75,7 +75,7 @@ def _nodes(element: Element, light: bool) -> np.ndarray:
     return np.ascontiguousarray(np.moveaxis(values, -1, 0))
 
 
-def stepped(xp: Arrays, rgb: Array, steps: tuple[Step, ...]) -> Array:
+def stepped(xp: Arrays, rgb: Array, steps: tuple[ColourStep, ...]) -> Array:
     """Colours (3, M) behind colour steps, clamped after each.
 
     Args:

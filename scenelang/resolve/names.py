@@ -233,7 +233,11 @@ class Names:
                 self._arguments(node.args or (), scope, self._blend(node))
                 self._walk(node.child, scope, kind)
             case nodes.MaterialUse() | nodes.MaterialExpr():
-                self._add(node.name.span, node.name.text, "material")
+                for name in [node.name] if node.shading is None else [node.shading, node.name]:
+                    if "." in name.text:
+                        self._reference(name, scope, "material", "material")
+                    else:
+                        self._add(name.span, name.text, "material")
                 if node.body is not None:
                     self._walk(node.body, scope, "material")
             case nodes.Call():
@@ -287,7 +291,9 @@ class Names:
         self.uses.append(use)
         return use
 
-    def _reference(self, name: nodes.Name, scope: Scope, otherwise: Role) -> Use | None:
+    def _reference(
+        self, name: nodes.Name, scope: Scope, otherwise: Role, member: Role = "member"
+    ) -> Use | None:
         """The use of a plain or dotted name; of a dotted one that of its last part."""
         alias, _, rest = name.text.partition(".")
         symbol = scope.find(alias)
@@ -300,7 +306,7 @@ class Names:
         self._add(Span(source, span.start, span.start + len(alias)), alias, "name", symbol)
         tail = Span(source, span.end - len(rest), span.end)
         if symbol is not None and symbol.kind == "import":
-            return self._add(tail, rest, "member", symbol)
+            return self._add(tail, rest, member, symbol)
         return None
 
     def _arguments(self, args: Iterable[nodes.Argument], scope: Scope, head: Use | None) -> None:

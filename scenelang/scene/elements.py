@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from pydantic import Field, PrivateAttr
 
@@ -22,7 +22,7 @@ class _Held:
 
 
 class Elements(Frozen):
-    """A file of elements; objects have its geometries as ``name.geometry``."""
+    """A file of elements; objects have its geometries as ``name.geometry``, and its materials likewise."""
 
     name: Word
     path: Annotated[
@@ -65,15 +65,22 @@ class Elements(Frozen):
         return None
 
 
-def elements_of(files: tuple[Elements, ...]) -> dict[str, Element | None]:
-    """All elements of files by the names that objects have them by; the bare names of files not read."""
-    found: dict[str, Element | None] = {}
-    for file in files:
-        if file.zoo is None:
-            found[file.name] = None
-        else:
-            found |= {f"{file.name}.{name}": element for name, element in file.zoo.geometries.items()}
-    return found
+class Brought(NamedTuple):
+    """Elements by the names that scenes have them by."""
+
+    geometries: dict[str, Element]
+    materials: dict[str, Element]
+    unread: frozenset[str]  # names of files that have not been read
+
+    @staticmethod
+    def of(files: tuple[Elements, ...]) -> Brought:
+        """All elements of files."""
+        zoos = [(file.name, file.zoo) for file in files if file.zoo is not None]
+        return Brought(
+            {f"{name}.{key}": element for name, zoo in zoos for key, element in zoo.geometries.items()},
+            {f"{name}.{key}": element for name, zoo in zoos for key, element in zoo.materials.items()},
+            frozenset(file.name for file in files if file.zoo is None),
+        )
 
 
 def load_elements(path: str | Path, name: str | None = None) -> Elements:

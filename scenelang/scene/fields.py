@@ -59,7 +59,7 @@ _WORD: Final = "[A-Za-z_][A-Za-z0-9_]*"
 _SPELT: Final[dict[str, Any]] = {"json_schema_extra": {"not": {"enum": list(RESERVED)}}}
 Word = Annotated[str, Field(pattern=f"^{_WORD}$", **_SPELT), _NOT_RESERVED]
 """A name that text can spell."""
-Geometry = Annotated[str, Field(pattern=rf"^{_WORD}(\.{_WORD})?$", **_SPELT), _NOT_RESERVED]
+Dotted = Annotated[str, Field(pattern=rf"^{_WORD}(\.{_WORD})?$", **_SPELT), _NOT_RESERVED]
 """The same, or that of an element behind the name of its file."""
 
 

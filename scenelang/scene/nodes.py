@@ -9,9 +9,9 @@ from pydantic import Field, field_validator, model_validator
 
 from scenelang.scene.elements import Elements
 from scenelang.scene.fields import (
+    Dotted,
     Finite,
     Frozen,
-    Geometry,
     Opaque,
     Pixels,
     Version,
@@ -28,21 +28,29 @@ Blend = Annotated[Finite, Field(gt=0, description="width of the blend of `smooth
 
 
 class Material(Frozen):
-    """A material of the model, with its texture and colour operations in order."""
+    """A material, with its texture and colour operations in order.
 
-    name: Annotated[Word, Field(description="a material of the model")]
+    One of the model that is a texture, or an element's, is lit as its ``shading`` says.
+    """
+
+    name: Annotated[Dotted, Field(description="a material of the model, or an element's")]
     ops: Annotated[tuple[MaterialOp, ...], Field(description="in order, nearest the leaf first")] = ()
+    shading: Annotated[
+        Word | None, Field(description="of a texture: flat, diffuse or volumetric; null: as usual")
+    ] = None
 
     if TYPE_CHECKING:
 
-        def __init__(self, name: str, ops: Iterable[MaterialOp] | MaterialOp = ()) -> None: ...
+        def __init__(
+            self, name: str, ops: Iterable[MaterialOp] | MaterialOp = (), shading: str | None = None
+        ) -> None: ...
 
 
 class Object(Frozen):
     """A leaf geometry, its transforms nearest the leaf first, and its material."""
 
     kind: Literal["object"] = "object"
-    geometry: Annotated[Geometry, Field(description="a leaf geometry of the model, or an element's")]
+    geometry: Annotated[Dotted, Field(description="a leaf geometry of the model, or an element's")]
     transforms: Transforms = ()
     material: Material | None = None
 

@@ -150,7 +150,8 @@ def _vector(values: tuple[float, ...]) -> str:
 def material(value: Material) -> str:
     """A material statement."""
     ops = " ".join(map(transform, value.ops))
-    return f"material {value.name} {{ {ops} }}" if ops else f"material {value.name};"
+    name = value.name if value.shading is None else f"{value.shading} {value.name}"
+    return f"material {name} {{ {ops} }}" if ops else f"material {name};"
 
 
 def numbers(step: Transform | MaterialOp) -> list[float]:

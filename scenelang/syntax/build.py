@@ -123,9 +123,10 @@ class Builder:
     def unary(self, op: int, operand: nodes.Expr) -> nodes.Expr:
         return nodes.Unary(Span(self.source, self.starts[op], operand.span.end), self.sign(op), operand)
 
-    def material(self, word: int, name: nodes.Name, *body: nodes.Block) -> nodes.Expr:
-        span = self._span(word, body[0] if body else name)
-        return nodes.MaterialExpr(span, name, body[0] if body else None) if name.text else nodes.BadExpr(span)
+    def material(self, word: int, *rest: Any) -> nodes.Expr:
+        span, body = self._span(word, rest[-1]), _block(rest[-1])
+        *shading, name = rest if body is None else rest[:-1]
+        return nodes.MaterialExpr(span, name, body, *shading) if name.text else nodes.BadExpr(span)
 
     def method(self, value: nodes.Expr, dot: int, name: nodes.Name, args: Arguments) -> nodes.Expr:
         span = Span(self.source, value.span.start, args[1])
@@ -260,9 +261,10 @@ class Builder:
         args, child = (rest[0][0], rest[1]) if rest[1:] else (None, rest[0])
         return nodes.Combined(op[1].to(child.span), op[0], child, op[1], args)
 
-    def material_use(self, word: int, name: nodes.Name, last: Any) -> nodes.Stmt:
-        span = self._span(word, last)
-        return nodes.MaterialUse(span, name, _block(last)) if name.text else nodes.BadStmt(span)
+    def material_use(self, word: int, *rest: Any) -> nodes.Stmt:
+        span = self._span(word, rest[-1])
+        *shading, name = rest[:-1]
+        return nodes.MaterialUse(span, name, _block(rest[-1]), *shading) if name.text else nodes.BadStmt(span)
 
     def call(self, name: nodes.Name, *rest: Any) -> nodes.Stmt:
         span = self._span(name, rest[-1])

@@ -121,10 +121,11 @@ class Index(Expr):
 
 
 class MaterialExpr(Expr):
-    """``material NAME`` or ``material NAME { … }`` used as a value."""
+    """``material NAME`` or ``material NAME { … }`` used as a value; as in `MaterialUse`."""
 
     name: Name
     body: Block | None
+    shading: Name | None = None
 
 
 class BadExpr(Expr):
@@ -235,10 +236,14 @@ class Combined(Stmt):
 
 
 class MaterialUse(Stmt):
-    """``material NAME;`` or ``material NAME { … }`` as a statement."""
+    """``material NAME;`` or ``material NAME { … }`` as a statement.
+
+    ``shading`` is the first of two names, as in ``material volumetric zoo.bark;``.
+    """
 
     name: Name
     body: Block | None
+    shading: Name | None = None
 
 
 class BadStmt(Stmt):

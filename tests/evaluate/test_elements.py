@@ -129,7 +129,7 @@ def test_names_come_through_other_files(folder: Path) -> None:
     ("text", "code", "words"),
     [
         (f"{IMPORT} zoo.rng {{ }}", "E0212", "`zoo` has no `rng`"),
-        (f"{IMPORT} let a = zoo.ring;", "E0213", "is an element, not a value"),
+        (f"{IMPORT} let a = zoo.ring;", "E0213", "is a geometry, not a value"),
         (f"{IMPORT} zoo.ring(2);", "E0308", "takes no arguments"),
         ('import "none.safetensors" as zoo;', "E0214", "no such file"),
         ('import "../zoo.safetensors" as zoo;', "E0215", "outside the import root"),
@@ -234,5 +234,5 @@ def test_a_program_without_elements_is_of_the_old_format(folder: Path) -> None:
 
 
 def test_models_that_draw_elements() -> None:
-    assert load_manifest("solids3d").elements == ("element of space",)
+    assert load_manifest("solids3d").elements == ("element of space", "texture", "colouring of space")
     assert load_manifest("shapes2d-reading").elements == ()

@@ -62,7 +62,8 @@ _operation = st.lists(st.tuples(_OPERATORS.map(lambda sign: [sign]), _unary), mi
 )
 _choice = _joined(_unary, "?", _unary, ":", st.one_of(_unary, st.deferred(lambda: _choice)))
 _range = _joined(_unary, st.sampled_from([[".."], ["..<"]]), _unary, _maybe(_joined("step", _unary)))
-_material = _joined("material", path, _maybe(st.deferred(lambda: block)))
+_texture = st.one_of(path, _joined(name, path))
+_material = _joined("material", _texture, _maybe(st.deferred(lambda: block)))
 value = st.one_of(expression, expression, _range, _material)
 
 statement: st.SearchStrategy[Tokens] = st.deferred(
@@ -73,7 +74,7 @@ statement: st.SearchStrategy[Tokens] = st.deferred(
         _joined("smooth", _arguments, block),
         _joined("smooth", _arguments, path, _maybe(_arguments), st.one_of(st.just([";"]), block)),
         _joined(st.sampled_from([["group"], ["chain"], ["union"], ["smooth"], ["subtract"]]), block),
-        _joined("material", path, st.one_of(st.just([";"]), block)),
+        _joined("material", _texture, st.one_of(st.just([";"]), block)),
         _joined("let", name, "=", value, ";"),
         _joined("param", name, "=", expression, _maybe(_joined("in", value)), ";"),
         _joined("fn", name, _parameters, "=", value, ";"),

@@ -10,7 +10,8 @@ from math import pi
 import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.looks import Look, coloured
+from scenelang.graph.affine import scaling
+from scenelang.graph.looks import Look, colour_steps, coloured
 from scenelang.graph.lower import Memory, lower
 from scenelang.graph.nodes import Fold, Leaf, Link, Move
 from scenelang.graph.steps import Affine, Warp
@@ -165,10 +166,13 @@ def test_colours_in_order_and_clamped() -> None:
     color, grey, hue = schema.Color, schema.Grayscale, schema.Hue
     move = schema.Translate(x=1, y=1)
     assert coloured(()) == (1, 1, 1)
-    assert coloured((color(rgb=(2.0, 0.5, -1.0)), color(rgb=(0.5, 1, 1)), move)) == (0.5, 0.5, 0)
-    assert coloured((color(rgb=(1, 0, 0)), grey(amount=1))) == pytest.approx((0.2126,) * 3)
-    assert coloured((color(rgb=(1, 0, 0)), hue(angle=2 * pi / 3))) == pytest.approx((0, 1, 0))
-    assert coloured((grey(amount=5), hue(angle=1))) == pytest.approx((1, 1, 1))
+    for ops, rgb in (
+        ((color(rgb=(2.0, 0.5, -1.0)), color(rgb=(0.5, 1, 1)), move), (0.5, 0.5, 0)),
+        ((color(rgb=(1, 0, 0)), grey(amount=1)), (0.2126,) * 3),
+        ((color(rgb=(1, 0, 0)), hue(angle=2 * pi / 3)), (0, 1, 0)),
+        ((grey(amount=5), hue(angle=1)), (1, 1, 1)),
+    ):
+        assert coloured(colour_steps(ops)) == pytest.approx(rgb)
 
 
 def test_hue_agrees_with_colorsys() -> None:
@@ -177,7 +181,7 @@ def test_hue_agrees_with_colorsys() -> None:
         rgb = (rng.random(), rng.random(), rng.choice([0.0, rng.random(), 1.0]))
         turns = rng.uniform(-3, 3)
         h, s, v = colorsys.rgb_to_hsv(*rgb)
-        ours = coloured((schema.Color(rgb=rgb), schema.Hue(angle=turns * 2 * pi)))
+        ours = coloured(colour_steps((schema.Color(rgb=rgb), schema.Hue(angle=turns * 2 * pi))))
         assert ours == pytest.approx(colorsys.hsv_to_rgb((h + turns) % 1, s, v), abs=1e-9)
 
 
@@ -185,7 +189,7 @@ def test_verify_names_the_pass() -> None:
     graph = lower(schema.Scene(nodes=(schema.Object(geometry="star"),)), SHAPES, None, Diagnostics())
     leaf = Leaf("star", Look("flat"))
     group = Fold("group", (Link("union", leaf),))
-    grey = Look("flat", colours=(schema.Grayscale(amount=1),))
+    grey = Look("flat", colours=(("grayscale", 1.0),))
     tilted = Move(Affine((1, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0)))
     cases = [
         (Fold("scene", (Link("subtract", leaf),)), ()),
@@ -210,15 +214,12 @@ def test_verify_names_the_pass() -> None:
 
 
 def test_a_constant_look_folds_to_its_colour() -> None:
-    ops = (schema.Flip(), schema.Color(rgb=(1, 0, 0)), schema.Grayscale(amount=0.5), schema.Hue(angle=1.0))
-    look = Look.of("flat", ops)
-    assert (look.texture, look.colours) == (ops[:1], ops[1:])
+    steps = (("color", 1.0, 0.0, 0.0), ("grayscale", 0.5), ("hue", 0.25))
+    look = Look("flat", steps, texture=(Affine(scaling(-1.0, 1.0)),))
     folded = look.folded()
-    assert folded == Look("flat", rgb=coloured(ops))
+    assert folded == Look("flat", rgb=coloured(steps))
     assert folded.colour() == look.colour()
     assert folded.folded() is folded
-    bark = Look.of("bark", ops)  # a texture is not one colour
-    assert bark.folded() is bark
 
 
 def test_objects_that_stay_keep_their_leaves() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.looks import Look, coloured
+from scenelang.graph.looks import Look, colour_steps, coloured
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import leaves
 from scenelang.graph.verify import Invariant, verify
@@ -25,6 +25,6 @@ def test_looks_become_one_colour() -> None:
     graph = fold_looks(lower(scene, manifest, None, diagnostics), Context(manifest, diagnostics))
     verify(graph, "fold_looks", {Invariant.LOOKS})
     star, square, pentagon = leaves(graph.root)
-    assert star.look == Look("flat", rgb=coloured(scene.nodes[0].material.ops))  # type: ignore[union-attr]
+    assert star.look == Look("flat", rgb=coloured(colour_steps(scene.nodes[0].material.ops)))  # type: ignore[union-attr]
     assert star.look is square.look
     assert pentagon.look == Look("flat")

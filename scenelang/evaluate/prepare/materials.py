@@ -10,11 +10,12 @@ from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.costs import MATERIAL_VALUE
-from scenelang.evaluate.file_context import Action, Place
+from scenelang.evaluate.file_context import Action, FileContext, Place
 from scenelang.evaluate.names import Binding, Env
 from scenelang.evaluate.prepare.blocks import misplaced, prepare_inner
 from scenelang.evaluate.prepare.expressions import POISONED, Code
-from scenelang.evaluate.prepare.references import value_of
+from scenelang.evaluate.prepare.references import value_of, wrong_kind
+from scenelang.evaluate.report.undefined import VALUES, unknown, unknown_member
 from scenelang.evaluate.values.value import POISON, MaterialValue, describe
 from scenelang.scene.schema import Material
 from scenelang.scene.spans import Written
@@ -58,21 +59,63 @@ def prepare_material(expr: nodes.MaterialExpr, place: Place) -> Code:
 def _prepare(
     written: nodes.MaterialUse | nodes.MaterialExpr, place: Place
 ) -> Callable[[Env], Material] | None:
-    """How to make the material node; None where the name is unknown."""
+    """How to make the material node; None where a name is unknown."""
     name, session = written.name, place.session
     operations = _operations(written.body, place)
-    known = session.vocabulary.materials
-    if known and name.text not in known:
-        _unknown(name, place, known)
+    called, shading = _called(name, place), _shading(written, place)
+    if called is None or shading == "":
         return None
     where = Written(name.span, written.span)
 
     def run(env: Env) -> Material:
-        material = make(Material, {"name": name.text, "ops": operations(env)})
+        material = make(Material, {"name": called, "ops": operations(env), "shading": shading})
         session.spans.record(material, where)
         return material
 
     return run
+
+
+def _called(name: nodes.Name, place: Place) -> str | None:
+    """What a Scene calls a material; None after a report."""
+    alias, dot, rest = name.text.partition(".")
+    words = place.session.vocabulary
+    if not dot:
+        known = words.materials | words.textures
+        if not known or alias in known:
+            return alias
+        _unknown(name, place, known)
+        return None
+    binding = place.scope.find(alias)
+    exported: FileContext | None = binding.value if binding and binding.kind == "import" else None
+    own = None if exported is None else exported.scope.names.get(rest)
+    if exported is not None and rest in exported.materials:
+        return exported.materials[rest]
+    if binding is None:
+        unknown(name, place)
+    elif binding.kind not in ("import", "poison"):
+        wrong_kind(nodes.Name(name.span, alias), binding, place, "an imported file")
+    elif own is not None and own.kind in VALUES:
+        _is_value(name, place)
+    elif own is not None:
+        wrong_kind(name, own, place, "a material")
+    else:
+        unknown_member(name, place, exported, "material")
+    return None
+
+
+def _shading(written: nodes.MaterialUse | nodes.MaterialExpr, place: Place) -> str | None:
+    """The word before the name, None without one and empty after a report."""
+    word, name, words = written.shading, written.name, place.session.vocabulary
+    if word is None:
+        return None
+    if words.materials and word.text not in words.materials:
+        _unknown(word, place, words.materials)
+        return ""
+    if name.text in words.materials - words.textures:
+        help = f"write material {name.text}"
+        place.report.error("E0213", f"`{name.text}` is not a texture", name.span, help=help)
+        return ""
+    return word.text
 
 
 def _operations(body: nodes.Block | None, place: Place) -> Callable[[Env], tuple[Any, ...]]:
@@ -97,11 +140,7 @@ def _unknown(name: nodes.Name, place: Place, known: set[str]) -> None:
     if words.blind:
         return
     if binding is not None and binding.kind in ("let", "argument", "loop"):
-        start = span.source.text.rfind("material", 0, span.start)
-        away = Fix("remove `material`", (Edit(Span(span.source, start, span.start), ""),))
-        help = f"to use the value write {name.text}; without `material`"
-        message = f"`{name.text}` is a value, not a material's name"
-        report.error("E0213", message, span, help=help, fix=away if start >= 0 else None)
+        _is_value(name, place)
     elif owner is not None and words.chosen is not None:
         message = f"material `{name.text}` belongs to model `{owner}`, not `{words.chosen.name}`"
         help = f"model `{words.chosen.name}` has {listing(known)}"
@@ -110,6 +149,16 @@ def _unknown(name: nodes.Name, place: Place, known: set[str]) -> None:
         hint, fix = did_you_mean(name.text, known, span)
         help = hint or f"there is {listing(known)}"
         report.error("E0208", f"unknown material `{name.text}`", span, help=help, fix=fix)
+
+
+def _is_value(name: nodes.Name, place: Place) -> None:
+    """Report `material mist` where `mist` is a material value."""
+    span = name.span
+    start = span.source.text.rfind("material", 0, span.start)
+    away = Fix("remove `material`", (Edit(Span(span.source, start, span.start), ""),))
+    help = f"to use the value write {name.text}; without `material`"
+    message = f"`{name.text}` is a value, not a material's name"
+    place.report.error("E0213", message, span, help=help, fix=away if start >= 0 else None)
 
 
 def _give(material: Material, span: Span, out: Builder, place: Place) -> None:
@@ -146,7 +195,7 @@ def prepare_value_use(stmt: nodes.Call, binding: Binding, place: Place) -> Actio
         material = value.material
         if stmt.body is not None:
             ops = (*material.ops, *operations(env))
-            material = make(Material, {"name": material.name, "ops": ops})
+            material = make(Material, {"name": material.name, "ops": ops, "shading": material.shading})
             session.spans.record(material, where)
         _give(material, span, out, place)
         session.count_parts(1 + len(material.ops), span)

@@ -61,7 +61,7 @@ def wrong_kind(
     name: nodes.Name, binding: Binding, place: Place, wanted: str, help: str | None = None
 ) -> None:
     """Report a name that stands for something else than is wanted here."""
-    kinds = {"fn": "a function", "module": "a module", "import": "an imported file", "element": "an element"}
+    kinds = {"fn": "a function", "module": "a module", "import": "an imported file", "element": "a geometry"}
     message = f"`{name.text}` is {kinds.get(binding.kind, 'a value')}, not {wanted}"
     key = "E0213", message, place.file.source, binding.span
     place.report.error_once(key, "E0213", message, name.span, help=help, labels=binding.labels())

@@ -276,6 +276,7 @@ def _elements(path: Path, zoo: Zoo, stmt: nodes.Import, context: FileContext) ->
     brought = FileContext(source, session, context.loader, context.defines, path)
     names = {name: Binding("element", stmt.alias.span, value=f"{known}.{name}") for name in zoo.geometries}
     brought.scope.names.update(names)
+    brought.materials.update({name: f"{known}.{name}" for name in zoo.materials})
     return brought
 
 

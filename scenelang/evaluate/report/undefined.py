@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, Literal
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
@@ -115,20 +115,30 @@ def within_effort(place: Place, kinds: Sequence[str]) -> list[tuple[str, Binding
     return [(n, b) for n, b in seen if b.kind in kinds]
 
 
-def unknown_member(name: nodes.Name, place: Place, exported: FileContext | None) -> None:
+def unknown_member(
+    name: nodes.Name, place: Place, exported: FileContext | None, what: Literal["name", "material"] = "name"
+) -> None:
     """Report that an imported file has no such name; nothing is known of one that cannot be read."""
     alias, _, rest = name.text.partition(".")
     if exported is None or (exported.damage and exported.damage.loses(rest)):
         return
     last = Span(name.span.source, name.span.end - len(rest), name.span.end)
-    known = [n for n, b in exported.scope.names.items() if b.kind != "import"]
+    if what == "material":
+        known = [*exported.materials]
+    elif rest in exported.materials:
+        help = f"write material {name.text}"
+        place.report.error("E0213", f"`{name.text}` is the name of a material", name.span, help=help)
+        return
+    else:
+        known = [n for n, b in exported.scope.names.items() if b.kind != "import"]
+    missing = f"`{alias}` has no {'material ' if what == 'material' else ''}`{rest}`"
 
     def advise() -> Advice:
         help, fix = did_you_mean(rest, known, last, effort=place.report.effort)
-        return help or (f"it has {listing(known)}" if known else "it defines nothing"), fix
+        return help or (f"it has {listing(known)}" if known else f"it defines no {what}"), fix
 
     nowhere = place._replace(scope=Scope(place.file.scope.slots))
-    report_unknown(nodes.Name(last, rest), nowhere, "E0212", f"`{alias}` has no `{rest}`", advise=advise)
+    report_unknown(nodes.Name(last, rest), nowhere, "E0212", missing, advise=advise)
 
 
 def report_early(name: nodes.Name, place: Place) -> bool:

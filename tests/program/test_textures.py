@@ -1,0 +1,162 @@
+"""Materials of users in Programs: texture coordinates, colour steps, kinds of models."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import scenelang as nsg
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.elements.zoo import Zoo
+from scenelang.lifting.layout import LAYOUTS
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import Program, program_bytes
+from scenelang.program.reading import parse_program
+from tests.elements.shapes import noise
+
+BARK, STONE, HIDE = noise(4, 6), noise(3, 3, name="stone", seed=1), noise(3, 3, 3, name="hide")
+ZOO = nsg.Elements.of("zoo", "zoo.safetensors", Zoo.of([BARK, STONE, HIDE]))
+
+
+def compiled(*materials: nsg.Material, geometry: str = "square", **scene: Any) -> Program:
+    nodes = [nsg.Object(geometry, nsg.Scale(0.5 - 0.1 * at), one) for at, one in enumerate(materials)]
+    return compile_scene(nsg.Scene(elements=ZOO, nodes=nodes, **scene))
+
+
+def frame_of(program: Program) -> np.ndarray:
+    layout = LAYOUTS["plane" if program.stage is None else "solid"]
+    return program.vectors[0, layout.geometry :][:6].reshape(2, 3)
+
+
+_number = st.floats(-2, 2).map(lambda v: round(v, 2))
+_factor = _number.filter(lambda v: abs(v) > 0.2)
+_move = st.one_of(
+    st.tuples(_number, _number).map(lambda by: nsg.Translate(*by)),
+    _number.map(lambda angle: nsg.Rotate(angle=angle)),
+    st.tuples(_factor, _factor).map(lambda by: nsg.Scale(*by)),
+    st.tuples(st.sampled_from(["xy", "yx"]), _number).map(lambda given: nsg.Shear(*given)),
+    st.just(nsg.Flip()),
+)
+
+
+def back(move: Any, x: float, y: float) -> tuple[float, float]:
+    """The point that a move brings to (x, y), as the language defines each of them."""
+    match move.kind:
+        case "translate":
+            return x - move.x, y - move.y
+        case "rotate":
+            c, s = math.cos(-move.angle), math.sin(-move.angle)
+            return c * x - s * y, s * x + c * y
+        case "scale":
+            return x / move.x, y / move.y
+        case "shear":
+            return (x - move.k * y, y) if move.axes == "xy" else (x, y - move.k * x)
+        case _:
+            return -x, y
+
+
+@settings(deadline=None)
+@given(st.lists(_move, max_size=7), st.sampled_from(["square", "torus"]))
+def test_a_point_goes_back_through_the_moves_last_to_first(moves: list[Any], geometry: str) -> None:
+    program = compiled(nsg.Material("zoo.bark", (*moves, nsg.Grayscale(0.5))), geometry=geometry)
+    frame = frame_of(program)
+    for x, y in ((0.0, 0.0), (0.7, -0.2), (-0.4, 0.9)):
+        expected = x, y
+        for move in reversed(moves):
+            expected = back(move, *expected)
+        found = frame @ [x, y, 1]
+        assert found == pytest.approx(expected, rel=1e-5, abs=1e-4 * max(1.0, float(abs(frame).max())))
+
+
+def test_colour_steps_are_as_written_and_linear_in_space() -> None:
+    ops = (
+        nsg.Color((0.5, 0.25, 1)),
+        nsg.Flip(),
+        nsg.Color((0.5, 1, 1)),
+        nsg.Hue.degrees(90),
+        nsg.Grayscale(0.25),
+    )
+    (flat,) = compiled(nsg.Material("zoo.bark", ops)).palette
+    assert flat == (BARK, (("color", 0.25, 0.25, 1.0), ("hue", 0.25), ("grayscale", 0.25)))
+    (solid,) = compiled(nsg.Material("zoo.bark", ops), geometry="torus").palette
+    half, quarter = (((v + 0.055) / 1.055) ** 2.4 for v in (0.5, 0.25))
+    assert solid.steps[0][1:] == pytest.approx((half * half, quarter, 1.0))
+    assert solid.steps[1:] == flat.steps[1:]
+
+
+def test_equal_paints_are_one() -> None:
+    red, same = (nsg.Material("zoo.bark", (nsg.Color("#f00"), move)) for move in (nsg.Flip(), nsg.Scale(2)))
+    program = compiled(red, nsg.Material("zoo.stone"), same, nsg.Material("flat", nsg.Color("#f00")))
+    assert [paint and paint.element.name for paint in program.paints()] == ["bark", "stone", "bark", None]
+    assert len(program.palette) == 2
+    assert program.elements == (BARK, STONE)
+    again = parse_program(program_bytes(program))
+    assert program_bytes(again) == program_bytes(
+        compiled(red, nsg.Material("zoo.stone"), same, nsg.Material("flat", nsg.Color("#f00")))
+    )
+
+
+def test_a_program_without_paints_is_of_the_old_format() -> None:
+    plain = compiled(nsg.Material("flat", (nsg.Scale(2), nsg.Color("#f00"))))
+    data = program_bytes(plain)
+    assert b'\\"format\\":1' in data
+    assert b"worn" not in data
+    np.testing.assert_array_equal(frame_of(plain), [[1, 0, 0], [0, 1, 0]])
+
+
+@pytest.mark.parametrize("shading", [None, "diffuse", "volumetric"])
+def test_a_texture_is_lit_as_its_shading_says(shading: str | None) -> None:
+    textured = compiled(nsg.Material("zoo.bark", shading=shading), geometry="sphere")
+    plain = compiled(nsg.Material(shading or "diffuse"), geometry="sphere")
+    np.testing.assert_array_equal(textured.vectors, plain.vectors)
+    assert textured.digest() != plain.digest()
+
+
+def test_hidden_objects_go_under_a_texture() -> None:
+    below, above = nsg.Object("square", nsg.Scale(0.2)), nsg.Object("square", (), nsg.Material("zoo.bark"))
+    program = compile_scene(nsg.Scene(elements=ZOO, nodes=[below, above]))
+    assert program.numbers == (2,)
+
+
+@pytest.mark.parametrize(
+    ("material", "geometry", "code", "words"),
+    [
+        (nsg.Material("zoo.hide"), "square", "E0502", "does not draw `zoo.hide`, a colouring of space"),
+        (nsg.Material("zoo.none"), "square", "E0502", "no file of elements has a material `zoo.none`"),
+        (nsg.Material("zoo.bark", shading="mist"), "square", "E0502", "no material `mist`"),
+        (nsg.Material("flat", shading="flat"), "square", "E0502", "`flat` is not a texture"),
+        (
+            nsg.Material("zoo.hide", nsg.Flip()),
+            "torus",
+            "E0504",
+            "`flip` moves a texture, and `zoo.hide` is a",
+        ),
+        (nsg.Material("zoo.bark", nsg.Scale(1e-31)), "square", "E0312", "`scale` is singular in float32"),
+        (nsg.Material("zoo.bark", (nsg.Scale(1e-20),) * 2), "square", "E0406", "compose to a singular one"),
+        (nsg.Material("zoo.bark", nsg.Translate(0, 0, 1)), "torus", "E0505", "leaves the plane"),
+        (
+            nsg.Material("zoo.bark", (nsg.Hue.degrees(9), nsg.Grayscale(0.5)) * 501),
+            "square",
+            "E0320",
+            "more than 1,000 operations",
+        ),
+    ],
+)
+def test_refusals(material: nsg.Material, geometry: str, code: str, words: str) -> None:
+    model, found = "shapes2d" if geometry == "square" else "solids3d", Diagnostics()
+    with pytest.raises(nsg.SceneError):
+        compile_scene(
+            nsg.Scene(elements=ZOO, nodes=nsg.Object(geometry, (), material)), model=model, diagnostics=found
+        )
+    assert [d.code for d in found] == [code]
+    assert words in found.items[0].message
+
+
+def test_models_of_the_paper_draw_no_textures() -> None:
+    with pytest.raises(nsg.SceneError, match=r"does not draw `zoo\.bark`, a texture"):
+        compiled(nsg.Material("zoo.bark"), model="shapes2d-reading")
