@@ -17,12 +17,14 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.render_machine import render_github, render_json, render_sarif
 from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile
+from scenelang.elements.zoo import read_zoo
 from scenelang.evaluate.session import Defines
 from scenelang.formatting import format_text
 from scenelang.interchange.gltf import import_gltf
 from scenelang.interchange.gltf_file import GltfError, parse_gltf
 from scenelang.program.program import ProgramError
 from scenelang.program.reading import parse_program
+from scenelang.tensors import TensorError
 
 NUMBER: Final = "¤"
 """Stands in a unit for the number of the repetition, so that pieces may differ."""
@@ -134,6 +136,14 @@ def _program(header: str) -> None:
         parse_program(struct.pack("<Q", len(data)) + data + bytes(64))
 
 
+def _zoo(header: str) -> None:
+    """The text stands as the outer header, and as ours inside one."""
+    for outer in (header, json.dumps({"__metadata__": {"scenelang": header}})):
+        data = outer.encode("utf-8", "replace")
+        with suppress(TensorError):
+            read_zoo(struct.pack("<Q", len(data)) + data + bytes(64))
+
+
 READERS: Final[dict[str, Callable[[str], None]]] = {
     "check": _check,
     "fix": _fix,
@@ -142,6 +152,7 @@ READERS: Final[dict[str, Callable[[str], None]]] = {
     "json": _json,
     "gltf": _gltf,
     "program": _program,
+    "zoo": _zoo,
 }
 _OF_TEXT: Final = ("check", "check", "check", "fix", "fmt", "edit")
 
@@ -239,6 +250,10 @@ _DATA: Final = (
     Pump("program", "[", '{"vectors":', "]", "}"),
     Pump("program", "9,", '{"vectors":{"shape":[', tail="1]}}"),
     Pump("program", "9", '{"vectors":{"shape":[', tail="]}}"),
+    Pump("zoo", '"a¤":{},', '{"format":1,"elements":{', tail='"b":0}}'),
+    Pump("zoo", '"a¤":[[0,0]],', '{"format":2,"elements":{},"materials":{},"groups":{', tail='"b":0}}'),
+    Pump("zoo", "[", '{"format":2,"elements":{"a":', "]", "}}"),
+    Pump("zoo", '"a¤":{"dtype":"U8","shape":[0],"data_offsets":[0,0]},', "{", tail='"b":0}'),
 )
 
 

@@ -18,6 +18,8 @@ TARGETS: Final = (
     "formatting",
     "incremental",
     "gltf",
+    "zoo",
+    "learn",
     "slow",
 )
 """Names of the modules in `fuzz.targets`."""

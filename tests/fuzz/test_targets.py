@@ -22,6 +22,8 @@ COUNTS = {
     "formatting": (40, 50),
     "incremental": (10, 25),
     "gltf": (20, 200),
+    "zoo": (20, 150),
+    "learn": (30, 60),
     "slow": (4, 4),
 }
 """How many seeds and mutations a target takes in about two seconds."""
