@@ -10,7 +10,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from types import TracebackType
 from typing import IO, Any, Final
@@ -18,7 +18,8 @@ from typing import IO, Any, Final
 from scenelang.fitting.mesh import FitError
 
 MEMORY: Final = 6 << 30  # bytes that the process may hold, where the system can bound them
-CPU_S: Final = 300.0  # of processor time for one file
+CPU_S: Final = 300.0  # of processor time for one file, and until it is read and something said of it
+READ_S: Final = 60.0
 _CODE: Final = """
 import json, sys
 sys.path[:] = json.loads(sys.argv[1])
@@ -76,7 +77,7 @@ class Apart:
             if kind == "error":
                 raise FitError(*told)
             hear[kind](*told)
-        raise FitError(_ended(self._end(), request["cpu_s"]))
+        raise FitError(_ended(self._end()))
 
     def _begun(self) -> subprocess.Popen[bytes]:
         if self._process is None:
@@ -97,11 +98,11 @@ class Apart:
         return process.returncode
 
 
-def _ended(status: int, cpu_s: float) -> str:
+def _ended(status: int) -> str:
     import signal
 
     if -status == getattr(signal, "SIGXCPU", None):
-        return f"it takes more than {cpu_s:g} s of processor time"
+        return "reading it, or making something of it, takes too much processor time"
     return f"what reads it has failed ({f'signal {-status}' if status < 0 else f'status {status}'})"
 
 
@@ -112,10 +113,17 @@ def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -
     sys.addaudithook(_refuse)
     while line := sys.stdin.buffer.readline():
         request = json.loads(line)
-        _bound(request["cpu_s"])
         data = sys.stdin.buffer.read(request["bytes"])
+        _bound(min(READ_S, request["cpu_s"]))
+        limits = iter([request["cpu_s"]])
+
+        def tell(kind: str, *told: Any, limits: Iterator[float] = limits) -> None:
+            if kind == "say" and (limit_s := next(limits, None)):
+                _bound(limit_s)
+            _tell(out, kind, *told)
+
         try:
-            made = make(request, data, lambda *told: _tell(out, *told))
+            made = make(request, data, tell)
         except FitError as error:
             _tell(out, "error", str(error))
         except MemoryError:

@@ -175,6 +175,8 @@ def mesh_of(vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "au
         raise FitError(f"{len(triangles):,} triangles, at most {MOST_TRIANGLES:,}")
     if not np.isfinite(vertices).all() or not abs(vertices).max() < 1e100:
         raise FitError("a vertex is not finite")
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise FitError("a triangle has a corner that it does not hold")
     used = vertices[np.unique(triangles)]
     low, high = used.min(0), used.max(0)
     centre = (low + high) / 2

@@ -15,6 +15,7 @@ from scenelang.fitting import apart
 from scenelang.fitting.apart import Apart
 from scenelang.fitting.mesh import FitError
 
+CODE = apart._CODE
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="has no such bounds")
 
 
@@ -22,12 +23,10 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="has no such bou
 def made(monkeypatch: pytest.MonkeyPatch) -> Any:
     """What code makes of bytes in such a process."""
 
-    def ask(code: str, cpu_s: float = 60.0) -> tuple[bytes, list[Any]]:
-        start = (
-            "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from scenelang.fitting import apart\n"
-        )
-        wrapped = f"def make(request, data, tell):\n    import os\n    {code}\n"
-        monkeypatch.setattr(apart, "_CODE", f"{start}{wrapped}apart.serve(make)\n")
+    def ask(code: str, cpu_s: float = 60.0, read_s: float = 60.0) -> tuple[bytes, list[Any]]:
+        start, *_ = CODE.partition("apart.serve")
+        work = f"def make(request, data, tell):\n    import os\n    {code}\napart.serve(make)\n"
+        monkeypatch.setattr(apart, "_CODE", f"{start}apart.READ_S = {read_s}\n{work}")
         heard: list[Any] = []
         with Apart() as process:
             answers = [process({"cpu_s": cpu_s}, b"abc", {"say": heard.append}) for _ in range(2)]
@@ -41,10 +40,17 @@ def test_answers(made: Any) -> None:
     assert made("print('noise', flush=True); tell('say', 'a'); return data * 2") == (b"abcabc", ["a", "a"])
 
 
+def test_what_was_read_has_longer(made: Any) -> None:
+    work = "import time; end = time.process_time() + 2.2\n    while time.process_time() < end: pass"
+    assert made(f"tell('say', 'read')\n    {work}\n    return data", 60.0, 1.0)[0] == b"abc"
+    with pytest.raises(FitError, match="takes too much processor time"):
+        made(f"{work}\n    return data", 60.0, 1.0)
+
+
 @pytest.mark.parametrize(
     ("code", "words"),
     [
-        ("while True: pass", "more than 1 s of processor time"),
+        ("while True: pass", "takes too much processor time"),
         ("return bytes(apart.MEMORY)", "more than 6 GiB of memory"),
         (f"os.kill(os.getpid(), {int(signal.SIGSEGV)})", f"has failed .signal {int(signal.SIGSEGV)}"),
         ("os._exit(3)", "has failed .status 3"),

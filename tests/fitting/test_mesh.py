@@ -90,6 +90,8 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
     [
         (SQUARE, [], "no triangles"),
         (SQUARE * np.nan, [[0, 1, 2]], "not finite"),
+        (SQUARE, [[0, 1, 4]], "corner that it does not hold"),
+        (SQUARE, [[0, 1, -1]], "corner that it does not hold"),
         (SQUARE * 1e200, [[0, 1, 2]], "not finite"),
         (SQUARE * 0 + 7, [[0, 1, 2]], "at one point"),
         (SQUARE, [[0, 1, 1]], "flat"),
