@@ -169,7 +169,7 @@ def mesh_of(vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "au
     with needed("trimesh"):
         import trimesh
     notes = []
-    if vertices.ndim != 2 or triangles.ndim != 2 or not len(triangles):
+    if vertices.shape[1:] != (3,) or triangles.shape[1:] != (3,) or not len(triangles):
         raise FitError("it holds no triangles")
     if len(triangles) > MOST_TRIANGLES:
         raise FitError(f"{len(triangles):,} triangles, at most {MOST_TRIANGLES:,}")
