@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from scenelang.graph.nodes import BLEND, Fold, Leaf, Node
 from scenelang.graph.steps import Affine, Step, Warp
+from scenelang.reference.textures import colour_at
 from scenelang.words import TOKENS
 
 Array = Any  # numpy array or torch tensor
@@ -206,8 +207,10 @@ def evaluate(
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
-        own = leaf_distance(node.geometry, carry_back(steps, p), brought)
-        d = own * distance_scale(steps, len(p))
+        q = carry_back(steps, p)
+        d = leaf_distance(node.geometry, q, brought) * distance_scale(steps, len(p))
+        if node.look.element is not None and not owners:
+            return d, colour_at(node.look, carry_back(node.look.texture, q[: node.look.element.dimension]))
         paint = np.asarray((node.number,) if owners else node.look.colour(), np.float64)
         return d, np.broadcast_to(paint, (*d.shape, len(paint)))
     big_d, big_c = np.full(p[0].shape, np.inf), np.zeros((*p[0].shape, 1 if owners else 3))

@@ -116,7 +116,7 @@ def trilinear(nodes: Array, p: Sequence[float]) -> Array:
     n = len(nodes)
     at = [min(max((c + 1) / 2, 0), 1) * (n - 1) for c in p]
     total = np.zeros(3)
-    for corner in itertools.product(*((math.floor(c), min(math.floor(c) + 1, n - 1)) for c in at)):
+    for corner in itertools.product(*({math.floor(c), min(math.floor(c) + 1, n - 1)} for c in at)):
         total += np.prod([max(0, 1 - abs(c - i)) for c, i in zip(at, corner, strict=True)]) * nodes[corner]
     return total
 

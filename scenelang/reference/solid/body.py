@@ -13,7 +13,8 @@ import numpy as np
 
 from scenelang.graph.nodes import Leaf
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
-from scenelang.reference.field import TORUS, Array, Brought, distance_scale, leaf_distance
+from scenelang.reference.field import TORUS, Array, Brought, carry_back, distance_scale, leaf_distance
+from scenelang.reference.textures import colour_at
 
 _REACH = 0.15
 _TINY = 1e-300  # added to lengths that something is divided by
@@ -125,7 +126,7 @@ class Body:
         self, leaf: Leaf, steps: Sequence[Step], margin: float, brought: Brought | None = None
     ) -> None:
         self.geometry, self.brought = leaf.geometry, brought or {}
-        self.rgb = np.reshape(leaf.look.colour(), (3, 1))
+        self.look, self.rgb = leaf.look, np.reshape(leaf.look.colour(), (3, 1))
         self.medium = leaf.look.material == "volumetric"
         first = steps[0] if steps else None
         self.displace = first if isinstance(first, Displace) and not first.idle else None
@@ -171,6 +172,15 @@ class Body:
             x, y, z = np.sin(self.displace.frequency * p)
             d = d + self.displace.amount * x * y * z
         return d * self.scale, rate
+
+    def colour(self, p: Array) -> Array:
+        """Linear colours (3, M) or, of one everywhere, (3, 1)."""
+        if self.look.element is None:
+            return self.rgb
+        for step in (self.first, *self.back):
+            p = step(p)
+        own = carry_back(self.look.texture, p[: self.look.element.dimension])
+        return colour_at(self.look, own, light=True).T
 
     def gradient(self, p: Array) -> Array:
         """Gradients (3, M) of the world distance."""

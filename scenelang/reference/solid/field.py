@@ -142,7 +142,7 @@ class Field:
         def known() -> State:
             number, body = next(bodies)
             slope = body.gradient(p) if gradient else None
-            return State(body.distance(p)[0], np.bool_(body.medium), None, body.rgb, slope, number)
+            return State(body.distance(p)[0], np.bool_(body.medium), None, body.colour(p), slope, number)
 
         return _fold(self.root, known)
 
