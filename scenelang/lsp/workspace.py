@@ -206,7 +206,7 @@ class Workspace:
 
     def elements(self, document: Document, stmt: nodes.Import) -> tuple[Element, ...]:
         """The elements that an import brings; none where its file is scene text or damaged."""
-        path = self._place(document, stmt.path.value)
+        path = library.find(stmt.path.value) or self._place(document, stmt.path.value)
         if path is None or path.suffix != SUFFIX:
             return ()
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from scenelang.backend.neural import draw_program
+from scenelang.backend.small import draw_small
 from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.elements.zoo import SUFFIX
 from scenelang.graph.lower import Spans, lower
 from scenelang.image import Image
 from scenelang.measure.metrics import psnr
@@ -34,7 +37,12 @@ def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: 
 
     ``per_side`` is samples along each side of a pixel; 2 is the definition.
     """
-    return reference_image(lower(scene, manifest, spans, Diagnostics()), per_side=per_side)
+    graph = lower(scene, manifest, spans, Diagnostics())
+    if not graph.elements:
+        return reference_image(graph, per_side=per_side)
+    from scenelang.fitting.originals import originals_of
+
+    return reference_image(graph, per_side=per_side, brought=originals_of(scene, graph))
 
 
 def coverage(scene: Scene, manifest: Manifest) -> float:
@@ -42,6 +50,8 @@ def coverage(scene: Scene, manifest: Manifest) -> float:
     small = scene.model_copy(update={"canvas": (PROBE, PROBE), "background": None})
     if manifest.dimension == 3:
         small = small.model_copy(update={"ground": None, "canvas": (PROBE // 2, PROBE // 2)})
+    if scene.elements:  # as they are drawn, which needs no originals
+        return float(draw_small(compile_scene(small, model=manifest.name)).image[..., 3].mean())
     try:
         return float(reference_of(small, manifest)[..., 3].mean())
     except ValueError:
@@ -55,6 +65,11 @@ def sets_of(manifest: Manifest) -> dict[str, Callable[[Rng], Scene]]:
     return {name: partial(random_scene, config=config) for name, config in SETS.items()}
 
 
+def _scenes_with(meshes: str) -> Callable[[Rng], Scene]:
+    """What makes a random scene of the solids of a file of elements."""
+    return partial(random_solid, config=replace(SOLID_SETS["meshes3d"], meshes=meshes))
+
+
 def usual_set(manifest: Manifest) -> str:
     """The set that speed and accuracy of a model's set are measured on: of solids one that has everything."""
     return "mixed" if manifest.dimension == 3 else manifest.set
@@ -66,11 +81,13 @@ def scenes_of(model: Model, name: str, seed: int, side: int | None = None) -> Ca
     Scenes that cover under 2 % of the canvas are drawn again.
 
     Args:
+        name: of the set, or a file of elements, whose solids take the place of those of `meshes3d`.
         seed: of the set; training uses other streams of random numbers.
         side: shorter side of the canvas in pixels; by default that of the set.
     """
     manifest = model.manifest
-    make, least = sets_of(manifest)[name], LEAST_COVER
+    make = _scenes_with(name) if name.endswith(SUFFIX) else sets_of(manifest)[name]
+    least = LEAST_COVER
     if manifest.dimension == 2:
         least *= min(1.0, SETS[name].size ** 2)  # a tenth of the size covers a hundredth as much
 

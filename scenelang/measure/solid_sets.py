@@ -2,7 +2,8 @@
 
 ``solids3d`` is the base set: 1 to 3 spheres and tori, diffuse or volumetric, scaled by 0.35 to 0.85 per axis,
 turned about any axis and moved by ±1.2 (y: -0.5 to 0.9), in that order, colours uniform in 0.1 to 1 as
-written, all unions, on the default stage. The others change one thing each, ``mixed`` several.
+written, all unions, on the default stage. The others change one thing each, ``mixed`` several. ``meshes3d``
+has 1 to 4 of the meshes that ship, diffuse; they are scaled, turned and moved in random order.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 from dataclasses import dataclass
 
 from scenelang.measure.sets import Rng
+from scenelang.scene.elements import Brought, load_elements
 from scenelang.scene.schema import (
     Bend,
     Camera,
@@ -53,6 +55,7 @@ class SolidConfig:
         spread: factor on translations.
         staged: a random camera, light, ground and sky.
         canvas: pixels.
+        meshes: a file of elements whose solids take the place of spheres and tori.
     """
 
     objects: tuple[int, int] = (1, 3)
@@ -64,6 +67,7 @@ class SolidConfig:
     spread: float = 1.0
     staged: bool = False
     canvas: tuple[int, int] = (128, 128)
+    meshes: str = ""
 
 
 SOLID_SETS: dict[str, SolidConfig] = {
@@ -77,6 +81,7 @@ SOLID_SETS: dict[str, SolidConfig] = {
     "staged": SolidConfig(staged=True),
     "many": SolidConfig(objects=(16, 16), media=0.3, size=0.6),
     "mixed": SolidConfig(objects=(1, 4), warp=WARP, unions=0.4, spread=0.6, staged=True),
+    "meshes3d": SolidConfig(objects=(1, 4), media=0.0, meshes="std/meshes"),
 }
 
 
@@ -97,6 +102,8 @@ def _moves(rng: Rng, config: SolidConfig) -> list[Transform]:
     turn = Rotate(angle=float(rng.uniform(0, math.tau)), axis=_triple(rng, -1, 1))
     move = Translate(*(config.spread * rng.uniform((-1.2, -0.5, -1.2), (1.2, 0.9, 1.2))).tolist())
     maps: list[Transform] = [Scale(x, y, z), turn, move]
+    if config.meshes:
+        return [maps[i] for i in rng.permutation(3)]
     if not config.shuffled:
         return [*_warps(rng, config.warp), *maps]
     maps.append(Shear(AXES[int(rng.integers(6))], float(rng.uniform(-0.6, 0.6))))  # type: ignore[arg-type]
@@ -123,13 +130,16 @@ def _stage(rng: Rng) -> dict[str, object]:
 def random_solid(rng: Rng, config: SolidConfig) -> Scene:
     """One scene of a set; it may be that hardly anything of it is seen."""
     unions = rng.random() < config.unions
+    zoo = load_elements(config.meshes, "zoo") if config.meshes else None
+    brought = Brought.of((zoo,)).geometries if zoo is not None else {}
+    geometries = [name for name, it in brought.items() if it.dimension == 3] or ["sphere", "torus"]
     links: list[Link] = []
     for _ in range(int(rng.integers(config.objects[0], config.objects[1] + 1))):
         kind = "volumetric" if rng.random() < config.media else "diffuse"
         material = Material(kind, Color(_triple(rng, 0.1, 1.0)))
-        solid = Object(("sphere", "torus")[int(rng.integers(2))], _moves(rng, config), material)
+        solid = Object(geometries[int(rng.integers(len(geometries)))], _moves(rng, config), material)
         word = "union" if unions or not links else COMBINE[int(rng.integers(4))]
         other = word == "smooth" and rng.random() < 0.5
         links.append(Link(word, solid, k=float(rng.uniform(0.05, 0.5)) if other else BLEND))
-    stage = _stage(rng) if config.staged else {}
-    return Scene(model="solids3d", canvas=config.canvas, nodes=Chain(links), **stage)  # type: ignore[arg-type]
+    others = _stage(rng) if config.staged else {"elements": zoo} if zoo is not None else {}
+    return Scene(model="solids3d", canvas=config.canvas, nodes=Chain(links), **others)  # type: ignore[arg-type]

@@ -10,6 +10,7 @@ from pydantic import Field, PrivateAttr
 
 from scenelang.elements.element import Element
 from scenelang.elements.zoo import Zoo, load_zoo
+from scenelang.scene import library
 from scenelang.scene.fields import Frozen, Word
 from scenelang.tensors import TensorError
 
@@ -50,8 +51,8 @@ class Elements(Frozen):
     def read(self, root: Path) -> tuple[str, str] | None:
         """Read the file, within a folder where its path begins; code and message if that fails."""
         try:
-            place = (root / self.path).resolve()
-            if not place.is_relative_to(root.resolve()):
+            place = library.find(self.path) or (root / self.path).resolve()
+            if not library.owns(place) and not place.is_relative_to(root.resolve()):
                 return "E0215", f"`{self.path}` lies outside the import root"
             zoo = load_zoo(place)
         except TensorError as error:
@@ -87,7 +88,7 @@ def load_elements(path: str | Path, name: str | None = None) -> Elements:
     """Read a file of elements for a Scene.
 
     Args:
-        path: the file.
+        path: the file, or one that ships: ``"std/meshes"``.
         name: what objects have before the dot; by default the file's, without its suffix.
 
     Raises:
@@ -95,4 +96,5 @@ def load_elements(path: str | Path, name: str | None = None) -> Elements:
         TensorError: it is damaged, or no such file.
         ValueError: its name is not one that objects can have: give another.
     """
-    return Elements.of(Path(path).stem if name is None else name, str(path), load_zoo(path))
+    zoo = load_zoo(library.find(str(path)) or path)
+    return Elements.of(Path(path).stem if name is None else name, str(path), zoo)

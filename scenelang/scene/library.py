@@ -1,4 +1,4 @@
-"""The library that ships: scene files that every scene may import, by names such as ``std/shapes``.
+"""The library that ships: files that every scene may import, by names such as ``std/shapes``.
 
 Such a name means a file of this package wherever it is written. A user's own file of that name is
 ``./std/shapes``; one with a suffix, ``std/shapes.nsg``, is always the user's.
@@ -18,6 +18,10 @@ _FOLDER: Final = Path(__file__).resolve().parents[1] / "std"
 _RESERVED: Final = re.compile(r"std/[A-Za-z0-9_]+")
 
 
+_SUFFIXES: Final = (".nsg", ".safetensors")
+_FILES: Final = {f"std/{path.stem}": path for path in _FOLDER.iterdir() if path.suffix in _SUFFIXES}
+
+
 def is_reserved(text: str) -> bool:
     """Whether an import's path is the library's to give, a file of it or not."""
     return _RESERVED.fullmatch(text) is not None
@@ -25,12 +29,12 @@ def is_reserved(text: str) -> bool:
 
 def names() -> list[str]:
     """What there is to import."""
-    return sorted(f"std/{path.stem}" for path in _FOLDER.glob("*.nsg"))
+    return sorted(_FILES)
 
 
 def find(text: str) -> Path | None:
     """The file that a name of the library means; None where it means none."""
-    return _FOLDER / f"{text[4:]}.nsg" if text in names() else None
+    return _FILES.get(text)
 
 
 def owns(path: Path) -> bool:
@@ -50,7 +54,7 @@ def holds(source: SourceFile) -> bool:
 
 def meant(text: str, span: Span) -> tuple[str | None, Fix | None]:
     """Help and fix for the path of a file that is not there, if the library's was meant."""
-    name = text.removeprefix("./").removesuffix(".nsg")
+    name = text.removeprefix("./").removesuffix(".nsg").removesuffix(".safetensors")
     if name not in names():
         return None, None
     return f"the library that ships is `{name}`", Fix(f"write `{name}`", (Edit(span, f'"{name}"'),))

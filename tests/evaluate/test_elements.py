@@ -169,6 +169,27 @@ def test_an_eye_in_what_an_element_cuts_is_not_said_to_be_inside(folder: Path, o
     assert [d.code for d in found.errors] == ["E0408"] * inside
 
 
+def test_meshes_that_ship_are_at_hand_everywhere(tmp_path: Path) -> None:
+    text = 'import "std/meshes" as m; m.bunny { } m.teapot { } m.monkey { material volumetric; }'
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "s.nsg").write_text(text)
+    scenes = [
+        nsg.loads(text),
+        nsg.load(tmp_path / "deep" / "s.nsg"),
+        nsg.load(tmp_path / "deep" / "s.nsg", root=tmp_path),
+    ]
+    scenes += [nsg.Scene.from_json(scenes[0].to_json(), root=tmp_path), nsg.loads(scenes[0].to_nsg())]
+    assert all(scene == scenes[0] for scene in scenes)
+    assert nsg.load_elements("std/meshes", "m") == scenes[0].elements[0]
+    program = compile_scene(scenes[0])
+    assert program.model == "solids3d"
+    assert [element.name for element in program.elements] == ["bunny", "monkey", "teapot"]
+    assert all(element.about["license"] and element.about["source"] for element in program.elements)
+    assert sum(len(element.data) for element in program.elements) < 100_000
+    with pytest.raises(nsg.RenderError, match=r"`m\.bunny` was made from `bunny\.obj`, which is not in"):
+        nsg.render(scenes[0], backend="reference")
+
+
 def test_json_has_the_file_and_its_digest(folder: Path) -> None:
     scene = good(folder, IMPORT + RING)
     back = nsg.Scene.from_json(scene.to_json(), root=folder)

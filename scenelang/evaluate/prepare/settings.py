@@ -23,6 +23,7 @@ from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import angle, number
 from scenelang.evaluate.values.transforms import color, vector
 from scenelang.evaluate.values.value import POISON, Problem, Time, Vec, show, unexpected
+from scenelang.scene import library
 from scenelang.scene.faults import MOST, camera_fault, light_fault
 from scenelang.scene.schema import MAX_FRAMES, Animation, Camera, Elements, Ground, Light
 from scenelang.scene.spans import Written
@@ -269,7 +270,8 @@ def _elements(path: Path, zoo: Zoo, stmt: nodes.Import, context: FileContext) ->
         while name in taken:  # the alias of another file, elsewhere
             count += 1
             name = f"{stmt.alias.text}_{count}"
-        written = path.relative_to(root).as_posix() if root is not None else stmt.path.value
+        inside = root is not None and not library.owns(path)
+        written = path.relative_to(root).as_posix() if root is not None and inside else stmt.path.value
         session.elements[path] = Elements.of(name, written, zoo)
     known = session.elements[path].name
     source = SourceFile(stmt.path.value, "")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from scenelang.cli import options
 from scenelang.cli.progress import Bar
 from scenelang.cli.say import need_metrics
 from scenelang.lab.commands import common
@@ -14,7 +15,12 @@ from scenelang.lab.commands import common
 @click.command("eval")
 @click.argument("model")
 @click.option(
-    "--set", "sets", multiple=True, metavar="NAME", help="A set; may be repeated. Default: MODEL's own."
+    "--set",
+    "sets",
+    multiple=True,
+    metavar="NAME",
+    help="A set, or a file of elements, whose solids take the place of those of meshes3d; may be repeated. "
+    "Default: MODEL's own.",
 )
 @click.option("--all-sets", is_flag=True, help="Every set there is.")
 @click.option("--scenes", default=1000, show_default=True, type=click.IntRange(1, 1_000_000))
@@ -30,6 +36,7 @@ from scenelang.lab.commands import common
     metavar="FOLDER",
     help="Of exact pictures, which are drawn and kept there unless they are.",
 )
+@options.originals
 @common.seed
 @common.out
 @common.weights
@@ -55,13 +62,14 @@ def command(
     import torch
 
     from scenelang.backend.options import keep_memory
+    from scenelang.elements.zoo import SUFFIX
     from scenelang.lab.evaluate import evaluate_set, sheet
     from scenelang.measure.scenes import sets_of
 
     loaded = common.model_to_measure(model, weights)
     known = sets_of(loaded.manifest)
     chosen = tuple(known) if all_sets else sets or (loaded.manifest.set,)
-    common.check_names("set", chosen, known)
+    common.check_names("set", [name for name in chosen if not name.endswith(SUFFIX)], known)
     keep_memory()
     torch.set_num_threads(threads)
     for name in chosen:
@@ -69,8 +77,9 @@ def command(
             summary, worst = evaluate_set(
                 loaded, name, scenes, seed, side=side, kept=kept, threads=threads, report=bar
             )
-        common.write_json(out / f"{name}.json", summary)
-        sheet(loaded, name, seed, worst, side, kept).save(out / f"{name}-worst.png")
+        stem = Path(name).stem
+        common.write_json(out / f"{stem}.json", summary)
+        sheet(loaded, name, seed, worst, side, kept).save(out / f"{stem}-worst.png")
         p, s, f = summary["psnr"], summary["ssim"], summary["flip"]
         click.echo(
             f"{name}: PSNR {p['mean']:.2f} dB (p5 {p['p5']:.2f}, worst {p['worst']:.2f}), "
