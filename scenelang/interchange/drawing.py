@@ -15,7 +15,7 @@ from scenelang.graph.looks import colour_steps, coloured
 from scenelang.graph.nodes import Fold, Graph, Leaf, Node
 from scenelang.graph.space import Space
 from scenelang.graph.spaces import SPACES
-from scenelang.interchange.dumps import hex_text, move_text, op_text, stage_text, token_names
+from scenelang.interchange.dumps import hex_text, look_text, move_text, op_text, stage_text, token_names
 from scenelang.program.compile import find_model
 from scenelang.scene import schema
 from scenelang.scene.text import material, transform
@@ -120,7 +120,9 @@ def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:
 def _graph_box(node: Node, space: Space) -> Box:
     moves = _short([move_text(move, space) for move in node.moves])
     if isinstance(node, Leaf):
-        return Box((node.geometry, *moves), hex_text(space.written(node.look.colour())), leaf=True)
+        texture = () if node.look.element is None else (look_text(node.look, space),)
+        rgb = hex_text(space.written(node.look.colour()))
+        return Box((node.geometry, *texture, *moves), rgb, leaf=True)
     return Box((node.kind, *moves))
 
 

@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.span import Span
+from scenelang.elements.element import Element
+from scenelang.graph.looks import Look
 from scenelang.graph.nodes import BLEND, Fold, Graph, Leaf, Link, Move, Node
 from scenelang.graph.space import Space
+from scenelang.graph.spaces import PLANE
 from scenelang.graph.stage import HORIZON, ZENITH, Stage, Triple, encoded, stage_data
 from scenelang.graph.steps import IDENTITY, Affine, Displace, Twist, Warp
 from scenelang.syntax import nodes
@@ -100,7 +103,7 @@ def dump(graph: Graph) -> str:
         word = "" if first or link.op == "union" else f"{op_text(link)} "
         node = link.node
         if isinstance(node, Leaf):
-            name = f"{node.geometry} {hex_text(graph.space.written(node.look.colour()))}"
+            name = f"{node.geometry} {look_text(node.look, graph.space)}"
             name += "" if node.look.material == "flat" else f" {node.look.material}"
         else:
             name = f"({node.kind})"
@@ -113,6 +116,15 @@ def dump(graph: Graph) -> str:
 
 def _push(stack: list[tuple[Link, int, bool]], fold: Fold, depth: int) -> None:
     stack.extend((fold.links[at], depth, at == 0) for at in range(len(fold.links) - 1, -1, -1))
+
+
+def look_text(look: Look, space: Space) -> str:
+    """A colour; or a texture with the moves of it and what is done to its colours."""
+    if look.element is None:
+        return hex_text(space.written(look.colour()))
+    moves = [move_text(Move(step), PLANE) for step in look.texture]
+    steps = [f"{kind}({' '.join(f'{v:.6g}' for v in numbers)})" for kind, *numbers in look.colours]
+    return " ".join([look.element.name, *moves, *steps])
 
 
 def move_text(move: Move, space: Space) -> str:
@@ -183,10 +195,21 @@ def _staged(stage: Stage | None) -> dict[str, Any]:
 def _node(node: Node) -> dict[str, Any]:
     moves = [_move(move) for move in node.moves]
     if isinstance(node, Leaf):
-        look = {"geometry": node.geometry, "material": node.look.material, "rgb": list(node.look.colour())}
+        look: dict[str, Any] = {
+            "geometry": node.geometry,
+            "material": node.look.material,
+            "rgb": list(node.look.colour()),
+        }
+        if (element := node.look.element) is not None:
+            rows = [_move(Move(step))["affine"][:2] for step in node.look.texture]
+            look["texture"] = {**_texture(element), "steps": list(node.look.colours), "moves": rows}
         return {"kind": "leaf", **look, "moves": moves}
     links = [{"op": link.op, **_width(link), "node": _node(link.node)} for link in node.links]
     return {"kind": node.kind, "moves": moves, "links": links}
+
+
+def _texture(element: Element) -> dict[str, Any]:
+    return {"name": element.name, "digest": element.digest}
 
 
 def _width(link: Link) -> dict[str, Any]:
@@ -207,7 +230,10 @@ def program_data(program: Program) -> dict[str, Any]:
     places = [place and place._asdict() for place in program.places]
     bounds, vectors = program.bounds.tolist(), program.vectors.tolist()
     columns = zip(program.objects, token_names(program), bounds, places, vectors, strict=True)
-    rows = [dict(zip(names, row, strict=True)) for row in columns]
+    rows: list[dict[str, Any]] = [dict(zip(names, row, strict=True)) for row in columns]
+    for row, paint in zip(rows, program.paints(), strict=True):
+        if paint is not None:
+            row["texture"] = {**_texture(paint.element), "steps": list(paint.steps)}
     return {
         "canvas": list(program.canvas),
         "background": None if program.background is None else list(program.background),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from itertools import islice
 from typing import Final
 
@@ -150,7 +150,9 @@ class _Maker:
             if len(before) == 2:
                 yield Item("as", Kind.Keyword, "as ")
         elif last == "material":
-            yield from self._materials()
+            yield from self._materials(self.words.materials)
+        elif before[-2:-1] == ("material",) and last in self.words.materials:
+            yield from self._materials(frozenset())
         elif (len(before) == 1 and last in COMBINE) or (before[0] == "smooth" and last == ")"):
             yield from self._children("a")
             yield from (self._keyword(word) for word in ("group", *COMBINE, "chain"))
@@ -226,10 +228,16 @@ class _Maker:
             if fits and symbol.kind in ("let", "argument", "loop"):
                 yield Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
 
-    def _materials(self) -> Iterator[Item]:
-        for name in sorted(self.words.materials):
-            text = f"{name} {{ ${{1:color(#d33);}} }}"
-            yield Item(name, Kind.EnumMember, text, "a", "material", words.MATERIALS.get(name, ""), True)
+    def _materials(self, constant: Collection[str]) -> Iterator[Item]:
+        """Materials of the model, and files that may hold others."""
+        for name in sorted({*constant, *self.words.textures}):
+            text, kind = f"{name} {{ ${{1:color(#d33);}} }}", "material" if name in constant else "texture"
+            yield Item(name, Kind.EnumMember, text, "a", kind, words.MATERIALS.get(name, ""), True)
+        for symbol in self.names.visible(self.cursor.offset):
+            stmt = symbol.node
+            held = self.docs.elements(self.document, stmt) if isinstance(stmt, nodes.Import) else ()
+            if any(element.material for element in held):
+                yield self._symbol(symbol)
 
     # ------------------------------------------------------------ expressions
 

@@ -95,7 +95,7 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             node = next((n for n in _calls(document, use) if n.name.text == text), None)
             return about and about + _node_facts(document, node)
         case "material":
-            return _offered(document, f"material {text}", "materials", text, words.MATERIALS)
+            return _offered(document, f"material {text}", "looks", text, words.MATERIALS)
         case "model":
             return next((_model(m) for m in vocabulary_of(document).models if m.name == text), None)
         case "argument":
@@ -108,11 +108,12 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
 
 
 def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[Element], str]) -> str | None:
-    """The geometry and the material of an imported file that have a name, as they are shown and told of."""
-    if use.role != "member" or use.symbol is None or not isinstance(use.symbol.node, nodes.Import):
+    """The geometry or the material of an imported file that has a name, as it is shown and told of."""
+    worn, symbol = use.role == "material", use.symbol
+    if not (worn or use.role == "member") or symbol is None or not isinstance(symbol.node, nodes.Import):
         return None
-    name = use.text.partition(".")[0]
-    found = [element for element in docs.elements(document, use.symbol.node) if element.name == name]
+    listed, name = docs.elements(document, symbol.node), use.text.partition(".")[0]
+    found = [element for element in listed if element.name == name and element.material == worn]
     told = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in found]
     return "\n\n".join(told)
 

@@ -33,6 +33,8 @@ def definition(docs: Workspace, document: Document, offset: int) -> types.Locati
         library = docs.imported(document, use.text)
         return types.Location(library.uri, library.lines.range(0, 0)) if library is not None else None
     found = docs.definition(document, use)
+    if found is None and use.symbol is not None and use.symbol.kind == "import":
+        found = document, use.symbol  # a file of elements
     if found is None:
         return None
     where, symbol = found

@@ -231,7 +231,7 @@ class Workspace:
             return next(((where, p) for p in symbol.params if p.name == use.text), None)
         if use.symbol is None:
             return None
-        if use.role != "member":
+        if use.role not in ("member", "material"):
             return document, use.symbol
         stmt = use.symbol.node
         library = self.imported(document, stmt.path.value) if isinstance(stmt, nodes.Import) else None

@@ -117,7 +117,7 @@ def drawing_cost(
     Returns:
         ``pixels`` of the canvas, ``refined`` (pixels sampled four times), what `_meetings` or `_rays` say,
         ``ms`` (the best of three frames, after one that does not count), ``psnr`` (dB, at most 50), ``flip``
-        (None without its package) and ``parameters``.
+        (None without its package), ``unknown`` (why there is no exact picture, or None) and ``parameters``.
     """
     by_numpy = program.stage is not None and place_of(model.network).type == "cpu"  # as `render` draws them
 
@@ -134,14 +134,19 @@ def drawing_cost(
         started = time.perf_counter()
         drawing = draw()
         times.append(1000 * (time.perf_counter() - started))
-    exact = over_white(reference_of(scene, model.manifest, spans=spans))
+    own, unknown = over_white(drawing.image), None
+    try:
+        exact = over_white(reference_of(scene, model.manifest, spans=spans))
+    except ValueError as error:
+        exact, unknown = None, str(error)
     return {
         "pixels": program.canvas[0] * program.canvas[1],
         "refined": drawing.refined,
         **(_meetings(drawing, program, model) if drawing.work is None else _rays(drawing.work)),
         "ms": round(min(times), 2),
-        "psnr": round(min(MOST_DB, psnr(over_white(drawing.image), exact)), 2),
-        "flip": _flip(over_white(drawing.image), exact),
+        "psnr": None if exact is None else round(min(MOST_DB, psnr(own, exact)), 2),
+        "flip": None if exact is None else _flip(own, exact),
+        "unknown": unknown,
         "parameters": sum(p.numel() for p in model.network.parameters()),
     }
 

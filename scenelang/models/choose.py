@@ -57,7 +57,7 @@ def _size(model: Manifest) -> tuple[int, int, int, float, str]:
 
 def lacking(model: Manifest, used: Iterable[Use]) -> list[str]:
     """Those of the names that a scene uses which a model does not know, in the order of the scene."""
-    return [name for name, field, _ in used if name not in getattr(model, field)]
+    return [shown(use) for use in used if use[0] not in getattr(model, use[1])]
 
 
 def apart(scene: Scene, models: Sequence[Manifest]) -> tuple[Use, Use] | None:
@@ -73,6 +73,13 @@ def apart(scene: Scene, models: Sequence[Manifest]) -> tuple[Use, Use] | None:
 
 Use = tuple[str, str, object]
 """A name, the field of manifests that lists such names, and the node that uses it first."""
+
+
+def shown(use: Use) -> str:
+    """A name as the scene has it: of an element its own."""
+    name, field, node = use
+    own = getattr(node, "geometry", None) or getattr(node, "name", None)
+    return own if field == "elements" and own else name
 
 
 def uses(scene: Scene) -> Iterator[Use]:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Label
 from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.suggest import listing
 from scenelang.graph.lower import Memory, Spans
 from scenelang.graph.nodes import Graph
-from scenelang.models.choose import apart, best_of_sets, choose_model
+from scenelang.models.choose import apart, best_of_sets, choose_model, lacking, shown, uses
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.passes import check_scene
 from scenelang.scene.schema import Scene
@@ -95,8 +96,10 @@ def find_model(
 def _no_model(
     scene: Scene, manifests: Sequence[Manifest], diagnostics: Diagnostics, spans: Spans | None
 ) -> None:
-    """Report that no model has all of a scene, at two names that are never together."""
-    help = "name one with `model`, and the errors say what it lacks"
+    """Report that no model has all of a scene, at two names that are never together, and which is near."""
+    used = list(uses(scene))
+    nearest = min(manifests, key=lambda model: len(lacking(model, used)))
+    help = f"`{nearest.name}` comes nearest; it lacks {listing(lacking(nearest, used))}"
     pair = apart(scene, manifests)
     if pair is None:
         fact = "no single model has every geometry, material and transform of the scene"
@@ -107,7 +110,8 @@ def _no_model(
         " and ".join(f"`{m.name}`" for m in manifests if name in getattr(m, field)) for name, field, _ in pair
     ]
     labels = [Label(places[0], f"{known[0] or 'no model'} has this")] if places[0] is not None else []
-    fact = f"no model has both `{pair[0][0]}` and `{pair[1][0]}`, which {known[1] or 'none'} has"
+    one, other = (f"`{shown(use)}`" for use in pair)
+    fact = f"no model has both {one} and {other}, which {known[1] or 'none'} has"
     diagnostics.add("E0508", fact, places[1], labels=labels, help=help)
 
 

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from scenelang.elements.zoo import zoo_bytes
-from tests.elements.shapes import ball, element, square, torus
+from tests.elements.shapes import ball, element, noise, square, torus
 from tests.lsp.client import CAPABILITIES, Client
 from tests.lsp.test_completion import labels
 from tests.lsp.test_hover import hover
@@ -25,6 +25,23 @@ def test_elements_are_proposed_and_told_of(client: Client, uri: str) -> None:
     told = hover(client, client.at(uri, "zoo.ring", 5))
     assert "element of space: 33 × 33 × 33 distances" in told
     assert "license: none needed" in told
+
+
+def test_materials_are_proposed_told_of_and_found(client: Client, uri: str) -> None:
+    zoo = Path(uri.removeprefix("file://")).with_name("zoo.safetensors")
+    zoo.write_bytes(zoo_bytes([element(torus, "ring"), noise(2, 3, name="ring"), noise(2, 2)]))
+    text = (
+        'import "zoo.safetensors" as zoo;\nsphere { material diffuse zoo.ring; }\ntorus { material zoo.; }\n'
+    )
+    client.replace(uri, text)
+    assert labels(client, client.at(uri, "zoo.; }", 4)) == ["bark", "ring"]
+    assert "zoo" in labels(client, client.at(uri, "material diffuse zoo", 9))
+    assert labels(client, client.at(uri, "diffuse zoo", 8))[-1] == "zoo"
+    told = hover(client, client.at(uri, "zoo.ring;", 5))
+    assert "texture: 3 × 2 colours" in told
+    assert "distances" not in told
+    found = client.request("textDocument/definition", client.at(uri, "zoo.ring;", 5))
+    assert found["range"]["start"]["line"] == 0
 
 
 @pytest.mark.parametrize("shows", [True, False])

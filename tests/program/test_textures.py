@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.elements.zoo import Zoo
+from scenelang.interchange.dumps import dump, graph_data, program_data
 from scenelang.lifting.layout import LAYOUTS
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program, program_bytes
@@ -155,6 +156,33 @@ def test_refusals(material: nsg.Material, geometry: str, code: str, words: str) 
         )
     assert [d.code for d in found] == [code]
     assert words in found.items[0].message
+
+
+def test_dumps_tell_of_textures() -> None:
+    ops = (nsg.Flip(), nsg.Grayscale(0.5))
+    program, graphs = compiled(nsg.Material("zoo.bark", ops)), dict[str, Any]()
+    scene = nsg.Scene(elements=ZOO, nodes=nsg.Object("square", (), nsg.Material("zoo.bark", ops)))
+    compile_scene(scene, after=graphs.__setitem__)
+    assert dump(graphs["fold_looks"]).splitlines()[1] == "  square bark [-1 0 0; 0 1 0] grayscale(0.5)"
+    assert graph_data(graphs["lower"])["root"]["links"][0]["node"]["texture"] == {
+        "name": "bark",
+        "digest": BARK.digest,
+        "steps": [("grayscale", 0.5)],
+        "moves": [[[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]]],
+    }
+    assert program_data(program)["rows"][0]["texture"]["steps"] == [("grayscale", 0.5)]
+
+
+def test_an_error_names_the_model_that_comes_nearest() -> None:
+    ball = nsg.Object("sphere", (), nsg.Material("zoo.bark"))
+    found = Diagnostics()
+    hide = nsg.Object("square", (), nsg.Material("zoo.hide"))
+    with pytest.raises(nsg.SceneError):
+        compile_scene(nsg.Scene(elements=ZOO, nodes=[ball, hide]), diagnostics=found)
+    (only,) = found
+    assert only.code == "E0508"
+    assert only.message.startswith("no model has both `sphere` and `square`, which `shapes2d`")
+    assert only.help == "`solids3d` comes nearest; it lacks square"
 
 
 def test_models_of_the_paper_draw_no_textures() -> None:

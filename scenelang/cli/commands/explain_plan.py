@@ -62,14 +62,16 @@ def _text(plan: dict[str, Any]) -> str:
     lines += [f"  {name} lacks {', '.join(names)}" for name, names in plan["lacking"].items()]
     lines += ["", *_table(plan["stages"]), ""]
     tokens = ", ".join(f"{number:,} {word}" for word, number in plan["tokens"].items())
-    error = f"{cost['psnr']:.2f} dB PSNR (50 at most)"
-    if cost["flip"] is not None:
-        error += f", FLIP {cost['flip']:.4f},"
+    if cost["unknown"] is not None:
+        error = f"not known: {cost['unknown']}"
+    else:
+        flip = "" if cost["flip"] is None else f", FLIP {cost['flip']:.4f},"
+        error = f"{cost['psnr']:.2f} dB PSNR (50 at most){flip} against the exact picture"
     lines += [
         f"stream     {plan['rows']:,} row{'s' * (plan['rows'] != 1)} of 64 numbers ({tokens or 'empty'})",
         *(_rays(cost, plan["rows"]) if "rays" in cost else _meetings(cost)),
         f"frame      {cost['ms']:.1f} ms",
-        f"error      {error} against the exact picture",
+        f"error      {error}",
     ]
     return "\n".join(lines)
 
