@@ -9,6 +9,7 @@ but 0, so that bzip2 makes little of the others.
 from __future__ import annotations
 
 import bz2
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -17,7 +18,6 @@ import numpy.typing as npt
 from scenelang.elements.element import Element
 
 Grid = npt.NDArray[np.float32]  # (3, n, n, n)
-WIDTHS: Final = np.array([[1 / 32], [1 / 16], [1 / 16]], np.float32)
 _LUMA: Final = np.array([[0.25, 0.5, 0.25], [1.0, 0.0, -1.0], [-0.5, 1.0, -0.5]], np.float32)
 
 
@@ -36,26 +36,32 @@ def _turned(matrix: npt.NDArray[np.float32], grid: Grid) -> Grid:
     return np.asarray((matrix @ grid.reshape(3, -1)).reshape(grid.shape), np.float32)
 
 
-def _stepped(expected: Grid, steps: npt.NDArray[np.int8]) -> Grid:
-    return np.asarray(expected + steps * WIDTHS[..., None, None], np.float32)
+def _widths(element: Element) -> Grid:
+    """How much a step is, for luma and for both differences."""
+    return np.array([1.0, 2.0, 2.0], np.float32).reshape(3, 1, 1, 1) / np.float32(element.sizes[1])
 
 
-def packed(name: str, colours: Grid, near: npt.NDArray[np.bool_], about: dict[str, str | float]) -> Element:
+def packed(
+    name: str, colours: Grid, near: npt.NDArray[np.bool_], about: dict[str, str | float], steps: int = 40
+) -> Element:
     """The element of colours, 0 to 1.
 
     Args:
-        near: (n, n, n), whether a node counts; a grid before the last counts where any node around one does.
+        near: (n, n, n), whether a node counts. One of a coarser grid does where any around it do, and of the
+            coarsest all.
+        steps: of luma from 0 to 1; half a step is the farthest that a node that counts comes to lie off.
     """
-    element = Element(name, "colours", (len(near),), "bzip2", b"", about)
-    true, grid, found = _turned(_LUMA, colours), None, []
+    element = Element(name, "colours", (len(near), steps), "bzip2", b"", about)
+    true, widths, grid = _turned(_LUMA, colours), _widths(element), None
+    found: list[bytes] = []
     for side in element.sides:
         apart = (len(near) - 1) // (side - 1)
         expected = np.zeros((3, side, side, side), np.float32) if grid is None else between(grid)
-        steps = np.rint((true[:, ::apart, ::apart, ::apart] - expected) / WIDTHS[..., None, None])
-        kept = (steps.clip(-127, 127) * _around(near, apart)).astype(np.int8)
-        grid = _stepped(expected, kept)
+        wanted = np.rint((true[:, ::apart, ::apart, ::apart] - expected) / widths)
+        kept = (wanted.clip(-127, 127) * (_around(near, apart) if found else True)).astype(np.int8)
+        grid = expected + kept * widths
         found.append(kept.tobytes())
-    return Element(name, "colours", (len(near),), "bzip2", bz2.compress(b"".join(found), 9), about)
+    return replace(element, data=bz2.compress(b"".join(found), 9))
 
 
 def _around(near: npt.NDArray[np.bool_], apart: int) -> npt.NDArray[np.bool_]:
@@ -75,10 +81,11 @@ def unpacked(element: Element) -> Grid:
         TensorError: the element is damaged.
     """
     flat, first, grid = np.frombuffer(element.inflated(), np.int8), 0, None
+    widths = _widths(element)
     for side in element.sides:
         shape = (3, side, side, side)
         steps = flat[first : first + 3 * side**3].reshape(shape)
         expected = np.zeros(shape, np.float32) if grid is None else between(grid)
-        grid, first = _stepped(expected, steps), first + steps.size
+        grid, first = expected + steps * widths, first + steps.size
     assert grid is not None
     return _turned(np.linalg.inv(_LUMA), grid).clip(0.0, 1.0)

@@ -37,7 +37,7 @@ FORMS: Final = {
     # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.elements.picture`)
     "picture": Form(("height", "width"), ("webp", "av1"), {2: "texture"}),
     # a material: colours over [-1, 1]^3, at nodes on its faces too (`scenelang.elements.colours`)
-    "colours": Form(("side",), ("bzip2",), {3: "colouring of space"}),
+    "colours": Form(("side", "steps"), ("bzip2",), {3: "colouring of space"}),
 }
 
 
@@ -50,7 +50,7 @@ class Element:
         form: one of `FORMS`.
         sizes: its numbers, as the form has them. A pyramid has its dimension (2 or 3), the cells of its
             coarsest grid along an axis, and grids, each of twice as many cells as the one before; a picture
-            height and width in texels; colours their nodes along an axis.
+            height and width in texels; colours nodes along an axis, and steps from dark to light.
         coding: of its bytes, one of the form's.
         data: the bytes.
         about: what its maker says of it: license, source, errors; text and numbers by their names.
@@ -100,7 +100,7 @@ class Element:
             return tuple(cells * 2**level + 1 for level in range(levels))
         if self.form == "picture":
             return self.sizes
-        found = list(self.sizes)
+        found = [self.sizes[0]]
         while found[0] % 2 and found[0] >= 9:  # halved as far as that leaves 4 cells
             found.insert(0, found[0] // 2 + 1)
         return tuple(found)
@@ -134,7 +134,7 @@ def in_range(form: str, sizes: tuple[int, ...]) -> bool:
     if form == "picture":
         return all(1 <= side <= MOST_PIXELS for side in sizes)
     if form == "colours":
-        return 2 <= sizes[0] <= MOST_SIDE[3]
+        return 2 <= sizes[0] <= MOST_SIDE[3] and 4 <= sizes[1] <= 255
     dimension, cells, levels = sizes
     fits = dimension in MOST_SIDE and 2 <= cells <= 8 and 1 <= levels <= 9
     return fits and cells * 2 ** (levels - 1) < MOST_SIDE[dimension]

@@ -9,7 +9,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from scenelang.elements.element import Element
-from scenelang.elements.zoo import MOST_BYTES, read_zoo, zoo_bytes
+from scenelang.elements.groups import Group
+from scenelang.elements.zoo import MOST_BYTES, Zoo, read_zoo, zoo_bytes
 from scenelang.files import NotWritten, output_place, read_regular, write_output
 from scenelang.fitting.apart import CPU_S, Apart, Hear
 from scenelang.fitting.making import MOST_OF, Wish
@@ -53,10 +54,10 @@ def learn(
         for file, called in zip(map(Path, files), names, strict=True):
             try:
                 known = read_elements(out).get((called, wish.paints(file.suffix)))
-                found, new = _learned(file, called, wish, known, apart, hear)
-                if new:
-                    add_elements(out, found)
-                made += found
+                found = _learned(file, called, wish, known, apart, hear)
+                if isinstance(found, Zoo):
+                    add_elements(out, found.elements, {called: (), **found.groups})
+                made += found.elements if isinstance(found, Zoo) else [found]
             except FitError as error:
                 troubles.append(f"{file}: {error}")
             except NotWritten:
@@ -111,11 +112,15 @@ def read_elements(out: str | os.PathLike[str]) -> dict[tuple[str, bool], Element
     Raises:
         OSError: it cannot be read, or is something else.
     """
+    return _named(_read(out).elements)
+
+
+def _read(out: str | os.PathLike[str]) -> Zoo:
     try:
         with open(out, "rb") as file:
-            return _named(read_zoo(file.read(MOST_BYTES + 1)).elements)
+            return read_zoo(file.read(MOST_BYTES + 1))
     except FileNotFoundError:
-        return {}
+        return Zoo.of(())
     except TensorError as error:
         raise NotWritten(errno.EINVAL, f"it is not a file of elements: {error}", os.fspath(out)) from None
 
@@ -124,13 +129,20 @@ def _named(elements: Iterable[Element]) -> dict[tuple[str, bool], Element]:
     return {(element.name, element.material): element for element in elements}
 
 
-def add_elements(out: str | os.PathLike[str], made: Sequence[Element]) -> None:
+def add_elements(
+    out: str | os.PathLike[str], made: Sequence[Element], groups: Mapping[str, Group] | None = None
+) -> None:
     """Put elements into a file, in place of the geometries and materials of their names, whole or not at all.
+
+    Args:
+        groups: to put in too; one without parts is taken out.
 
     Raises:
         OSError: it cannot be written, or would be more than can be read.
     """
-    data = zoo_bytes((read_elements(out) | _named(made)).values())
+    held = _read(out)
+    kept = {name: group for name, group in {**held.groups, **(groups or {})}.items() if group}
+    data = zoo_bytes((_named(held.elements) | _named(made)).values(), kept)
     try:
         read_zoo(data)
     except TensorError as error:
@@ -140,8 +152,8 @@ def add_elements(out: str | os.PathLike[str], made: Sequence[Element]) -> None:
 
 def _learned(
     path: Path, name: str, wish: Wish, known: Element | None, apart: Apart, hear: Mapping[str, Hear]
-) -> tuple[list[Element], bool]:
-    """The elements of a file, and whether they are new."""
+) -> Zoo | Element:
+    """What a file brings, or what was made of it before."""
     suffix = path.suffix.lower()
     if suffix not in MOST_OF:
         raise FitError(f"not one of {', '.join(MOST_OF)}")
@@ -151,9 +163,11 @@ def _learned(
     about = wish.about(path, data)
     if known is not None and wish.made(known, about):
         hear["say"](f"{name}: made before of this file")
-        return [known], False
+        return known
     hear["progress"](name, 0.0, 1.0)
     request = {"name": name, "suffix": suffix, "wish": asdict(wish), "about": about}
-    limit_s = max(CPU_S, 2 * wish.budget_s) if wish.budget_s < 1e6 else CPU_S
+    request["folder"] = os.path.abspath(path.parent)
+    usual_s = CPU_S * (4 if wish.parts else 1)
+    limit_s = max(usual_s, 2 * wish.budget_s) if wish.budget_s < 1e6 else usual_s
     made = apart({**request, "cpu_s": limit_s}, data, hear)
-    return list(read_zoo(made).elements), True
+    return read_zoo(made)

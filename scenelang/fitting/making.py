@@ -12,12 +12,14 @@ from typing import Any, Final, Literal
 
 from scenelang.elements.element import TEXELS, Element
 from scenelang.elements.zoo import is_said, zoo_bytes
-from scenelang.fitting import mesh, outline, picture
-from scenelang.fitting.ladder import NEAR, Rung, fit
-from scenelang.fitting.mesh import Sign
+from scenelang.fitting import outline, parts, picture, solids
+from scenelang.fitting.colours import fit_colours
+from scenelang.fitting.ladder import NEAR, Rung, Shape, fit
+from scenelang.fitting.mesh import FitError, Mesh, Sign
 
-MOST_OF: Final = {**mesh.MOST_OF, **outline.MOST_OF, **picture.MOST_OF}
+MOST_OF: Final = {**solids.MOST_OF, **outline.MOST_OF, **picture.MOST_OF}
 """Bytes of a file, by the suffixes that are read."""
+COARSER: Final = 4.0  # times as far as the whole a part may be off, in its own radii
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,9 @@ class Wish:
         source: where they are from.
         pictures: what they become.
         texels: most of a texture along its longer side.
+        parts: whether those of a file are elements of their own; if left out, those of drawings are.
+        color_error: root mean square off of a mesh's colours that is near enough, of channels in [0, 1];
+            `scenelang.fitting.colours.NEAR` if left out.
     """
 
     sign: Sign = "auto"
@@ -44,6 +49,8 @@ class Wish:
     source: str | None = None
     pictures: Literal["texture", "outline"] = "texture"
     texels: int = TEXELS
+    parts: bool | None = None
+    color_error: float | None = None
 
     def __post_init__(self) -> None:
         for text in (self.license, self.source):
@@ -55,8 +62,10 @@ class Wish:
         name = "".join(c if c.isprintable() else "?" for c in original.name)
         said = {"license": self.license, "source": self.source, "original": name}
         said |= {"sha256": hashlib.sha256(data).hexdigest()}
+        asked: dict[str, str | float | None]
         asked = {"sign": None if self.sign == "auto" else self.sign, "max_error": self.max_error}
-        asked |= {"texels": None if self.texels == TEXELS else self.texels}
+        asked |= {"texels": None if self.texels == TEXELS else self.texels, "color_error": self.color_error}
+        asked |= {"parts": None if self.parts is None else "apart" if self.parts else "together"}
         return {key: value for key, value in (said | asked).items() if value is not None}
 
     def paints(self, suffix: str) -> bool:
@@ -70,7 +79,7 @@ class Wish:
         return ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
 
 
-ASKED: Final = frozenset(("license", "source", "sign", "max_error", "texels"))
+ASKED: Final = frozenset(("license", "source", "sign", "max_error", "texels", "color_error", "parts"))
 
 
 def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> bytes:
@@ -83,25 +92,38 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
     Raises:
         FitError: nothing does.
     """
-    wish, suffix = Wish(**request["wish"]), request["suffix"]
-    end_s = time.monotonic() + wish.budget_s
-    kind = _texture if wish.paints(suffix) else _shape
-    return zoo_bytes([kind(data, suffix, request["name"], wish, request["about"], end_s, tell)])
+    wish, suffix, name = Wish(**request["wish"]), request["suffix"], request["name"]
+    about, end_s = request["about"], time.monotonic() + wish.budget_s
+    if wish.paints(suffix):
+        return zoo_bytes([_texture(data, name, wish, about, end_s, tell)])
+    brought = parts.brought(data, suffix, name, Path(request["folder"]), wish.sign, wish.parts)
+    tell("say", f"{name}: {', '.join(brought.notes)}")
+    group, made = list(brought.group), []
+    for called, shape in brought.shapes.items():
+        part = next((part for part in group if part.geometry == called), None)
+        own = about | ({"part": brought.numbers[called]} if called in brought.numbers else {})
+        try:
+            made.append(_shape(shape, called, 1.0 if part is None else part.size, wish, own, end_s, tell))
+            if part is not None and part.material and isinstance(shape, Mesh):
+                made.append(_colours(shape, called, wish, own, end_s, tell))
+        except FitError as error:
+            if called == name:
+                raise
+            tell("say", f"{called}: left out: {error}")
+            group = [part for part in group if part.geometry != called]
+    return zoo_bytes(made, {name: tuple(group)} if group else {})
 
 
 def _shape(
-    data: bytes,
-    suffix: str,
+    shape: Shape,
     name: str,
+    size: float,
     wish: Wish,
     about: dict[str, str | float],
     end_s: float,
     tell: Callable[..., None],
 ) -> Element:
-    """The element of a mesh or an outline."""
-    flat = suffix in outline.MOST_OF
-    shape = outline.read_outline(data, suffix) if flat else mesh.read_mesh(data, suffix, wish.sign)
-    tell("say", f"{name}: {', '.join(shape.notes)}")
+    """The element of a mesh or an outline; one that is small in the whole may be off by more of its size."""
 
     def report(rung: Rung) -> None:
         tell(
@@ -110,26 +132,51 @@ def _shape(
             f"1 in 100 {rung.worst:.4f}  normals {rung.normal_deg:.1f}°",
         )
 
+    asked = (wish.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
     element, tried = fit(
         shape,
         name,
-        max_error=wish.max_error,
+        max_error=asked,
         budget_s=end_s - time.monotonic(),
         steps=wish.steps,
         about=about,
         report=report,
         progress=lambda side, share: tell("progress", f"{name}, {side} a side", share, 1.0),
     )
-    off, asked = float(element.about["error"]), wish.max_error or NEAR[shape.dimension]
+    off = float(element.about["error"])
     short = "" if off <= asked else f", where {asked:g} was asked"
     shown = f"{element.sides[-1]} distances a side, {len(element.data):,} bytes, error {off:.5f}{short}"
     tell("say", f"{name}: {shown}; {len(tried)} grids tried")
     return element
 
 
+def _colours(
+    shape: Mesh,
+    name: str,
+    wish: Wish,
+    about: dict[str, str | float],
+    end_s: float,
+    tell: Callable[..., None],
+) -> Element:
+    """The material of a mesh."""
+    element = fit_colours(
+        shape,
+        name,
+        max_error=wish.color_error,
+        budget_s=end_s - time.monotonic(),
+        steps=wish.steps,
+        about=about,
+        report=lambda tried: tell(
+            "say", f"  {tried.side:>4} a side {tried.bytes:>8,} bytes  colours off by {tried.error:.4f}"
+        ),
+    )
+    shown = f"{element.sides[-1]} colours a side, {len(element.data):,} bytes"
+    tell("say", f"{name}: {shown}, off by {element.about['error']:.4f}")
+    return element
+
+
 def _texture(
     data: bytes,
-    suffix: str,
     name: str,
     wish: Wish,
     about: dict[str, str | float],

@@ -1,26 +1,24 @@
-"""Triangle meshes as solids: read, put into the unit ball, and asked for distances.
+"""Triangle meshes as solids: put into the unit ball, and asked for distances and colours.
 
-Needs trimesh, which reads, and libigl, which measures. Every file is taken for a stranger's: what libigl
-would not survive is refused here.
+Needs trimesh and libigl, which measures. Every mesh is taken for a stranger's: what libigl would not survive
+is refused here.
 """
 
 from __future__ import annotations
 
-import io
-import logging
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.fitting.looks import Look
+
 Points = npt.NDArray[np.float64]  # (M, 3)
 Sign = Literal["auto", "winding", "closed"]
-MOST_OF: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
 MOST_TRIANGLES: Final = 4_000_000
 _ENCLOSED: Final = 0.5  # share of a surface that has to have an inside
 _BESIDE: Final = 2e-3  # leaf units from a surface to where its sides are asked
@@ -41,6 +39,7 @@ class Mesh:
         closed: tell inside by the nearest surface's normal, otherwise by winding numbers.
         centre, size: of the ball in the file's own coordinates.
         notes: what was found and mended.
+        look: the colours of its triangles, where they have any.
     """
 
     vertices: Points
@@ -49,6 +48,7 @@ class Mesh:
     centre: tuple[float, float, float]
     size: float
     notes: tuple[str, ...] = ()
+    look: Look | None = None
     dimension: ClassVar[int] = 3
 
     @cached_property
@@ -87,26 +87,47 @@ class Mesh:
         square, triangle, at = boxes.squared_distance(*mesh, p)
         return np.where(abs(windings.winding_number(p)) > 0.5, -1.0, 1.0) * np.sqrt(square), triangle, at
 
+    def spread(self, count: int, seed: int) -> tuple[npt.NDArray[np.int64], Points]:
+        """Triangles (M,) and barycentric shares (M, 3) of points spread evenly on all of the surface."""
+        random = np.random.default_rng(seed)
+        a, b, c = self.vertices[self.triangles].swapaxes(0, 1)
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        at = random.choice(len(area), count, p=area / area.sum())
+        u, v = random.random((2, count))
+        u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+        return at, np.stack([1 - u - v, u, v], 1)
+
+    def points(self, triangles: npt.NDArray[np.int64], share: Points) -> Points:
+        """Points (M, 3) of triangles (M,), by barycentric shares (M, 3)."""
+        return np.asarray((self.vertices[self.triangles[triangles]] * share[..., None]).sum(1))
+
+    def touched(self, p: Points) -> tuple[npt.NDArray[np.int64], Points]:
+        """Triangles (M,) and barycentric shares (M, 3) of the points of the surface nearest to points."""
+        _, triangle, at = self._nearest(p)
+        a, b, c = self.vertices[self.triangles[triangle]].swapaxes(0, 1)
+        across = np.cross(b - a, c - a)
+        square = np.maximum((across * across).sum(1), 1e-300)
+        v = (np.cross(at - a, c - a) * across).sum(1) / square
+        w = (np.cross(b - a, at - a) * across).sum(1) / square
+        share = np.stack([1 - v - w, v, w], 1).clip(0, 1)
+        return triangle, share / share.sum(1, keepdims=True)
+
     def surface(self, count: int) -> tuple[Points, Points]:
         """Points (K, 3) spread evenly on the outside of the solid, K at most ``count``, and normals there.
 
         Raises:
             FitError: most of the surface has no inside.
         """
-        random = np.random.default_rng(1)
-        corners = self.vertices[self.triangles]
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = np.linalg.norm(across, axis=1)
-        at = random.choice(len(area), count, p=area / area.sum())
-        u, v = random.random((2, count, 1))
-        u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-        a, b, c = corners[at].swapaxes(0, 1)
-        points, normals = a + u * (b - a) + v * (c - a), across[at] / area[at, None]
+        at, share = self.spread(count, 1)
+        a, b, c = self.vertices[self.triangles[at]].swapaxes(0, 1)
+        normals = np.cross(b - a, c - a)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        points = self.points(at, share)
         sides = [self.distances(points + way * _BESIDE * normals) < 0 for way in (1, -1)]
         outer = sides[0] != sides[1]
         if outer.mean() < _ENCLOSED:
-            share = f"{100 * (1 - outer.mean()):.0f} % of the surface has no inside"
-            raise FitError(f"{share} {_BESIDE:g} radii below it: it encloses no solid")
+            open_ = f"{100 * (1 - outer.mean()):.0f} % of the surface has no inside"
+            raise FitError(f"{open_} {_BESIDE:g} radii below it: it encloses no solid")
         turned = np.where(sides[0], -1.0, 1.0)[:, None]
         return points[outer], (normals * turned)[outer]
 
@@ -138,34 +159,10 @@ def needed(name: str) -> Iterator[None]:
         raise FitError(message) from error
 
 
-def read_mesh(data: bytes, suffix: str, sign: Sign = "auto") -> Mesh:
-    """The mesh in the bytes of a file with a suffix of `MOST_OF`.
-
-    Args:
-        sign: what tells inside: ``winding`` numbers, which take any mesh, or normals, for ``closed`` ones
-            whose surface nowhere passes through itself; ``auto`` is ``winding``.
-
-    Raises:
-        FitError: it is damaged, empty or too large, or encloses nothing.
-    """
-    with needed("trimesh"):
-        import trimesh
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    try:  # a reader of many formats, which a stranger's file may break in many ways
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            file, kind = io.BytesIO(data), suffix[1:]
-            found = trimesh.load_scene(file, file_type=kind, resolver=None, skip_materials=True).to_mesh()
-        vertices, triangles = np.asarray(found.vertices, float), np.asarray(found.faces, np.int64)
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise FitError(f"damaged or not a mesh: {str(error) or type(error).__name__}"[:200]) from error
-    return mesh_of(vertices, triangles, sign)
-
-
-def mesh_of(vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "auto") -> Mesh:
-    """The solid that triangles enclose; as `read_mesh`."""
+def mesh_of(
+    vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "auto", look: Look | None = None
+) -> Mesh:
+    """The solid that triangles enclose, and what it looks like; as `scenelang.fitting.solids.read_mesh`."""
     with needed("trimesh"):
         import trimesh
     notes = []
@@ -191,9 +188,11 @@ def mesh_of(vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "au
     if not sound.all():
         notes.append(f"{(~sound).sum():,} flat triangles left out")
         mesh.update_faces(sound)
+        look = look and look.of(sound)
     if not (once := _once(mesh.faces)).all():  # many at one place would all be asked, for each point
         notes.append(f"{(~once).sum():,} triangles that are there twice left out")
         mesh.update_faces(once)
+        look = look and look.of(once)
     closed = bool(mesh.is_watertight and mesh.is_winding_consistent)
     if sign == "closed" and not closed:
         raise FitError("it is not closed; tell inside by winding numbers: --sign winding")
@@ -201,6 +200,7 @@ def mesh_of(vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "au
     if by_normals and mesh.volume < 0:
         notes.append("inside out, turned")
         mesh.invert()
+        look = look and replace(look, tint=look.tint[:, ::-1], uv=look.uv[:, ::-1])
     told = "normals" if by_normals else "winding numbers"
     kind = "closed" if closed else "not closed"
     notes = [f"{len(mesh.faces):,} triangles", kind, *notes, f"inside by {told}"]
@@ -211,4 +211,5 @@ def mesh_of(vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "au
         (float(centre[0]), float(centre[1]), float(centre[2])),
         size,
         tuple(notes),
+        look,
     )

@@ -12,9 +12,8 @@ from scenelang.elements.element import Element
 from scenelang.files import read_regular
 from scenelang.fitting.ladder import Shape
 from scenelang.fitting.making import MOST_OF
-from scenelang.fitting.mesh import FitError, read_mesh
-from scenelang.fitting.outline import MOST_OF as DRAWINGS
-from scenelang.fitting.outline import read_outline
+from scenelang.fitting.mesh import FitError
+from scenelang.fitting.parts import shape_in
 from scenelang.graph.nodes import Graph, leaves
 from scenelang.scene.schema import Scene
 
@@ -49,18 +48,18 @@ def _original(name: str, element: Element, folder: str | Path | None) -> Shape:
     if path.name != file or path.suffix.lower() not in MOST_OF or not path.is_file():
         raise FitError(f"{made}, which is not in `{folder}`")
     version = path.stat().st_mtime_ns, path.stat().st_size
-    shape = _shape(path, digest, element.about.get("sign") == "closed", *version)
+    part = int(element.about.get("part", 0))
+    shape = _shape(path, digest, element.about.get("sign") == "closed", part, *version)
     if shape is None:
         raise FitError(f"{made}, and `{path}` is another file of that name")
     return shape
 
 
 @lru_cache(maxsize=8)
-def _shape(path: Path, digest: str, closed: bool, *version: int) -> Shape | None:
+def _shape(path: Path, digest: str, closed: bool, part: int, *version: int) -> Shape | None:
     """The shape in a file, None if that is another one; frames of an animation ask again and again."""
     suffix = path.suffix.lower()
     data = read_regular(path, MOST_OF[suffix])
     if hashlib.sha256(data).hexdigest() != digest:
         return None
-    flat = suffix in DRAWINGS
-    return read_outline(data, suffix) if flat else read_mesh(data, suffix, "closed" if closed else "auto")
+    return shape_in(data, suffix, "closed" if closed else "auto", part)

@@ -36,11 +36,21 @@ class Layer:
         edges: (E, 2, 2).
         inside: tells of points (M, 2) whether the layer covers them; None of a stroke.
         half: of a stroke's width.
+        color: sRGB, 0 to 1; empty where it has none.
     """
 
     edges: Edges
     inside: Inside | None
     half: float = 0.0
+    color: tuple[float, ...] = ()
+
+    def touches(self, other: Layer) -> bool:
+        """Whether the boxes around both share a point."""
+        boxes = [
+            (layer.edges.min((0, 1)) - layer.half, layer.edges.max((0, 1)) + layer.half)
+            for layer in (self, other)
+        ]
+        return bool((boxes[0][0] <= boxes[1][1]).all() and (boxes[1][0] <= boxes[0][1]).all())
 
     def pieces(self) -> Edges:
         """Edges cut to `PIECE`, of a filled area those with just one side in it."""
@@ -77,7 +87,7 @@ class Outline:
     def __init__(self, layers: list[Layer], notes: tuple[str, ...] = ()) -> None:
         from scipy.spatial import cKDTree
 
-        self.notes = notes
+        self.notes, self._source = notes, layers
         if not layers or sum(len(layer.edges) for layer in layers) == 0:
             raise FitError("it draws nothing")
         if sum(len(layer.edges) for layer in layers) > MOST_EDGES:
@@ -104,6 +114,24 @@ class Outline:
                 self._layers.append((moved, pieces, cKDTree(pieces.mean(1))))
         if not self._layers:
             raise FitError("it covers nothing")
+
+    def painted(self) -> list[tuple[tuple[float, ...], list[Layer]]]:
+        """Its colours in the order of painting, and the layers of each, as they lay in the file.
+
+        A layer joins earlier ones of its colour where nothing that was painted since touches it.
+        """
+        found: list[tuple[tuple[float, ...], list[Layer]]] = []
+        for layer in self._source:
+            for color, layers in reversed(found):
+                if color == layer.color:
+                    layers.append(layer)
+                    break
+                if any(layer.touches(other) for other in layers):
+                    found.append((layer.color, [layer]))
+                    break
+            else:
+                found.append((layer.color, [layer]))
+        return found
 
     def distances(self, p: Points) -> Points:
         """Signed distances (M,) of points (M, 2), negative inside."""

@@ -46,6 +46,18 @@ if TYPE_CHECKING:
     "through itself; auto is winding.",
 )
 @click.option(
+    "--parts/--together",
+    default=None,
+    help="Whether parts are elements of their own too: solids that a mesh file names, areas of one colour. "
+    "Those of drawings are if this is left out.",
+)
+@click.option(
+    "--color-error",
+    type=click.FloatRange(0, min_open=True),
+    metavar="SHARE",
+    help="Root mean square off of a mesh's colours: 0.025.",
+)
+@click.option(
     "--max-error",
     type=click.FloatRange(0, min_open=True),
     metavar="SHARE",
@@ -72,6 +84,8 @@ def command(
     pictures: Literal["texture", "outline"],
     texels: int,
     sign: Sign,
+    parts: bool | None,
+    color_error: float | None,
     max_error: float | None,
     budget: float,
     steps: int | None,
@@ -102,7 +116,7 @@ def command(
     if preview is not None:
         targets(["preview"], preview)
     try:
-        wish = Wish(sign, max_error, budget, steps, license, source, pictures, texels)
+        wish = Wish(sign, max_error, budget, steps, license, source, pictures, texels, parts, color_error)
         names_of(files, wish, name)
     except ValueError as error:
         raise click.UsageError(f"{error}.") from None

@@ -1,0 +1,187 @@
+"""What a file brings: shapes to be made elements, and the parts that a ready group of them has.
+
+Of parts that are copies of each other, turned, mirrored, larger or smaller, the first one's shape serves all.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from scenelang.elements.groups import MOST_PARTS, Group, Part
+from scenelang.fitting import outline, solids
+from scenelang.fitting.ladder import Shape
+from scenelang.fitting.looks import Look
+from scenelang.fitting.mesh import FitError, Mesh, Points, Sign
+from scenelang.fitting.outline import Outline
+from scenelang.fitting.solids import Solid
+
+_ALIKE: Final = 1e-4  # of a part's size: how far its points may lie off those of a copy
+
+
+class Brought(NamedTuple):
+    """What a file is made.
+
+    Args:
+        shapes: what each element is made of, by its name; the whole comes last.
+        numbers: of the parts in the file, from 1, by the names of their elements.
+        group: the parts that it has, none where nothing is known of them but their shape.
+        notes: what there is to say of the file.
+    """
+
+    shapes: dict[str, Shape]
+    numbers: dict[str, int]
+    group: Group
+    notes: tuple[str, ...]
+
+
+def brought(
+    data: bytes, suffix: str, name: str, folder: Path | None, sign: Sign, apart: bool | None
+) -> Brought:
+    """What the bytes of a file bring.
+
+    Args:
+        suffix: one that `scenelang.fitting.solids` or `scenelang.fitting.outline` reads.
+        name: of the whole.
+        folder: where the file lies.
+        apart: whether its parts are elements of their own; if left out, those of drawings are.
+
+    Raises:
+        FitError: it is damaged, empty or too large, encloses nothing, or has too many parts.
+    """
+    if suffix in outline.MOST_OF:
+        return drawn_parts(outline.read_outline(data, suffix), name, apart)
+    found, notes = solids.read_solids(data, suffix, folder)
+    made = solid_parts(found, name, sign, bool(apart))
+    return made._replace(notes=(*made.notes, *notes))
+
+
+def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
+    """A part by its number, or the whole for 0.
+
+    Raises:
+        FitError: as `brought`, or there is no such part.
+    """
+    if suffix in outline.MOST_OF:
+        drawn = outline.read_outline(data, suffix)
+        if number == 0:
+            return drawn
+        layers = [layers for _, layers in drawn.painted()][number - 1 :]
+        if layers:
+            return Outline(layers[0])
+    else:
+        found, _ = solids.read_solids(data, suffix)
+        if number <= len(found):
+            return solids.whole(found[number - 1 : number] if number else found, sign)
+    raise FitError(f"it has no part {number}")
+
+
+def named(word: str, taken: set[str]) -> str:
+    """A name as scenes can say it, and not taken."""
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in word).strip("_")
+    found, count = name, 1
+    while found in taken:
+        count += 1
+        found = f"{name}_{count}"
+    return found
+
+
+def solid_parts(found: list[Solid], name: str, sign: Sign, apart: bool) -> Brought:
+    """What a file of meshes brings.
+
+    Args:
+        name: of the whole.
+        apart: whether its solids are elements of their own.
+
+    Raises:
+        FitError: it encloses nothing, or has too many parts.
+    """
+    whole = solids.whole(found, sign)
+    if not apart or len(found) < 2:
+        return Brought({name: whole}, {}, _alone(name, whole), whole.notes)
+    _few(len(found))
+    shapes: dict[str, Shape] = {}
+    numbers = {}
+    firsts: list[tuple[Solid, Mesh, str]] = []
+    group = []
+    for number, solid in enumerate(found, 1):
+        mesh = solids.whole([solid], sign)
+        rows, centre, size = np.eye(3), np.array(mesh.centre), mesh.size
+        for first, like, called in firsts:  # noqa: B007, a copy goes by the first one's name
+            if (copy := _copy(first, solid)) is not None:
+                larger, rows, shift = copy
+                centre, size = larger * rows @ like.centre + shift, larger * like.size
+                break
+        else:
+            called = named(f"{name}_{solid.name}", {*shapes, name})
+            shapes[called], numbers[called] = mesh, number
+            firsts.append((solid, mesh, called))
+        turn = () if abs(rows - np.eye(3)).max() < _ALIKE else tuple(map(tuple, rows.tolist()))
+        place = tuple(((centre - whole.centre) / whole.size).tolist())
+        group.append(Part(called, place, size / whole.size, turn, *_worn(mesh.look, called)))
+    return Brought({**shapes, name: whole}, numbers, tuple(group), whole.notes)
+
+
+def _alone(name: str, mesh: Mesh) -> Group:
+    colour, material = _worn(mesh.look, name)
+    return (Part(name, (0.0, 0.0, 0.0), 1.0, (), colour, material),) if mesh.look is not None else ()
+
+
+def _worn(look: Look | None, name: str) -> tuple[tuple[float, ...], str]:
+    """The one colour of a look, or the name that its material is to have."""
+    if look is None:
+        return (), ""
+    return ((), name) if look.plain is None else (look.plain, "")
+
+
+def _few(count: int) -> None:
+    if count > MOST_PARTS:
+        raise FitError(f"{count:,} parts, at most {MOST_PARTS}; without --parts it is one element")
+
+
+def _copy(first: Solid, other: Solid) -> tuple[float, Points, Points] | None:
+    """Size s, rotation or reflection R and shift t that make one solid another, s R p + t (Umeyama 1991)."""
+    same = len(first.vertices) == len(other.vertices) and np.array_equal(first.triangles, other.triangles)
+    if not same or not _alike(first.look, other.look):
+        return None
+    middles = first.vertices.mean(0), other.vertices.mean(0)
+    p, q = first.vertices - middles[0], other.vertices - middles[1]
+    left, stretch, right = np.linalg.svd(p.T @ q)
+    turn, size = (left @ right).T, float(stretch.sum() / max(np.square(p).sum(), 1e-300))
+    if not abs(size * p @ turn.T - q).max() <= _ALIKE * abs(q).max():
+        return None
+    return size, turn, middles[1] - size * turn @ middles[0]
+
+
+def _alike(one: Look | None, other: Look | None) -> bool:
+    """Whether copies may share their element: both of one colour each, or looking the same."""
+    if one is None or other is None:
+        return one is other
+    if one.plain is not None or other.plain is not None:
+        return one.plain is not None and other.plain is not None
+    pairs = ((one.tint, other.tint), (one.linear, other.linear), (one.uv, other.uv), (one.image, other.image))
+    images = len(one.images) == len(other.images) and all(map(np.array_equal, one.images, other.images))
+    return images and all(np.array_equal(a, b) for a, b in pairs)
+
+
+def drawn_parts(whole: Outline, name: str, apart: bool | None) -> Brought:
+    """What a drawing brings: what it paints in one colour after another, each a part.
+
+    Raises:
+        FitError: it has too many parts.
+    """
+    painted = [(colour, Outline(layers)) for colour, layers in whole.painted()]
+    if len(painted) < 2 or apart is False or (apart is None and len(painted) > MOST_PARTS):
+        colours = {colour for colour, _ in painted if colour}
+        group = tuple(Part(name, (0.0, 0.0), 1.0, (), colour) for colour in colours if len(colours) == 1)
+        return Brought({name: whole}, {}, group, whole.notes)
+    _few(len(painted))
+    parts = []
+    names = {f"{name}_{k}": k for k in range(1, len(painted) + 1)}
+    for called, (colour, part) in zip(names, painted, strict=True):
+        x, y = ((a - b) / whole.size for a, b in zip(part.centre, whole.centre, strict=True))
+        parts.append(Part(called, (x, y), part.size / whole.size, (), colour))
+    shapes = dict(zip(names, (part for _, part in painted), strict=True))
+    return Brought({**shapes, name: whole}, names, tuple(parts), whole.notes)

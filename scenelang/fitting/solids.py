@@ -1,0 +1,182 @@
+"""Files of meshes, which trimesh reads: the solids in them, where they lie, and what they look like."""
+
+from __future__ import annotations
+
+import io
+import json
+import logging
+import re
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.files import read_regular
+from scenelang.fitting.looks import Look, joined, look_of, white
+from scenelang.fitting.mesh import MOST_TRIANGLES, FitError, Mesh, Points, Sign, mesh_of, needed
+
+MOST_OF: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
+_MOST_BESIDE: Final = 1 << 26  # bytes of a file that one names
+_UNDERSTOOD: Final = re.compile(
+    r"KHR_(materials|lights|mesh_quantization|animation|node|xmp)|EXT_texture_webp"
+)
+_IGNORED: Final = ("animations", "cameras", "skins")
+
+
+class Solid(NamedTuple):
+    """What has a name of its own in a file.
+
+    Args:
+        vertices: (V, 3), where they lie in the whole.
+        triangles: (F, 3) indices.
+        look: None where the file says nothing of it.
+    """
+
+    name: str
+    vertices: Points
+    triangles: npt.NDArray[np.int64]
+    look: Look | None = None
+
+
+def read_mesh(data: bytes, suffix: str, sign: Sign = "auto") -> Mesh:
+    """The mesh in the bytes of a file with a suffix of `MOST_OF`, all of its solids as one.
+
+    Args:
+        sign: what tells inside: ``winding`` numbers, which take any mesh, or normals, for ``closed`` ones
+            whose surface nowhere passes through itself; ``auto`` is ``winding``.
+
+    Raises:
+        FitError: it is damaged, empty or too large, or encloses nothing.
+    """
+    return whole(read_solids(data, suffix)[0], sign)
+
+
+def whole(solids: Sequence[Solid], sign: Sign = "auto") -> Mesh:
+    """All solids as one mesh; as `read_mesh`."""
+    if not solids:
+        raise FitError("it holds no triangles")
+    _, vertices, triangles, look = _joined("", solids)
+    return mesh_of(vertices, triangles, sign, look)
+
+
+def read_solids(data: bytes, suffix: str, folder: Path | None = None) -> tuple[list[Solid], list[str]]:
+    """The solids in the bytes of a file with a suffix of `MOST_OF`, and what there is to say of it.
+
+    Args:
+        folder: where the materials and textures lie that it names; without one there are none.
+
+    Raises:
+        FitError: it is damaged or too large, or has what cannot be read.
+    """
+    with needed("trimesh"):
+        import trimesh
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
+    beside = _beside(folder)
+    try:  # a reader of many formats, which a stranger's file may break in many ways
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            notes = _notes(data) if suffix == ".glb" else []
+            objects = {"split_objects": True} if re.search(rb"^o ", data, re.M) else {"split_groups": True}
+            kind = {"file_type": suffix[1:], "resolver": beside, **(objects if suffix == ".obj" else {})}
+            found = trimesh.load_scene(io.BytesIO(data), skip_materials=folder is None, **kind)
+            solids = _solids(found, suffix, folder is not None)
+    except (FitError, MemoryError):
+        raise
+    except Exception as error:
+        raise FitError(f"damaged or not a mesh: {str(error) or type(error).__name__}"[:200]) from error
+    return solids, [*notes, *(f"`{name}` not found beside it" for name in sorted(beside.missing))]
+
+
+def _notes(data: bytes) -> list[str]:
+    """What of a glTF is left out.
+
+    Raises:
+        FitError: it cannot be read without an extension.
+    """
+    header = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    strange = [name for name in header.get("extensionsRequired", ()) if not _UNDERSTOOD.match(name)]
+    if strange:
+        message = f"it is compressed or needs what is not read here: {', '.join(strange)}"
+        raise FitError(f"{message}; export it without")
+    meshes, notes = header.get("meshes", ()), [f"{name} left out" for name in _IGNORED if header.get(name)]
+    primitives = [part for mesh in meshes for part in mesh.get("primitives", ())]
+    if any("targets" in part for part in primitives):
+        notes.append("morph targets left out")
+    if any(part.get("mode", 4) not in (4, 5) for part in primitives):
+        notes.append("points, lines and fans left out")
+    if "KHR_lights_punctual" in header.get("extensions", {}):
+        notes.append("lights left out")
+    if len(header.get("scenes", ())) > 1:
+        notes.append(f"{len(header['scenes'])} scenes, of which it takes number {header.get('scene', 0) + 1}")
+    return notes
+
+
+def _beside(folder: Path | None) -> Any:
+    """What finds files that a file names, in its folder and below."""
+    import trimesh
+
+    class Beside(trimesh.resolvers.Resolver):
+        def __init__(self) -> None:
+            self.missing: set[str] = set()
+
+        def get(self, name: str) -> bytes:
+            try:
+                assert folder is not None
+                path = (folder / name.replace("\\", "/").lstrip("/")).resolve()
+                assert path.is_relative_to(folder.resolve())
+                found = read_regular(path, _MOST_BESIDE)
+                assert len(found) <= _MOST_BESIDE
+            except (OSError, ValueError, AssertionError):
+                self.missing |= {"".join(c for c in name if c.isprintable())[:80]} if folder else set()
+                raise KeyError(name) from None
+            return found
+
+        def keys(self) -> tuple[str, ...]:
+            return ()
+
+        def namespaced(self, namespace: str) -> Any:
+            return self
+
+        def write(self, name: str, data: Any) -> None:
+            raise NotImplementedError
+
+    return Beside()
+
+
+def _solids(scene: Any, suffix: str, looks: bool) -> list[Solid]:
+    """The solids of a scene, those of one name joined, in the order of the file."""
+    named: dict[str, list[Solid]] = {}
+    textures: dict[int, npt.NDArray[np.uint8]] = {}
+    count = 0
+    for node in reversed(scene.graph.nodes_geometry):
+        matrix, geometry = scene.graph[node]
+        mesh = scene.geometry[geometry]
+        if not hasattr(mesh, "faces"):
+            continue  # points or lines
+        count += len(mesh.faces)
+        if count > MOST_TRIANGLES:
+            raise FitError(f"more than {MOST_TRIANGLES:,} triangles")
+        vertices = np.asarray(mesh.vertices, float) @ matrix[:3, :3].T + matrix[:3, 3]
+        triangles = np.asarray(mesh.faces, np.int64)
+        look = look_of(mesh, suffix == ".glb", textures) if looks else None
+        name = str(node)
+        if mesh.metadata.get("from_gltf_primitive"):
+            name = str(scene.graph.transforms.parents[node])
+        elif suffix == ".obj" and mesh.visual.kind == "texture":
+            name = name.removesuffix(f"_{mesh.visual.material.name}")
+        named.setdefault(name, []).append(Solid(name, vertices, triangles, look))
+    return [_joined(name, solids) for name, solids in named.items()]
+
+
+def _joined(name: str, solids: Sequence[Solid]) -> Solid:
+    first = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
+    looks = [solid.look or white(len(solid.triangles)) for solid in solids]
+    return Solid(
+        name,
+        np.concatenate([solid.vertices for solid in solids]),
+        np.concatenate([s.triangles + at for s, at in zip(solids, first, strict=False)]),
+        joined(looks) if any(solid.look for solid in solids) else None,
+    )
