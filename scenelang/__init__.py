@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from scenelang.diagnostics.error import SceneError as SceneError
     from scenelang.evaluate.evaluation import load as load
     from scenelang.evaluate.evaluation import loads as loads
+    from scenelang.fitting.api import FitError as FitError
+    from scenelang.fitting.api import learn as learn
     from scenelang.formatting.format import format_text as format_text
     from scenelang.image import Image as Image
     from scenelang.measure.metrics import compare as compare
@@ -73,6 +75,7 @@ _HOME: Final = {
     "scenelang.diagnostics.diagnostic": "Diagnostic Diagnostics",
     "scenelang.diagnostics.error": "SceneError",
     "scenelang.evaluate.evaluation": "load loads",
+    "scenelang.fitting.api": "FitError learn",
     "scenelang.formatting.format": "format_text",
     "scenelang.image": "Image",
     "scenelang.measure.metrics": "compare",

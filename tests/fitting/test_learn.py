@@ -40,6 +40,20 @@ def run(*arguments: Any) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
+def test_python_learns_what_the_command_does(folder: Path) -> None:
+    heard: list[str] = []
+    zoo = nsg.learn("star.svg", "zoo.safetensors", name="sun", license="CC0", steps=1, say=heard.append)
+    assert (
+        run("star.svg", "-o", "other.safetensors", "--name", "sun", "--license", "CC0", "--steps", 1)[0] == 0
+    )
+    assert Path("zoo.safetensors").read_bytes() == Path("other.safetensors").read_bytes()
+    assert any("sun" in line for line in heard)
+    scene = nsg.Scene(elements=zoo, nodes=nsg.Object("zoo.sun", nsg.Scale(0.5)))
+    assert len(nsg.compile(scene)) == 1
+    with pytest.raises(nsg.FitError, match=r"bad\.ply"):
+        nsg.learn(["bad.ply"], "zoo.safetensors")
+
+
 def test_learn_adds_to_a_file_and_a_scene_draws_it(folder: Path) -> None:
     about = ("--license", "CC0", "--source", "https://example.org")
     assert run("a-ball.ply", "-o", "zoo.safetensors", *about)[0] == 0
