@@ -1,6 +1,7 @@
 """Draw the sixteen textures of the model `textures2d`, and write them as its elements.
 
-python docs/make_textures.py               writes scenelang/models/textures2d/textures.safetensors
+python docs/make_textures.py               writes textures.safetensors into scenelang/models/textures2d, and
+                                           beside it the weights of `shapes2d`, whose shapes it draws
 python docs/make_textures.py --sheet OUT   draws all of them, one beside another
 
 Bytes are the same again with the same numpy and Pillow; texels are with others too.
@@ -328,3 +329,5 @@ if __name__ == "__main__":
     else:
         made = [painted(name, drawn(name), ABOUT) for name in TEXTURES]
         write_whole(ROOT / "textures2d" / "textures.safetensors", zoo_bytes(made))
+        shapes = (ROOT / "shapes2d" / "weights.safetensors").read_bytes()
+        write_whole(ROOT / "textures2d" / "weights.safetensors", shapes)

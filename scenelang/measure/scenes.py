@@ -62,7 +62,11 @@ def sets_of(manifest: Manifest) -> dict[str, Callable[[Rng], Scene]]:
     """What makes a random scene of each set that a model of a dimension draws."""
     if manifest.dimension == 3:
         return {name: partial(random_solid, config=config) for name, config in SOLID_SETS.items()}
-    return {name: partial(random_scene, config=config) for name, config in SETS.items()}
+    known = {name: config for name, config in SETS.items() if manifest.textures or not config.textures}
+    return {
+        name: partial(random_scene, config=config, textures=manifest.textures if config.textures else ())
+        for name, config in known.items()
+    }
 
 
 def _scenes_with(meshes: str) -> Callable[[Rng], Scene]:

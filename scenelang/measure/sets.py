@@ -2,13 +2,17 @@
 
 ``shapes2d`` is the base set: 1 to 4 objects, twirl and bend in ±0.8, scale 0.2 to 0.55 per axis, any
 rotation, translation in ±0.7, in that order, colours uniform in 0.1 to 1, 40 % unions only, else tokens
-uniform. The others change one thing each.
+uniform. The others change one thing each. `textures2d` has 1 to 4 squares with one of a model's textures
+each: scale and translation, and of the texture flip, rotation and hue; `textures2d-mixed` has the four
+shapes, warps and booleans, and any moves and colours of textures, one object in five being plain.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -17,9 +21,13 @@ from scenelang.scene.schema import (
     Boolean,
     Chain,
     Color,
+    Flip,
+    Grayscale,
     Group,
+    Hue,
     Link,
     Material,
+    MaterialOp,
     Object,
     Rotate,
     Scale,
@@ -49,6 +57,11 @@ class SetConfig:
     # random scales, rotations, translations and shears instead of one each; 0 for one each
     affine_steps: int = 0
     shuffled: bool = False  # scale, rotate, translate and shear once each, in random order
+    geometries: tuple[str, ...] = GEOMETRIES
+    rotated: bool = True
+    # of a model's textures: "few" are flipped, rotated and their hue turned, "any" moved and coloured in any
+    # order, "" has none
+    textures: Literal["", "few", "any"] = ""
     # how objects are put together: "chain", "groups" (each in two nested groups) or "tree"
     nest: str = "chain"
 
@@ -69,6 +82,10 @@ SETS: dict[str, SetConfig] = {
     "crowd": SetConfig(objects=(100, 100), size=0.4),
     "strong": SetConfig(warp=2.4),
     "large": SetConfig(size=3.0),
+    "textures2d": SetConfig(
+        unions=1.0, deformed=False, geometries=("square",), rotated=False, textures="few"
+    ),
+    "textures2d-mixed": SetConfig(textures="any"),
 }
 
 
@@ -92,7 +109,7 @@ def _moves(rng: Rng, config: SetConfig) -> list[Transform]:
         some: list[Transform] = [scale, rotate, translate, Shear(axes="xy", k=_uniform(rng, -0.6, 0.6))]
         return moves + [some[i] for i in rng.permutation(4)]
     if not config.affine_steps:
-        return [*moves, scale, rotate, translate]
+        return [*moves, scale, *([rotate] if config.rotated else []), translate]
     return moves + long_chain(rng, config.affine_steps, scale, [rotate, translate])
 
 
@@ -112,13 +129,39 @@ def long_chain(rng: Rng, steps: int, first: Transform, last: list[Transform]) ->
     return [*chain, *last]
 
 
-def random_object(rng: Rng, config: SetConfig) -> Object:
-    rgb = tuple(_uniform(rng, 0.1, 1.0) for _ in range(3))
-    return Object(
-        geometry=GEOMETRIES[int(rng.integers(4))],
-        transforms=tuple(_moves(rng, config)),
-        material=Material(name="flat", ops=(Color(rgb=rgb),)),  # type: ignore[arg-type]
+def _colour(rng: Rng) -> Color:
+    return Color(rgb=(_uniform(rng, 0.1, 1.0), _uniform(rng, 0.1, 1.0), _uniform(rng, 0.1, 1.0)))
+
+
+def _texture(rng: Rng, config: SetConfig, names: Sequence[str]) -> Material:
+    """One of the textures, moved and coloured."""
+    name = names[int(rng.integers(len(names)))]
+    turn, hue = (_uniform(rng, -math.pi, math.pi) for _ in range(2))
+    flips: list[MaterialOp] = [Flip()] if rng.random() < 0.5 else []
+    if config.textures == "few":
+        return Material(name, (*flips, Rotate(angle=turn), Hue(angle=hue)))
+    some: list[MaterialOp] = [
+        *flips,
+        Rotate(angle=turn),
+        Scale(x=_uniform(rng, 0.5, 2.0), y=_uniform(rng, 0.5, 2.0), z=1.0),
+        Shear(axes="xy", k=_uniform(rng, -0.6, 0.6)),
+        Translate(x=_uniform(rng, -1.0, 1.0), y=_uniform(rng, -1.0, 1.0)),
+        Hue(angle=hue),
+        Grayscale(amount=_uniform(rng, 0.0, 1.0)),
+        _colour(rng),
+    ]
+    return Material(
+        name, tuple(some[i] for i in rng.permutation(len(some))[: int(rng.integers(len(some) + 1))])
     )
+
+
+def random_object(rng: Rng, config: SetConfig, textures: Sequence[str] = ()) -> Object:
+    colour = _colour(rng)
+    geometry = config.geometries[int(rng.integers(len(config.geometries)))]
+    moves = tuple(_moves(rng, config))
+    if config.textures == "few" or (config.textures and rng.random() < 0.8):
+        return Object(geometry, moves, _texture(rng, config, textures))
+    return Object(geometry, moves, Material("flat", (colour,)))
 
 
 def _tree(rng: Rng, leaves: list[SceneNode]) -> SceneNode:
@@ -135,12 +178,13 @@ def _tree(rng: Rng, leaves: list[SceneNode]) -> SceneNode:
     return Boolean(op=word, children=(_tree(rng, leaves[:-1]), leaves[-1]))
 
 
-def random_scene(rng: Rng, config: SetConfig) -> Scene:
-    """One scene of a set."""
+def random_scene(rng: Rng, config: SetConfig, textures: Sequence[str] = ()) -> Scene:
+    """One scene of a set; ``textures`` are the names of a model's."""
     count = int(rng.integers(config.objects[0], config.objects[1] + 1))
-    objects = [random_object(rng, config) for _ in range(count)]
+    objects = [random_object(rng, config, textures) for _ in range(count)]
+    model = "textures2d" if textures else "shapes2d"
     if config.nest == "tree":
-        return Scene(model="shapes2d", canvas=config.canvas, nodes=(_tree(rng, list(objects)),))
+        return Scene(model=model, canvas=config.canvas, nodes=(_tree(rng, list(objects)),))
     unions = rng.random() < config.unions
     words = ["union", *(COMBINE[0 if unions else int(rng.integers(4))] for _ in range(count - 1))]
     nodes: list[SceneNode] = list(objects)
@@ -152,4 +196,4 @@ def random_scene(rng: Rng, config: SetConfig) -> Scene:
         ]
     links = tuple(Link(op=w, node=n) for w, n in zip(words, nodes, strict=True))
     chain = Chain(children=links)
-    return Scene(model="shapes2d", canvas=config.canvas, nodes=(chain,))
+    return Scene(model=model, canvas=config.canvas, nodes=(chain,))
