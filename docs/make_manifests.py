@@ -58,7 +58,7 @@ def text(data: dict[str, Any]) -> str:
     """JSON with lists and small tables on a line each."""
     out = json.dumps(data, indent=2)
     out = re.sub(r"\[\n\s+([^\[\]{}]*?)\n\s+\]", lambda m: "[" + re.sub(r"\s*\n\s*", " ", m[1]) + "]", out)
-    flat = re.compile(r'("(?:limits|[a-z0-9]+)"): \{\n\s+([^{}\[\]]*?)\n\s+\}')
+    flat = re.compile(r'("[a-z0-9-]+"): \{\n\s+([^{}\[\]]*?)\n\s+\}')
     return flat.sub(lambda m: m[1] + ": {" + re.sub(r"\s*\n\s*", " ", m[2]) + "}", out) + "\n"
 
 

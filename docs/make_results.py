@@ -54,6 +54,13 @@ SOLIDS = {
 }
 
 
+TEXTURES = {
+    "textures2d": "1 to 4 squares, scaled and moved; of their textures flip, rotation and hue",
+    "textures2d-mixed": "four shapes, deformed, random booleans; any moves and colours, one in five plain",
+    "shapes2d": "without textures",
+}
+
+
 def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
     """The Markdown table of the sets of a folder that were measured; of solids also what no cap hides."""
     heads = ["set", "what", "scenes", "PSNR, dB", "5th percentile", "worst"]
@@ -172,6 +179,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "accuracy": accuracy,
     "stability": stability,
     "solids": partial(accuracy, "solids3d", SOLIDS),
+    "textures": partial(accuracy, "textures2d", TEXTURES),
     "large-solids": partial(accuracy, "solids3d-256", SOLIDS),
     "solid-stability": partial(stability, 3),
     "blends": blends,
