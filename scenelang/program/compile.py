@@ -109,9 +109,9 @@ def _no_model(
     known = [
         " and ".join(f"`{m.name}`" for m in manifests if name in getattr(m, field)) for name, field, _ in pair
     ]
-    labels = [Label(places[0], f"{known[0] or 'no model'} has this")] if places[0] is not None else []
+    labels = [Label(places[0], f"in {known[0] or 'no model'}")] if places[0] is not None else []
     one, other = (f"`{shown(use)}`" for use in pair)
-    fact = f"no model has both {one} and {other}, which {known[1] or 'none'} has"
+    fact = f"no model has both {one} and {other}, which is in {known[1] or 'no model'}"
     diagnostics.add("E0508", fact, places[1], labels=labels, help=help)
 
 
