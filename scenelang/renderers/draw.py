@@ -137,7 +137,8 @@ def draw_objects(
 
     if program.stage is None:
         raise ProgramError("a program of the plane, which the model does not draw")
-    field = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
+    brought, paints = program.brought(), program.paints()
+    field = SolidField(network, program.vectors, program.tokens, brought, paints)  # type: ignore[arg-type]
     image, work = draw_solids(
         field,
         program.stage,

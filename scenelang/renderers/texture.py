@@ -45,6 +45,9 @@ class Texture:
         (a, b, u), (c, d, v) = frame.astype(np.float64).reshape(2, 3).tolist()
         self._place = Affine(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
         self._flat, self._sides = flat, values.shape[-2:]
+        across = abs(np.array([row[:2] for row in self._place.rows])).max() if values.ndim == 3 else 0.5
+        self.detail = float(across) * max(values.shape)
+        """Texels that a way of a leaf unit may cross, about."""
 
     def at(self, q: Array) -> Array:
         """Colours (3, M) at leaf coordinates (d, M)."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scenelang.graph.affine import composed
 from scenelang.graph.looks import Look
 from scenelang.graph.nodes import Fold, Leaf, Link, Move
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
@@ -15,6 +16,7 @@ from scenelang.lifting.exact import inverse_frame
 from scenelang.lifting.layout import SOLID_LAYOUT as LAYOUT
 from scenelang.models.solid import solid_arrays
 from scenelang.models.weights import shipped_weights
+from scenelang.program.paints import Paint
 from scenelang.renderers.solid.field import SolidField
 from scenelang.renderers.solid.network import SolidArrays, SolidNetwork
 from scenelang.words import TOKENS
@@ -23,7 +25,10 @@ LEAVES, MATERIALS = ("sphere", "torus"), ("diffuse", "volumetric")
 
 
 class Object(NamedTuple):
-    """An object; steps are nearest the leaf first: displacement, turns, maps, turns, maps."""
+    """An object; steps are nearest the leaf first: displacement, turns, maps, turns, maps.
+
+    With a paint, whose texture is moved, in place of the colour.
+    """
 
     leaf: str
     steps: Sequence[Step] = ()
@@ -31,6 +36,8 @@ class Object(NamedTuple):
     rgb: tuple[float, float, float] = (0.8, 0.5, 0.3)
     token: str = "union"
     k: float = 0.15
+    paint: Paint | None = None
+    texture: tuple[Affine, ...] = ()
 
 
 @lru_cache
@@ -90,6 +97,8 @@ def vector(o: Object, net: SolidNetwork) -> np.ndarray:
     for frame, matrix in ((LAYOUT.frame, last), (LAYOUT.middle, middle)):
         g[frame] = inverse_frame(tuple(matrix[:3].ravel().tolist()), 3)
     m = np.zeros(64 - len(g))
+    rows = np.reshape(composed(o.texture), (3, 4))[:2, [0, 1, 3]]
+    m[:6] = np.linalg.inv(np.vstack([rows, (0, 0, 1)]))[:2].ravel()
     m[LAYOUT.colour] = np.column_stack([np.diag(o.rgb), np.zeros(3)]).ravel()
     m[LAYOUT.material_code] = net.xp.to_numpy(net.material_codes)[MATERIALS.index(o.material)]
     return np.concatenate([g, m]).astype(np.float32)
@@ -99,7 +108,8 @@ def field(objects: Sequence[Object], net: SolidNetwork | None = None) -> SolidFi
     """The field of a stream of objects."""
     net = net or network()
     vectors = np.reshape([vector(o, net) for o in objects], (-1, 64)).astype(np.float32)
-    return SolidField(net, vectors, np.array([TOKENS[o.token] for o in objects], np.int8))
+    tokens = np.array([TOKENS[o.token] for o in objects], np.int8)
+    return SolidField(net, vectors, tokens, paints=[o.paint for o in objects])
 
 
 MIXED = (
@@ -123,11 +133,15 @@ def graph(objects: Sequence[Object]) -> Fold:
     """The same stream as a graph, for the reference."""
     return Fold(
         "scene",
-        tuple(
-            Link(o.token, Leaf(o.leaf, Look(o.material, rgb=o.rgb), tuple(map(Move, o.steps))), o.k)
-            for o in objects
-        ),
+        tuple(Link(o.token, Leaf(o.leaf, look(o), tuple(map(Move, o.steps))), o.k) for o in objects),
     )
+
+
+def look(o: Object) -> Look:
+    """What an object looks like."""
+    if o.paint is None:
+        return Look(o.material, rgb=o.rgb)
+    return Look(o.material, o.paint.steps, element=o.paint.element, texture=o.texture)
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:

@@ -76,13 +76,15 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
     width, height = canvas
     if samples == "one":
         every = np.array(rows)[:, None] + 0.5
-        return _shade(lighting, canvas, np.arange(width) + 0.5, every)
+        found, work = _shade(lighting, canvas, np.arange(width) + 0.5, every)
+        return found[:4], work
     if samples != "four" and min(canvas) > 1:  # a line of pixels shows too little of what changes
         near = range(max(rows.start - 1, 0), min(rows.stop + 1, height))
-        once, work = _shade(lighting, canvas, np.arange(width) + 0.5, np.array(near)[:, None] + 0.5)
+        x_centres, y_centres = np.arange(width) + 0.5, np.array(near)[:, None] + 0.5
+        once, work = _shade(lighting, canvas, x_centres, y_centres, 2 / min(canvas))
         band = slice(rows.start - near.start, rows.stop - near.start)
-        picture = np.ascontiguousarray(once[:, band])
-        shown = once if lighting.stage.transparent else once[:3]
+        picture = np.ascontiguousarray(once[:4, band])
+        shown = once[3:] if lighting.stage.transparent else once[4:]
         y, x = np.nonzero(rough(shown, lighting.pace.contrast)[band])
     else:
         picture, work = np.empty((4, len(rows), width), np.float32), Work()
@@ -90,20 +92,23 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
     if len(x):
         quarter = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])
         four, more = _shade(lighting, canvas, x[:, None] + quarter[0], y[:, None] + rows.start + quarter[1])
-        picture[:, y, x] = four.mean(2)
+        picture[:, y, x] = four[:4].mean(2)
         work += more + Work(refined=len(x))
     return picture, work
 
 
 def _shade(
-    lighting: Lighting, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray
+    lighting: Lighting, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray, px: float = 0.0
 ) -> tuple[np.ndarray, Work]:
-    """Radiance and alpha (4, …) at places of the picture in pixels from its upper left corner."""
+    """Radiance, alpha and plain radiance (7, …) at places in pixels from the picture's upper left corner.
+
+    With px as of `Lighting.shade`.
+    """
     xp, way = lighting.xp, directions(lighting.stage.camera, canvas, x, y)
     with xp.inference():
-        shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes))
-        both = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None]], 0))
-    return both.reshape(4, *way.shape[1:]), shade.work
+        shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes), px)
+        found = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None], shade.plain], 0))
+    return found.reshape(7, *way.shape[1:]), shade.work
 
 
 def directions(camera: Camera, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray) -> np.ndarray:

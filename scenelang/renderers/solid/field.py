@@ -7,19 +7,20 @@ objects in, one by one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
-from scenelang.elements.element import Element
-from scenelang.renderers.arrays import Array, Arrays, Layers
-from scenelang.renderers.field import SMOOTH, UNION
-from scenelang.renderers.grid import GridShape, grid_shape
-from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted
-from scenelang.renderers.solid.passes import BEGIN, END, OBJECT, SLACK, WAY, Passes, find_passes, read_solids
-
-_ROWS = (1, 2, 5)  # of a point's memory, by `Wanted`
+from scenelang.renderers.arrays import Array, Arrays
+from scenelang.renderers.solid.network import EMPTY, Cell, Wanted
+from scenelang.renderers.solid.objects import Objects
+from scenelang.renderers.solid.passes import (
+    BEGIN,
+    END,
+    INF,
+    OBJECT,
+    WAY,
+    Passes,
+    find_passes,
+)
 
 
 class Meeting(NamedTuple):
@@ -27,7 +28,7 @@ class Meeting(NamedTuple):
 
     Args:
         distance: D.
-        register: colour and medium (4, M), the medium alone (1, M), or nothing (0, M).
+        register: colours and medium (R, M), as in `SolidField.looks`, the medium alone (1, M), or nothing.
         inside: which balls (K, M) the points are in.
         gradient: of D (3, M), if asked for.
         change: a bound on D and on how far another object's material may begin, if asked for.
@@ -44,102 +45,8 @@ class Meeting(NamedTuple):
     met: int = 0
 
 
-class SolidField:
-    """A program's objects with their weights, ready to be met by points.
-
-    Args:
-        network: trained parameters, on any device.
-        vectors: (N, 64) float32, geometry and material vectors.
-        tokens: (N,) boolean tokens 0 to 3.
-        brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
-
-    Raises:
-        ProgramError: an object's vector holds no way from the world to a leaf, or an element is damaged.
-    """
-
-    def __init__(
-        self,
-        network: SolidNetwork,
-        vectors: np.ndarray,
-        tokens: np.ndarray,
-        brought: Sequence[Element | None] | None = None,
-    ) -> None:
-        self.network, self.xp, self.tokens = network, network.xp, tokens
-        with self.xp.inference():
-            self.solids = read_solids(network, vectors, tokens)
-            self._tables(vectors)
-            self._decoders(vectors, brought or [None] * len(vectors))
-        kinds = self.xp.to_numpy(self.looks)[3] > 0.5
-        self.draws = all(solid.draws for solid in self.solids)
-        """Whether all objects draw."""
-        self.media = bool(kinds.any())
-        """Whether some object is a medium."""
-        self.mixed = self.media and not kinds.all()
-        """Whether not all are."""
-        self.coloured = self.media and np.ptp(self.xp.to_numpy(self.looks)[:3, kinds], 1).max() > 0
-        """Whether media have different colours."""
-
-    def _tables(self, vectors: np.ndarray) -> None:
-        """What pairs of points and objects look up: arrays (…, N)."""
-        xp, network, layout = self.xp, self.network, self.network.layout
-        m = vectors[:, layout.geometry :]
-        frames, count = [solid.frame for solid in self.solids], len(vectors)
-
-        def table(values: object, *shape: int) -> Array:
-            return xp.array(np.array(values, np.float32).reshape(*shape, count), network.codes)
-
-        self.scale, self.amount, self.frequency = (
-            table([getattr(frame, name) for frame in frames]) for name in ("scale", "amount", "frequency")
-        )
-        self.linear = xp.stack([f.outer.linear for f in frames], -1) if frames else table([], 3, 3)
-        self.shift = xp.stack([f.outer.shift for f in frames], -1) if frames else table([], 3)
-        self.turned = [(i, frame) for i, frame in enumerate(frames) if frame.steps]
-        self.far = any(solid.radius > RADIUS for solid in self.solids)
-        self.bumpy = any(frame.amount for frame in frames)
-        look = network.look(xp.array(m[:, layout.material_code].copy(), network.codes)).T
-        matrix = table(m[:, layout.colour].T, 3, 4)
-        colour = (matrix[:, :3] * look[:3]).sum(1) + matrix[:, 3]
-        self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
-        self.empty = xp.full((), EMPTY, network.codes)
-        self.smooth = table(self.tokens == SMOOTH) > 0 if SMOOTH in self.tokens else None
-        keys = [(solid.token, solid.frame.blend if solid.token == SMOOTH else BLEND) for solid in self.solids]
-        self.alike = len(set(keys)) <= 1
-        cells = [network.cell(*key) for key in (keys[:1] if self.alike else keys)]
-        cells = cells or [network.cell(UNION, BLEND)]
-        self.cells = [
-            Cell(*(xp.concat(list(part), 1) for part in zip(*each, strict=True)))
-            for each in zip(*cells, strict=True)
-        ]
-
-    def _decoders(self, vectors: np.ndarray, brought: Sequence[Element | None]) -> None:
-        """What tells distances, and which of them is each object's."""
-        xp, network = self.xp, self.network
-        codes = vectors[:, : network.layout.code]
-        keys = [
-            code.tobytes() if element is None else element
-            for code, element in zip(codes, brought, strict=True)
-        ]
-        # codes first, whose numbers are those of their segments
-        ordered = sorted(dict.fromkeys(keys), key=lambda key: isinstance(key, Element))
-        number = {key: at for at, key in enumerate(ordered)}
-        learned = [
-            xp.array(np.frombuffer(key, np.float32).copy(), network.codes)
-            for key in ordered
-            if isinstance(key, bytes)
-        ]
-        self.decoders: list[Layers | GridShape] = [
-            *map(network.decoder, learned),
-            *(grid_shape(key, xp, network.codes) for key in ordered if isinstance(key, Element)),
-        ]
-        self.decoder = xp.array(np.array([number[key] for key in keys], np.float32), network.codes)
-        plain = [
-            element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps
-            for element, s in zip(brought, self.solids, strict=True)
-        ]
-        self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[3] > 0.5)
-        """1 where `segments.py` may answer."""
-        known = len(network.segment_w) and float(self.asked.sum())
-        self.segments = [network.segment(code) for code in learned] if known else []
+class SolidField(Objects):
+    """A program's objects, ready to be met by points of rays."""
 
     def passes(self, origin: Array, way: Array, limit: Array) -> tuple[Array, Passes]:
         """As `find_passes`, of unit directions way (3, M)."""
@@ -154,6 +61,7 @@ class SolidField:
         gradient: bool = False,
         change: bool = False,
         owners: bool = False,
+        p: Array | None = None,
     ) -> Meeting:
         """Let points of rays meet the objects.
 
@@ -162,6 +70,7 @@ class SolidField:
             t: how far along each the point is (M,).
             wanted: what of the register to answer beside the distance.
             gradient, change, owners: what else; with owners the register says nothing.
+            p: the points themselves (3, M), where they are a little off the rays.
         """
         xp, count = self.xp, len(t)
         inside = self._inside(passes, t)
@@ -172,9 +81,14 @@ class SolidField:
         objects = xp.whole(pairs[OBJECT])
         if not self.draws:
             objects = xp.select(objects < 0, -1 - objects, objects)
-        at = pairs[WAY] * xp.take(t, rays) + xp.take(passes.origins, objects)
-        d, own = self._distances(at, objects, gradient)
-        memory = xp.full((_ROWS[wanted], count), 0.0, t)
+        if p is None:
+            at = pairs[WAY] * xp.take(t, rays) + xp.take(passes.origins, objects)
+        else:
+            at = self._behind(objects, xp.take(p, rays))
+        q, own_points = self._local(at, objects)
+        d, own = self._distances(q, own_points, objects, gradient)
+        looks = self._looks(q, objects) if wanted == Wanted.ALL and self.textures else None
+        memory = xp.full(((1, 2, 1 + len(self.looks))[wanted], count), 0.0, t)
         memory[0] = EMPTY
         slope = xp.full((3, count), 0.0, t) if gradient else None
         bound = xp.full((count,), EMPTY, t) if change else None
@@ -187,7 +101,7 @@ class SolidField:
             index, which, near = None if len(place) == count else place, objects[pair], d[pair]
             before, look = _part(xp, memory, index), self.looks
             if wanted:
-                look = xp.take(look, which)
+                look = xp.take(look, which) if looks is None else looks[:, pair]
             cell = self.cells[wanted]
             if not self.alike:
                 cell = Cell(*(xp.take(weights, which) for weights in cell))
@@ -216,7 +130,7 @@ class SolidField:
             blend = xp.minimum(gap, abs(before[0] - d) / 2)
             gap = xp.select(xp.take(self.smooth, which), blend, gap)
         # objects of the kind that is there change nothing of it
-        return xp.select(abs(before[1] - look[3]) > 0.5, gap, self.empty)
+        return xp.select(abs(before[1] - look[-1]) > 0.5, gap, 0 * gap + EMPTY)
 
     def _inside(self, passes: Passes, t: Array) -> Array:
         """Which balls (K, M) points at t (M,) are in, of objects that change something there."""
@@ -228,62 +142,26 @@ class SolidField:
                 touched = touched | inside[slot]
         return inside
 
-    def _distances(self, at: Array, objects: Array, gradient: bool) -> tuple[Array, Array | None]:
-        """World distances (P,) to objects at points (3, P) behind their maps; gradients (3, P) if asked."""
-        xp, q, g = self.xp, at, None
-        own = []  # of the objects with more than a map, their points
-        for i, frame in self.turned:
-            index = xp.where(objects == i)
-            if len(index):
-                own.append((frame, index, xp.take(at, index)))
-        if own:
-            q = 1 * at
-            for frame, index, p in own:
-                xp.put(q, index, frame.local(xp, p))
-        length = rim = None
-        place = q
-        if self.far:
-            length = xp.sqrt((q * q).sum(0))
-            rim = RADIUS / length.clip(RADIUS)
-            place = q * rim
-        found = self._decoded(place, objects, gradient)
-        d, g = found[0], found[1:]
-        if length is not None and rim is not None:
-            d = d + (length - RADIUS).clip(0.0)
-            if gradient:
-                n = q / length.clip(1e-9)
-                g = xp.select(length > RADIUS, rim * (g - (g * n).sum(0) * n) + n, g)
-        if self.bumpy:
-            f, amount = xp.take(self.frequency, objects), xp.take(self.amount, objects)
-            s = xp.sin(f * q)
-            d = d + amount * (s[0] * s[1] * s[2])
-            if gradient:
-                c = xp.cos(f * q)
-                more = xp.stack([c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]], 0)
-                g = g + (amount * f) * more
-        scale = xp.take(self.scale, objects)
-        if not gradient:
-            return d * scale, None
-        for frame, index, p in own:
-            xp.put(g, index, frame.pulled(xp, p, xp.take(g, index)))
-        return d * scale, (xp.take(self.linear, objects) * g[:, None]).sum(0) * scale
-
-    def _decoded(self, q: Array, objects: Array, gradient: bool) -> Array:
-        """What decoders say at leaf coordinates (3, P): distances (1, P), or these and gradients (4, P)."""
-        xp = self.xp
-        if len(self.decoders) == 1:
-            return self._field(q, self.decoders[0], gradient)
-        found, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
-        for i, layers in enumerate(self.decoders):
-            index = xp.where(which == i)
-            if len(index):
-                xp.put(found, index, self._field(xp.take(q, index), layers, gradient))
+    def colours(self, passes: Passes, t: Array, p: Array) -> Array:
+        """Colours (3, M) at points p in objects, as `meet` answers, sooner where it is one object alone."""
+        xp, inside = self.xp, self._inside(passes, t)
+        alone = inside.sum(0) == 1
+        one, several = xp.where(alone), xp.where(~alone)
+        found = xp.full((3, len(t)), 0.0, t)
+        if len(several):
+            there = passes.at(xp, several), xp.take(t, several), Wanted.ALL
+            xp.put(found, several, self.meet(*there, p=xp.take(p, several)).register[:3])
+        if len(one):
+            objects = xp.whole(xp.take((passes.slots[OBJECT] * inside).sum(0), one))
+            xp.put(found, one, self.worn(objects, xp.take(p, one)))
         return found
 
-    def _field(self, q: Array, decoder: Layers | GridShape, gradient: bool) -> Array:
-        if isinstance(decoder, GridShape):
-            return decoder.field(q, gradient)
-        return self.network.field(q, decoder, gradient)
+    def textured(self, passes: Passes) -> Array:
+        """Texels (M,) that rays may cross in a world unit, 0 where they pass no object with a texture."""
+        slots, xp = passes.slots, self.xp
+        objects = xp.whole(slots[OBJECT].clip(0))
+        detail = xp.take(self.detail, objects.reshape(-1)).reshape(objects.shape)
+        return (detail * (slots[OBJECT] >= 0) * (slots[BEGIN] < INF)).sum(0)
 
 
 def _part(xp: Arrays, whole: Array, index: Array | None) -> Array:

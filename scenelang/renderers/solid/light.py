@@ -14,13 +14,12 @@ import numpy as np
 from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.solid.field import Meeting, SolidField
+from scenelang.renderers.solid.lookups import EVEN, INTO, Lookups
 from scenelang.renderers.solid.march import CAREFUL, Pace, Piece, Trail, Work, march
 from scenelang.renderers.solid.network import Wanted
 from scenelang.renderers.solid.passes import BEGIN, END, INF
 
-INTO = 3e-5  # world units behind a surface where its material is asked for
 CLEAR = 2e-4  # world units before a surface where rays from the light end
-EVEN = 2  # how much more evenly than the light that the medium takes nodes lie
 PARTS = 3  # of pieces of which nodes do not tell enough
 LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
 JUMP = 0.03  # linear: of colours that differ
@@ -33,15 +32,26 @@ CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents o
 
 
 class Shade(NamedTuple):
-    """What M rays see: premultiplied linear radiance (3, M), alpha (M,), and what it took."""
+    """What M rays see.
+
+    Args:
+        radiance: premultiplied and linear (3, M).
+        plain: the same with plain colours for those of textures.
+        alpha: (M,).
+        work: what it took.
+    """
 
     radiance: Array
+    plain: Array
     alpha: Array
     work: Work
 
 
 class Points(NamedTuple):
-    """Points (3, K) where light may arrive, what they send to the eye without it, and what more with it."""
+    """Points (3, K) where light may arrive, what they send to the eye without it, and what more with it.
+
+    The latter two are (R, K), colours and, of fields with textures, plain colours.
+    """
 
     p: Array
     base: Array
@@ -60,22 +70,26 @@ class Lighting:
     def __init__(self, field: SolidField, stage: Stage, pace: Pace = CAREFUL) -> None:
         self.field, self.stage, self.xp, self.pace = field, stage, field.xp, pace
         like = field.network.codes
+        twice = 2 if field.textures else 1  # colours, and plain ones in place of textures'
         self.eye, self.lamp, self.power, self.horizon, self.zenith = (
             field.xp.array(np.asarray(value, np.float32), like)
             for value in (
                 stage.camera.eye,
                 stage.light.position,
-                [stage.light.power * c for c in stage.light.rgb],
-                stage.horizon,
-                stage.zenith,
+                [stage.light.power * c for c in stage.light.rgb] * twice,
+                stage.horizon * twice,
+                stage.zenith * twice,
             )
         )
+        self.lookups = Lookups(field, stage.camera, pace.nodes)
 
-    def shade(self, way: Array) -> Shade:
+    def shade(self, way: Array, px: float = 0.0) -> Shade:
         """What rays from the eye see.
 
         Args:
             way: unit directions (3, M).
+            px: side of the pixels for which textures are looked up four times, of a picture that is 2 wide;
+                0: once.
         """
         xp, stage = self.xp, self.stage
         seen, limit = self._sky(way), self.limit(way)
@@ -87,31 +101,32 @@ class Lighting:
         both, found = xp.concat([surface, floor], 0), []
         work = Work(way.shape[1], 0, trail.near, trail.steps, trail.met + len(surface))
         if len(surface):
-            found.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail)))
+            found.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail, px)))
         if len(floor):
             found.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
         mist = None
         if trail.pieces:
             pieces = self._cut(way, self._parted(trail))
-            mist, share = self._scattering(way, trail, pieces)
+            mist, share = self._scattering(way, trail, pieces, px)
             found.append(mist)
         if not found:
-            return Shade(seen, alpha, work)
+            return Shade(seen[:3], seen[-3:], alpha, work)
         points = Points(*(xp.concat(list(part), 1) for part in zip(*found, strict=True)))
         light, free, more = self._lit(points, xp.take(trail.soft, surface))
         work += more
         xp.put(seen, both, light[:, : len(both)])
         xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
         if mist is not None:
-            glow, more = self._glow(way, trail, pieces, share, light[:, len(both) :], free[len(both) :])
+            lit = light[:, len(both) :], free[len(both) :]
+            glow, more = self._glow(way, trail, pieces, share, *lit, px)
             clear = xp.exp(-EXTINCTION * trail.length)
             seen, alpha, work = seen * clear + glow, 1 - (1 - alpha) * clear, work + more
-        return Shade(seen, alpha, work)
+        return Shade(seen[:3], seen[-3:], alpha, work)
 
     def _glow(
-        self, way: Array, trail: Trail, pieces: Piece, share: Array, light: Array, free: Array
+        self, way: Array, trail: Trail, pieces: Piece, share: Array, light: Array, free: Array, px: float
     ) -> tuple[Array, Work]:
-        """Light (3, M) that pieces of rays in media send towards the eye.
+        """Light (R, M) that pieces of rays in media send towards the eye.
 
         Those whose nodes do not tell how the light goes on between them are cut and asked again.
 
@@ -120,12 +135,14 @@ class Lighting:
             trail: what they met.
             pieces: their ways through media, P.
             share: what these have of what is seen (P,).
-            light: what nodes on them send (3, K).
+            light: what nodes on them send (R, K).
             free: whether any light reaches those (K,).
+            px: as of `shade`.
         """
-        xp, count, glow, work = self.xp, self.pace.nodes, 0 * way, Work(met=light.shape[1])
-        sent, nodes = light.reshape(3, count, -1), free.reshape(count, -1)
-        shown = sent.sum(0)
+        xp, count, work = self.xp, self.pace.nodes, Work(met=light.shape[1])
+        glow = xp.full((len(light), way.shape[1]), 0.0, way)
+        sent, nodes = light.reshape(len(light), count, -1), free.reshape(count, -1)
+        shown = sent[-3:].sum(0)
         edge = (nodes != nodes[:1]).sum(0) > 0
         cut = (edge | (shown[-1] > STEEP * shown[0]) | (pieces[2] - pieces[1] > LONG)) & (share > LEAST)
         whole, parts = xp.where(~cut), xp.where(cut)
@@ -135,9 +152,9 @@ class Lighting:
             each = (end - begin) / PARTS
             finer = [(ray, begin + i * each, begin + (i + 1) * each, before + i * each) for i in range(PARTS)]
             pieces = tuple(xp.concat(part, 0) for part in zip(*finer, strict=True))
-            light, _, more = self._lit(self._scattering(way, trail, pieces)[0], trail.soft[:0])
+            light, _, more = self._lit(self._scattering(way, trail, pieces, px)[0], trail.soft[:0])
             work += more + Work(met=light.shape[1])
-            xp.add(glow, pieces[0], light.reshape(3, count, -1).sum(1))
+            xp.add(glow, pieces[0], light.reshape(len(light), count, -1).sum(1))
         return glow, work
 
     def limit(self, way: Array) -> Array:
@@ -160,7 +177,7 @@ class Lighting:
         base = colour * (AMBIENT[0] + AMBIENT[1] * n[1]) + haze
         return Points(p + LIFT * n, base, colour * self.power[:, None] * (facing / (r * r)))
 
-    def _scattering(self, way: Array, trail: Trail, pieces: Piece) -> tuple[Points, Array]:
+    def _scattering(self, way: Array, trail: Trail, pieces: Piece, px: float) -> tuple[Points, Array]:
         """Nodes in media, whose light comes towards the eye, all pieces for each in turn, and shares (P,).
 
         With u = 1 - T^(1 / EVEN), the integral over T sigma dt is one over EVEN (1 - u)^(EVEN - 1) du. Where
@@ -178,7 +195,9 @@ class Lighting:
         weight = weights * (EVEN * taken * left ** (EVEN - 1) * xp.exp(-EXTINCTION * before))
         rays = xp.concat([ray] * self.pace.nodes, 0)
         p = self.eye[:, None] + xp.take(way, rays) * t
-        colour = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register[:3] * weight.reshape(-1)
+        colour = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register[:-1] * weight.reshape(-1)
+        for index, node, woven in self.lookups.along(way, trail, pieces, px):
+            xp.put(colour[:3], index + node * len(ray), woven)
         r = _length(xp, self.lamp[:, None] - p).clip(NEAREST)
         points = Points(p, colour * AMBIENT[0], colour * self.power[:, None] / (4 * r * r))
         return points, weight.sum(0)
@@ -191,7 +210,7 @@ class Lighting:
             soft: of the first, 1 where they are not at a distance of 0 though something begins there.
         """
         xp, (p, light, more) = self.xp, points
-        lit = xp.where(more.sum(0) > 0)
+        lit = xp.where(abs(more).sum(0) > 0)
         way = xp.take(p, lit) - self.lamp[:, None]
         r = _length(xp, way)
         edge = 0 * p[0]
@@ -210,8 +229,8 @@ class Lighting:
         xp.put(free, lit, clear > 0)
         return light, free, Work(0, len(lit), trail.near, trail.steps, trail.met)
 
-    def surface(self, way: Array, index: Array, trail: Trail) -> tuple[Array, ...]:
-        """Points where rays meet solids, normals, colours, and light that joins in before (3, K) each."""
+    def surface(self, way: Array, index: Array, trail: Trail, px: float = 0.0) -> tuple[Array, ...]:
+        """Where rays meet solids, and normals (3, K), colours, and light that joins in before (R, K)."""
         xp = self.xp
         t = xp.take(trail.hit, index)
         passes = trail.at(self.xp, index)
@@ -230,9 +249,17 @@ class Lighting:
                 xp.put(old, off, new)
         g = found.gradient
         towards = _dot(g, way)
-        p = self.eye[:, None] + way * (t + sharp * (INTO + self._ahead(found, way, None)))
+        t = t + sharp * (INTO + self._ahead(found, way, None))
+        p = self.eye[:, None] + way * t
         n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
-        return p, n, found.register[:3], 0 * p
+        colour = found.register[:-1]
+        for soft in (False, True) if px and self.field.textures else ():
+            some = xp.where((self.field.textured(passes) > 0) & (sharp != soft))
+            if len(some):
+                ways, ts, ns = (xp.take(each, some) for each in (way, t, n))
+                mean = self.lookups.mean(passes.at(xp, some), ways, ts, ns, soft, px)
+                xp.put(colour[:3], some, mean)
+        return p, n, colour, 0 * colour
 
     def _ahead(self, found: Meeting, way: Array, index: Array | None) -> Array:
         """How much farther rays meet the surface than where the field was asked."""
@@ -250,7 +277,8 @@ class Lighting:
         n = p * 0
         n[1] = 1.0
         kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
-        colour = xp.array(np.asarray(ground.rgb, np.float32), p)[:, None]
+        rgb = np.tile(np.asarray(ground.rgb, np.float32), len(self.horizon) // 3)
+        colour = xp.array(rgb, p)[:, None]
         return p, n, kept * colour, (1 - kept) * self.horizon[:, None]
 
     def _parted(self, trail: Trail) -> Piece:
@@ -268,7 +296,7 @@ class Lighting:
         ray, begin, end, before = (xp.take(part, some) for part in piece)
         passes = trail.at(xp, ray)
         places = [begin + (end - begin) * share for share in LOOKS]
-        seen = [field.meet(passes, t, Wanted.ALL).register for t in places]
+        seen = [field.meet(passes, t, Wanted.ALL).register[-4:] for t in places]
         steps = [xp.where(abs(a - b).sum(0) > JUMP) for a, b in pairwise(seen)]
         which = xp.concat(steps, 0)
         low, high, first, last = (
@@ -278,7 +306,7 @@ class Lighting:
         passes = passes.at(xp, which)
         for _ in range(HALVINGS):
             half = (low + high) / 2
-            there = field.meet(passes, half, Wanted.ALL).register
+            there = field.meet(passes, half, Wanted.ALL).register[-4:]
             nearer = abs(there - first).sum(0) < abs(there - last).sum(0)
             low, high = xp.select(nearer, half, low), xp.select(nearer, high, half)
         start, done = begin, 0

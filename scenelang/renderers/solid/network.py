@@ -160,8 +160,8 @@ class SolidNetwork:
         Args:
             d: the object's distance (M,).
             memory: the distance so far and the register behind it (1, M), (2, M) with the medium alone, or
-                (5, M).
-            look: the object's own register (4, 1), or (4, M).
+                (1 + R, M) with colours before it.
+            look: the object's own register (R, 1), or (R, M).
             cell: of the object's token.
             wanted: what the memory holds.
 
@@ -178,10 +178,10 @@ class SolidNetwork:
             return new, take
         if wanted == Wanted.KIND:
             kind = xp.largest(gates[1:])
-            return xp.concat([new, memory[1:] + kind * (look[3:] - memory[1:])], 0), take
+            return xp.concat([new, memory[1:] + kind * (look[-1:] - memory[1:])], 0), take
         n = 1 + self.config.paint_lines
         paint, kind = xp.largest(gates[1:n]), xp.largest(gates[n:])
-        gate = xp.concat([paint, paint, paint, kind], 0)
+        gate = xp.concat([paint] * (len(memory) - 2) + [kind], 0)
         return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
 
     def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:

@@ -11,7 +11,8 @@ from scenelang.outputs import DEEP, Outputs
 from scenelang.renderers.arrays import Array
 from scenelang.renderers.solid.draw import TILE, directions, rough
 from scenelang.renderers.solid.field import SolidField
-from scenelang.renderers.solid.light import INTO, Lighting
+from scenelang.renderers.solid.light import Lighting
+from scenelang.renderers.solid.lookups import INTO
 from scenelang.renderers.solid.march import Trail, march
 from scenelang.renderers.solid.network import Wanted
 from scenelang.renderers.solid.passes import INF
