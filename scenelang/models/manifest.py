@@ -18,7 +18,18 @@ MOST: Final = 1e300  # bound of the numbers in ranges
 _MOST_BYTES: Final = 1 << 20
 _LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
 """Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""
-_RANGES: Final = {"objects", "smooth", "twirl", "bend", "twist", "scale", "thin", "blend", "displace"}
+_RANGES: Final = {
+    "objects",
+    "smooth",
+    "twirl",
+    "bend",
+    "twist",
+    "scale",
+    "thin",
+    "blend",
+    "displace",
+    "texels",
+}
 
 
 _DRAWN: Final = {

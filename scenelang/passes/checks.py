@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from math import hypot
+from math import dist, hypot, sqrt, tan
 from operator import itemgetter
 
 from scenelang.diagnostics.diagnostic import Label
@@ -90,6 +90,7 @@ _CODES = {
     "blend": "W0507",
     "twist": "W0509",
     "displace": "W0510",
+    "texels": "W0511",
 }
 _SUBJECTS = {
     "twirl": "a `twirl` of {value} on {name}",
@@ -98,6 +99,7 @@ _SUBJECTS = {
     "displace": "a displacement of {value} of {name}",
     "scale": "a scale of {value} of {name}",
     "thin": "{name}, {value} times as long as wide,",
+    "texels": "a texture of {value} texels to a pixel on {name}",
 }
 """What is said of an object, in the order of the warnings."""
 _TOLERANCE = 1e-9
@@ -107,7 +109,8 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     """Warn once for each quantity outside its trained or measured range, at the object furthest out.
 
     Deformations are measured in the normal form, per unit length of the space they act in; the scale of an
-    object is each of the two stretches of its affine maps, and how thin it is their ratio.
+    object is each of the two stretches of its affine maps, and how thin it is their ratio. A texture's texels
+    are counted where they are densest; of a solid at its centre.
 
     Before: STREAM. After: unchanged.
     """
@@ -115,7 +118,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     measures = partial(_measures, space=graph.space)
     outside: dict[str, list[tuple[float, float, Leaf]]] = {}  # (by how much, value, object)
     for _, leaf in rows:
-        for quantity, value in leaf.noted("measures", measures):
+        for quantity, value in (*leaf.noted("measures", measures), *_texels(leaf, graph)):
             if quantity in trained:
                 low, high = trained[quantity]
                 excess = max(low - value, value - high) / ((high - low) or 1.0)
@@ -183,6 +186,21 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
         elif isinstance(step, Displace):
             found.append(("displace", abs(step.amount)))
     return found
+
+
+def _texels(leaf: Leaf, graph: Graph) -> Measures:
+    """Texels of a picture to a pixel."""
+    element, affines = leaf.look.element, affine.composed(leaf.steps)
+    if element is None or element.dimension == 3:
+        return []
+    a, b, c, _, d, e, f, *_ = affine.inverted(affine.compose(affines, leaf.look.moved))
+    p, q, r = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f
+    texels = max(element.sizes) / 2 * sqrt((p + r) / 2 + hypot((p - r) / 2, q))  # to a unit of the world
+    pixel = 2 / min(graph.canvas)
+    if graph.stage is not None:
+        camera = graph.stage.camera
+        pixel *= dist(camera.eye, affines[3::4]) * tan(camera.fov_rad / 2)
+    return [("texels", texels * pixel)]
 
 
 def _warn(context: Context, quantity: str, message: str, leaf: Leaf) -> None:

@@ -158,6 +158,26 @@ def test_refusals(material: nsg.Material, geometry: str, code: str, words: str) 
     assert words in found.items[0].message
 
 
+@pytest.mark.parametrize(
+    ("geometry", "scale", "size", "texels"),
+    [
+        ("square", nsg.Scale(0.5), 64, 6 / (0.5 * 2 * 32)),  # six texels over 2 units of the texture
+        ("square", nsg.Scale(0.5, 0.13), 64, 6 / (0.13 * 2 * 32)),
+        ("sphere", nsg.Scale(0.5, 0.5, 0.1), 64, 6 / (0.5 * 2 * 32) * 37.44**0.5 / 3),  # the eye's distance
+    ],
+)
+@pytest.mark.parametrize("repeats", [1, 100])
+def test_textures_that_are_drawn_small(
+    geometry: str, scale: nsg.Scale, size: int, texels: float, repeats: int
+) -> None:
+    shown = nsg.Object(geometry, scale, nsg.Material("zoo.bark", nsg.Scale(1 / repeats)))
+    found = Diagnostics()
+    compile_scene(nsg.Scene(elements=ZOO, nodes=shown, canvas=(size, size + 8)), diagnostics=found)
+    said = [d.message for d in found if d.code == "W0511"]
+    value = f"a texture of {texels * repeats:.3g} texels to a pixel on `{geometry}` is outside"
+    assert [message.startswith(value) for message in said] == [True] * (repeats > 1)
+
+
 def test_dumps_tell_of_textures() -> None:
     ops = (nsg.Flip(), nsg.Grayscale(0.5))
     program, graphs = compiled(nsg.Material("zoo.bark", ops)), dict[str, Any]()
@@ -181,7 +201,7 @@ def test_an_error_names_the_model_that_comes_nearest() -> None:
         compile_scene(nsg.Scene(elements=ZOO, nodes=[ball, hide]), diagnostics=found)
     (only,) = found
     assert only.code == "E0508"
-    assert only.message.startswith("no model has both `sphere` and `square`, which `shapes2d`")
+    assert only.message.startswith("no model has both `sphere` and `square`, which is in `shapes2d`")
     assert only.help == "`solids3d` comes nearest; it lacks square"
 
 
