@@ -24,6 +24,9 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
     Row 0 is the top. Notebooks show it as a PNG.
     """
 
+    credit: str = ""
+    """Whose work it shows and under which licenses; PNG files hold it, and a copy of the array does not."""
+
     def to_uint8(self) -> npt.NDArray[np.uint8]:
         """8-bit values, floor(255 v + 1/2)."""
         scaled: npt.NDArray[np.float32] = np.clip(np.asarray(self), 0.0, 1.0) * 255.0 + 0.5
@@ -52,11 +55,14 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         if kind == "EXR":
             return exr(self.layers())
         from PIL import Image as pillow
+        from PIL.PngImagePlugin import PngInfo
 
-        image = self.to_pil()
+        image, info = self.to_pil(), PngInfo()
+        if self.credit:
+            info.add_itxt("Copyright", self.credit)
         data = io.BytesIO()
         try:
-            image.save(data, kind)
+            image.save(data, kind, **({"pnginfo": info} if kind == "PNG" and self.credit else {}))
         except OSError:
             white = pillow.new("RGBA", image.size, "white")
             data = io.BytesIO()

@@ -20,6 +20,7 @@ except ModuleNotFoundError as error:
     raise RenderError("this is drawn by torch, which is not installed; pip install torch") from error
 from scenelang.backend.options import Samples, keep_memory
 from scenelang.backend.options import usable_cores as usable_cores
+from scenelang.elements.element import credit_of
 from scenelang.models.load import Model, ModelError, load_model, place_of
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing, Kept, draw_objects
@@ -123,7 +124,7 @@ def draw_program(
         try:
             program.check_weights(model.digest)
             if isinstance(network, Framed | Solids):
-                return draw_objects(
+                drawing = draw_objects(
                     network,
                     program,
                     threads=threads,
@@ -133,6 +134,8 @@ def draw_program(
                     samples=samples,
                     progress=progress,
                 )
+                drawing.image.credit = credit_of(program.elements)
+                return drawing
             if samples != "adaptive":
                 raise RenderError(f"model `{name}` samples pixels in one way only, not `{samples}`")
             torch.set_num_threads(threads)

@@ -12,6 +12,7 @@ from typing import Final, Literal, NamedTuple
 
 from scenelang.backend.load import load_of
 from scenelang.backend.options import Device, RenderError, Samples, keep_memory, usable_cores
+from scenelang.elements.element import credit_of
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError
@@ -92,7 +93,7 @@ def draw_small(
         program.check_weights(digest)
         if program.stage is None:
             threads = split = 1
-        return draw_objects(
+        drawing = draw_objects(
             network,
             program,
             threads=threads or usable_cores(),
@@ -103,3 +104,5 @@ def draw_small(
         )
     except (ModelError, ProgramError) as error:
         raise RenderError(str(error)) from None
+    drawing.image.credit = credit_of(program.elements)
+    return drawing

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import hashlib
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -127,6 +128,15 @@ class Element:
         if len(found) != self.held or not inflate.eof or inflate.unused_data:
             raise TensorError(f"element `{self.name}` does not hold {self.held:,} bytes")
         return found
+
+
+def credit_of(elements: Iterable[Element]) -> str:
+    """What elements say of their licenses and sources, a line each; those that say neither are left out."""
+    said = [
+        (element.name, [str(element.about[key]) for key in ("license", "source") if key in element.about])
+        for element in elements
+    ]
+    return "\n".join(dict.fromkeys(f"{name}: {', '.join(what)}" for name, what in said if what))
 
 
 def in_range(form: str, sizes: tuple[int, ...]) -> bool:

@@ -68,6 +68,10 @@ def test_learn_adds_to_a_file_and_a_scene_draws_it(folder: Path) -> None:
     Path("scene.nsg").write_text('import "zoo.safetensors" as zoo; zoo.a_ball { scale(0.5); }')
     program = nsg.compile(nsg.load("scene.nsg"))
     assert [element.about for element in program.elements] == [before.about]
+    for device in ("auto", "cpu"):
+        nsg.render(program, device=device).save("credited.png")
+        with Image.open("credited.png") as opened:
+            assert opened.info["Copyright"] == "a_ball: CC0, https://example.org"
     pictures = [nsg.render(nsg.load("scene.nsg")), nsg.render(nsg.loads("sphere { scale(0.5); }"))]
     assert abs(pictures[0] - pictures[1]).mean() < 2e-3
 
