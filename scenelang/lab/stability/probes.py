@@ -14,13 +14,16 @@ from functools import partial
 
 import numpy as np
 
+from scenelang.elements.element import TEXELS
 from scenelang.measure import varied
 from scenelang.measure.sets import SETS, Rng, SetConfig, random_object, random_scene
 from scenelang.measure.varied import LARGE as LARGE
 from scenelang.measure.varied import Base
+from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import (
     Bend,
     Chain,
+    Material,
     Object,
     Rotate,
     Scale,
@@ -30,7 +33,8 @@ from scenelang.scene.schema import (
     Twirl,
 )
 
-BASE = SETS["shapes2d"]
+BASE, TEXTURED = SETS["shapes2d"], "textures2d"
+_BEYOND = 3.0  # scale of a square that covers the canvas however it is turned
 Make = Callable[[Rng, float], Scene]
 
 
@@ -45,6 +49,8 @@ class Probe:
     make: Make  # a scene for a value
     # whether the compiler may fold affine maps; else the lifting multiplies every one of them
     folded: bool = True
+    # whether it shows what sampling costs: it is compared with many samples a pixel, moving ones too
+    sampled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,9 +179,47 @@ def _interleaved(rng: Rng, steps: float) -> Scene:
     return _scene(rng, affine_steps=max(3, int(steps)))
 
 
+def _texels(rng: Rng, texels: float) -> Scene:
+    """A square beyond a small canvas, with so many texels of a texture to a pixel."""
+    side, names = 48, load_manifest(TEXTURED).textures
+    material = Material(
+        names[int(rng.integers(len(names)))],
+        (
+            Scale.uniform(TEXELS / (texels * side * _BEYOND)),
+            Rotate(angle=float(rng.uniform(-math.pi, math.pi))),
+            Translate(x=float(rng.uniform(-1, 1)), y=float(rng.uniform(-1, 1))),
+        ),
+    )
+    moves = Scale.uniform(_BEYOND), Rotate(angle=float(rng.uniform(-math.pi, math.pi)))
+    scene = union_of([Object("square", moves, material)])
+    return scene.model_copy(update={"model": TEXTURED, "canvas": (side, side)})
+
+
+def drifting(scene: Scene, frames: int) -> list[Scene]:
+    """Frames of a scene of one chain whose objects drift by a third of a pixel each."""
+    step = 2 / min(scene.canvas)
+    return [
+        varied.rebuilt(
+            scene,
+            lambda _, node, f=f: [*node.transforms, Translate(x=0.31 * step * f, y=0.17 * step * f)],  # type: ignore[misc]
+        )
+        for f in range(frames)
+    ]
+
+
 PROBES = common(_scene, _scene, BASE.warp)
 PROBES["affine"] = replace(PROBES["affine"], make=_interleaved)
 FLAT = Kit(PROBES, apart, animated)
+TEXTURES = replace(
+    FLAT,
+    probes={
+        **PROBES,
+        "texels": Probe(
+            "textures drawn small, against 64 samples a pixel", "texels to a pixel",
+            (0.5, 1, 2, 3, 4, 5, 6, 8, 16), 1, _texels, sampled=True,
+        ),
+    },
+)  # fmt: skip
 
 
 def rng_of(seed: int, index: int, attempt: int = 0) -> Rng:

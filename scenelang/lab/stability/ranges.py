@@ -33,7 +33,7 @@ def quantities(dimension: int) -> dict[str, tuple[str, float, float]]:
         "twirl": warp,
         "bend": warp,
         "scale": ("size", *scales),
-        **({"thin": ("thin", 1.0, 1.0)} if dimension == 2 else solid),
+        **({"thin": ("thin", 1.0, 1.0), "texels": ("texels", 1.0, 1.0)} if dimension == 2 else solid),
         "blend": ("deep", scales[1], scales[1]),
     }
 
@@ -42,6 +42,7 @@ FROM_NOTHING = {
     "smooth": 0.0,
     "blend": 0.0,
     "displace": 0.0,
+    "texels": 0.0,
 }  # what the least value is where the probe starts later
 BOTH_WAYS = {"twirl", "bend", "twist"}  # the range is the same on either side of 0
 

@@ -22,7 +22,7 @@ from scenelang.graph.spaces import SPACES
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.image import Image
 from scenelang.lab.about import Report, about, silent
-from scenelang.lab.stability.probes import FLAT, Kit, Probe, rng_of, union_of
+from scenelang.lab.stability.probes import FLAT, TEXTURES, Kit, Probe, drifting, rng_of, union_of
 from scenelang.lab.stability.solid_probes import SOLIDS
 from scenelang.lifting import exact
 from scenelang.lifting.layout import LAYOUTS
@@ -49,7 +49,7 @@ Array = npt.NDArray[np.float64]
 
 def kit_of(manifest: Manifest) -> Kit:
     """What a model is measured with."""
-    return SOLIDS if manifest.dimension == 3 else FLAT
+    return SOLIDS if manifest.dimension == 3 else TEXTURES if manifest.textures else FLAT
 
 
 class Errors(NamedTuple):
@@ -171,11 +171,13 @@ def run_probe(model: Model, name: str, scenes: int, seed: int, report: Report = 
     values = probe.values if name not in SIZES or not model.manifest.sizes else ()
     fine = name in SIZES and model.manifest.dimension == 2  # that of solids would take hours
     for at, value in enumerate(values):
-        found, ideal = [], []
+        found, ideal, changes = [], [], []
         for index in range(scenes):
             scene = scene_of(probe, value, index, seed, model)
             picture = _drawn(model, scene, probe.folded)
-            found.append(compare(picture, exact_picture(scene, model)))
+            found.append(compare(picture, exact_picture(scene, model, IDEAL if probe.sampled else 2)))
+            if probe.sampled:
+                changes.append(_change(model, drifting(scene, FRAMES), IDEAL))
             if fine:
                 ideal.append(compare(picture, exact_picture(scene, model, IDEAL)).per_edge)
         rows.append(
@@ -188,6 +190,8 @@ def run_probe(model: Model, name: str, scenes: int, seed: int, report: Report = 
                 "per_covered": round(float(np.mean([e.per_covered for e in found])), 6),
             }
         )
+        if probe.sampled:
+            rows[-1]["flicker"] = spread(changes, 95)
         if fine:
             rows[-1]["per_edge_ideal"] = round(float(np.mean(ideal)), 6)
         report(name, at + 1, len(probe.values))
@@ -230,16 +234,22 @@ def flicker(model: Model, scenes: int, seed: int) -> dict[str, float]:
         frames = [
             sized(f, model.manifest) for f in kit_of(model.manifest).animated(rng_of(seed, index), FRAMES)
         ]
-        ours = [np.asarray(_drawn(model, f, True), np.float64) for f in frames]
-        exact_ones = [exact_picture(f, model)[0] for f in frames]
-        extra = real = 0.0
-        for i in range(1, FRAMES):
-            change = exact_ones[i] - exact_ones[i - 1]
-            extra += float(np.square(ours[i] - ours[i - 1] - change).sum())
-            real += float(np.square(change).sum())
-        if real > 0:
-            ratios.append(math.sqrt(extra / real))
+        ratio = _change(model, frames)
+        if math.isfinite(ratio):
+            ratios.append(ratio)
     return {"mean": round(float(np.mean(ratios)), 5), "worst": round(max(ratios), 5)}
+
+
+def _change(model: Model, frames: Sequence[Scene], per_side: int = 2) -> float:
+    """The ratio of `flicker` of one animation, of whose exact pictures a pixel has so many samples a side."""
+    ours = [np.asarray(_drawn(model, f, True), np.float64) for f in frames]
+    exact_ones = [exact_picture(f, model, per_side)[0] for f in frames]
+    extra = real = 0.0
+    for i in range(1, len(frames)):
+        change = exact_ones[i] - exact_ones[i - 1]
+        extra += float(np.square(ours[i] - ours[i - 1] - change).sum())
+        real += float(np.square(change).sum())
+    return math.sqrt(extra / real) if real > 0 else math.inf
 
 
 def arithmetic(model: Model, scenes: int, seed: int) -> dict[str, float]:
