@@ -49,7 +49,7 @@ def manifest(name: str) -> dict[str, Any]:
     suite = RESULTS / ("stability.json" if name == BASE else f"stability-{name}.json")
     if suite.exists():
         ranges, lines = measured_ranges(json.loads(suite.read_text("utf-8")), data["dimension"])
-        data["trained"] = ranges
+        data["trained"] |= ranges  # a suite may be of few probes
         data["measured"]["stability"] = lines
     return data
 

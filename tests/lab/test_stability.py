@@ -23,6 +23,7 @@ from scenelang.lab.stability.suite import (
     kit_of,
     order_of_disjoint,
     picture_of,
+    run_probe,
     run_stability,
     scene_of,
     unfolded,
@@ -101,7 +102,8 @@ def test_lifting_solids_one_map_after_the_other_gives_the_same_chain(solids: Mod
 
 
 @pytest.mark.parametrize(
-    ("of", "name"), [("shapes2d", n) for n in PROBES] + [("solids3d", n) for n in SOLIDS.probes]
+    ("of", "name"),
+    [("shapes2d", n) for n in PROBES] + [("solids3d", n) for n in SOLIDS.probes] + [("textures2d", "texels")],
 )
 def test_probes_vary_one_thing(of: str, name: str) -> None:
     probe = kit_of(load_manifest(of)).probes[name]
@@ -111,6 +113,19 @@ def test_probes_vary_one_thing(of: str, name: str) -> None:
     assert probe.make(rng_of(1, 2), probe.values[0]) != first
     for value in (probe.values[0], probe.values[-1]):
         compile_scene(probe.make(rng_of(1, 3), value), model=of)  # raises where it is refused
+
+
+def test_textures_drawn_small_flicker() -> None:
+    """Against many samples: of few texels to a pixel hardly any change is wrong, of many most of it."""
+    model = load_model("textures2d")
+    probe = kit_of(model.manifest).probes["texels"]
+    small = dataclasses.replace(probe, values=(1.0, 16.0))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(kit_of(model.manifest).probes, "texels", small)
+        few, many = run_probe(model, "texels", 1, 3)["rows"]
+    assert few["psnr"]["mean"] > 45 > 35 > many["psnr"]["mean"]
+    assert few["flicker"]["mean"] < 0.25
+    assert many["flicker"]["mean"] > 0.5
 
 
 def test_objects_apart_do_not_overlap(model: Model) -> None:

@@ -34,6 +34,7 @@ from scenelang.scene.schema import (
 )
 
 BASE, TEXTURED = SETS["shapes2d"], "textures2d"
+NAMES = load_manifest(TEXTURED).textures
 _BEYOND = 3.0  # scale of a square that covers the canvas however it is turned
 Make = Callable[[Rng, float], Scene]
 
@@ -181,9 +182,9 @@ def _interleaved(rng: Rng, steps: float) -> Scene:
 
 def _texels(rng: Rng, texels: float) -> Scene:
     """A square beyond a small canvas, with so many texels of a texture to a pixel."""
-    side, names = 48, load_manifest(TEXTURED).textures
+    side = 48
     material = Material(
-        names[int(rng.integers(len(names)))],
+        NAMES[int(rng.integers(len(NAMES)))],
         (
             Scale.uniform(TEXELS / (texels * side * _BEYOND)),
             Rotate(angle=float(rng.uniform(-math.pi, math.pi))),
