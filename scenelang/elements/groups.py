@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
@@ -11,6 +12,7 @@ from scenelang.tensors import TensorError
 MOST_PARTS: Final = 256
 _MOST: Final = 1e4  # how far away or how large a part may be, and how small by its inverse
 _Numbers = tuple[float, ...]
+Painted = tuple[()] | tuple[float, float, float]  # a colour of sRGB, 0 to 1, or none
 
 
 class Part(NamedTuple):
@@ -29,7 +31,7 @@ class Part(NamedTuple):
     place: _Numbers
     size: float
     turn: tuple[_Numbers, ...] = ()
-    color: _Numbers = ()
+    color: Painted = ()
     material: str = ""
 
 
@@ -69,6 +71,13 @@ def read_group(
 
 
 _FIELDS: Final = frozenset(Part._fields)
+
+
+def told(group: Group) -> str:
+    """What there is to say of a group."""
+    counts = Counter(part.geometry for part in group)
+    shown = ", ".join(name if count == 1 else f"{count} {name}" for name, count in counts.items())
+    return f"group of {shown}"
 
 
 def _frozen(value: Any) -> Any:

@@ -12,12 +12,12 @@ from typing import Any, Final, Literal
 
 from scenelang.elements.element import TEXELS, Element
 from scenelang.elements.zoo import is_said, zoo_bytes
-from scenelang.fitting import outline, parts, picture, solids
+from scenelang.fitting import drawing, parts, picture, solids
 from scenelang.fitting.colours import fit_colours
 from scenelang.fitting.ladder import NEAR, Rung, Shape, fit
 from scenelang.fitting.mesh import FitError, Mesh, Sign
 
-MOST_OF: Final = {**solids.MOST_OF, **outline.MOST_OF, **picture.MOST_OF}
+MOST_OF: Final = {**solids.MOST_OF, **drawing.MOST_OF, **picture.MOST_OF}
 """Bytes of a file, by the suffixes that are read."""
 COARSER: Final = 4.0  # times as far as the whole a part may be off, in its own radii
 

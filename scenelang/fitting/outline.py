@@ -6,22 +6,20 @@ wide as they are drawn, with round joins and ends.
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.fitting.mesh import FitError, Points, needed
+from scenelang.elements.groups import Painted
+from scenelang.fitting.mesh import FitError, Points
 from scenelang.fitting.picture import opened
 
-MOST_OF: Final = dict.fromkeys((".svg", ".png", ".jpg", ".jpeg"), 10 << 20)  # bytes of a file
 MOST_EDGES: Final = 200_000
 MOST_PIXELS: Final = 16_000_000
 PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
-_CURVE: Final = 48  # edges of a curve
 _STRIP: Final = 64  # points of neighbouring heights
 _BESIDE: Final = 1e-4  # leaf units from an edge to where its sides are asked
 Edges = npt.NDArray[np.float64]  # (E, 2, 2): edges, ends, coordinates
@@ -42,7 +40,7 @@ class Layer:
     edges: Edges
     inside: Inside | None
     half: float = 0.0
-    color: tuple[float, ...] = ()
+    color: Painted = ()
 
     def touches(self, other: Layer) -> bool:
         """Whether the boxes around both share a point."""
@@ -115,12 +113,12 @@ class Outline:
         if not self._layers:
             raise FitError("it covers nothing")
 
-    def painted(self) -> list[tuple[tuple[float, ...], list[Layer]]]:
+    def painted(self) -> list[tuple[Painted, list[Layer]]]:
         """Its colours in the order of painting, and the layers of each, as they lay in the file.
 
         A layer joins earlier ones of its colour where nothing that was painted since touches it.
         """
-        found: list[tuple[tuple[float, ...], list[Layer]]] = []
+        found: list[tuple[Painted, list[Layer]]] = []
         for layer in self._source:
             for color, layers in reversed(found):
                 if color == layer.color:
@@ -196,61 +194,8 @@ def winding(edges: Edges, odd: bool) -> Inside:
     return inside
 
 
-def read_outline(data: bytes, suffix: str) -> Outline:
-    """A drawing (.svg), or the dark or opaque part of a picture, in the bytes of a file.
-
-    Raises:
-        FitError: it is damaged, empty or too large, or draws nothing.
-    """
-    return Outline(*(_drawing(data) if suffix == ".svg" else _picture(data)))
-
-
-def _drawing(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
-    with needed("svgelements"):
-        import svgelements
-    try:  # a reader of a large format, which a stranger's file may break in many ways
-        parsed = svgelements.SVG.parse(io.BytesIO(data), reify=True)
-        shapes = [e for e in parsed.elements() if isinstance(e, svgelements.Shape)]
-        others = {type(e).__name__.lower() for e in parsed.elements()} & {"text", "image"}
-        layers = [layer for shape in shapes for layer in _layers(shape, svgelements)]
-    except Exception as error:
-        raise FitError(f"damaged or not a drawing: {str(error) or type(error).__name__}"[:200]) from error
-    strokes = sum(layer.inside is None for layer in layers)
-    notes = f"{len(layers) - strokes:,} areas, {strokes:,} strokes"
-    return layers, (notes, *(f"{name} left out" for name in sorted(others)))
-
-
-def _layers(shape: Any, svg: Any) -> Iterator[Layer]:
-    """What a shape of a drawing paints, y up."""
-    open_edges, closing = [], []
-    for part in svg.Path(shape).as_subpaths():
-        points = [at for segment in svg.Path(part) for at in _ends(segment, svg)]
-        if len(points) > 1:
-            line = np.array(points) * (1.0, -1.0)
-            open_edges.append(np.stack([line[:-1], line[1:]], 1))
-            closing.append(np.stack([line[-1:], line[:1]], 1))
-    if not open_edges:
-        return
-    edges, closed = np.concatenate(open_edges), np.concatenate([*open_edges, *closing])
-    if shape.fill is not None and shape.fill.value is not None and shape.fill.alpha:
-        yield Layer(closed, winding(closed, shape.values.get("fill-rule") == "evenodd"))
-    if shape.stroke is not None and shape.stroke.value is not None and shape.stroke.alpha:
-        width = float(shape.stroke_width or 0.0)
-        if width > 0:
-            yield Layer(edges, None, width / 2)
-
-
-def _ends(segment: Any, svg: Any) -> list[tuple[float, float]]:
-    """Points of a segment, its last one among them."""
-    if segment.end is None:
-        return []
-    if isinstance(segment, svg.Move | svg.Line | svg.Close):
-        return [(segment.end.x, segment.end.y)]
-    found = [segment.point(at) for at in np.linspace(0, 1, _CURVE + 1)[1:]]
-    return [(point.x, point.y) for point in found]
-
-
-def _picture(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
+def traced(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
+    """The outline of the dark or opaque part of a picture in the bytes of a file."""
     with opened(data, MOST_PIXELS) as file:
         pixels = np.asarray(file.convert("RGBA"), float) / 255
     opaque = bool((pixels[..., 3] < 0.5).any())

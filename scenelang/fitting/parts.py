@@ -10,8 +10,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from scenelang.elements.groups import MOST_PARTS, Group, Part
-from scenelang.fitting import outline, solids
+from scenelang.elements.groups import MOST_PARTS, Group, Painted, Part
+from scenelang.fitting import drawing, solids
 from scenelang.fitting.ladder import Shape
 from scenelang.fitting.looks import Look
 from scenelang.fitting.mesh import FitError, Mesh, Points, Sign
@@ -51,8 +51,8 @@ def brought(
     Raises:
         FitError: it is damaged, empty or too large, encloses nothing, or has too many parts.
     """
-    if suffix in outline.MOST_OF:
-        return drawn_parts(outline.read_outline(data, suffix), name, apart)
+    if suffix in drawing.MOST_OF:
+        return drawn_parts(drawing.read_outline(data, suffix), name, apart)
     found, notes = solids.read_solids(data, suffix, folder)
     made = solid_parts(found, name, sign, bool(apart))
     return made._replace(notes=(*made.notes, *notes))
@@ -64,8 +64,8 @@ def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
     Raises:
         FitError: as `brought`, or there is no such part.
     """
-    if suffix in outline.MOST_OF:
-        drawn = outline.read_outline(data, suffix)
+    if suffix in drawing.MOST_OF:
+        drawn = drawing.read_outline(data, suffix)
         if number == 0:
             return drawn
         layers = [layers for _, layers in drawn.painted()][number - 1 :]
@@ -129,7 +129,7 @@ def _alone(name: str, mesh: Mesh) -> Group:
     return (Part(name, (0.0, 0.0, 0.0), 1.0, (), colour, material),) if mesh.look is not None else ()
 
 
-def _worn(look: Look | None, name: str) -> tuple[tuple[float, ...], str]:
+def _worn(look: Look | None, name: str) -> tuple[Painted, str]:
     """The one colour of a look, or the name that its material is to have."""
     if look is None:
         return (), ""

@@ -11,6 +11,7 @@ from typing import Final
 from lsprotocol import types
 
 from scenelang import words
+from scenelang.elements.groups import told
 from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.lsp.callees import find_callee, word_of
 from scenelang.lsp.context import Cursor, cursor_at, sight_at
@@ -310,8 +311,11 @@ class _Maker:
                 for name in "xyzrgb":
                     yield Item(name, Kind.Field)
             return
-        for found in self.docs.elements(self.document, symbol.node):
-            if found.material == ("material" in before[-4:-2]):
+        zoo, worn = self.docs.zoo(self.document, symbol.node), "material" in before[-4:-2]
+        for name, group in zoo.groups.items() if zoo is not None and not worn else ():
+            yield Item(f"{name}()", Kind.Module, f"{name}() {{ $0 }}", "a", "group", told(group), True)
+        for found in zoo.elements if zoo is not None else ():
+            if found.material == worn:
                 yield Item(
                     found.name, Kind.Class, f"{found.name} {{ $0 }}", "a", found.kind, found.told(), True
                 )

@@ -9,6 +9,7 @@ from typing import Any, Final
 from lsprotocol import types
 
 from scenelang import words
+from scenelang.elements import groups
 from scenelang.elements.element import Element
 from scenelang.lsp import values
 from scenelang.lsp.callees import find_symbol, word_of
@@ -112,9 +113,13 @@ def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[
     worn, symbol = use.role == "material", use.symbol
     if not (worn or use.role == "member") or symbol is None or not isinstance(symbol.node, nodes.Import):
         return None
-    listed, name = docs.elements(document, symbol.node), use.text.partition(".")[0]
-    found = [element for element in listed if element.name == name and element.material == worn]
+    zoo, name = docs.zoo(document, symbol.node), use.text.partition(".")[0]
+    if zoo is None:
+        return ""
+    found = [element for element in zoo.elements if element.name == name and element.material == worn]
     told = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in found]
+    if name in zoo.groups and not worn:
+        told.append(f"```text\n{name}(): {groups.told(zoo.groups[name])}\n```")
     return "\n\n".join(told)
 
 

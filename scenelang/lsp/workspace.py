@@ -19,7 +19,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Fix, Label
 from scenelang.diagnostics.diagnostic import Edit as Change
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.elements.element import Element
-from scenelang.elements.zoo import SUFFIX, load_zoo
+from scenelang.elements.zoo import SUFFIX, Zoo, load_zoo
 from scenelang.evaluate.loader import Unreadable, read_source
 from scenelang.lsp.text import Encoding, Lines, applied
 from scenelang.resolve.names import Names, Symbol, Use
@@ -206,13 +206,18 @@ class Workspace:
 
     def elements(self, document: Document, stmt: nodes.Import) -> tuple[Element, ...]:
         """The elements that an import brings; none where its file is scene text or damaged."""
+        zoo = self.zoo(document, stmt)
+        return () if zoo is None else zoo.elements
+
+    def zoo(self, document: Document, stmt: nodes.Import) -> Zoo | None:
+        """The file of elements that an import brings, if it is one."""
         path = library.find(stmt.path.value) or self._place(document, stmt.path.value)
         if path is None or path.suffix != SUFFIX:
-            return ()
+            return None
         try:
-            return load_zoo(path).elements
+            return load_zoo(path)
         except (OSError, TensorError):
-            return ()
+            return None
 
     def _place(self, document: Document, text: str) -> Path | None:
         """The file that a path in a document means."""

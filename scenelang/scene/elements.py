@@ -12,6 +12,8 @@ from scenelang.elements.element import Element
 from scenelang.elements.zoo import Zoo, load_zoo
 from scenelang.scene import library
 from scenelang.scene.fields import Frozen, Word
+from scenelang.scene.groups import objects_of
+from scenelang.scene.nodes import Group, Object
 from scenelang.tensors import TensorError
 
 
@@ -47,6 +49,17 @@ class Elements(Frozen):
     def zoo(self) -> Zoo | None:
         """What is in the file; None where it has not been read."""
         return self._held.zoo
+
+    def group(self, name: str) -> Group | Object:
+        """A ready group: its parts in their places and looks; of one part that alone.
+
+        Raises:
+            KeyError: the file has no such group, or has not been read.
+        """
+        if self.zoo is None:
+            raise KeyError(f"`{self.path}` has not been read")
+        objects = objects_of(self.zoo, self.name, name)
+        return objects[0] if len(objects) == 1 else Group(objects)
 
     def read(self, root: Path) -> tuple[str, str] | None:
         """Read the file, within a folder where its path begins; code and message if that fails."""

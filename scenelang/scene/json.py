@@ -20,9 +20,10 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.files import depth_of_json
 from scenelang.scene import modifiers, nodes
+from scenelang.scene.data import SceneData
 from scenelang.scene.fields import said
 from scenelang.scene.json_places import Key, Value, deeper_than, follow, read_places, record_places
-from scenelang.scene.nodes import MAX_NODE_DEPTH, Link, Object, SceneData, SceneNode
+from scenelang.scene.nodes import MAX_NODE_DEPTH, Link, Object, SceneNode
 from scenelang.scene.spans import SpanMap
 
 S = TypeVar("S", bound=SceneData)

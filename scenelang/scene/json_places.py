@@ -12,8 +12,8 @@ from pydantic import BaseModel
 
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.records import Record
+from scenelang.scene.data import SceneData
 from scenelang.scene.fields import TAGS
-from scenelang.scene.nodes import SceneData
 from scenelang.scene.spans import SpanMap, Written
 
 Key = str | int

@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from scenelang.scene.data import SceneData
 from scenelang.scene.elements import Elements as Elements
 from scenelang.scene.elements import load_elements as load_elements
 from scenelang.scene.modifiers import Bend as Bend
@@ -36,7 +37,6 @@ from scenelang.scene.nodes import Group as Group
 from scenelang.scene.nodes import Link as Link
 from scenelang.scene.nodes import Material as Material
 from scenelang.scene.nodes import Object as Object
-from scenelang.scene.nodes import SceneData
 from scenelang.scene.nodes import SceneNode as SceneNode
 from scenelang.scene.stage import Camera as Camera
 from scenelang.scene.stage import Ground as Ground

@@ -14,10 +14,11 @@ from scenelang.deep import deep_stack
 from scenelang.diagnostics.error import SceneError
 from scenelang.formatting import format_text
 from scenelang.records import Record
+from scenelang.scene.data import SceneData
 from scenelang.scene.elements import Elements
 from scenelang.scene.fields import Frozen, Rgb
 from scenelang.scene.modifiers import MaterialOp, Transform
-from scenelang.scene.nodes import Boolean, Link, Material, Object, SceneData, SceneNode
+from scenelang.scene.nodes import Boolean, Link, Material, Object, SceneNode
 from scenelang.words import BLEND, OPERATIONS, STAGE, TRANSFORMS
 
 _Line = str | tuple[str, SceneNode, int]

@@ -12,9 +12,10 @@ from PIL import Image
 pytest.importorskip("svgelements")
 pytest.importorskip("scipy")
 
+from scenelang.fitting.drawing import read_outline
 from scenelang.fitting.ladder import fit
 from scenelang.fitting.mesh import FitError
-from scenelang.fitting.outline import Outline, read_outline, winding
+from scenelang.fitting.outline import Outline, winding
 from tests.elements.shapes import square
 
 POINTS = np.random.default_rng(0).uniform(-1, 1, (2000, 2))
@@ -132,3 +133,44 @@ def test_an_entity_bomb_ends() -> None:
     bomb = f"<!DOCTYPE svg [{''.join(lines)}]><svg><path d='&a9;'/></svg>"
     with pytest.raises(FitError, match="damaged"):
         read_outline(bomb.encode(), ".svg")
+
+
+@pytest.mark.parametrize(
+    ("body", "colours"),
+    [
+        ('<style>.a { fill: #0a0 } #b { fill: blue }</style><rect class="a" @/><circle id="b" r="9"/>',
+         [(0, 2 / 3, 0), (0, 0, 1)]),
+        ('<g fill="red"><rect @/></g><use href="#a"/><defs><rect id="a" fill="#00f" @/></defs>',
+         [(1, 0, 0), (0, 0, 1)]),
+        ('<rect fill="red" fill-opacity=".5" @/>', [(1, 0.5, 0.5)]),
+        ('<g opacity="0.5"><g style="opacity: 50%"><rect @/></g></g>', [(0.75, 0.75, 0.75)]),
+        ('<rect opacity="0" @/><rect fill="red" @/>', [(1, 0, 0)]),
+        ('<rect visibility="hidden" @/><rect fill="red" @/>', [(1, 0, 0)]),
+        ('<mask id="m"><rect @/></mask><marker><rect @/></marker><rect fill="red" mask="url(#m)" @/>',
+         [(1, 0, 0)]),
+        ('<symbol id="s"><rect fill="red" @/></symbol><use href="#s"/>', [(1, 0, 0)]),
+        ('<rect fill="#123" stroke="red" stroke-width="2" @/>', [(1 / 15, 2 / 15, 0.2), (1, 0, 0)]),
+        ('<linearGradient id="g"><stop offset="0" stop-color="#f00"/><stop offset="1" '
+         'style="stop-color: #00f"/></linearGradient><rect fill="url(#g) red" @/>', [(0.5, 0, 0.5)]),
+        ('<linearGradient id="g"><stop offset="50%" stop-color="#f00"/><stop offset="50%" stop-color="#00f"'
+         ' stop-opacity="0"/></linearGradient><radialGradient id="h" href="#g"/>'
+         '<style>rect { fill: url(#h); stroke: none }</style><rect @/>', [(1, 0.5, 0.5)]),
+        ('<rect fill="red" @/><rect x="40" fill="red" width="9" height="9"/>', [(1, 0, 0)]),
+        ('<rect fill="red" @/><rect fill="blue" x="40" width="9" height="9"/><rect fill="red" x="80" @/>',
+         [(1, 0, 0), (0, 0, 1)]),
+        ('<rect fill="red" @/><rect fill="blue" x="5" width="9" height="9"/><rect fill="red" x="9" @/>',
+         [(1, 0, 0), (0, 0, 1), (1, 0, 0)]),
+    ],
+)  # fmt: skip
+def test_colours_of_drawings(body: str, colours: list[tuple[float, float, float]]) -> None:
+    body = body.replace("@", 'width="10" height="10"')
+    found = read_outline(f'<svg xmlns="http://www.w3.org/2000/svg">{body}</svg>'.encode(), ".svg")
+    assert [colour for colour, _ in found.painted()] == [pytest.approx(c, abs=0.01) for c in colours]
+
+
+def test_what_of_a_drawing_is_lost_is_said() -> None:
+    body = '<text>a</text><clipPath id="c"><rect/></clipPath><pattern id="p"/><rect width="9" height="9"/>'
+    found = read_outline(f"<svg>{body}<filter/></svg>".encode(), ".svg")
+    assert [f"{what} left out" in found.notes for what in ("text", "clip paths", "patterns", "filters")] == [
+        True
+    ] * 4

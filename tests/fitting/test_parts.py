@@ -210,3 +210,22 @@ def test_objects_of_obj_are_parts() -> None:
     assert len(found.group) == 2
     assert len(found.shapes) == 2
     assert whole(solids).size > 2
+
+
+def test_a_drawing_is_parts_in_its_colours(tmp_path: Path) -> None:
+    rows = ("#f00", 0, 0, 8), ("#00f", 2, 2, 4), ("#f00", 20, 0, 4)
+    shapes = "".join(f'<rect fill="{c}" x="{x}" y="{y}" width="{a}" height="{a}"/>' for c, x, y, a in rows)
+    (tmp_path / "logo.svg").write_text(f"<svg>{shapes}</svg>")
+    out = tmp_path / "zoo.safetensors"
+    learn([tmp_path / "logo.svg"], out, Wish(steps=1))
+    zoo = load_zoo(out)
+    assert list(zoo.geometries) == ["logo", "logo_1", "logo_2"]
+    first, second = zoo.groups["logo"]
+    half = (24**2 + 8**2) ** 0.5 / 2
+    assert first == Part("logo_1", (0, 0), 1.0, (), (1, 0, 0))  # both red squares reach as far as the whole
+    assert second.place == pytest.approx(((4 - 12) / half, (4 - 4) / half))
+    assert second.size == pytest.approx(8**0.5 / half)
+    shape = parts.shape_in((tmp_path / "logo.svg").read_bytes(), ".svg", "auto", 2)
+    assert shape.size == pytest.approx(8**0.5)
+    learn([tmp_path / "logo.svg"], out, Wish(steps=1, parts=False))
+    assert "logo" not in load_zoo(out).groups

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from scenelang.elements.groups import Part
 from scenelang.elements.zoo import zoo_bytes
 from tests.elements.shapes import ball, element, noise, square, torus
 from tests.lsp.client import CAPABILITIES, Client
@@ -71,3 +72,15 @@ def test_elements_are_shown_where_the_editor_shows_pictures(
         assert tile[48, 48].tolist() == [34, 34, 34]
         assert tile[2, 2].tolist() == [255, 255, 255]
         assert np.ptp(ring[40:56, 40:56, 0]) > 40  # lit
+
+
+def test_groups_are_proposed_and_told_of(client: Client, uri: str) -> None:
+    zoo = Path(uri.removeprefix("file://")).with_name("zoo.safetensors")
+    ring = Part("ring", (0.0, 0.5, 0.0), 0.5)
+    zoo.write_bytes(zoo_bytes([element(torus, "ring")], {"car": (ring, ring), "ring": (ring,)}))
+    client.replace(uri, 'import "zoo.safetensors" as zoo;\nzoo.car();\nzoo.ring();\nzoo.;\n')
+    assert labels(client, client.at(uri, "zoo.;", 4)) == ["car()", "ring", "ring()"]
+    assert "car(): group of 2 ring" in hover(client, client.at(uri, "zoo.car", 5))
+    told = hover(client, client.at(uri, "zoo.ring", 5))
+    assert "distances" in told
+    assert "ring(): group of ring" in told

@@ -8,6 +8,7 @@ from scenelang.diagnostics.suggest import did_you_mean, instead, listing
 from scenelang.evaluate.file_context import Action, Place
 from scenelang.evaluate.names import Binding
 from scenelang.evaluate.prepare.blocks import prepare_inner
+from scenelang.evaluate.prepare.elements import prepare_element
 from scenelang.evaluate.prepare.expressions import prepare_arguments
 from scenelang.evaluate.prepare.materials import prepare_value_use
 from scenelang.evaluate.prepare.nodes import HOLDERS, prepare_module_call, prepare_object
@@ -45,7 +46,7 @@ def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
     if binding.kind == "module":
         return prepare_module_call(stmt, binding.value, place)
     if binding.kind == "element":
-        return prepare_object(stmt, place, binding.value)
+        return prepare_element(stmt, place, binding.value)
     if binding.kind in VALUES:
         return prepare_value_use(stmt, binding, place)
     _skim(stmt, place)

@@ -28,7 +28,7 @@ from scenelang.words import BLEND, KEYWORDS, LANGUAGE
 HOLDERS = ("file", "group", "chain", "unknown")
 
 
-def _holds_children(place: Place, span: Span, what: str, name: str) -> bool:
+def holds_children(place: Place, span: Span, what: str, name: str) -> bool:
     """Whether children may stand here; reports it if not."""
     if place.kind in HOLDERS:
         return True
@@ -41,7 +41,7 @@ def _holds_children(place: Place, span: Span, what: str, name: str) -> bool:
     return False
 
 
-def _place_child(node: Any, where: Written, out: Builder, session: Session) -> None:
+def place_child(node: Any, where: Written, out: Builder, session: Session) -> None:
     """Hand a finished node to the block it stands in."""
     session.spans.record(node, where, session.report.calls)
     session.count_parts(1, where.name)
@@ -65,7 +65,7 @@ def _join_child(node: Any, where: Written, out: Builder, session: Session) -> No
 def prepare_object(stmt: nodes.Call, place: Place, geometry: str | None = None) -> Action | None:
     """``GEOMETRY { … }`` with a geometry that the model has, or one of its own."""
     name, session, where = stmt.name.text, place.session, Written(stmt.name.span, stmt.span)
-    fits = _holds_children(place, where.name, "object `{}`", name)
+    fits = holds_children(place, where.name, "object `{}`", name)
     body = prepare_inner(stmt.body, place.inner("object"))
     if stmt.args:
         prepare_arguments(stmt.args, place)
@@ -89,7 +89,7 @@ def prepare_object(stmt: nodes.Call, place: Place, geometry: str | None = None) 
             "transforms": tuple(inside.transforms),
             "material": inside.material,
         }
-        _place_child(make(Object, fields), where, out, session)
+        place_child(make(Object, fields), where, out, session)
 
     return action
 
@@ -98,7 +98,7 @@ def prepare_object(stmt: nodes.Call, place: Place, geometry: str | None = None) 
 
 
 def prepare_node(stmt: nodes.Node, place: Place) -> Action | None:
-    fits = _holds_children(place, stmt.keyword, "`{}`", stmt.kind)
+    fits = holds_children(place, stmt.keyword, "`{}`", stmt.kind)
     chain = stmt.kind == "chain"
     if chain:
         _check_first(stmt, place)
@@ -112,7 +112,7 @@ def prepare_node(stmt: nodes.Node, place: Place) -> Action | None:
         inside = ChainBuilder() if chain else Builder()
         _run_nested(body, env, inside, session, where.name)
         node = _finish(stmt.kind, inside, inside.transforms, inside.material, width(env))
-        _place_child(node, where, out, session)
+        place_child(node, where, out, session)
 
     return action
 
@@ -219,7 +219,7 @@ def _makes_child(stmt: nodes.Stmt, place: Place) -> bool:
 def prepare_module_call(stmt: nodes.Call, definition: Definition, place: Place) -> Action | None:
     """``NAME(1);`` or ``NAME(1) { transforms }``: one child, whatever the module holds."""
     session, where = place.session, Written(stmt.name.span, stmt.span)
-    fits = _holds_children(place, where.name, "a call of module `{}`", stmt.name.text)
+    fits = holds_children(place, where.name, "a call of module `{}`", stmt.name.text)
     given = prepare_arguments(stmt.args, place)
     block = prepare_inner(stmt.body, place.inner("object")) if stmt.body is not None else None
     enter = entering(stmt.name, given, definition, place)
@@ -234,22 +234,29 @@ def prepare_module_call(stmt: nodes.Call, definition: Definition, place: Place) 
         _run_nested(Body(definition.run, 1), frame, inside, session, where.name)
         session.report.calls = before
         session.depth -= 1
-        transforms, material = inside.transforms, inside.material
-        if block is not None:
-            own = Builder()
-            block.run(env, own, session, where.name)
-            transforms = [*transforms, *own.transforms]
-            material = material or own.material
-        if len(inside.children) != 1:
-            _place_child(_finish("group", inside, transforms, material), where, out, session)
-            return
-        child = inside.children[0]
-        if transforms or (material is not None and child.material is None):
-            moved = (*child.transforms, *transforms)
-            fields = {**child.__dict__, "transforms": moved, "material": child.material or material}
-            changed = make(child.__class__, fields)
-            session.spans.copy(child, changed)
-            child = changed
-        _join_child(child, where, out, session)
+        place_called(inside, block, env, where, out, session)
 
     return action
+
+
+def place_called(
+    inside: Builder, block: Body | None, env: Env, where: Written, out: Builder, session: Session
+) -> None:
+    """Hand what a call has made to the block it stands in, moved as the call's own block says."""
+    transforms, material = inside.transforms, inside.material
+    if block is not None:
+        own = Builder()
+        block.run(env, own, session, where.name)
+        transforms = [*transforms, *own.transforms]
+        material = material or own.material
+    if len(inside.children) != 1:
+        place_child(_finish("group", inside, transforms, material), where, out, session)
+        return
+    child = inside.children[0]
+    if transforms or (material is not None and child.material is None):
+        moved = (*child.transforms, *transforms)
+        fields = {**child.__dict__, "transforms": moved, "material": child.material or material}
+        changed = make(child.__class__, fields)
+        session.spans.copy(child, changed)
+        child = changed
+    _join_child(child, where, out, session)

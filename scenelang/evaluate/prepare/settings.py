@@ -276,8 +276,8 @@ def _elements(path: Path, zoo: Zoo, stmt: nodes.Import, context: FileContext) ->
     known = session.elements[path].name
     source = SourceFile(stmt.path.value, "")
     brought = FileContext(source, session, context.loader, context.defines, path)
-    names = {name: Binding("element", stmt.alias.span, value=f"{known}.{name}") for name in zoo.geometries}
-    brought.scope.names.update(names)
+    for name in (*zoo.geometries, *zoo.groups):
+        brought.scope.names[name] = Binding("element", stmt.alias.span, value=f"{known}.{name}")
     brought.materials.update({name: f"{known}.{name}" for name in zoo.materials})
     return brought
 
