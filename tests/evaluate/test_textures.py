@@ -110,7 +110,7 @@ def test_equal_materials_are_equal_values(folder: Path) -> None:
         ("zoo.bark { }", "E0213", "`zoo.bark` is the name of a material"),
         ("square { zoo.bark; }", "E0213", "`zoo.bark` is the name of a material"),
         ("let a = zoo.bark;", "E0213", "`zoo.bark` is the name of a material"),
-        ("square { material flat square; }", "E0208", "unknown material `square`"),
+        ("square { material flat square; }", "E0213", "`square` is a geometry, not a material"),
         ("square { material mist zoo.bark; }", "E0208", "unknown material `mist`"),
         ("torus { material diffuse volumetric; }", "E0213", "`volumetric` is not a texture"),
         ("square { material zoo.bark; material zoo.stone; }", "E0332", "a second material in one block"),

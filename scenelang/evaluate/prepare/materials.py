@@ -145,6 +145,8 @@ def _unknown(name: nodes.Name, place: Place, known: set[str]) -> None:
         message = f"material `{name.text}` belongs to model `{owner}`, not `{words.chosen.name}`"
         help = f"model `{words.chosen.name}` has {listing(known)}"
         report.error("E0205", message, span, help=help, labels=place.session.model_label())
+    elif name.text in words.geometries:
+        report.error("E0213", f"`{name.text}` is a geometry, not a material", span)
     else:
         hint, fix = did_you_mean(name.text, known, span)
         help = hint or f"there is {listing(known)}"
