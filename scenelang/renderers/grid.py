@@ -27,12 +27,19 @@ def blended(xp: Arrays, flat: Array, first: Array, share: Sequence[Array], corne
     values = []
     for corner in corners:
         row = first + corner
-        a = xp.take(flat, row)
-        values.append(a + (xp.take(flat, row + 1) - a) * share[-1])
+        values.append(_between(xp.take(flat, row), xp.take(flat, row + 1), share[-1]))
     for along in reversed(share[:-1]):
         pairs = zip(values[::2], values[1::2], strict=True)
-        values = [a + (b - a) * along for a, b in pairs]
+        values = [_between(a, b, along) for a, b in pairs]
     return values[0]
+
+
+def _between(a: Array, b: Array, share: Array) -> Array:
+    """``a + (b - a) share``, in place of b."""
+    b -= a
+    b *= share
+    b += a
+    return b
 
 
 class Lattice:
