@@ -19,7 +19,7 @@ from scenelang.fitting.mesh import FitError, Mesh, Sign
 
 MOST_OF: Final = {**solids.MOST_OF, **drawing.MOST_OF, **picture.MOST_OF}
 """Bytes of a file, by the suffixes that are read."""
-COARSER: Final = 4.0  # times as far as the whole a part may be off, in its own radii
+COARSER: Final = 2.0  # times as far as the whole a part may be off, in its own radii
 
 
 @dataclass(frozen=True, slots=True)
