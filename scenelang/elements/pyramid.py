@@ -81,7 +81,7 @@ def packed(
 
 
 def unpacked(element: Element) -> Grid:
-    """The finest grid of an element, once more refined where it is small; any bytes give finite numbers.
+    """The finest grid of an element, as it is drawn; any bytes give finite numbers.
 
     Raises:
         TensorError: the element is damaged.
@@ -93,6 +93,9 @@ def unpacked(element: Element) -> Grid:
         expected = np.zeros(shape, np.float32) if grid is None else between(grid)
         grid, first = _stepped(expected, steps), first + steps.size
     assert grid is not None
-    if 2 * len(grid) - 1 <= MOST_SIDE[grid.ndim]:
-        grid = between(grid)
-    return grid
+    return finest(grid)
+
+
+def finest(grid: Grid) -> Grid:
+    """The last grid of a pyramid as it is drawn: once more refined where it is small."""
+    return between(grid) if 2 * len(grid) - 1 <= MOST_SIDE[grid.ndim] else grid

@@ -1,7 +1,8 @@
 """The smallest pyramid of distances that is as near as asked.
 
-Pyramids of two kinds of coarsest grid grow level by level, the smaller one first, and each is measured as it
-is drawn: what it says at points of the true surface, and how its normals lie there.
+Pyramids of two kinds of coarsest grid grow level by level, the smaller one first. The finest grid of each is
+settled on the surface (`settle.py`), and it is measured as it is drawn: what it says at other points of the
+true surface, and how its normals lie there.
 """
 
 from __future__ import annotations
@@ -17,15 +18,17 @@ import numpy.typing as npt
 from scenelang.elements.element import MOST_SIDE, Element
 from scenelang.elements.pyramid import Grid, packed, refine, unpacked
 from scenelang.fitting.mesh import Points
+from scenelang.fitting.settle import settled
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.grid import GridShape
 
 CELLS: Final = (4, 6)  # of the coarsest grids, along an axis
 FEWEST: Final = {2: 25, 3: 13}  # nodes along an axis of what is measured, by dimension
 BAND: Final = 4.5  # cells from the surface within which distances are true; farther ones are expected
-SAMPLES: Final = 20_000
+SAMPLES: Final = 20_000  # points of the surface where an element is measured
+SETTLED: Final = {2: 0, 3: 200_000}  # and where it is settled, by dimension
 BLOCK: Final = 100_000  # points that are asked for at a time
-NEAR: Final = {2: 1e-4, 3: 5e-4}  # mean distance off that is near enough, by dimension
+NEAR: Final = {2: 1e-4, 3: 3e-4}  # mean distance off that is near enough, by dimension
 
 
 class Shape(Protocol):
@@ -73,6 +76,8 @@ class _Pyramid:
 
     cells: int
     grid: Grid | None = None
+    before: Grid | None = None
+    true: Grid | None = None
     steps: list[npt.NDArray[np.int8]] = field(default_factory=list)
 
     @property
@@ -91,10 +96,20 @@ class _Pyramid:
                 progress(side, first / len(at))
                 part = at[first : first + BLOCK]
                 found[np.ravel_multi_index(tuple(part.T), expected.shape)] = shape.distances(axis[part])
-            return found.reshape(expected.shape)
+            self.true = found.reshape(expected.shape)
+            return self.true
 
+        self.before = self.grid
         self.grid, steps = refine(self.grid, side, shape.dimension, true)
         self.steps.append(steps)
+
+    def element(self, name: str, points: Points) -> Element:
+        """The element so far, settled on points of the surface."""
+        steps, true = self.steps, self.true
+        if len(points) and true is not None:
+            last = refine(self.before, len(true), true.ndim, lambda _: settled(true, points))[1]
+            steps = [*steps[:-1], last]
+        return packed(name, self.cells, steps, {})
 
 
 def fit(
@@ -122,7 +137,8 @@ def fit(
         FitError: the shape encloses nothing.
     """
     started = time.monotonic()
-    points, normals = shape.surface(SAMPLES)
+    points, normals = shape.surface(SAMPLES + SETTLED[shape.dimension])
+    others, points, normals = points[SAMPLES:], points[:SAMPLES], normals[:SAMPLES]
     growing = [_Pyramid(cells) for cells in CELLS]
     best: tuple[float, Element] | None = None
     tried: list[Rung] = []
@@ -137,7 +153,7 @@ def fit(
         pyramid.grow(shape, progress)
         if pyramid.next_side // 2 + 1 < FEWEST[shape.dimension]:
             continue
-        element = packed(name, pyramid.cells, pyramid.steps, {})
+        element = pyramid.element(name, others)
         rung = measured(element, points, normals)
         tried.append(rung)
         report(rung)

@@ -13,6 +13,7 @@ pytest.importorskip("svgelements")
 trimesh = pytest.importorskip("trimesh")
 
 import scenelang as nsg  # noqa: E402
+from scenelang.backend.render import exact_graph  # noqa: E402
 from scenelang.elements.zoo import load_zoo, zoo_bytes  # noqa: E402
 from scenelang.fitting.learn import learn  # noqa: E402
 from scenelang.fitting.making import Wish  # noqa: E402
@@ -103,7 +104,7 @@ def test_distances_and_slopes_of_a_mesh(sign: str) -> None:
 )
 def test_a_cube_is_drawn_as_by_its_formula(folder: Path, text: str) -> None:
     shown = scene(folder, text)
-    graph = nsg.backend.render.exact_graph(shown)[0]
+    graph = exact_graph(shown)[0]
     exact = reference_image(graph, brought={"zoo.cube": Cube()})
     assert psnr_db(np.asarray(nsg.render(shown, backend="reference")), np.asarray(exact)) > 60
     nsg.render_outputs(shown, ["depth", "alpha"], backend="reference")
