@@ -11,6 +11,7 @@ from scenelang.graph.steps import Affine, Warp
 from scenelang.program.paints import Paint
 from scenelang.reference.solid.field import Field
 from scenelang.reference.solid.image import solid_image
+from scenelang.renderers.solid import lookups
 from scenelang.renderers.solid.draw import draw_solids
 from scenelang.renderers.solid.parameters import Solids
 from tests.elements.shapes import noise
@@ -108,6 +109,14 @@ def test_textures_are_looked_up_four_times_without_four_rays() -> None:
     assert psnr(some, four) > 38
     plain = draw_solids(field([o._replace(paint=None) for o in objects]), Stage(), (64, 64))[1]
     assert work.refined < 1.2 * plain.refined
+
+
+def test_many_lookups_are_made_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    objects = [Object("sphere", paint=Paint(FINE)), Object("torus", (), "volumetric", paint=Paint(COARSE))]
+    whole, _ = draw_solids(field(objects), Stage(), (32, 32))
+    for name in ("PIXELS", "CHUNK"):
+        monkeypatch.setattr(lookups, name, 17)
+    np.testing.assert_allclose(draw_solids(field(objects), Stage(), (32, 32))[0], whole, rtol=0, atol=1e-5)
 
 
 def test_light_in_a_medium_of_two_colours_is_the_sum_of_both_ways() -> None:

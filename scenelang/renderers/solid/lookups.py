@@ -18,6 +18,7 @@ EVEN = 2  # how much more evenly than the light that the medium takes nodes lie
 BUSY = 8.0  # texels that a piece may cross with `FEW` panels of two points each
 FEW, MANY = 4, 12
 CHUNK = 1024  # pieces of which textures are looked up at once
+PIXELS = 4096  # on surfaces, likewise
 GRAZING = 0.5  # how much farther or nearer a pixel's samples may be on a surface, as a part of the way
 
 
@@ -51,6 +52,12 @@ class Lookups:
         What a medium gives way to, if soft, has its own plane, and its own colours there.
         """
         xp, field = self._xp, self._field
+        if len(t) > PIXELS:
+            parts = [slice(at, at + PIXELS) for at in range(0, len(t), PIXELS)]
+            some = [
+                (Passes(passes.slots[:, :, at], passes.origins), way[:, at], t[at], n[:, at]) for at in parts
+            ]
+            return xp.concat([self.mean(*each, soft, px) for each in some], 1)
         seen, objects = way * t, None
         if soft:
             owner = field.meet(passes, t + INTO, Wanted.KIND, owners=True).owner
