@@ -147,6 +147,17 @@ def blends() -> str:
     return f"{markdown(heads, rows)}\n\n{said}, seed {found['seed']}; ± is the 95 % interval of the mean."
 
 
+def texels() -> str:
+    """What textures lose and how they flicker where they are drawn small."""
+    found = json.loads((HERE / "results" / "stability-textures2d.json").read_text())
+    rows = [
+        [f"{row['value']:g}", *(f"{row['psnr'][k]:.1f}" for k in ("mean", "worst"))]
+        + [f"{row['flicker'][k]:.2f}" for k in ("mean", "worst")]
+        for row in found["probes"]["texels"]["rows"]
+    ]
+    return markdown(("texels to a pixel", "mean PSNR, dB", "worst", "flicker", "worst"), rows)
+
+
 def rivals() -> str:
     """What frames of solids cost, drawn by us and by others, with what `python -m benchmarks.solids` says."""
     path = HERE / "results" / "solid-rivals.json"
@@ -183,6 +194,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "large-solids": partial(accuracy, "solids3d-256", SOLIDS),
     "solid-stability": partial(stability, 3),
     "blends": blends,
+    "texels": texels,
     "rivals": rivals,
     **{name: experiment(name) for name in EXPERIMENTS},
 }
