@@ -63,10 +63,24 @@ def rgb(values: Iterable[float], factor: float = 1.0) -> str:
 # ---------------------------------------------------------------- shapes
 
 
+MESHES: dict[str, str] = {}  # shapes of other geometries
+
+
+def mesh(vertices: np.ndarray, triangles: np.ndarray) -> str:
+    """A closed mesh, without what ends it."""
+    corners, faces = ", ".join(map(numbers, vertices)), ", ".join(map(numbers, triangles))
+    return (
+        f"mesh2 {{ vertex_vectors {{ {len(vertices)}, {corners} }} "
+        f"face_indices {{ {len(triangles)}, {faces} }} inside_vector <0.3, 1, 0.2>"
+    )
+
+
 def primitive(leaf: Leaf, more: float = 0.0) -> str:
     """A leaf under affine maps, larger all around by so much of its own space."""
     steps: Any = leaf.steps
     maps = [np.reshape(step.rows, (3, 4)).T.ravel() for step in steps]
+    if leaf.geometry in MESHES:
+        return " ".join([MESHES[leaf.geometry], *(f"matrix {numbers(rows)}" for rows in maps), "}"])
     core = f"sphere {{ 0, {1 + more}" if leaf.geometry == "sphere" else f"torus {{ 0.7, {0.3 + more} sturm"
     return " ".join([core, *(f"matrix {numbers(rows)}" for rows in maps), "}"])
 

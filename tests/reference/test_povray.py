@@ -15,7 +15,7 @@ from scenelang.measure.metrics import flip
 from scenelang.reference.solid.image import solid_image
 from tests.pictures import psnr_db
 from tests.reference import solid_oracle
-from tests.reference.povray import povray, povray_picture
+from tests.reference.povray import MESHES, mesh, povray, povray_picture
 from tests.reference.solid_scenes import GOLD, RED, SKY, USUAL, fold, leaf, moved, scaled, sheared, turned
 
 pytestmark = [
@@ -129,3 +129,25 @@ def test_the_slow_loop(name: str) -> None:
     print(f"PSNR {decibels:.1f} dB, FLIP {difference:.5f}")
     assert decibels > 42
     assert difference < 0.015
+
+
+def test_meshes() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    pytest.importorskip("igl")
+    from scenelang.fitting.mesh import mesh_of
+
+    made = trimesh.creation.torus(0.7, 0.3, major_sections=14, minor_sections=7)
+    shape = mesh_of(np.asarray(made.vertices), np.asarray(made.faces, np.int64))
+    MESHES["ring"] = mesh(shape.vertices, shape.triangles)
+    root = fold(
+        leaf("ring", "diffuse", GOLD, scaled(0.9, 0.6, 1.1), turned(0.8, 1, 0.4, 0.2), moved(-0.4, 0, 0)),
+        leaf("ring", "volumetric", SKY, scaled(0.7), turned(1.4, 0.2, 1, 0), moved(1.0, 0.3, 0.2)),
+        ("subtract", leaf("sphere", "diffuse", RED, scaled(0.5), moved(-0.9, 0.2, 0.5))),
+        leaf("sphere", "diffuse", RED, scaled(0.3), moved(0.3, -0.6, 0.7)),
+    )
+    ours = np.asarray(solid_image(root, Stage(), (90, 90), brought={"ring": shape}))
+    theirs = encoded(povray_picture(root, Stage(), (90, 90)))
+    decibels, difference = psnr_db(theirs, ours), flip(theirs, ours)
+    print(f"PSNR {decibels:.1f} dB, FLIP {difference:.5f}")
+    assert decibels > 48
+    assert difference < 0.002
