@@ -186,7 +186,7 @@ def _model(manifest: Manifest) -> str:
     ranges = [f"{name} {low:g} to {high:g}" for name, (low, high) in manifest.trained.items()]
     rows = [
         ("geometries", ", ".join(manifest.geometries)),
-        ("materials", ", ".join(manifest.materials)),
+        ("materials", ", ".join(manifest.looks)),
         ("transforms", ", ".join(manifest.transforms)),
         ("texture operations", ", ".join(manifest.material_ops)),
         ("measured for", "; ".join(ranges)),

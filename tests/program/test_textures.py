@@ -13,11 +13,13 @@ from hypothesis import strategies as st
 import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.elements.zoo import Zoo
+from scenelang.graph.nodes import Graph
 from scenelang.interchange.dumps import dump, graph_data, program_data
 from scenelang.lifting.layout import LAYOUTS
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program, program_bytes
 from scenelang.program.reading import parse_program
+from scenelang.reference.image import reference_image
 from tests.elements.shapes import noise
 
 BARK, STONE, HIDE = noise(4, 6), noise(3, 3, name="stone", seed=1), noise(3, 3, 3, name="hide")
@@ -176,6 +178,29 @@ def test_textures_that_are_drawn_small(
     said = [d.message for d in found if d.code == "W0511"]
     value = f"a texture of {texels * repeats:.3g} texels to a pixel on `{geometry}` is outside"
     assert [message.startswith(value) for message in said] == [True] * (repeats > 1)
+
+
+@pytest.mark.parametrize("geometries", [("square", "star"), ("sphere", "torus")])
+def test_passes_keep_the_exact_picture(geometries: tuple[str, str]) -> None:
+    moves = (
+        nsg.Rotate(angle=0.4),
+        nsg.Scale(0.7, -0.4),
+        nsg.Shear("yx", 0.5),
+        nsg.Translate(0.3, 0.1),
+        nsg.Flip(),
+    )
+    colours = nsg.Hue.degrees(50), nsg.Hue.degrees(90), nsg.Color((1, 0.5, 0.8)), nsg.Color((0.5, 1, 0.9))
+    ops = [op for pair in zip(moves, (*colours, nsg.Grayscale(0.3)), strict=True) for op in pair]
+    one, other = (nsg.Material(name, ops) for name in ("zoo.bark", "zoo.stone"))
+    below = nsg.Object(geometries[0], (nsg.Scale(0.8), nsg.Rotate(angle=0.2)), one)
+    above = nsg.Object(geometries[1], (nsg.Twirl(0.6), nsg.Scale(0.6)), other)
+    group = nsg.Group([below, above], nsg.Translate(0.1, 0.1))
+    graphs: dict[str, Graph] = {}
+    compile_scene(nsg.Scene(elements=ZOO, nodes=group, canvas=(24, 20)), after=graphs.__setitem__)
+    drawn = {name: np.asarray(reference_image(graph)) for name, graph in graphs.items()}
+    assert len(np.unique(drawn["lower"].reshape(-1, 3).round(3), axis=0)) > 50
+    for name, picture in drawn.items():
+        np.testing.assert_allclose(picture, drawn["lower"], atol=2e-6, err_msg=name)
 
 
 def test_dumps_tell_of_textures() -> None:

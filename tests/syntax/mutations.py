@@ -129,7 +129,7 @@ def scenes() -> tuple[Scene, ...]:
 @cache
 def models() -> tuple[Manifest, ...]:
     """The shipped model, and one in space that some scenes name."""
-    return load_manifest("shapes2d"), SOLIDS
+    return load_manifest("shapes2d"), load_manifest("textures2d"), SOLIDS
 
 
 # ---------------------------------------------------------------- making slips

@@ -15,6 +15,7 @@ from tests.syntax.reading import MALFORMED, apply, expected, mistakes, read
 ONE_LINERS: list[tuple[str, list[tuple[int, str]]]] = [
     ("let a = 1", [(10, "E0102")]),
     ("scale(0.8) translate(1, 2);", [(11, "E0102")]),
+    ("let mist = material flat\nstar { mist; }", [(25, "E0102")]),  # no texture of another line
     ("translate(-0.2, 0; scale(2);", [(18, "E0103")]),
     ("translate(sin(cos(0.5);", [(23, "E0103")]),
     ("fn f(p = abs(sin(p));", [(7, "E0103")]),

@@ -242,18 +242,19 @@ class Search:
         return any(self.kinds[at] == tables().literals[word] for word in words)
 
     def _begins_statement(self, at: int) -> bool:
-        """Whether a line inside brackets is laid out like a statement of its own."""
+        """Whether a line inside brackets or after ``material flat`` is laid out like a statement of its own."""
         if not self.tokens.on_new_line(at):
             return False
-        inside = self._is(at - 1, "let", "param", "fn", "module") or self.open_brackets(at)
-        return bool(inside) and self.kinds[at] in (self.name, *self.keywords) and leaves_open(self.kinds, at)
+        inside = self._is(at - 1, "let", "param", "fn", "module") or self._is(at - 2, "material")
+        inside = inside or bool(self.open_brackets(at))
+        return inside and self.kinds[at] in (self.name, *self.keywords) and leaves_open(self.kinds, at)
 
     def _broken_off(self, stack: list[int], at: int, cost: float = _BREAK) -> Iterator[Repair]:
         """The line before a token breaks off in the middle of a statement."""
         opening, closing = (tables().literals[text] for text in "{}")
         for goal, rest in ((self.semicolon, ()), (opening, (closing,))):
             missing = completion(stack, goal)
-            if missing:
+            if missing or (missing is not None and goal == self.semicolon):
                 yield Repair(at, 0, (*missing, goal, *rest), cost + 0.05 * len(missing))
 
     def _closings(self, at: int) -> Iterator[Repair]:
