@@ -242,7 +242,7 @@ class Search:
         return any(self.kinds[at] == tables().literals[word] for word in words)
 
     def _begins_statement(self, at: int) -> bool:
-        """Whether a line inside brackets or after ``material flat`` is laid out like a statement of its own."""
+        """Whether a line in brackets, or after ``material flat``, is laid out like a statement of its own."""
         if not self.tokens.on_new_line(at):
             return False
         inside = self._is(at - 1, "let", "param", "fn", "module") or self._is(at - 2, "material")
