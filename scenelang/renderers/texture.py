@@ -101,12 +101,9 @@ def turned(xp: Arrays, rgb: Array, turns: float) -> Array:
     r, g, b = rgb
     value, least = xp.maximum(xp.maximum(r, g), b), xp.minimum(xp.minimum(r, g), b)
     chroma = value - least
-    sixth = chroma.clip(1e-12)  # of grey, which has no hue, 0 of it is taken
-    of_red, of_green, of_blue = (g - b) / sixth, (b - r) / sixth + 2.0, (r - g) / sixth + 4.0
-    hue = xp.select(value == r, of_red, xp.select(value == g, of_green, of_blue)) + (turns % 1.0) * 6.0
-    channels = []
-    for start in (5.0, 3.0, 1.0):
-        k = (hue + start) / 6.0
-        k = (k - xp.floor(k)) * 6.0
-        channels.append(value - chroma * xp.minimum(k, 4.0 - k).clip(0.0, 1.0))
-    return xp.stack(channels, 0)
+    sixth = 1.0 / chroma.clip(1e-12)  # of grey, which has no hue, 0 of it is taken
+    of_green, of_blue = (b - r) * sixth + 2.0, (r - g) * sixth + 4.0
+    hue = xp.select(value == r, (g - b) * sixth, xp.select(value == g, of_green, of_blue)) / 6.0 + turns % 1.0
+    hue = (hue - xp.floor(hue)) * 6.0
+    shares = abs(hue - 3.0) - 1.0, 2.0 - abs(hue - 2.0), 2.0 - abs(hue - 4.0)
+    return xp.stack([least + chroma * share.clip(0.0, 1.0) for share in shares], 0)
