@@ -51,6 +51,7 @@ SOLIDS = {
     "wide": "a canvas of 5 to 3",
     "staged": "random camera, light, ground and sky",
     "mixed": "1 to 4, deformed, booleans, on a random stage",
+    "meshes3d": "1 to 4 of bunny, teapot and monkey, diffuse; scaled, turned and moved in random order",
 }
 
 
