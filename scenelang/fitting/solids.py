@@ -20,9 +20,7 @@ from scenelang.fitting.mesh import MOST_TRIANGLES, FitError, Mesh, Points, Sign,
 
 MOST_OF: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
 _MOST_BESIDE: Final = 1 << 26  # bytes of a file that one names
-_UNDERSTOOD: Final = re.compile(
-    r"KHR_(materials|lights|mesh_quantization|animation|node|xmp)|EXT_texture_webp"
-)
+_UNDERSTOOD: Final = re.compile("KHR_(materials|lights|node|xmp)|EXT_texture_webp")
 _IGNORED: Final = ("animations", "cameras", "skins")
 
 
@@ -109,6 +107,8 @@ def _notes(data: bytes) -> list[str]:
         notes.append("points, lines and fans left out")
     if "KHR_lights_punctual" in header.get("extensions", {}):
         notes.append("lights left out")
+    if "KHR_texture_transform" in header.get("extensionsUsed", ()):
+        notes.append("moves of textures left out")
     if len(header.get("scenes", ())) > 1:
         notes.append(f"{len(header['scenes'])} scenes, of which it takes number {header.get('scene', 0) + 1}")
     return notes

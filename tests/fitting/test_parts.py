@@ -165,6 +165,7 @@ def changed(data: bytes, change: dict[str, Any]) -> bytes:
     [
         ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "compressed.*KHR_draco_mesh_compression"),
         ({"extensionsRequired": ["EXT_meshopt_compression"]}, "EXT_meshopt_compression; export it without"),
+        ({"extensionsRequired": ["KHR_mesh_quantization"]}, "KHR_mesh_quantization"),
     ],
 )
 def test_what_of_gltf_is_not_read(car: bytes, change: dict[str, Any], words: str) -> None:
@@ -179,6 +180,7 @@ def test_what_of_gltf_is_not_read(car: bytes, change: dict[str, Any], words: str
         ({"cameras": [{"type": "perspective"}]}, "cameras left out"),
         ({"extensions": {"KHR_lights_punctual": {"lights": []}}}, "lights left out"),
         ({"extensionsRequired": ["KHR_materials_unlit"]}, None),
+        ({"extensionsUsed": ["KHR_texture_transform"]}, "moves of textures left out"),
     ],
 )
 def test_what_of_gltf_is_left_out(car: bytes, change: dict[str, Any], note: str | None) -> None:
