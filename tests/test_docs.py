@@ -199,7 +199,8 @@ def test_every_picture_is_made_and_used() -> None:
 
 def test_every_example_is_shown() -> None:
     page = (ROOT / "docs/examples.md").read_text("utf-8")
-    for path in (ROOT / "examples").glob("*.*"):
+    files = (ROOT / "examples").glob("*.*")
+    for path in (file for file in files if file.suffix != ".safetensors"):  # what scenes import
         assert f"(../examples/{path.name})" in page, path.name
 
 
