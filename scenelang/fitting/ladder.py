@@ -28,6 +28,7 @@ BAND: Final = 4.5  # cells from the surface within which distances are true; far
 SAMPLES: Final = 20_000  # points of the surface where an element is measured
 SETTLED: Final = {2: 0, 3: 200_000}  # and where it is settled, by dimension
 BLOCK: Final = 100_000  # points that are asked for at a time
+THIN: Final = 0.02  # share of a surface that may be too thin for a grid
 NEAR: Final = {2: 1e-4, 3: 3e-4}  # mean distance off that is near enough, by dimension
 
 
@@ -46,6 +47,10 @@ class Shape(Protocol):
     def size(self) -> float:
         """Radius of the ball there."""
 
+    @property
+    def beside(self) -> float:
+        """How far below its surface it has an inside."""
+
     def distances(self, p: Points) -> Points:
         """Signed distances (M,) of points (M, d), negative inside."""
 
@@ -61,6 +66,7 @@ class Rung(NamedTuple):
         error: mean distance off at the surface, in leaf units.
         worst: what one point of a hundred exceeds.
         normal_deg: median angle between normals.
+        thin: share of the surface below which the grid has no inside.
     """
 
     side: int
@@ -68,6 +74,7 @@ class Rung(NamedTuple):
     error: float
     worst: float
     normal_deg: float
+    thin: float
 
 
 @dataclass(slots=True)
@@ -140,7 +147,7 @@ def fit(
     points, normals = shape.surface(SAMPLES + SETTLED[shape.dimension])
     others, points, normals = points[SAMPLES:], points[:SAMPLES], normals[:SAMPLES]
     growing = [_Pyramid(cells) for cells in CELLS]
-    best: tuple[float, Element] | None = None
+    best: tuple[Rung, Element] | None = None
     tried: list[Rung] = []
     ended = "steps"
     while best is None or (
@@ -154,23 +161,34 @@ def fit(
         if pyramid.next_side // 2 + 1 < FEWEST[shape.dimension]:
             continue
         element = pyramid.element(name, others)
-        rung = measured(element, points, normals)
+        rung = measured(element, points, normals, shape.beside)
         tried.append(rung)
         report(rung)
-        if best is None or rung.error < best[0]:
-            best = rung.error, element
+        if best is None or rung.error < best[0].error:
+            best = rung, element
         if rung.error <= (max_error or NEAR[shape.dimension]):
             ended = "near enough"
             break
     assert best is not None
-    error, kept = best
-    said = {**(about or {}), "error": error, "steps": len(tried), "ended": ended, "size": shape.size}
+    rung, kept = best
+    said = {
+        **(about or {}),
+        "error": rung.error,
+        "thin": rung.thin,
+        "steps": len(tried),
+        "ended": ended,
+        "size": shape.size,
+    }
     said |= dict(zip("xyz", shape.centre, strict=False))
     return replace(kept, about=said), tried
 
 
-def measured(element: Element, points: Points, normals: Points) -> Rung:
-    """How far an element is off at points (M, 3) of the true surface and their normals."""
+def measured(element: Element, points: Points, normals: Points, beside: float) -> Rung:
+    """How far an element is off at points (M, d) of the true surface and their normals.
+
+    Args:
+        beside: leaf units below these points where the true shape has an inside.
+    """
     grid = unpacked(element)
     drawn = GridShape(NUMPY, grid.reshape(-1), len(grid), grid.ndim)
     off, *slope = drawn.field(np.ascontiguousarray(points.T, np.float32), gradient=True)
@@ -178,6 +196,6 @@ def measured(element: Element, points: Points, normals: Points) -> Rung:
     facing = np.clip((np.array(slope) * normals.T).sum(0) / length, -1, 1)
     away = abs(off)
     angle = float(np.degrees(np.median(np.arccos(facing))))
-    return Rung(
-        element.sides[-1], len(element.data), float(away.mean()), float(np.quantile(away, 0.99)), angle
-    )
+    below = drawn.distance(np.ascontiguousarray((points - beside * normals).T, np.float32))
+    worst, thin = float(np.quantile(away, 0.99)), float((below > 0).mean())
+    return Rung(element.sides[-1], len(element.data), float(away.mean()), worst, angle, thin)

@@ -14,7 +14,7 @@ from scenelang.elements.element import TEXELS, Element
 from scenelang.elements.zoo import is_said, zoo_bytes
 from scenelang.fitting import drawing, parts, picture, solids
 from scenelang.fitting.colours import fit_colours
-from scenelang.fitting.ladder import NEAR, Rung, Shape, fit
+from scenelang.fitting.ladder import NEAR, THIN, Rung, Shape, fit
 from scenelang.fitting.mesh import FitError, Mesh, Sign
 
 MOST_OF: Final = {**solids.MOST_OF, **drawing.MOST_OF, **picture.MOST_OF}
@@ -145,6 +145,8 @@ def _shape(
     )
     off = float(element.about["error"])
     short = "" if off <= asked else f", where {asked:g} was asked"
+    if (thin := float(element.about["thin"])) > THIN:
+        short += f", {100 * thin:.0f} % of the surface too thin for the grid"
     shown = f"{element.sides[-1]} distances a side, {len(element.data):,} bytes, error {off:.5f}{short}"
     tell("say", f"{name}: {shown}; {len(tried)} grids tried")
     return element

@@ -50,6 +50,7 @@ class Mesh:
     notes: tuple[str, ...] = ()
     look: Look | None = None
     dimension: ClassVar[int] = 3
+    beside: ClassVar[float] = _BESIDE
 
     @cached_property
     def _trees(self) -> tuple[Any, Any]:
@@ -202,7 +203,7 @@ def mesh_of(
         mesh.invert()
         look = look and replace(look, tint=look.tint[:, ::-1], uv=look.uv[:, ::-1])
     told = "normals" if by_normals else "winding numbers"
-    kind = "closed" if closed else "not closed"
+    kind = "closed" if closed else "not closed, filled where the winding number is over a half"
     notes = [f"{len(mesh.faces):,} triangles", kind, *notes, f"inside by {told}"]
     return Mesh(
         np.ascontiguousarray(mesh.vertices, float),

@@ -81,6 +81,7 @@ class Outline:
     """
 
     dimension = 2
+    beside = _BESIDE
 
     def __init__(self, layers: list[Layer], notes: tuple[str, ...] = ()) -> None:
         from scipy.spatial import cKDTree

@@ -22,9 +22,9 @@ def ring() -> Mesh:
 
 def test_errors_are_those_of_the_shape(ring: Mesh) -> None:
     """A true torus lies as far from the mesh of one as chords lie from arcs."""
-    rung = measured(element(torus, levels=5), *ring.surface(5000))
+    rung = measured(element(torus, levels=5), *ring.surface(5000), ring.beside)
     assert 0.0001 < rung.error < 0.0006
-    larger = measured(element(lambda *p: torus(*p) - 0.01, levels=5), *ring.surface(5000))
+    larger = measured(element(lambda *p: torus(*p) - 0.01, levels=5), *ring.surface(5000), ring.beside)
     assert larger.error == pytest.approx(0.01, abs=0.001)
 
 
@@ -41,3 +41,12 @@ def test_the_same_steps_give_the_same_bytes(ring: Mesh) -> None:
     made = [fit(ring, "ring", max_error=1e-9, steps=3, budget_s=b)[0] for b in (1e-9, 1e9)]
     assert made[0].data == made[1].data
     assert made[0].about["steps"] == 3
+
+
+def test_what_is_too_thin_is_told() -> None:
+    """A plate thinner than a cell of a grid is not in it, however near to its faces the grid's surface is."""
+    plate = trimesh.creation.box((1.6, 1.0, 0.03))
+    mesh = mesh_of(np.asarray(plate.vertices), np.asarray(plate.faces, np.int64))
+    tried = [rung.thin for rung in fit(mesh, "plate", max_error=1e-9, steps=6)[1]]
+    assert tried[0] > 0.3
+    assert tried[-1] < 0.05
