@@ -50,7 +50,7 @@ def test_completion_of_members_paths_models_and_units(client: Client, uri: str) 
     client.replace(uri, SCENE + 'let a = lib.;\nimport "" as b;\nmodel "";\nlet c = 30d;\nlib.;\n')
     assert labels(client, client.at(uri, "lib.;", 4)) == ["dot", "twice", "unit"]
     assert labels(client, client.at(uri, "lib.;", 4, 1)) == ["dot", "unit"]
-    assert labels(client, client.at(uri, 'import "" as', 8)) == ["std/shapes", "lib.nsg"]
+    assert labels(client, client.at(uri, 'import "" as', 8)) == ["std/meshes", "std/shapes", "lib.nsg"]
     assert labels(client, client.at(uri, 'model ""', 7)) == available()
     assert labels(client, client.at(uri, "30d;", 3)) == ["30deg"]
 

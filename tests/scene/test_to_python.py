@@ -52,14 +52,15 @@ def test_repr_is_code(scene: nsg.Scene) -> None:
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_every_way_gives_the_same_program(path: Path) -> None:
+def test_every_way_gives_the_same_program(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(path.parent)  # where files of elements are looked for
     scene = nsg.load(path)
     program = program_bytes(nsg.compile(scene))
     ways = (
         run(scene.to_python()),
-        nsg.Scene.from_json(scene.to_json()),
-        nsg.Scene.from_json(to_readable_json(scene)),
-        nsg.loads(scene.to_nsg()),
+        nsg.Scene.from_json(scene.to_json(), root="."),
+        nsg.Scene.from_json(to_readable_json(scene), root="."),
+        nsg.loads(scene.to_nsg(), root="."),
     )
     for way in ways:
         assert way == scene
