@@ -28,6 +28,8 @@ BAND: Final = 4.5  # cells from the surface within which distances are true; far
 SAMPLES: Final = 20_000  # points of the surface where an element is measured
 SETTLED: Final = {2: 0, 3: 200_000}  # and where it is settled, by dimension
 BLOCK: Final = 100_000  # points that are asked for at a time
+LONG_S: Final = 240.0  # of processor time, into which the grids of a shape fit unless a budget is larger
+DEARER: Final = 4.0  # at most, a grid than the one before
 THIN: Final = 0.02  # share of a surface that may be too thin for a grid
 NEAR: Final = {2: 1e-4, 3: 3e-4}  # mean distance off that is near enough, by dimension
 
@@ -134,7 +136,8 @@ def fit(
 
     Args:
         max_error: in leaf units; `NEAR` if left out.
-        budget_s: no further pyramid is begun after so many seconds; one is tried in any case.
+        budget_s: no further pyramid is begun after so many seconds; one is tried in any case. Nor is one,
+            without ``steps``, that may end after `LONG_S` of processor time.
         steps: how many are tried at most, whatever the time; the same number gives the same bytes.
         about: what the element says of itself, beside its figures.
         report: called with each that was tried.
@@ -143,7 +146,8 @@ def fit(
     Raises:
         FitError: the shape encloses nothing.
     """
-    started = time.monotonic()
+    started, worked, spent = time.monotonic(), time.process_time(), 0.0
+    finite_s = budget_s if budget_s < np.inf else 0.0
     points, normals = shape.surface(SAMPLES + SETTLED[shape.dimension])
     others, points, normals = points[SAMPLES:], points[:SAMPLES], normals[:SAMPLES]
     growing = [_Pyramid(cells) for cells in CELLS]
@@ -156,6 +160,10 @@ def fit(
         pyramid = min(growing, key=lambda p: p.next_side)
         if pyramid.next_side > MOST_SIDE[shape.dimension]:
             ended = "largest grid"
+            break
+        spent, before = time.process_time() - worked, spent
+        if tried and steps is None and spent + DEARER * (spent - before) > max(LONG_S, finite_s):
+            ended = "time"
             break
         pyramid.grow(shape, progress)
         if pyramid.next_side // 2 + 1 < FEWEST[shape.dimension]:

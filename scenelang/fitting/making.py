@@ -74,8 +74,9 @@ class Wish:
 
     def made(self, element: Element, about: dict[str, str | float]) -> bool:
         """Whether an element is what would be made again."""
-        said = element.about
-        ended = said.get("ended") != "steps" or said.get("steps") == self.steps
+        said, usual = element.about, self.steps is None and self.budget_s == math.inf
+        cut_short = {"steps": True, "time": not usual}.get(str(said.get("ended")), False)
+        ended = not cut_short or said.get("steps") == self.steps
         return ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
 
 
@@ -145,6 +146,8 @@ def _shape(
     )
     off = float(element.about["error"])
     short = "" if off <= asked else f", where {asked:g} was asked"
+    if element.about["ended"] == "time":
+        short += ", a finer grid would take minutes: --budget"
     if (thin := float(element.about["thin"])) > THIN:
         short += f", {100 * thin:.0f} % of the surface too thin for the grid"
     shown = f"{element.sides[-1]} distances a side, {len(element.data):,} bytes, error {off:.5f}{short}"

@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip("igl")
 trimesh = pytest.importorskip("trimesh")
 
+from scenelang.fitting import ladder  # noqa: E402
 from scenelang.fitting.ladder import fit, measured  # noqa: E402
 from scenelang.fitting.mesh import Mesh, mesh_of  # noqa: E402
 from tests.elements.shapes import element, torus  # noqa: E402
@@ -50,3 +51,11 @@ def test_what_is_too_thin_is_told() -> None:
     tried = [rung.thin for rung in fit(mesh, "plate", max_error=1e-9, steps=6)[1]]
     assert tried[0] > 0.3
     assert tried[-1] < 0.05
+
+
+def test_what_would_take_too_long_is_not_begun(ring: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was reached till then is kept; steps that are asked for are tried all the same."""
+    monkeypatch.setattr(ladder, "LONG_S", 0.0)
+    ended = [fit(ring, "ring", max_error=1e-9, **asked) for asked in ({}, {"steps": 2})]
+    assert [element.about["ended"] for element, _ in ended] == ["time", "steps"]
+    assert len(ended[0][1]) == 1
