@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scenelang.elements.colours import Grid, packed, unpacked
 from scenelang.elements.element import Element
 from scenelang.fitting.mesh import Mesh
+from scenelang.fitting.settle import corners
 
 SIDES: Final = (17, 25, 33, 49, 65, 97, 129, 193)  # nodes along an axis, the last where an error is asked
 NEAR: Final = 0.025  # root mean square of channels off, 0 to 1, that is near enough
@@ -84,13 +85,7 @@ def _weights(points: npt.NDArray[np.float64], side: int) -> Any:
     """What each node (n³) of a grid counts at points (M, 3) between them: a sparse matrix (M, n³)."""
     from scipy.sparse import csr_matrix
 
-    place = (points + 1) / 2 * (side - 1)
-    low = place.astype(np.int64).clip(0, side - 2)
-    share = place - low
-    columns, values = [], []
-    for corner in np.ndindex(2, 2, 2):
-        columns.append(np.ravel_multi_index(tuple((low + corner).T), (side,) * 3))
-        values.append(np.where(corner, share, 1 - share).prod(1))
+    columns, values = zip(*corners(points, side), strict=True)
     start = np.arange(0, 8 * len(points) + 1, 8)
     found = np.stack(values, 1).astype(np.float32).ravel(), np.stack(columns, 1).ravel(), start
     return csr_matrix(found, shape=(len(points), side**3))
@@ -102,10 +97,8 @@ def _grid(mesh: Mesh, side: int) -> tuple[Grid, npt.NDArray[np.bool_]]:
 
     assert mesh.look is not None
     near = np.zeros((side,) * 3, bool)
-    place = (mesh.points(*mesh.spread(_COVER * side * side, 2)) + 1) / 2 * (side - 1)
-    low = place.astype(np.int64).clip(0, side - 2)
-    for corner in np.ndindex(2, 2, 2):
-        near[tuple((low + corner).T)] = True
+    for node, _ in corners(mesh.points(*mesh.spread(_COVER * side * side, 2)), side):
+        near.reshape(-1)[node] = True
     nodes = np.argwhere(near)
     colours = mesh.look.at(*mesh.touched(nodes * np.float64(2 / (side - 1)) - 1)).astype(np.float32)
     at, share = mesh.spread(_EACH * len(nodes), 3)

@@ -147,7 +147,7 @@ def fit(
         FitError: the shape encloses nothing.
     """
     started, worked, spent = time.monotonic(), time.process_time(), 0.0
-    finite_s = budget_s if budget_s < np.inf else 0.0
+    long_s = max(LONG_S, budget_s) if budget_s < np.inf else LONG_S
     points, normals = shape.surface(SAMPLES + SETTLED[shape.dimension])
     others, points, normals = points[SAMPLES:], points[:SAMPLES], normals[:SAMPLES]
     growing = [_Pyramid(cells) for cells in CELLS]
@@ -162,7 +162,7 @@ def fit(
             ended = "largest grid"
             break
         spent, before = time.process_time() - worked, spent
-        if tried and steps is None and spent + DEARER * (spent - before) > max(LONG_S, finite_s):
+        if tried and steps is None and spent + DEARER * (spent - before) > long_s:
             ended = "time"
             break
         pyramid.grow(shape, progress)

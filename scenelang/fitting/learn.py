@@ -15,6 +15,7 @@ from scenelang.files import NotWritten, output_place, read_regular, write_output
 from scenelang.fitting.apart import CPU_S, Apart, Hear
 from scenelang.fitting.making import MOST_OF, Wish
 from scenelang.fitting.mesh import FitError
+from scenelang.fitting.parts import said
 from scenelang.tensors import TensorError
 
 Progress = Callable[[str, float, float], None]
@@ -90,7 +91,7 @@ def names_of(files: Sequence[str | os.PathLike[str]], wish: Wish, name: str | No
 
 def _word(stem: str) -> str:
     """A file's name as an element's."""
-    word = "".join(c if c.isascii() and c.isalnum() else "_" for c in stem).strip("_")
+    word = said(stem)
     return f"_{word}" if word[:1].isdigit() else word
 
 

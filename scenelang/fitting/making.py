@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 from scenelang.elements.element import TEXELS, Element
 from scenelang.elements.zoo import is_said, zoo_bytes
@@ -74,13 +74,35 @@ class Wish:
 
     def made(self, element: Element, about: dict[str, str | float]) -> bool:
         """Whether an element is what would be made again."""
-        said, usual = element.about, self.steps is None and self.budget_s == math.inf
-        cut_short = {"steps": True, "time": not usual}.get(str(said.get("ended")), False)
+        said = element.about
+        usual = self.steps is None and self.budget_s == math.inf
+        cut_short = said.get("ended") == "steps" or (said.get("ended") == "time" and not usual)
         ended = not cut_short or said.get("steps") == self.steps
         return ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
 
 
 ASKED: Final = frozenset(("license", "source", "sign", "max_error", "texels", "color_error", "parts"))
+
+
+class _Job(NamedTuple):
+    """What is asked of an element, and when its file's time ends."""
+
+    wish: Wish
+    about: dict[str, str | float]
+    end_s: float
+    tell: Callable[..., None]
+
+    def say(self, line: str) -> None:
+        self.tell("say", line)
+
+    @property
+    def terms(self) -> dict[str, Any]:
+        """As what fits takes them."""
+        return {
+            "budget_s": self.end_s - time.monotonic(),
+            "steps": self.wish.steps,
+            "about": self.about,
+        }
 
 
 def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> bytes:
@@ -94,55 +116,45 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
         FitError: nothing does.
     """
     wish, suffix, name = Wish(**request["wish"]), request["suffix"], request["name"]
-    about, end_s = request["about"], time.monotonic() + wish.budget_s
+    job = _Job(wish, request["about"], time.monotonic() + wish.budget_s, tell)
     if wish.paints(suffix):
-        return zoo_bytes([_texture(data, name, wish, about, end_s, tell)])
+        return zoo_bytes([_texture(data, name, job)])
     brought = parts.brought(data, suffix, name, Path(request["folder"]), wish.sign, wish.parts)
-    tell("say", f"{name}: {', '.join(brought.notes)}")
+    job.say(f"{name}: {', '.join(brought.notes)}")
     group, made = list(brought.group), []
     for called, shape in brought.shapes.items():
         part = next((part for part in group if part.geometry == called), None)
-        own = about | ({"part": brought.numbers[called]} if called in brought.numbers else {})
+        number = {"part": brought.numbers[called]} if called in brought.numbers else {}
+        own = job._replace(about=job.about | number)
         try:
-            made.append(_shape(shape, called, 1.0 if part is None else part.size, wish, own, end_s, tell))
+            made.append(_shape(shape, called, 1.0 if part is None else part.size, own))
             if part is not None and part.material and isinstance(shape, Mesh):
-                made.append(_colours(shape, called, wish, own, end_s, tell))
+                made.append(_colours(shape, called, own))
         except FitError as error:
             if called == name:
                 raise
-            tell("say", f"{called}: left out: {error}")
+            job.say(f"{called}: left out: {error}")
             group = [part for part in group if part.geometry != called]
     return zoo_bytes(made, {name: tuple(group)} if group else {})
 
 
-def _shape(
-    shape: Shape,
-    name: str,
-    size: float,
-    wish: Wish,
-    about: dict[str, str | float],
-    end_s: float,
-    tell: Callable[..., None],
-) -> Element:
+def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
     """The element of a mesh or an outline; one that is small in the whole may be off by more of its size."""
 
     def report(rung: Rung) -> None:
-        tell(
-            "say",
+        job.say(
             f"  {rung.side:>4} a side {rung.bytes:>8,} bytes  error {rung.error:.5f}  "
             f"1 in 100 {rung.worst:.4f}  normals {rung.normal_deg:.1f}°",
         )
 
-    asked = (wish.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
+    asked = (job.wish.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
     element, tried = fit(
         shape,
         name,
         max_error=asked,
-        budget_s=end_s - time.monotonic(),
-        steps=wish.steps,
-        about=about,
         report=report,
-        progress=lambda side, share: tell("progress", f"{name}, {side} a side", share, 1.0),
+        progress=lambda side, share: job.tell("progress", f"{name}, {side} a side", share, 1.0),
+        **job.terms,
     )
     off = float(element.about["error"])
     short = "" if off <= asked else f", where {asked:g} was asked"
@@ -151,58 +163,38 @@ def _shape(
     if (thin := float(element.about["thin"])) > THIN:
         short += f", {100 * thin:.0f} % of the surface too thin for the grid"
     shown = f"{element.sides[-1]} distances a side, {len(element.data):,} bytes, error {off:.5f}{short}"
-    tell("say", f"{name}: {shown}; {len(tried)} grids tried")
+    job.say(f"{name}: {shown}; {len(tried)} grids tried")
     return element
 
 
-def _colours(
-    shape: Mesh,
-    name: str,
-    wish: Wish,
-    about: dict[str, str | float],
-    end_s: float,
-    tell: Callable[..., None],
-) -> Element:
+def _colours(shape: Mesh, name: str, job: _Job) -> Element:
     """The material of a mesh."""
     element = fit_colours(
         shape,
         name,
-        max_error=wish.color_error,
-        budget_s=end_s - time.monotonic(),
-        steps=wish.steps,
-        about=about,
-        report=lambda tried: tell(
-            "say", f"  {tried.side:>4} a side {tried.bytes:>8,} bytes  colours off by {tried.error:.4f}"
+        max_error=job.wish.color_error,
+        report=lambda tried: job.say(
+            f"  {tried.side:>4} a side {tried.bytes:>8,} bytes  colours off by {tried.error:.4f}"
         ),
+        **job.terms,
     )
     shown = f"{element.sides[-1]} colours a side, {len(element.data):,} bytes"
-    tell("say", f"{name}: {shown}, off by {element.about['error']:.4f}")
+    job.say(f"{name}: {shown}, off by {element.about['error']:.4f}")
     return element
 
 
-def _texture(
-    data: bytes,
-    name: str,
-    wish: Wish,
-    about: dict[str, str | float],
-    end_s: float,
-    tell: Callable[..., None],
-) -> Element:
+def _texture(data: bytes, name: str, job: _Job) -> Element:
     """The element of a picture."""
-    found = picture.read_picture(data, wish.texels)
-    tell("say", f"{name}: {', '.join(found.notes)}")
+    found = picture.read_picture(data, job.wish.texels)
+    job.say(f"{name}: {', '.join(found.notes)}")
     element, tried = picture.fit_picture(
         found,
         name,
-        max_error=wish.max_error,
-        budget_s=end_s - time.monotonic(),
-        steps=wish.steps,
-        about=about,
-        report=lambda coded: tell(
-            "say", f"  {coded.form:>12} {coded.bytes:>8,} bytes  error {coded.error:.4f}"
-        ),
+        max_error=job.wish.max_error,
+        report=lambda coded: job.say(f"  {coded.form:>12} {coded.bytes:>8,} bytes  error {coded.error:.4f}"),
+        **job.terms,
     )
     height, width = element.sizes
     shown = f"{width} × {height} texels, {len(element.data):,} bytes, error {element.about['error']:.4f}"
-    tell("say", f"{name}: {shown}; {len(tried)} forms tried")
+    job.say(f"{name}: {shown}; {len(tried)} forms tried")
     return element

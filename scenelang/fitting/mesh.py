@@ -6,7 +6,7 @@ is refused here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -124,13 +124,28 @@ class Mesh:
         normals = np.cross(b - a, c - a)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         points = self.points(at, share)
-        sides = [self.distances(points + way * _BESIDE * normals) < 0 for way in (1, -1)]
-        outer = sides[0] != sides[1]
-        if outer.mean() < _ENCLOSED:
-            open_ = f"{100 * (1 - outer.mean()):.0f} % of the surface has no inside"
+        found, out = outer(self.distances, points, normals, _BESIDE)
+        enclosed = len(found) / len(points)
+        if enclosed < _ENCLOSED:
+            open_ = f"{100 * (1 - enclosed):.0f} % of the surface has no inside"
             raise FitError(f"{open_} {_BESIDE:g} radii below it: it encloses no solid")
-        turned = np.where(sides[0], -1.0, 1.0)[:, None]
-        return points[outer], (normals * turned)[outer]
+        return found, out
+
+
+def outer(
+    distances: Callable[[Points], Points], points: Points, normals: Points, beside: float
+) -> tuple[Points, Points]:
+    """Of points of surfaces (M, d) those with an inside on one side alone (K, d), and outward normals.
+
+    Args:
+        distances: signed, of points.
+        normals: (M, d), to either side.
+        beside: how far from a surface its sides are asked.
+    """
+    sides = [distances(points + way * beside * normals) < 0 for way in (1, -1)]
+    chosen = sides[0] != sides[1]
+    turned = np.where(sides[0], -1.0, 1.0)[:, None]
+    return points[chosen], (normals * turned)[chosen]
 
 
 def _once(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.elements.groups import Painted
-from scenelang.fitting.mesh import FitError, Points
+from scenelang.fitting.mesh import FitError, Points, outer
 from scenelang.fitting.picture import opened
 
 MOST_EDGES: Final = 200_000
@@ -163,13 +163,10 @@ class Outline:
                 normals.append(side * way)
         all_points, all_normals = np.concatenate(points), np.concatenate(normals)
         chosen = random.choice(len(all_points), min(count, len(all_points)), replace=False)
-        at, way = all_points[chosen], all_normals[chosen]
-        sides_in = [self.distances(at + sign * _BESIDE * way) < 0 for sign in (1, -1)]
-        outer = sides_in[0] != sides_in[1]
-        if not outer.any():
+        found, out = outer(self.distances, all_points[chosen], all_normals[chosen], _BESIDE)
+        if not len(found):
             raise FitError(f"it is nowhere thicker than {_BESIDE:g} of its radius")
-        turned = np.where(sides_in[0], -1.0, 1.0)[:, None]
-        return at[outer], (way * turned)[outer]
+        return found, out
 
 
 def _moved(inside: Inside, middle: Points, size: float) -> Inside:

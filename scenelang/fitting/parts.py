@@ -78,9 +78,14 @@ def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
     raise FitError(f"it has no part {number}")
 
 
+def said(text: str) -> str:
+    """A text as part of a name that scenes can say: letters, digits and _ between them."""
+    return "".join(c if c.isascii() and c.isalnum() else "_" for c in text).strip("_")
+
+
 def named(word: str, taken: set[str]) -> str:
     """A name as scenes can say it, and not taken."""
-    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in word).strip("_")
+    name = said(word)
     found, count = name, 1
     while found in taken:
         count += 1

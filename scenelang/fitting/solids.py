@@ -141,7 +141,7 @@ def _beside(folder: Path | None) -> Any:
             return self
 
         def write(self, name: str, data: Any) -> None:
-            raise NotImplementedError
+            raise PermissionError(f"`{name}` is only read")
 
     return Beside()
 
