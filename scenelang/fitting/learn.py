@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 from scenelang.elements.element import Element
-from scenelang.elements.groups import Group
 from scenelang.elements.zoo import MOST_BYTES, Zoo, read_zoo, zoo_bytes
 from scenelang.files import NotWritten, output_place, read_regular, write_output
 from scenelang.fitting.apart import CPU_S, Apart, Hear
@@ -47,17 +46,17 @@ def learn(
         ValueError: names that scenes cannot say, or twice the same.
     """
     names = names_of(files, wish, name)
-    _writable(out)
+    held = _writable(out)
     made: list[Element] = []
     troubles = []
     hear: dict[str, Hear] = {"say": say, "progress": progress}
     with Apart() as apart:
         for file, called in zip(map(Path, files), names, strict=True):
             try:
-                known = read_elements(out).get((called, wish.paints(file.suffix)))
+                known = _named(held).get((called, wish.paints(file.suffix)))
                 found = _learned(file, called, wish, known, apart, hear)
                 if isinstance(found, Zoo):
-                    add_elements(out, found.elements, {called: (), **found.groups})
+                    held = _added(out, held, found, called)
                 made += found.elements if isinstance(found, Zoo) else [found]
             except FitError as error:
                 troubles.append(f"{file}: {error}")
@@ -95,8 +94,8 @@ def _word(stem: str) -> str:
     return f"_{word}" if word[:1].isdigit() else word
 
 
-def _writable(out: str | os.PathLike[str]) -> None:
-    """Find out before the work whether its result has a place, and whether it is one."""
+def _writable(out: str | os.PathLike[str]) -> Zoo:
+    """What a file of elements holds; found out before the work, as is whether its result has a place."""
     place = output_place(out)
     for path, right in ((place.parent, os.W_OK | os.X_OK), (place, os.W_OK)):
         if path != place or place.exists():
@@ -104,21 +103,8 @@ def _writable(out: str | os.PathLike[str]) -> None:
                 raise NotWritten(errno.ENOENT, f"there is no folder `{path}`", os.fspath(out))
             if not os.access(path, right):
                 raise NotWritten(errno.EACCES, os.strerror(errno.EACCES), os.fspath(out))
-    read_elements(out)
-
-
-def read_elements(out: str | os.PathLike[str]) -> dict[tuple[str, bool], Element]:
-    """What a file of elements holds that is to be written again, by name and whether it is a material.
-
-    Raises:
-        OSError: it cannot be read, or is something else.
-    """
-    return _named(_read(out).elements)
-
-
-def _read(out: str | os.PathLike[str]) -> Zoo:
     try:
-        with open(out, "rb") as file:
+        with open(place, "rb") as file:
             return read_zoo(file.read(MOST_BYTES + 1))
     except FileNotFoundError:
         return Zoo.of(())
@@ -126,29 +112,25 @@ def _read(out: str | os.PathLike[str]) -> Zoo:
         raise NotWritten(errno.EINVAL, f"it is not a file of elements: {error}", os.fspath(out)) from None
 
 
-def _named(elements: Iterable[Element]) -> dict[tuple[str, bool], Element]:
-    return {(element.name, element.material): element for element in elements}
+def _named(zoo: Zoo) -> dict[tuple[str, bool], Element]:
+    """Elements by name and whether they are materials."""
+    return {(element.name, element.material): element for element in zoo.elements}
 
 
-def add_elements(
-    out: str | os.PathLike[str], made: Sequence[Element], groups: Mapping[str, Group] | None = None
-) -> None:
-    """Put elements into a file, in place of the geometries and materials of their names, whole or not at all.
-
-    Args:
-        groups: to put in too; one without parts is taken out.
+def _added(out: str | os.PathLike[str], held: Zoo, made: Zoo, name: str) -> Zoo:
+    """Write what was held and what was made of ``name``, in place of what has its names and of its group.
 
     Raises:
         OSError: it cannot be written, or would be more than can be read.
     """
-    held = _read(out)
-    kept = {name: group for name, group in {**held.groups, **(groups or {})}.items() if group}
-    data = zoo_bytes((_named(held.elements) | _named(made)).values(), kept)
+    groups = {other: group for other, group in held.groups.items() if other != name} | made.groups
+    data = zoo_bytes((_named(held) | _named(made)).values(), groups)
     try:
-        read_zoo(data)
+        zoo = read_zoo(data)
     except TensorError as error:
         raise NotWritten(errno.EFBIG, str(error), os.fspath(out)) from None
     write_output(out, data)
+    return zoo
 
 
 def _learned(
