@@ -67,16 +67,12 @@ class Look:
 
 def _looked_up(image: npt.NDArray[np.uint8], uv: Points) -> Points:
     """Texels, 0 to 1, bilinear between centres, repeated."""
-    size = np.array(image.shape[1::-1])
-    place = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) % 1.0 * size - 0.5
-    low = np.floor(place).astype(int)
-    share = place - low
-    found = np.zeros((len(uv), 3))
-    for dy, dx in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        column, row = ((low + np.array([dx, dy])) % size).T
-        weight = (share[:, 0] if dx else 1 - share[:, 0]) * (share[:, 1] if dy else 1 - share[:, 1])
-        found += image[row, column] * weight[:, None]
-    return found / 255
+    from scipy.ndimage import map_coordinates
+
+    place = np.stack([1 - uv[:, 1], uv[:, 0]]) % 1.0 * np.array([image.shape[:2]]).T - 0.5
+    channels = np.moveaxis(image, -1, 0)
+    found = [map_coordinates(c, place, np.float64, order=1, mode="grid-wrap") for c in channels]
+    return np.stack(found, 1) / 255
 
 
 def look_of(mesh: Any, linear: bool, textures: dict[int, npt.NDArray[np.uint8]]) -> Look | None:

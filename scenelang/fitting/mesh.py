@@ -104,13 +104,10 @@ class Mesh:
 
     def touched(self, p: Points) -> tuple[npt.NDArray[np.int64], Points]:
         """Triangles (M,) and barycentric shares (M, 3) of the points of the surface nearest to points."""
+        from trimesh.triangles import points_to_barycentric
+
         _, triangle, at = self._nearest(p)
-        a, b, c = self.vertices[self.triangles[triangle]].swapaxes(0, 1)
-        across = np.cross(b - a, c - a)
-        square = np.maximum((across * across).sum(1), 1e-300)
-        v = (np.cross(at - a, c - a) * across).sum(1) / square
-        w = (np.cross(b - a, at - a) * across).sum(1) / square
-        share = np.stack([1 - v - w, v, w], 1).clip(0, 1)
+        share = points_to_barycentric(self.vertices[self.triangles[triangle]], at, "cross").clip(0, 1)
         return triangle, share / share.sum(1, keepdims=True)
 
     def surface(self, count: int) -> tuple[Points, Points]:
@@ -150,13 +147,10 @@ def outer(
 
 def _once(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
     """Which of triangles (F, 3) are the first with their corners in their order round."""
-    first = triangles.argmin(1)[:, None]
-    turned = np.take_along_axis(triangles, (first + np.arange(3)) % 3, 1)
-    order = np.lexsort(turned.T)
-    same = (np.diff(turned[order], axis=0) == 0).all(1)
-    found = np.ones(len(triangles), bool)
-    found[order[1:][same]] = False
-    return found
+    from trimesh.grouping import unique_rows
+
+    turned = np.take_along_axis(triangles, (triangles.argmin(1)[:, None] + np.arange(3)) % 3, 1)
+    return np.isin(np.arange(len(triangles)), unique_rows(turned)[0])
 
 
 def _igl() -> Any:
@@ -178,7 +172,15 @@ def needed(name: str) -> Iterator[None]:
 def mesh_of(
     vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "auto", look: Look | None = None
 ) -> Mesh:
-    """The solid that triangles enclose, and what it looks like; as `scenelang.fitting.solids.read_mesh`."""
+    """The solid that triangles enclose, and what it looks like.
+
+    Args:
+        sign: what tells inside: ``winding`` numbers, which take any mesh, or normals, for ``closed`` ones
+            whose surface nowhere passes through itself; ``auto`` is ``winding``.
+
+    Raises:
+        FitError: it is empty, too large or damaged.
+    """
     with needed("trimesh"):
         import trimesh
     notes = []

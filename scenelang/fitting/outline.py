@@ -1,20 +1,20 @@
 """Outlines as flat shapes: read from drawings and pictures, put into the unit disc, and asked for distances.
 
-Needs svgelements, which reads drawings, and scipy. A shape is a union of layers: filled areas, and strokes as
-wide as they are drawn, with round joins and ends.
+Needs svgelements, which reads drawings, contourpy, which traces pictures, and scipy. A shape is a union of
+layers: filled areas, and strokes as wide as they are drawn, with round joins and ends.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from scenelang.elements.groups import Painted
-from scenelang.fitting.mesh import FitError, Points, outer
+from scenelang.fitting.mesh import FitError, Points, needed, outer
 from scenelang.fitting.picture import opened
 
 MOST_EDGES: Final = 200_000
@@ -201,31 +201,8 @@ def traced(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
     value = pixels[..., 3] if opaque else 1 - luma
     value = np.pad(value, 1)[::-1]  # y up, and nothing outside
     note = "its opaque part" if opaque else "its dark part"
-    edges = _contour(value)
+    with needed("contourpy"):
+        from contourpy import contour_generator
+    lines: Any = contour_generator(z=value).lines(0.5)
+    edges = np.concatenate([np.zeros((0, 2, 2)), *(np.stack([line[:-1], line[1:]], 1) for line in lines)])
     return [Layer(edges, winding(edges, odd=True))], (note,)
-
-
-def _contour(value: npt.NDArray[np.float64]) -> Edges:
-    """Where a picture is a half: one or two edges across each square of four pixels (marching squares)."""
-    up = value > 0.5
-    corners = np.stack([up[:-1, :-1], up[:-1, 1:], up[1:, 1:], up[1:, :-1]])
-    y, x = np.nonzero(corners.any(0) & ~corners.all(0))
-    held = np.stack([value[y, x], value[y, x + 1], value[y + 1, x + 1], value[y + 1, x]])
-    at = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
-    crossings = []
-    for k in range(4):
-        a, b = held[k], held[(k + 1) % 4]
-        crosses = (a > 0.5) != (b > 0.5)
-        share = np.where(crosses, (0.5 - a) / np.where(crosses, b - a, 1.0), np.nan)[:, None]
-        crossings.append(at[k] + share * (at[(k + 1) % 4] - at[k]) + np.stack([x, y], 1))
-    found = np.stack(crossings, 1)  # (cells, 4 sides, 2), nan where a side is not crossed
-    edges = []
-    count = np.isfinite(found[..., 0]).sum(1)
-    two = found[count == 2]
-    edges.append(two[np.isfinite(two[..., 0])].reshape(-1, 2, 2))
-    four = found[count == 4]
-    high = (held[0][count == 4] > 0.5) == (held.mean(0)[count == 4] > 0.5)  # which corners the middle joins
-    for joined in ((0, 1, 2, 3), (1, 2, 3, 0)):
-        part = four[high if joined[0] == 0 else ~high][:, list(joined)]
-        edges.append(part.reshape(-1, 2, 2))
-    return np.concatenate(edges)

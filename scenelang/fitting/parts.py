@@ -147,17 +147,18 @@ def _few(count: int) -> None:
 
 
 def _copy(first: Solid, other: Solid) -> tuple[float, Points, Points] | None:
-    """Size s, rotation or reflection R and shift t that make one solid another, s R p + t (Umeyama 1991)."""
+    """Size s, rotation or reflection R and shift t that make one solid another, s R p + t."""
+    from trimesh.registration import procrustes
+
     same = len(first.vertices) == len(other.vertices) and np.array_equal(first.triangles, other.triangles)
     if not same or not _alike(first.look, other.look):
         return None
-    middles = first.vertices.mean(0), other.vertices.mean(0)
-    p, q = first.vertices - middles[0], other.vertices - middles[1]
-    left, stretch, right = np.linalg.svd(p.T @ q)
-    turn, size = (left @ right).T, float(stretch.sum() / max(np.square(p).sum(), 1e-300))
-    if not abs(size * p @ turn.T - q).max() <= _ALIKE * abs(q).max():
+    matrix, moved, _ = procrustes(first.vertices, other.vertices)
+    reach = abs(other.vertices - other.vertices.mean(0)).max()
+    if not abs(moved - other.vertices).max() <= _ALIKE * reach:
         return None
-    return size, turn, middles[1] - size * turn @ middles[0]
+    size = float(np.linalg.norm(matrix[:3, 0]))
+    return size, matrix[:3, :3] / size, matrix[:3, 3]
 
 
 def _alike(one: Look | None, other: Look | None) -> bool:

@@ -39,21 +39,8 @@ class Solid(NamedTuple):
     look: Look | None = None
 
 
-def read_mesh(data: bytes, suffix: str, sign: Sign = "auto") -> Mesh:
-    """The mesh in the bytes of a file with a suffix of `MOST_OF`, all of its solids as one.
-
-    Args:
-        sign: what tells inside: ``winding`` numbers, which take any mesh, or normals, for ``closed`` ones
-            whose surface nowhere passes through itself; ``auto`` is ``winding``.
-
-    Raises:
-        FitError: it is damaged, empty or too large, or encloses nothing.
-    """
-    return whole(read_solids(data, suffix)[0], sign)
-
-
 def whole(solids: Sequence[Solid], sign: Sign = "auto") -> Mesh:
-    """All solids as one mesh; as `read_mesh`."""
+    """All solids as one mesh; as `mesh_of`."""
     if not solids:
         raise FitError("it holds no triangles")
     _, vertices, triangles, look = _joined("", solids)

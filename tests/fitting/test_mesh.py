@@ -12,7 +12,7 @@ pytest.importorskip("igl")
 trimesh = pytest.importorskip("trimesh")
 
 from scenelang.fitting.mesh import FitError, Sign, mesh_of  # noqa: E402
-from scenelang.fitting.solids import read_mesh  # noqa: E402
+from scenelang.fitting.solids import read_solids, whole  # noqa: E402
 
 
 def arrays(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -33,7 +33,7 @@ def test_each_format_gives_the_solid_in_the_unit_ball(suffix: str, tmp_path: Pat
     made = box(4, 2, 1)
     made.apply_translation([100, 20, -3])
     made.export(tmp_path / f"box.{suffix}")
-    mesh = read_mesh((tmp_path / f"box.{suffix}").read_bytes(), f".{suffix}")
+    mesh = whole(read_solids((tmp_path / f"box.{suffix}").read_bytes(), f".{suffix}")[0])
     size = np.linalg.norm([2, 1, 0.5])
     assert mesh.centre == pytest.approx((100, 20, -3))
     assert mesh.size == pytest.approx(size)
@@ -121,4 +121,4 @@ def test_what_is_no_solid(vertices: np.ndarray, triangles: Any, words: str) -> N
 )
 def test_damaged_files(suffix: str, data: bytes, words: str) -> None:
     with pytest.raises(FitError, match=words):
-        read_mesh(data, suffix)
+        whole(read_solids(data, suffix)[0])
