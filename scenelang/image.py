@@ -146,7 +146,7 @@ def from_samples(colour: npt.NDArray[Any], alpha: npt.NDArray[Any] | None) -> Im
     if alpha is not None:
         straight = colour / np.maximum(alpha, 1e-6)[..., None]
         colour = np.concatenate([straight, alpha[..., None]], 2)
-    image: Image = np.clip(colour, 0.0, 1.0).astype(np.float32).view(Image)
+    image: Image = np.clip(colour, 0.0, 1.0).astype(np.float32, copy=False).view(Image)
     return image
 
 

@@ -45,6 +45,7 @@ ORDER = (
     "scenelang.image",
     "scenelang.reference",
     "scenelang.renderers",
+    "scenelang.models.slopes",
     "scenelang.models.solid",
     "scenelang.models.framed",
     "scenelang.models.load",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scenelang.lifting.layout import LAYOUTS
 from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.models.slopes import load_slopes
 from scenelang.models.weights import ModelError, check_shapes, open_weights, shipped_weights
 from scenelang.renderers.network import FramedArrays, FramedConfig, parameter_shapes
 
@@ -77,4 +78,6 @@ def load_arrays(name: str) -> ArrayModel:
         from scenelang.models.solid import solid_arrays
 
         return ArrayModel(solid_arrays(data, len(manifest.geometries), len(manifest.materials)), digest)
-    return ArrayModel(framed_arrays(data, manifest), digest)
+    network = framed_arrays(data, manifest)
+    network.slopes = load_slopes(name, digest, network.codes, float(network.far[0]))
+    return ArrayModel(network, digest)

@@ -14,6 +14,7 @@ from torch import Tensor
 from scenelang.lifting.layout import LAYOUTS, WIDTH
 from scenelang.models.framed import MOST_WIDTH, framed_config
 from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.models.slopes import load_slopes
 from scenelang.models.solid import solid_config
 from scenelang.models.weights import LIFTING, Codes, check_shapes, codes_of, open_weights, shipped_weights
 from scenelang.models.weights import ModelError as ModelError
@@ -130,8 +131,11 @@ def load_model(name: str, device: str = "cpu", path: Path | None = None) -> Mode
         ModelError: its weights are missing or damaged.
     """
     manifest, data = load_manifest(name), shipped_weights(name, path)
-    network = load_network(data, manifest, device)
-    return Model(manifest, network, codes_of(manifest, data), open_weights(data).header)
+    network, codes = load_network(data, manifest, device), codes_of(manifest, data)
+    if isinstance(network, Framed):
+        host = network.codes.cpu().numpy()
+        network.slopes = load_slopes(name, codes.digest, host, float(network.far[0]))
+    return Model(manifest, network, codes, open_weights(data).header)
 
 
 def place_of(network: Network) -> torch.device:

@@ -24,6 +24,7 @@ class Arrays:
     to_numpy: ClassVar[Any] = staticmethod(np.asarray)
     concat: ClassVar[Any] = staticmethod(np.concatenate)  # (parts, axis)
     stack: ClassVar[Any] = staticmethod(np.stack)  # (parts, axis)
+    copy: ClassVar[Any] = staticmethod(np.copy)
     packed: ClassVar[Any] = staticmethod(np.ascontiguousarray)  # the same entries, contiguous in memory
     where: ClassVar[Any] = staticmethod(lambda mask: mask.nonzero()[0])  # indices (k,) of a mask (M,)
     exp: ClassVar[Any] = np.exp

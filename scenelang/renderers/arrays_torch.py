@@ -26,6 +26,7 @@ class Torch(Arrays):
     to_numpy = staticmethod(lambda x: x.detach().cpu().numpy())
     concat = staticmethod(torch.cat)
     stack = staticmethod(torch.stack)
+    copy = staticmethod(Tensor.clone)
     packed = staticmethod(Tensor.contiguous)
     where = staticmethod(_where)
     exp, log, cos, sin = torch.exp, torch.log, torch.cos, torch.sin

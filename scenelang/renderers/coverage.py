@@ -1,67 +1,36 @@
 """Coverage: how pixels of the plane ask the field, with as few questions as show.
 
-A pixel is the mean of four samples at a quarter of a pixel from its centre. Most pixels have no outline
-near them and one look at the centre is as good; only pixels that the network says are near one are
-sampled four times. Elsewhere only textures are looked up at all four. An object is met only by the points
-that it can reach. These rules look at a pixel alone, so that tiles and threads change nothing.
+Blocks of pixels are asked before pixels. An object is looked at by the blocks that it can reach; of each
+such pair the distance at the block's centre, and how fast it is proved to change, bound it on all of the
+block, and intervals through the cell bound what the block shows (`bounds.py`). Blocks of one colour are
+filled; of the others, objects that are proved to change nothing there are dropped, and so is what lies behind
+one that hides it. What is left is asked again in smaller blocks, and pixel by pixel in the end.
+
+A pixel is the mean of four samples at a quarter of a pixel from its centre. Most pixels have no outline near
+them and one look at the centre is as good; only pixels that the network says are near one are sampled four
+times. Blocks lie where they do whatever the tiles are, so that tiles and threads change nothing.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scenelang.renderers.arrays import Array
-from scenelang.renderers.field import SMOOTH, Field, Row
+from scenelang.renderers.field import Field, Trace
+from scenelang.renderers.meetings import Index, Meetings, Pairs, meetings_of
 from scenelang.renderers.network import RADIUS
+from scenelang.renderers.raster import LEVELS, Raster, raster
+from scenelang.renderers.worn import CORNER, QUARTER, add_textures, blending
 
-CHUNK = 4096  # points that go through the network at once; their activations stay in the L2 cache
+ENOUGH = 1 << 14  # pairs of an object and a pixel up to which blocks are not looked at again
+PAIRS = 1 << 14  # of an object and a point that are met at a time
 NEAR = 0.85  # pixels: farther from an outline a pixel has one colour
-CORNER = 0.36  # pixels from the centre to a sample, a little rounded up
-NARROW = 1 / 16  # of a pixel by the width of a blend: above it colours change much across the pixel
-LEAST = 1e-4  # of a colour, that counts as part of what a point shows
-NOBODY = -1.0  # in place of an object's number
+MANY = 0  # objects a pixel above which it is asked which of them matter to its samples
+FLAT = 1e-4  # of a channel: a block that is known so well has one colour
 _ROUNDING = 1e-6  # world units
-_FOUR = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)  # pixels
-
-
-@dataclass(slots=True)
-class Shade:
-    """What `Coverage.shade` gives at M points.
-
-    Args:
-        picture: premultiplied colour, and coverage in [0, 1], (4, M).
-        edge: (M,) world distance to the nearest outline, as the network sees it, at most.
-        evaluated: number of (object, point) pairs that went through the network.
-        met: (M,) which points went through it at all; the others show the background.
-    """
-
-    picture: Array
-    edge: Array
-    evaluated: int
-    met: Array
-
-
-@dataclass(frozen=True, slots=True)
-class PixelRows:
-    """Points in pixel order: from the top row down, ``group`` points a pixel.
-
-    Args:
-        down: (pixels,) minus the world y of the pixels' centres, which never falls.
-        group: points a pixel.
-        spread: how far up or down from its centre a pixel's points may lie, world units.
-    """
-
-    down: np.ndarray
-    group: int = 1
-    spread: float = 0.0
-
-    def between(self, ymin: float, ymax: float) -> tuple[int, int]:
-        """Range of points outside which none has a y in [ymin, ymax]."""
-        first = int(self.down.searchsorted(-(ymax + self.spread)))
-        last = int(self.down.searchsorted(-(ymin - self.spread), "right"))
-        return self.group * first, self.group * last
 
 
 @dataclass(slots=True)
@@ -69,226 +38,290 @@ class Tile:
     """Some rows of pixels.
 
     Args:
-        picture: premultiplied colour and coverage (pixels, 4).
+        picture: (rows, width, 3) over a background, else premultiplied colour and coverage (rows, width, 4).
+        background: (3,), if any.
         pairs: (object, sample) pairs that went through the network.
         refined: pixels that were sampled four times.
-        met: pixels that an object reached.
+        met: pixels that were asked one by one.
     """
 
     picture: np.ndarray
-    pairs: int
-    refined: int
-    met: int
+    background: np.ndarray | None
+    pairs: int = 0
+    refined: int = 0
+    met: int = 0
+
+    def over(self, picture: np.ndarray) -> np.ndarray:
+        """What is shown (…, 3 or 4) of premultiplied colour and coverage (…, 4)."""
+        if self.background is None:
+            return picture
+        shown: np.ndarray = picture[..., :3] + (1 - picture[..., 3:]) * self.background
+        return shown
 
 
 class Coverage:
     """Asks a field for pixels.
 
     Args:
-        skip: leave out the points that an object cannot reach.
+        skip: leave out what objects cannot reach or is proved not to matter.
+        prove: leave out the latter, too.
     """
 
-    def __init__(self, field: Field, *, skip: bool = True) -> None:
+    def __init__(self, field: Field, *, skip: bool = True, prove: bool = True) -> None:
         self.field, self.xp, self.skip = field, field.xp, skip
-        self._reach = np.array(
-            [(r.frame.centre[1], *r.frame.half[1], self.reach(r), r.frame.growth) for r in field.rows],
-            np.float64,
-        ).reshape(-1, 5)
+        self.prove = prove and field.provable
+        self._all_draw = bool(field.draws.all())
 
-    def reach(self, row: Row) -> float:
-        """Leaf units from its origin up to which points meet an object; inf where all do."""
-        return row.reach if self.skip else float("inf")
-
-    def tile(self, canvas: tuple[int, int], rows: range, samples: str) -> Tile:
+    def tile(
+        self, canvas: tuple[int, int], rows: range, samples: str, background: np.ndarray | None = None
+    ) -> Tile:
         """Draw some rows of a picture; see `scenelang.renderers.draw.draw`."""
-        xp, refine = self.xp, samples == "adaptive"
-        width, height = canvas
-        px = 2 / min(width, height)  # world units
-        # float64 up to here: at 8192 pixels float32 would move samples by a hundredth of a pixel
-        x = (np.arange(width) + 0.5 - width / 2) * px
-        y = (height / 2 - 0.5 - np.arange(rows.start, rows.stop)) * px
-        grid = np.empty((2, len(rows), width), np.float32)
-        grid[0], grid[1] = x, y[:, None]
-        centres = grid.reshape(2, -1)
-        points = xp.array(centres, self.field.network.codes)
+        grid = raster(canvas, rows)
+        nothing = np.zeros(4, np.float32) if background is None else background
+        picture = np.empty((grid.high, grid.wide, len(nothing)), np.float32)
+        picture[:] = nothing
+        tile = Tile(picture, background)
+        with self.xp.inference():
+            side, meetings = self.meetings(grid, tile)
+            blocks = grid.blocks(picture, side)
+            for columns, part, points in self._pixels(grid, side, meetings):
+                inside = grid.inside(columns, side)
+                tile.met += points.shape[1] * points.shape[2] if inside is None else int(inside.sum())
+                found = self.xp.to_numpy(self._points(part, points, grid.px, samples, tile, inside))
+                values = tile.over(np.ascontiguousarray(found.transpose(2, 0, 1))).reshape(
+                    len(part.columns), side, side, -1
+                )
+                blocks[columns[1] // side, :, columns[0] // side] = values
+        tile.picture = picture[: len(rows), : canvas[0]]
+        return tile
+
+    def _points(
+        self, meetings: Meetings, p: Array, px: float, samples: str, tile: Tile, wanted: np.ndarray | None
+    ) -> Array:
+        """Pictures (groups, 4, B) of pixels with centres (2, groups, B)."""
         if samples == "four":
-            shade = self._four(points, centres[1], px)
-            met = int(shade.met.reshape(-1, 4).any(1).sum())
-            return Tile(xp.to_numpy(_means(shade)).T, shade.evaluated, centres.shape[1], met)
-        pad, spread = (CORNER * px, px) if refine else (0.0, 0.0)
-        shade = self.shade(points, pad, PixelRows(-centres[1]), spread)
-        pairs, refined = shade.evaluated, 0
-        if refine and (refined := len(near := xp.where(shade.edge < NEAR * px))):
-            closer = self._four(xp.take(points, near), centres[1][xp.to_numpy(near)], px)
-            xp.put(shade.picture, near, _means(closer))
-            pairs += closer.evaluated
-        return Tile(xp.to_numpy(shade.picture).T, pairs, refined, int(shade.met.sum()))
+            tile.refined += p.shape[1] * p.shape[2] if wanted is None else int(wanted.sum())
+            return self._four(meetings, p, px, tile)
+        if samples == "one":
+            return self._picture(meetings, p, tile)
+        field = self.field
+        trace = field.trace(p.shape[1], len(meetings.pairs)) if field.textured else None
+        q, d, memory = self.ask(meetings, p, tile, trace)
+        edge = abs(memory[:, 0]) / field.unit
+        rate = self.xp.array((1 / self.field.frames.stretch[meetings.pairs.object]).astype(np.float32), p)
+        near = abs(d[:, 0]) * rate
+        for part in meetings.slots():
+            some = edge[:, : part.stop - part.start]
+            some[:] = self.xp.minimum(some, near[:, part])
+        near = edge < NEAR * px
+        if trace is not None:
+            seen = memory[:, 0] * field.slope < 0.5
+            near = near | (seen & blending(field, meetings, trace, px))
+            add_textures(field, meetings, trace, p, memory, seen & ~near, px)
+        picture = field.picture(memory)
+        close = self.xp.to_numpy(near)
+        column, group = np.nonzero((close if wanted is None else close & wanted).T)
+        if not len(column):
+            return picture
+        some, source = meetings.some(column)
+        if self.prove and len(source) > MANY * len(column):
+            # what matters to the four samples, given the distances in the middle
+            place = some.places()
+            by = np.argsort(place, kind="stable")
+            source, place = source[by], place[by]
+            pairs = replace(some.pairs.take(by), block=place)
+            middle = self.xp.to_numpy(d)[group[place], 0, source]
+            here = self.xp.to_numpy(q)[:, group[place], source].astype(np.float64)
+            rise = self.field.rise(pairs.object, here, pairs.rate * (CORNER * px))
+            some, _ = meetings_of(self._proved(pairs, middle, rise)[0])
+            column, group = column[some.columns], group[some.columns]
+        tile.refined += len(column)
+        flat = self.xp.array(group * p.shape[2] + column, p)
+        centres = self.xp.take(p.reshape(2, -1), flat)[:, None]
+        values = [picture[0, :, :0]]
+        for first, portion in _portions(some, 4):
+            last = first + len(portion.columns)
+            values.append(self._four(portion, centres[..., first:last], px, tile)[0])
+        planes = self.xp.packed(picture.swapaxes(0, 1)).reshape(4, -1)
+        self.xp.put(planes, flat, self.xp.concat(values, 1))
+        return planes.reshape(4, *p.shape[1:]).swapaxes(0, 1)
 
-    def _four(self, p: Array, y: np.ndarray, px: float) -> Shade:
-        """The four samples, side by side, of pixels centred at points (2, M), whose y are (M,)."""
-        samples = p[:, :, None] + self.xp.array(_FOUR * np.float32(px), p)[:, None]  # (2, M, 4)
-        return self.shade(samples.reshape(2, -1), 0.0, PixelRows(-y, 4, 0.3 * px))
+    def owners(self, canvas: tuple[int, int], rows: range) -> np.ndarray:
+        """Numbers (rows, width), from 1, of the objects that paint pixels' centres, 0 where none does."""
+        grid = raster(canvas, rows)
+        tile = Tile(np.empty((grid.high, grid.wide, 4), np.float32), None)
+        found = np.zeros((grid.high, grid.wide), np.int32)
+        with self.xp.inference():
+            side, meetings = self.meetings(grid, tile)
+            blocks = grid.blocks(found[..., None], side)
+            for columns, part, points in self._pixels(grid, side, meetings):
+                own = np.zeros(points.shape[1:], np.int32)
+                trace = self.field.trace(points.shape[1], len(part.pairs))
+                memory = self.ask(part, points, tile, trace)[2]
+                painted = self.xp.to_numpy(trace.paint) > 0.5
+                for slot in part.slots():
+                    some = own[:, : slot.stop - slot.start]
+                    some[:] = np.where(painted[:, slot], part.pairs.object[slot] + 1, some)
+                covered = self.xp.to_numpy(self.field.picture(memory)[:, 3]) > 0.5
+                values = np.where(covered, own, 0).T.reshape(-1, side, side, 1)
+                blocks[columns[1] // side, :, columns[0] // side] = values
+        return found[: len(rows), : canvas[0]]
 
-    def shade(self, p: Array, pad: float = 0.0, rows: PixelRows | None = None, spread: float = 0.0) -> Shade:
-        """Draw at world points.
+    def _pixels(
+        self, grid: Raster, side: int, meetings: Meetings
+    ) -> Iterator[tuple[tuple[Index, Index], Meetings, Array]]:
+        """Where blocks begin, what they meet, and their pixels' centres (2, groups, B), row by row."""
+        for _, part in _portions(meetings, side * side):
+            columns = grid.place(part.columns, side)
+            yield columns, part, self.xp.array(grid.centres(columns, side), self.field.like)
+
+    def _four(self, meetings: Meetings, p: Array, px: float, tile: Tile) -> Array:
+        """Means (groups, 4, B) of the four samples of pixels."""
+        offsets = self.xp.array(QUARTER * np.float32(px), p)
+        samples = (p[:, :, None] + offsets[:, None, :, None]).reshape(2, -1, p.shape[2])
+        picture = self._picture(meetings, samples, tile)
+        return picture.reshape(p.shape[1], 4, 4, p.shape[2]).mean(1)
+
+    def _picture(self, meetings: Meetings, p: Array, tile: Tile) -> Array:
+        """What single points (2, groups, B) show (groups, 4, B)."""
+        field = self.field
+        trace = field.trace(p.shape[1], len(meetings.pairs)) if field.textured else None
+        memory = self.ask(meetings, p, tile, trace)[2]
+        if trace is not None:
+            seen = memory[:, 0] * field.slope < 0.5
+            add_textures(field, meetings, trace, p, memory, seen, 0.0)
+        return field.picture(memory)
+
+    def ask(
+        self, meetings: Meetings, p: Array, tile: Tile, trace: Trace | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Leaf coordinates (2, groups, P), features (groups, F, P), memory (groups, S + 3, B)."""
+        field, objects = self.field, meetings.pairs.object
+        q = field.frames.local(self.xp, objects, self.xp.take(p, self.xp.array(meetings.places(), p)))
+        d = field.features(objects, q, meetings.pairs.far)
+        tile.pairs += d.shape[0] * len(objects)
+        return q, d, field.fold(meetings, d, trace)
+
+    # ------------------------------------------------------------ blocks
+
+    def meetings(self, grid: Raster, tile: Tile) -> tuple[int, Meetings]:
+        """What blocks, and of what side, have to be asked pixel by pixel; fills others in the tile."""
+        count = len(self.field.tokens)
+        if not self.skip:
+            side = LEVELS[-1]
+            blocks = grid.high // side * (grid.wide // side)
+            block, objects = np.divmod(np.arange(blocks * count), max(count, 1))
+            every = np.ones(len(block), bool)
+            rate = np.full(len(block), np.inf)
+            return side, meetings_of(Pairs(block, objects, ~every, every, rate))[0]
+        pairs = self._candidates(grid)
+        side = LEVELS[0]
+        pairs = self._looked(grid, pairs, side, tile)
+        for smaller in LEVELS[1:]:
+            if len(pairs) * side * side <= ENOUGH:
+                break
+            pairs, side = _split(pairs, grid.wide // side, side // smaller), smaller
+            pairs = self._looked(grid, pairs, side, tile)
+        return side, meetings_of(pairs)[0]
+
+    def _candidates(self, grid: Raster) -> Pairs:
+        """Objects at the largest blocks that their bounds meet."""
+        side, frames, reach = LEVELS[0], self.field.frames, self.field.reach
+        size = side * grid.px
+        every = np.isinf(reach)
+        low, high = frames.boxes(np.where(every, 0.0, reach))
+        corner = grid.left - grid.px / 2, grid.top + grid.px / 2
+        most = np.array([grid.wide // side, grid.high // side])
+        first = np.stack([low[0] - corner[0], corner[1] - high[1]]) - _ROUNDING
+        last = np.stack([high[0] - corner[0], corner[1] - low[1]]) + _ROUNDING
+        first = np.floor((first / size).clip(0, most[:, None])).astype(np.intp)
+        last = np.ceil((last / size).clip(0, most[:, None])).astype(np.intp)
+        first, last = np.where(every, 0, first), np.where(every, most[:, None], last)
+        across, down = (last - first).clip(0)
+        counts = across * down
+        objects = np.repeat(np.arange(len(counts)), counts)
+        at = np.arange(len(objects)) - np.repeat(np.cumsum(counts) - counts, counts)
+        y, x = np.divmod(at, across[objects])
+        block = (first[1][objects] + y) * most[0] + first[0][objects] + x
+        by = np.argsort(block, kind="stable")
+        none = np.zeros(len(by), bool)
+        return Pairs(block[by], objects[by], none, none, np.full(len(by), np.inf))
+
+    def _looked(self, grid: Raster, pairs: Pairs, side: int, tile: Tile) -> Pairs:
+        """What pairs are left of some when their blocks have been looked at."""
+        field, objects = self.field, pairs.object
+        across, down = grid.place(pairs.block, side)
+        half = side / 2 - 0.5
+        centre = np.stack([grid.left + (across + half) * grid.px, grid.top - (down + half) * grid.px])
+        world = side * grid.px / 2**0.5 + _ROUNDING
+        q, radius = field.frames.blocks(objects, centre, np.full(len(objects), world))
+        length = np.hypot(*q)
+        with np.errstate(invalid="ignore"):
+            kept = ~(length - radius > field.reach[objects])
+            far = ~(length + radius <= RADIUS)
+        if not self._all_draw:
+            # what draws nothing by itself matters where something was drawn before
+            drawn = np.cumsum(kept & (field.draws[objects] | pairs.open))
+            begins = np.searchsorted(pairs.block, pairs.block)
+            kept &= drawn > np.where(begins > 0, drawn[begins - 1], 0)
+        index = np.flatnonzero(kept)
+        pairs, q = replace(pairs, far=far).take(index), q[:, index]
+        if not (self.prove and len(index)):
+            return pairs
+        tile.pairs += len(pairs)
+        rise = field.rise(pairs.object, q, radius[index])
+        pairs = replace(pairs, rate=radius[index] / world)
+        left, flat, values = self._proved(pairs, field.middles(pairs.object, q), rise)
+        x, y = grid.place(flat, side)
+        grid.blocks(tile.picture, side)[y // side, :, x // side] = tile.over(values)[:, None, None]
+        return left
+
+    def _proved(self, pairs: Pairs, middle: np.ndarray, rise: np.ndarray) -> tuple[Pairs, Index, np.ndarray]:
+        """What is left of pairs, and blocks of one colour (n,) with their pictures (n, 4).
 
         Args:
-            p: (2, M).
-            pad: objects that come within so many world units of a point meet it.
-            rows: how the points lie in rows; saves an object the look at points above and below it.
-            spread: side of the pixels for which textures are looked up four times, world units; 0: once.
+            pairs: sorted by block.
+            middle, rise: distances at the blocks' centres, and by how much others in them differ at most.
         """
-        field, xp, count = self.field, self.xp, p.shape[1]
-        with xp.inference():
-            worn = Worn(field, p, spread) if field.textured else None
-            memory = field.empty(count)  # state and register of each point
-            edge = xp.full((count,), float("inf"), p)
-            touched = edge < 0  # what nothing was drawn on stays empty whatever follows
-            evaluated = 0
-            for row in field.rows if rows is None else self._near(rows, pad):
-                index, q, radius = self.meeting(row, p, touched, pad, rows)
-                met = q.shape[1]
-                evaluated += met
-                for start in range(0, met, CHUNK):
-                    at = slice(start, start + CHUNK)
-                    points, lengths = q[:, at], None if radius is None else radius[at]
-                    part = at if index is None else index[at]
-                    before = memory[:, at] if index is None else xp.take(memory, part)
-                    new, d = field.meet(row, points, lengths, before)
-                    near = abs(d) / row.frame.stretch
-                    if worn is not None:
-                        worn.note(
-                            row, xp.where(edge == edge)[part] if index is None else part, before, new, d
-                        )
-                    if index is None:
-                        memory[:, at], edge[at] = new, xp.minimum(edge[at], near)
-                        continue
-                    xp.put(memory, part, new)
-                    xp.put(edge, part, xp.minimum(xp.take(edge, part), near))
-            edge = xp.minimum(edge, abs(memory[0]) / field.unit)
-            if worn is not None:
-                edge = worn.look(memory, edge)
-            met = touched if self.skip else touched | bool(field.rows)
-            return Shade(field.picture(memory), edge, evaluated, met)
-
-    def _near(self, rows: PixelRows, pad: float) -> list[Row]:
-        """The objects that may meet points in some rows; `meeting` finds none for the others."""
-        if not len(rows.down):
-            return []
-        y, slope, more, reach, growth = self._reach.T
-        high = slope * (reach + pad * growth) + more + rows.spread + _ROUNDING
-        near = ((y + high >= -rows.down[-1]) & (y - high <= -rows.down[0])) | np.isinf(reach)
-        return [self.field.rows[i] for i in np.flatnonzero(near).tolist()]
-
-    def meeting(
-        self, row: Row, p: Array, touched: Array, pad: float, rows: PixelRows | None
-    ) -> tuple[Array | None, Array, Array | None]:
-        """Which points an object meets, and marks those on which a union draws.
-
-        Returns:
-            Their indices (k,), None for all, leaf coordinates (2, k), and lengths (k,), None if all are near.
-        """
-        field, xp, reach = self.field, self.xp, self.reach(row)
-        if reach == float("inf"):
-            index = xp.where(touched) if self.skip else None
-            q = field.local(row, p if index is None else xp.take(p, index))
-            return index, q, xp.length(list(q))
-        reach += pad * row.frame.growth
-        xmin, ymin, xmax, ymax = row.frame.box(reach)
-        first, last = (0, p.shape[1]) if rows is None else rows.between(ymin, ymax)
-        x, y = p[:, first : max(first, last)]
-        index = xp.where((x >= xmin) & (x <= xmax) & (y >= ymin) & (y <= ymax)) + first
-        q = field.local(row, xp.take(p, index))
-        radius = xp.length(list(q))
-        near = radius <= reach
-        if not row.draws:
-            near &= xp.take(touched, index)
-        kept = xp.where(near)
-        index = xp.take(index, kept)
-        if row.draws:
-            touched[index] = True
-        return index, xp.take(q, kept), xp.take(radius, kept) if reach > RADIUS else None
+        meetings, source = meetings_of(pairs)
+        shown = self.field.proved(meetings, middle[source], rise[source])
+        low, high = shown.picture
+        flat = (high - low).max(0) <= FLAT
+        # back in the order of pairs, where those in front of an open one go
+        left, opened = np.empty((2, len(pairs)), bool)
+        left[source], opened[source] = ~shown.shut & ~flat[meetings.places()], shown.open
+        later = np.cumsum(opened[::-1])[::-1]  # open pairs from each on
+        ends = np.searchsorted(pairs.block, pairs.block, "right")
+        after = np.where(ends < len(pairs), later[np.minimum(ends, len(pairs) - 1)], 0)
+        left &= later - after - opened == 0
+        kept = replace(pairs, open=opened).take(np.flatnonzero(left))
+        return kept, meetings.columns[flat], ((low + high) / 2).T[flat]
 
 
-class Worn:
-    """Which textures M points show; they are looked up when all objects are met, where they are seen.
-
-    The register says how much of a point's colour is a texture's, and here is whose. Where one blends with
-    another, the first is looked up at once, or, where blends are narrow, the point is called near an outline.
+def _split(pairs: Pairs, wide: int, parts: int) -> Pairs:
+    """The same pairs of blocks that are smaller in both directions by a factor.
 
     Args:
-        field: with textures.
-        p: the points (2, M).
-        spread: as `Coverage.shade` takes it.
+        wide: larger blocks in a row.
     """
-
-    def __init__(self, field: Field, p: Array, spread: float) -> None:
-        self._field, self._xp, self._p, self._spread = field, field.xp, p, spread
-        self._four = self._xp.array(_FOUR * np.float32(spread), p)[:, :, None]
-        self._number = 0 * p[0] + NOBODY
-        self._mixed = p[0] != p[0]
-        self._rows: dict[int, Row] = {}
-
-    def note(self, row: Row, index: Array, before: Array, memory: Array, d: Array) -> None:
-        """Note what points (k,) show behind an object.
-
-        Args:
-            before: their memory (S + R, k) before it.
-            memory: and behind it, which is brought up to date.
-            d: its distances (k,).
-        """
-        xp, share, gate = self._xp, memory[-2], memory[-1]
-        taken = gate > LEAST
-        mixed = xp.where(taken & (gate < 1 - LEAST))
-        mixed = xp.take(mixed, xp.where(xp.take(share, mixed) > LEAST))
-        if row.token == SMOOTH and self._spread > NARROW * row.width:
-            gap = row.width + CORNER * self._spread * (1 + row.frame.stretch)
-            blends = abs(before[0] / self._field.unit - d) < gap
-            if row.texture is None:
-                blends = blends & (before[-2] > LEAST)
-            self._mixed[xp.take(index, xp.where(blends))] = True
-        elif row.texture is not None and len(mixed):
-            left = share - gate  # of the texture before
-            numbers = xp.take(self._number, xp.take(index, mixed))
-            for number in {*numbers.tolist()} - {NOBODY}:
-                some = xp.take(mixed, xp.where(numbers == number))
-                self._add(self._rows[number], memory, some, xp.take(index, some), left)
-        if row.texture is not None:
-            self._rows[row.number] = row
-            self._number[xp.take(index, xp.where(taken))] = row.number
-            xp.put(share, mixed, xp.take(gate, mixed))
-        memory[-1] = 0.0
-
-    def look(self, memory: Array, edge: Array) -> Array:
-        """Add to memories (S + R, M) the textures that are seen; the least distances (M,) to an outline, and
-        0 where colours mix.
-        """
-        xp, field = self._xp, self._field
-        seen = memory[0] * field.slope < 0.5
-        edge = xp.select(self._mixed & seen, 0 * edge, edge)
-        seen = seen & (memory[-2] > LEAST)
-        if self._spread:  # the others are looked at again
-            seen = seen & (edge >= NEAR * self._spread)
-        for number, row in self._rows.items():
-            whole = xp.where(seen & (self._number == number))
-            for start in range(0, len(whole), CHUNK):
-                some = whole[start : start + CHUNK]
-                self._add(row, memory, some, some, memory[-2])
-        return edge
-
-    def _add(self, row: Row, memory: Array, some: Array, index: Array, share: Array) -> None:
-        """Add an object's texture at points of an index to some of the memories, as large as a share (k,)."""
-        xp, field, s = self._xp, self._field, self._field.network.config.state
-        spots = xp.take(self._p, index)
-        if self._spread:
-            found = field.texture(row, (spots[:, None] + self._four).reshape(2, -1)).reshape(3, 4, -1)
-            found = (found[:, 0] + found[:, 1] + found[:, 2] + found[:, 3]) / 4
-        else:
-            found = field.texture(row, spots)
-        colour = memory[s : s + 3]
-        xp.put(colour, some, xp.take(colour, some) + found * xp.take(share, some))
+    down, across = np.divmod(pairs.block, wide)
+    at = np.arange(parts)
+    block = (
+        ((down * parts)[:, None, None] + at[:, None]) * (wide * parts) + (across * parts)[:, None, None] + at
+    )
+    block = block.reshape(-1)
+    by = np.argsort(block, kind="stable")
+    return replace(pairs.take(by // parts**2), block=block[by])
 
 
-def _means(shade: Shade) -> Array:
-    """Premultiplied colour and coverage (4, M) of pixels of four samples each."""
-    return shade.picture.reshape(4, -1, 4).mean(2)
+def _portions(meetings: Meetings, points: int) -> list[tuple[int, Meetings]]:
+    """Columns in turn, as many at a time as make `PAIRS` with so many points each, and which is the first."""
+    total = len(meetings.pairs) * points
+    if not total:
+        return []
+    if total <= PAIRS:
+        return [(0, meetings)]
+    which = np.cumsum(meetings.counts() * points) // PAIRS
+    starts = np.flatnonzero(np.concatenate([[True], which[1:] != which[:-1]])).tolist()
+    ends = [*starts[1:], len(which)]
+    return [(a, meetings.some(np.arange(a, b))[0]) for a, b in zip(starts, ends, strict=True)]

@@ -18,8 +18,8 @@ from scenelang.image import Image, enlarged, from_samples
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.coverage import Coverage, Tile
 from scenelang.renderers.field import Field
-from scenelang.renderers.frames import ObjectFrame
 from scenelang.renderers.network import FramedNetwork
+from scenelang.renderers.raster import LEVELS
 
 if TYPE_CHECKING:
     from scenelang.renderers.solid.march import Work
@@ -33,12 +33,10 @@ class Kept:
     """The last picture of a sequence.
 
     Args:
-        frames: of its objects, by their geometry vectors.
         keys: what each of its tiles showed, a digest.
-        picture: premultiplied (H, W, 4).
+        picture: (H, W, 3 or 4), as `Tile` has it.
     """
 
-    frames: dict[bytes, ObjectFrame] = field(default_factory=dict)
     keys: list[bytes] = field(default_factory=list)
     picture: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 4), np.float32))
 
@@ -46,33 +44,42 @@ class Kept:
         """Whether a tile of a picture with such keys shows what it did before."""
         return self.picture.shape == shape and len(self.keys) == len(keys) and self.keys[index] == keys[index]
 
-    def look(self, coverage: Coverage, canvas: tuple[int, int], tiles: Sequence[range]) -> list[bytes]:
+    def look(self, coverage: Coverage, program: Program, tiles: Sequence[range]) -> list[bytes]:
         """A digest of what each tile of a new picture will show."""
-        width, height = canvas
+        width, height = program.canvas
         px = 2 / min(width, height)  # world units
         scene = coverage.field
-        codes = scene.codes.tobytes()  # decoders are computed together: one for all of a scene's leaves
-        found, spans = [], []
-        for row, vector in zip(scene.rows, scene.vectors, strict=True):
-            box = row.frame.box(row.reach + _ROOM_PX * px * row.frame.growth)
-            spans.append((-np.inf, np.inf) if row.reach == float("inf") else box[1::2])
-            colour = scene.xp.to_numpy(row.colour).tobytes()
-            paint = row.paint and (row.paint.element.digest, row.paint.steps)
-            rest = repr((row.token, row.reach, row.brought and row.brought.digest, paint)).encode()
-            found.append(hashlib.sha256(codes + vector.tobytes() + colour + rest).digest())
-        rows = np.frombuffer(b"".join(found), np.uint8).reshape(len(found), 32)
-        low, high = np.array(spans, np.float64).reshape(-1, 2).T
-        common = repr((type(scene.xp).__name__, canvas, list(tiles))).encode()
+        reach, frames = scene.reach, scene.frames
+        low, high = frames.boxes(reach + _ROOM_PX * px * frames.growth)
+        low, high = (np.where(np.isinf(reach), end, y[1]) for end, y in ((-np.inf, low), (np.inf, high)))
+        colours = np.ascontiguousarray(scene.xp.to_numpy(scene.colours).T)
+        brought = [bytes(32) if held is None else bytes.fromhex(held.digest) for held in scene.brought]
+        paints = [
+            hashlib.sha256(repr(held and (held.element.digest, held.steps)).encode()).digest()
+            for held in scene.paints
+        ]
+        rows = np.concatenate(
+            [
+                np.ascontiguousarray(part).view(np.uint8).reshape(len(reach), -1)
+                for part in (scene.vectors, colours, scene.tokens, reach)
+            ]
+            + [np.frombuffer(b"".join(part), np.uint8).reshape(-1, 32) for part in (brought, paints)],
+            1,
+        )
+        common = (
+            repr((type(scene.xp).__name__, program.canvas, program.background, list(tiles))).encode()
+            + scene.codes.tobytes()
+        )
         keys = []
         for tile in tiles:
             top = (height / 2 - tile.start + _ROOM_PX) * px
-            bottom = (height / 2 - tile.stop - _ROOM_PX) * px
+            bottom = (height / 2 - tile.start - LEVELS[0] * -(-len(tile) // LEVELS[0]) - _ROOM_PX) * px
             reaching = rows[(low <= top) & (high >= bottom)]
             keys.append(hashlib.sha256(common + reaching.tobytes()).digest())
         return keys
 
 
-TILE = 1 << 15  # pixels that are drawn at a time
+TILE = 1 << 18  # pixels that are drawn at a time
 
 
 @dataclass(slots=True)
@@ -179,27 +186,24 @@ def draw(
             proportion; no compiled scene has such.
     """
     width, height = program.canvas
-    known = kept.frames if kept is not None else None
-    field = Field(network, program.vectors, program.tokens, program.brought(), program.paints(), frames=known)
+    field = Field(network, program.vectors, program.tokens, program.brought(), program.paints())
     coverage = Coverage(field, skip=skip)
     rows = max(1, min(tile // width, -(-height // (split or threads))))
+    rows = LEVELS[0] * -(-rows // LEVELS[0])
     tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
-    out = np.empty((height, width, 4), np.float32)
+    background = None if program.background is None else np.asarray(program.background, np.float32)
+    out = np.empty((height, width, 4 if background is None else 3), np.float32)
     drawn: list[Tile] = []
     finished: list[int] = []
-    seen = (
-        kept.look(coverage, program.canvas, tiles)
-        if kept is not None and skip and samples != "four"
-        else None
-    )
+    seen = kept.look(coverage, program, tiles) if kept is not None and skip and samples != "four" else None
 
     def one(index: int) -> None:
         band = tiles[index]
         if kept is not None and seen is not None and kept.shows(index, seen, out.shape):
             out[band.start : band.stop] = kept.picture[band.start : band.stop]
         else:
-            found = coverage.tile(program.canvas, band, samples)
-            out[band.start : band.stop] = found.picture.reshape(len(band), width, 4)
+            found = coverage.tile(program.canvas, band, samples, background)
+            out[band.start : band.stop] = found.picture
             drawn.append(found)
         finished.append(index)
         if progress is not None:
@@ -215,12 +219,8 @@ def draw(
         with ThreadPoolExecutor(threads, initializer=network.xp.one_core) as pool:
             list(pool.map(one, range(len(tiles))))
     if kept is not None and seen is not None:
-        kept.picture, kept.keys, kept.frames = out.copy(), seen, field.frames
-    if not np.isfinite(out).all():
+        kept.picture, kept.keys = out.copy(), seen
+    if not np.isfinite(out.sum()):
         raise ProgramError("a damaged program: numbers that the network cannot draw with")
     cost = [sum(getattr(t, name) for t in drawn) for name in ("pairs", "refined", "met")]
-    colour, alpha = out[..., :3], out[..., 3]
-    if program.background is None:
-        return Drawing(from_samples(colour, alpha), *cost)
-    colour += (1 - alpha)[..., None] * np.asarray(program.background, np.float32)
-    return Drawing(from_samples(colour, None), *cost)
+    return Drawing(from_samples(out[..., :3], out[..., 3] if background is None else None), *cost)

@@ -1,13 +1,15 @@
 """The framed renderer's field: what it answers at points, whoever asks and by whichever library.
 
 Letters are those of `network.py`. Each object's frame (`frames.py`) carries points into its own space, where
-the network meets them. Nothing here knows a pixel.
+the network meets them. All pairs of an object and a point are carried and decoded together, however many
+objects they are of; then the cell takes a point's objects in one by one. Nothing here knows a pixel.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,48 +17,44 @@ from scenelang.elements.element import Element
 from scenelang.program.paints import Paint
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array
-from scenelang.renderers.frames import FAR, ObjectFrame, local_points, read_frame
+from scenelang.renderers.bounds import Interval, Shown, shown
+from scenelang.renderers.frames import FAR, Frames
 from scenelang.renderers.grid import GridShape, grid_shape
-from scenelang.renderers.network import EMPTY, Cell, Decoder, FramedNetwork
+from scenelang.renderers.meetings import Meetings
+from scenelang.renderers.network import EMPTY, RADIUS, Cell, Decoder, FramedNetwork
+from scenelang.renderers.slopes import Floats, Slopes
 from scenelang.renderers.texture import Texture
 
 UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
 BLEND = 0.15  # world units: the width of the blends that the cell is trained on
 FARTHER = 2.0  # widths of a blend at which objects cannot change it
+CHUNK = 1024  # points that go through a decoder at once; their activations stay in the nearest caches
+ROUNDING = 1e-4, 2e-6  # leaf units, and share of a distance and world units, by which float32 may be off
+NO_TEXTURE = -1
+_UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is proved
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """One object, ready to be met.
+class Trace:
+    """What P pairs did to points.
 
     Args:
-        number: of the object, from 0.
-        token: how it joins what came before.
-        colour: (R, 1): three numbers, and where some object has a texture, whether this one has, and 1.
-        shape: of its leaf, learned or brought by a user.
-        paint, texture: in place of the colour, what users brought.
-        reach: leaf units from its origin beyond which it changes nothing; inf where it concerns every point.
-        width: of the blend by which it joins.
-        cell: the weights of its token and of that width.
+        paint: (groups, P) how far the object's colour came in.
+        margin: (groups, P) by how much what was there before is nearer than the object, world units.
     """
 
-    frame: ObjectFrame
-    number: int
-    token: int
-    colour: Array
-    shape: Decoder | GridShape
-    brought: Element | None
-    paint: Paint | None
-    texture: Texture | None
-    reach: float
-    width: float
-    cell: Cell
+    paint: Array
+    margin: Array
 
-    @property
-    def draws(self) -> bool:
-        """Whether something may be seen, where it is met, of what was empty before."""
-        return self.token in (UNION, SMOOTH)
+    def shares(self, meetings: Meetings, seen: Array) -> Array:
+        """How much of each object's colour (groups, P) is left when all are met, 0 at points not seen."""
+        left, found = 1.0 * seen, 0.0 * self.paint
+        for part in reversed(meetings.slots()):
+            rest, paint = left[:, : part.stop - part.start], self.paint[:, part]
+            found[:, part] = rest * paint
+            rest *= 1.0 - paint
+        return found
 
 
 class Field:
@@ -67,7 +65,12 @@ class Field:
         vectors: (N, 64) float32, geometry and material vectors.
         brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
         paints: likewise, None where a row has the colour of its vector.
-        frames: of geometry vectors that were read before, by their bytes.
+
+    Attributes:
+        frames: of the objects.
+        reach: (N,) leaf units from an object's origin beyond which it changes nothing; inf where it concerns
+            every point.
+        draws: (N,) whether something may be seen, where it is met, of what was empty before.
 
     Raises:
         ProgramError: an object's vector holds no way from the world to a leaf, or an element cannot be drawn.
@@ -80,126 +83,217 @@ class Field:
         tokens: np.ndarray,
         brought: Sequence[Element | None] | None = None,
         paints: Sequence[Paint | None] | None = None,
-        *,
-        frames: Mapping[bytes, ObjectFrame] | None = None,
     ) -> None:
-        self.network, self.xp = network, network.xp
-        self.vectors = vectors
+        self.network, self.xp, self.like = network, network.xp, network.codes
+        self.vectors, self.tokens = vectors, np.asarray(tokens, np.intp)
+        self.brought, self.paints = brought or [None] * len(vectors), paints or [None] * len(vectors)
         self.layout = layout = network.layout
-        self.codes = np.array(sorted(set(map(tuple, vectors[:, : layout.code].tolist()))), np.float32)
-        """Of the leaves in use (K, C)."""
-        geometry = {vector.tobytes(): vector for vector in vectors[:, : layout.geometry]}
-        known = frames or {}
-        self.frames = {k: known.get(k) or read_frame(vector, layout) for k, vector in geometry.items()}
+        self.frames = Frames(vectors[:, : layout.geometry], layout)
+        self.draws = self.tokens <= SMOOTH
         with self.xp.inference():
-            self.cells = [
-                Cell(*map(self.xp.packed, cell)) for cell in zip(*network.cell_weights(), strict=True)
-            ]
             self.slope = float(self.xp.exp(network.read_slope)) / 4
-            self.unit = float(np.linalg.norm(self.xp.to_numpy(self.cells[UNION].candidate[0])))
-            """Growth of the margin per world unit."""
-            self.widest = BLEND
-            """Of the blends, at least the usual one."""
-            none = [None] * len(tokens)
-            self.textured = any(paints or none)
-            """Whether some object has a texture."""
-            self.rows = self._rows(vectors, tokens, brought or none, paints or none)
+            self.unit = float(np.linalg.norm(self.xp.to_numpy(network.cell_weights()[2][UNION, 0])))
+            """Growth of the state per world unit."""
+            self._shapes()
+            self._cells()
+            self._colours()
 
-    def _rows(
-        self,
-        vectors: np.ndarray,
-        tokens: np.ndarray,
-        brought: Sequence[Element | None],
-        paints: Sequence[Paint | None],
-    ) -> list[Row]:
-        if not len(vectors):
-            return []
+    def _shapes(self) -> None:
+        """Decoders of the leaves in use, grids of elements, and which object has which."""
+        xp, network = self.xp, self.network
+        every = np.ascontiguousarray(self.vectors[:, : self.layout.code])
+        found, self.shape = _numbered(every.view(f"V{every[:1].nbytes}").ravel().tolist())
+        codes = np.array([np.frombuffer(code, np.float32) for code in found], np.float32)
+        self.codes = codes = codes.reshape(len(found), self.layout.code)
+        """Of the leaves in use (K, C): decoders are computed together."""
+        layers, far = network.decoder_weights(xp.array(codes, self.like))
+        self.shapes: list[Decoder | GridShape] = [
+            Decoder([(xp.packed(w[i]), b[i]) for w, b in layers], far) for i in range(len(codes))
+        ]
+        self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
+        for element in dict.fromkeys(element for element in self.brought if element is not None):
+            if network.config.features != 1:
+                raise ProgramError("elements for a network that knows more than distances")
+            self.shape[[held == element for held in self.brought]] = len(self.shapes)
+            self.shapes.append(grid_shape(element, xp, self.like))
+            self.slopes.append(self.shapes[-1].slopes())  # type: ignore[union-attr]
+
+    def _cells(self) -> None:
+        """Cells by token and width of the blend; behind them the same with gates that are open."""
         xp, layout = self.xp, self.layout
-        g, m = vectors[:, : layout.geometry], vectors[:, layout.geometry :]
-        like = self.network.codes
-        layers, far = self.network.decoder_weights(xp.array(self.codes, like))
-        shapes = {
-            tuple(code): Decoder([(xp.packed(w[i]), b[i]) for w, b in layers], far)
-            for i, code in enumerate(self.codes.tolist())
-        }
-        grids = {element: grid_shape(element, xp, like) for element in {*brought} if element is not None}
-        if grids and self.network.config.features != 1:
-            raise ProgramError("elements for a network that knows more than distances")
-        codes_m = xp.array(m[:, layout.material_code].copy(), like)
-        albedo = self.network.object_albedo(codes_m)
-        albedo = xp.concat([albedo, xp.full((len(g), 1), 1.0, like)], 1)
-        matrix = xp.array(m[:, layout.colour].reshape(-1, 3, 4).copy(), like)
-        colours = (matrix @ albedo[:, :, None]).clip(0.0, 1.0)  # (N, 3, 1)
-        widths = np.where(vectors[:, layout.blend] > 0, vectors[:, layout.blend].astype(float), BLEND)
+        widths = self.vectors[:, layout.blend].astype(np.float64)
+        self.widths = widths = np.where((widths > 0) & (self.tokens == SMOOTH), widths, BLEND)
+        """Of the blends by which objects join (N,), world units."""
         # the widest of the smooth unions from each row on, 0 for none
-        blends_after = np.maximum.accumulate(np.where(tokens == SMOOTH, widths, 0.0)[::-1])[::-1]
-        self.widest = max(BLEND, float(blends_after[0]))
-        textures: dict[tuple[Paint, bytes], Texture] = {}
-        rows = []
-        for i, token in enumerate(tokens.tolist()):
-            frame = self.frames[g[i].tobytes()]
-            if token == INTERSECT or (token == SUBTRACT and blends_after[i]):
-                reach = float("inf")
-            else:
-                reach = 1.0 + SLACK + FARTHER * blends_after[i] / frame.scale
-            cell = self.cells[token]
-            if token == SMOOTH and widths[i] != BLEND:
-                # The fold of s d and s D is s D', so that the cell's own width is that of any other.
-                scale = BLEND / float(widths[i])
-                cell = Cell(cell.lines * scale, cell.bias, cell.candidate, cell.bump / scale)
-            element = brought[i]
-            learned = shapes[tuple(g[i, : layout.code].tolist())]
-            shape = learned if element is None else grids[element]
-            texture, paint, colour = None, paints[i], colours[i]
-            if paint is not None and token in (UNION, SMOOTH):  # the others leave colours as they are
-                texture = textures.get(key := (paint, m[i, :6].tobytes()))
-                texture = textures[key] = texture or Texture(xp, paint, m[i, :6], like, light=False)
-            if self.textured:
-                worn = [0.0 * colour, 0.0 * colour[:1] + 1.0] if texture else [colour, 0.0 * colour[:1]]
-                colour = xp.concat([*worn, 0.0 * colour[:1] + 1.0], 0)
-            looks = colour, shape, element, paint, texture
-            rows.append(Row(frame, i, token, *looks, float(reach), float(widths[i]), cell))
-        return rows
+        blends = np.where(self.tokens == SMOOTH, np.where(widths > 0, widths, BLEND), 0.0)
+        after = np.maximum.accumulate(blends[::-1])[::-1]
+        self.widest = max([BLEND, *after[:1].tolist()])
+        every = (self.tokens == INTERSECT) | ((self.tokens == SUBTRACT) & (after > 0))
+        self.reach = np.where(every, np.inf, 1.0 + SLACK + FARTHER * after / self.frames.scale)
+        kinds, self._cell = _numbered(list(zip(self.tokens.tolist(), widths.tolist(), strict=True)))
+        tokens = [token for token, _ in kinds]
+        lines, bias, candidate, bump = (
+            np.asarray(xp.to_numpy(part))[tokens].T for part in self.network.cell_weights()
+        )
+        lines, candidate = lines.swapaxes(0, 1), candidate.swapaxes(0, 1)
+        # The fold of s d and s D is s D', so that the cell's own width is that of any other.
+        scale = np.array([BLEND / width for _, width in kinds], np.float32)
+        table = Cell(lines * scale, bias, candidate, bump[0] / scale)
+        opened = Cell(0 * lines, 0 * bias + 1, candidate, 0 * bump[0])
+        host = [np.concatenate(pair, -1).astype(np.float32) for pair in zip(table, opened, strict=True)]
+        self._opened = len(kinds)
+        self._table = Cell(*(xp.array(part, self.like) for part in host))
+        self._host = Cell(*host)
 
-    def empty(self, count: int) -> Array:
-        """State and register (S + R, M) of points that have met nothing."""
-        rows = self.network.config.state + (5 if self.textured else 3)
-        memory = self.xp.full((rows, count), 0.0, self.network.codes)
-        memory[0] = EMPTY * self.widest / BLEND
+    def _colours(self) -> None:
+        xp, m = self.xp, self.vectors[:, self.layout.geometry :]
+        albedo = self.network.object_albedo(xp.array(m[:, self.layout.material_code].copy(), self.like))
+        albedo = xp.concat([albedo, xp.full((len(m), 1), 1.0, self.like)], 1)
+        matrix = xp.array(m[:, self.layout.colour].reshape(-1, 3, 4).copy(), self.like)
+        self.colours = xp.packed((matrix @ albedo[:, :, None])[:, :, 0].clip(0.0, 1.0).T)
+        """Of the objects (3, N); 0 where a texture is worn."""
+        self.textures: list[Texture] = []
+        self.texture = np.full(len(m), NO_TEXTURE)
+        """Which of the textures an object wears (N,)."""
+        known: dict[tuple[Paint, bytes], int] = {}
+        for i, paint in enumerate(self.paints):
+            if paint is None or not self.draws[i]:  # the others leave colours as they are
+                continue
+            self.texture[i] = known.setdefault((paint, m[i, :6].tobytes()), len(known))
+            if len(known) > len(self.textures):
+                self.textures.append(Texture(xp, paint, m[i, :6], self.like, light=False))
+            self.colours[:, i] = 0.0
+
+    @property
+    def provable(self) -> bool:
+        """Whether the network is of the kind that `shown` folds intervals of."""
+        return self.network.config.state == self.network.config.features == 1
+
+    @property
+    def textured(self) -> bool:
+        """Whether some object wears a texture."""
+        return bool(self.textures)
+
+    def empty(self, groups: int, count: int, register: int = 3) -> Array:
+        """State and register (groups, S + R, count) of points that have met nothing."""
+        memory = self.xp.full((groups, self.network.config.state + register, count), 0.0, self.like)
+        memory[:, 0] = EMPTY * self.widest / BLEND
         return memory
 
-    def texture(self, row: Row, p: Array) -> Array:
-        """Colours (3, M) of an object with a texture at world points (d, M)."""
-        assert row.texture is not None
-        return row.texture.at(self.local(row, p))
-
-    def local(self, row: Row, p: Array) -> Array:
-        """Leaf coordinates of world points, both (d, M)."""
-        return local_points(self.xp, row.frame, p)
-
-    def meet(self, row: Row, q: Array, radius: Array | None, memory: Array) -> tuple[Array, Array]:
-        """Let points meet an object.
+    def features(self, objects: np.ndarray, q: Array, far: np.ndarray) -> Array:
+        """Features (groups, F, P) in world units of objects (P,) at leaf coordinates (2, groups, P).
 
         Args:
-            q: their leaf coordinates (d, M).
-            radius: the lengths of those (M,); None where none is beyond `RADIUS`.
-            memory: state and register (S + R, M).
-
-        Returns:
-            State and register, and the object's distances (M,), world units.
+            far: (P,) whether points of a column may lie beyond `RADIUS`.
         """
-        s = self.network.config.state
-        if isinstance(row.shape, GridShape):
-            features = row.shape.distance(q)[None] * row.frame.scale
-        else:
-            features = self.network.decode(q, radius, row.frame.scale, row.shape)
-        if row.frame.wild:
-            features = features.clip(-FAR, FAR)
-        new = self.network.step(features, memory[:s], memory[s:], row.colour, row.cell)
-        return self.xp.concat(new, 0), features[0]
+        xp, shape = self.xp, self.shape[objects]
+        used = np.flatnonzero(np.bincount(shape)).tolist()
+        groups = q.shape[1]
+        found = None
+        for at in used:
+            index = None if len(used) == 1 else np.flatnonzero(shape == at)
+            part = q if index is None else xp.take(q, xp.array(index, q))
+            rim = far.any() if index is None else far[index].any()
+            one = self._decoded(self.shapes[at], part.reshape(2, -1), bool(rim)).reshape(
+                -1, groups, part.shape[2]
+            )
+            if index is None:
+                found = one
+                break
+            if found is None:
+                found = xp.full((one.shape[0], groups, len(objects)), 0.0, q)
+            for feature, values in zip(found, one, strict=True):
+                xp.put(feature, xp.array(index, q), values)
+        assert found is not None
+        scale = xp.array(self.frames.scale[objects].astype(np.float32), q)
+        found = found.swapaxes(0, 1) * scale
+        return found.clip(-FAR, FAR) if self.frames.wild[objects].any() else found
+
+    def _decoded(self, shape: Decoder | GridShape, q: Array, far: bool) -> Array:
+        """Features (F, M) in leaf units."""
+        if isinstance(shape, GridShape):
+            return shape.distance(q)[None]
+        parts = []
+        for start in range(0, q.shape[1], CHUNK):
+            part = q[:, start : start + CHUNK]
+            radius = self.xp.length(list(part)) if far else None
+            parts.append(self.network.decode(part, radius, 1.0, shape))
+        return parts[0] if len(parts) == 1 else self.xp.concat(parts, 1)
+
+    def fold(self, meetings: Meetings, features: Array, trace: Trace | None = None) -> Array:
+        """State and register (groups, S + 3, B) of columns that have met their objects.
+
+        Args:
+            features: of the pairs (groups, F, P).
+            trace: where to write down what each object did.
+        """
+        xp, s = self.xp, self.network.config.state
+        pairs = meetings.pairs
+        memory = self.empty(features.shape[0], len(meetings.columns), 3 if trace is None else 4)
+        kind = xp.array(self._cell[pairs.object] + self._opened * pairs.open, self.like)
+        lines, bias, candidate, bump = (xp.take(part, kind) for part in self._table)
+        colours = xp.take(self.colours, xp.array(pairs.object, self.like))
+        if trace is not None:  # a colour of 1 over a register of 0 shows the gate
+            colours = xp.concat([colours, 0.0 * colours[:1] + 1.0], 0)
+        for part in meetings.slots():
+            d, old = features[..., part], memory[..., : part.stop - part.start]
+            levels, wanted = bias[:, part], 0.0
+            for i in range(d.shape[1]):
+                levels = levels + d[:, i : i + 1] * lines[:, i, part]
+                wanted = wanted + d[:, i : i + 1] * candidate[:, i, part]
+            for i in range(s):
+                levels = levels + old[:, i : i + 1] * lines[:, d.shape[1] + i, part]
+            if trace is not None:
+                trace.margin[:, part] = old[:, 0] / self.unit - d[:, 0]
+                old[:, s + 3] = 0.0
+            new = self.network.update(levels, wanted, bump[:, part], old[:, :s], old[:, s:], colours[:, part])
+            old[:, :s], old[:, s:] = new
+            if trace is not None:
+                trace.paint[:, part] = old[:, s + 3]
+        return memory[:, : s + 3]
+
+    def trace(self, groups: int, pairs: int) -> Trace:
+        """Room for a trace."""
+        return Trace(*(self.xp.full((groups, pairs), 0.0, self.like) for _ in range(2)))
 
     def picture(self, memory: Array) -> Array:
-        """Premultiplied colour and coverage (4, M), in [0, 1], of points that have met all objects."""
-        coverage = (0.5 - memory[0] * self.slope).clip(0.0, 1.0)
-        s = self.network.config.state
-        return self.xp.concat([memory[s : s + 3] * coverage, coverage[None]], 0)
+        """Premultiplied colour and coverage (groups, 4, B), in [0, 1], of points that met all objects."""
+        coverage = (0.5 - memory[:, :1] * self.slope).clip(0.0, 1.0)
+        return self.xp.concat([memory[:, self.network.config.state :] * coverage, coverage], 1)
+
+    def middles(self, objects: np.ndarray, q: Floats) -> np.ndarray:
+        """World distances (P,) at leaf coordinates (2, P)."""
+        seen = np.nan_to_num(q).clip(-FAR, FAR)
+        far = np.full(len(objects), bool((np.hypot(*seen) > RADIUS).any()))
+        points = self.xp.array(seen.astype(np.float32)[:, None], self.like)
+        found: np.ndarray = self.xp.to_numpy(self.features(objects, points, far))[0, 0]
+        return found
+
+    def rise(self, objects: np.ndarray, q: Floats, radius: Floats) -> np.ndarray:
+        """By how much world distances (P,) at leaf coordinates differ at most from those in radii (P,)."""
+        found, shape = np.full(len(objects), np.inf), self.shape[objects]
+        for at, slopes in enumerate(self.slopes):
+            here = np.flatnonzero(shape == at)
+            if slopes is not None and len(here):
+                found[here] = slopes.rise(q.take(here, -1), radius[here])
+        most = np.fmin((found + ROUNDING[0]) * self.frames.scale[objects], _UNKNOWN)
+        return np.asarray(most, np.float32)
+
+    def proved(self, meetings: Meetings, middle: np.ndarray, rise: np.ndarray) -> Shown:
+        """What blocks are proved to show, whose pairs' distances lie within ``rise`` of ``middle``."""
+        objects = meetings.pairs.object
+        rise = rise + np.float32(ROUNDING[1]) * (1 + abs(middle))
+        distance = Interval(middle - rise, middle + rise)
+        kind = self._cell[objects]
+        cell = Cell(*(part.take(kind, -1) for part in self._host))
+        dark = np.asarray(self.xp.to_numpy(self.colours)).take(objects, -1)
+        colours = Interval(dark, np.where(self.texture[objects] == NO_TEXTURE, dark, 1.0))
+        with np.errstate(all="ignore"):
+            return shown(meetings, distance, cell, colours, EMPTY * self.widest / BLEND, self.slope)
+
+
+def _numbered(things: list[Any]) -> tuple[list[Any], np.ndarray]:
+    """The different ones, in the order in which they come, and which of these each is."""
+    numbers: dict[Any, int] = {}
+    index = [numbers.setdefault(thing, len(numbers)) for thing in things]
+    return list(numbers), np.array(index, np.intp)

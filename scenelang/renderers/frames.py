@@ -7,22 +7,20 @@ angle; nothing here is learned. Points are one array (d, M), and d is whatever t
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-from math import hypot
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from scenelang.graph.spaces import stretches
 from scenelang.lifting.layout import PLANE_LAYOUT, Layout
 from scenelang.program.program import ProgramError
-from scenelang.renderers.arrays import Array, Arrays
+from scenelang.renderers.arrays import NUMPY, Array, Arrays
 
 FAR = 1e15  # leaf units: where points lie that float32 cannot follow; out of reach of everything
 TAME = 1e8  # frames of smaller numbers cannot lead a point out of float32
 MOST = 1e31  # the compiler keeps maps and deformations below this
 
+Floats = npt.NDArray[np.float64]
 Number = Array | float
 """A number, or one for each of many objects: an array (…, 1), which goes beside coordinates (…, M)."""
 Point = Sequence[Array]  # the d coordinates, each (…, M), of points
@@ -62,97 +60,149 @@ def _combine(xp: Arrays, factors: tuple[Number, ...], p: Point) -> Array:
     return total
 
 
-@dataclass(frozen=True, slots=True)
-class ObjectFrame:
-    """An object's way back to its leaf, outermost first.
+class Frames:
+    """The ways of N objects back to their leaves: a map, warps, a map, warps, outermost first.
 
     Args:
-        steps: frames and warps in the order a world point meets them; identities are left out.
-        scale: world distance per leaf distance, the smallest singular value of the composed map.
-        stretch: how much faster than one world unit per world unit a distance can change at most.
-        centre: world point about which the object lies.
-        half: half extents (x, y) of the world box that holds a leaf disc of radius r: half[0] r + half[1].
-        wild: whether points may leave float32 on the way, which costs a detour through float64.
-    """
+        g: geometry vectors (N, .), as a layout of the plane has them.
 
-    steps: tuple[Affine | Warp, ...]
-    scale: float
-    stretch: float
-    centre: tuple[float, float]
-    half: tuple[tuple[float, float], tuple[float, float]]
-    wild: bool
-
-    @property
-    def growth(self) -> float:
-        """How many leaf units a point moves at most as it moves by a world unit."""
-        return self.stretch / self.scale
-
-    def box(self, radius: float) -> tuple[float, float, float, float]:
-        """World box (xmin, ymin, xmax, ymax) outside which leaf coordinates are longer than ``radius``."""
-        dx, dy = (slope * radius + more for slope, more in self.half)
-        x, y = self.centre
-        return x - dx, y - dy, x + dx, y + dy
-
-
-def read_frame(g: np.ndarray, layout: Layout = PLANE_LAYOUT) -> ObjectFrame:
-    """The frame of one geometry vector of the plane, in plain floats, as a stream has one for each object.
+    Attributes:
+        scale: (N,) world distance per leaf distance, the smallest singular value of the composed map.
+        stretch: (N,) how much faster than one world unit per world unit a distance can change at most.
+        wild: (N,) whether points may leave float32 on the way, which costs a detour through float64.
 
     Raises:
-        ProgramError: it does not lead from the world to a leaf, as those of compiled scenes do.
+        ProgramError: one does not lead from the world to a leaf, as those of compiled scenes do.
     """
-    numbers = g.tolist()
-    last, outer, middle, inner = [numbers[part] for part in _parts(layout)]
-    steps: list[Affine | Warp] = []
-    # from the leaf through the middle map, and on into the world; warps keep the distance to the origin
-    a, b, c, d, x, y = _inverse(middle)
-    e, f, g_, h, u, v = _inverse(last)
-    reach, moved = stretches(a, b, c, d)[1], hypot(x, y)
-    stretch = 1.0
-    for frame, warps, radius in ((last, outer, reach + moved), (middle, inner, 1.0)):
-        if frame != [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]:
-            steps.append(Affine((tuple(frame[:3]), tuple(frame[3:]))))
-        for at in range(0, len(warps), layout.strengths):
-            twirl, *bend = warps[at : at + layout.strengths]
-            if twirl or any(bend):
-                steps.append(Warp(twirl, tuple(bend)))
-                stretch *= 1.0 + radius * (abs(twirl) + hypot(*bend))
-    p, q, r, s = e * a + f * c, e * b + f * d, g_ * a + h * c, g_ * b + h * d
-    scale = stretches(p, q, r, s)[0]
-    largest = max(map(abs, (*last, *outer, *middle, *inner)))
-    if not (largest < MOST and 1 / MOST < scale < MOST):
-        raise ProgramError("a damaged program: a frame beyond float32")
-    if any(outer):
-        centre, across, along = (u, v), hypot(e, f), hypot(g_, h)
-        half = (across * reach, across * moved), (along * reach, along * moved)
-    else:
-        centre = e * x + f * y + u, g_ * x + h * y + v
-        half = (hypot(p, q), 0.0), (hypot(r, s), 0.0)
-    wild = largest > TAME or not 1 / TAME < scale < TAME
-    return ObjectFrame(tuple(steps), scale, min(stretch, MOST), centre, half, wild)
+
+    def __init__(self, g: np.ndarray, layout: Layout = PLANE_LAYOUT) -> None:
+        with np.errstate(all="ignore"):
+            self._read(np.ascontiguousarray(g.T, np.float64), layout)
+
+    def _read(self, numbers: Floats, layout: Layout) -> None:
+        self.numbers = numbers
+        last, middle = numbers[layout.frame], numbers[layout.middle]
+        # from the leaf through the middle map, and on into the world; warps keep the distance to the origin
+        a, b, c, d, x, y = _inverse(middle)
+        e, f, g, h, u, v = _inverse(last)
+        reach, moved = _stretches(a, b, c, d)[1], np.hypot(x, y)
+        self._stages: list[_Stage] = []
+        self.stretch = np.ones(numbers.shape[1])
+        for frame, warps, radius in (
+            (layout.frame, layout.outer_warps, reach + moved),
+            (layout.middle, layout.inner_warps, 1.0),
+        ):
+            rows = numbers[frame]
+            moves = (rows != np.reshape(layout.identity, (-1, 1))).any(0)
+            steep = _stretches(*rows[[0, 1, 3, 4]])[1]
+            self._stages.append(_Stage(frame, moves, steep, np.zeros_like(steep)))
+            for at in range(warps.start, warps.stop, layout.strengths):
+                strengths = slice(at, at + layout.strengths)
+                twirl, *bend = numbers[strengths]
+                turns = (numbers[strengths] != 0.0).any(0)
+                rate = abs(twirl) + np.hypot(*bend)
+                self._stages.append(_Stage(strengths, turns, np.ones_like(rate), rate))
+                self.stretch *= 1.0 + radius * rate
+        p, q, r, s = e * a + f * c, e * b + f * d, g * a + h * c, g * b + h * d
+        self.scale = _stretches(p, q, r, s)[0]
+        slots = [layout.frame, layout.outer_warps, layout.middle, layout.inner_warps]
+        largest = np.max([abs(numbers[slot]).max(0) for slot in slots], 0)
+        if not ((largest < MOST) & (self.scale > 1 / MOST) & (self.scale < MOST)).all():
+            raise ProgramError("a damaged program: a frame beyond float32")
+        self.stretch = np.minimum(self.stretch, MOST)
+        outer = (numbers[layout.outer_warps] != 0.0).any(0)
+        across, along = np.hypot(e, f), np.hypot(g, h)
+        zero = np.zeros_like(moved)
+        self._centre = np.where(outer, [u, v], [e * x + f * y + u, g * x + h * y + v])
+        self._slope = np.where(outer, [across * reach, along * reach], [np.hypot(p, q), np.hypot(r, s)])
+        self._more = np.where(outer, [across * moved, along * moved], [zero, zero])
+        self.wild = (largest > TAME) | ~((self.scale > 1 / TAME) & (self.scale < TAME))
+
+    @property
+    def growth(self) -> Floats:
+        """How many leaf units a point of each object's leaf moves at most as it moves by a world unit."""
+        return self.stretch / self.scale
+
+    def boxes(self, radius: Floats) -> tuple[Floats, Floats]:
+        """Corners (2, N) of world boxes outside which leaf coordinates are longer than radii (N,)."""
+        half = self._slope * radius + self._more
+        return self._centre - half, self._centre + half
+
+    def local(self, xp: Arrays, objects: np.ndarray, p: Array) -> Array:
+        """Leaf coordinates (2, ..., P) of world points (2, ..., P), a column for each of the objects (P,)."""
+        wide = bool(self.wild[objects].any())
+        points = list(xp.wide(p) if wide else p)
+        for stage in self._stages:
+            which = np.flatnonzero(stage.moves[objects])
+            if not len(which):
+                continue
+            every = 2 * len(which) > len(objects)
+            factors = self.numbers[stage.numbers][:, objects if every else objects[which]]
+            step = _step(xp.array(factors if wide else factors.astype(np.float32), p))
+            if every:
+                points = list(step(xp, points))
+                continue
+            index = xp.array(which, p)
+            moved = step(xp, [xp.take(coordinate, index) for coordinate in points])
+            points = [xp.copy(coordinate) for coordinate in points]
+            for coordinate, values in zip(points, moved, strict=True):
+                xp.put(coordinate, index, values)
+        q = xp.stack(points, 0)
+        return xp.narrow(q.clip(-FAR, FAR)) if wide else q
+
+    def blocks(self, objects: np.ndarray, p: Floats, radius: Floats) -> tuple[Floats, Floats]:
+        """Leaf coordinates (2, P) of discs' centres (2, P), and radii (P,) of discs in which they lie."""
+        points = list(p)
+        with np.errstate(all="ignore"):
+            for stage in self._stages:
+                if not stage.moves[objects].any():
+                    continue
+                # along the way from the centre, a warp's derivative is no longer than this
+                turning = (np.hypot(*points) + radius) * stage.rate[objects]
+                radius = radius * stage.steep[objects] * (1.0 + turning)
+                points = list(_step(self.numbers[stage.numbers][:, objects])(NUMPY, points))
+            return np.stack(points), radius
 
 
-@lru_cache
-def _parts(layout: Layout) -> tuple[slice, ...]:
-    return layout.frame, layout.outer_warps, layout.middle, layout.inner_warps
+class _Stage(NamedTuple):
+    """One map, or one warp, of every object.
+
+    Args:
+        numbers: where its numbers lie in a geometry vector.
+        moves: (N,) whether it moves anything.
+        steep: (N,) how far it takes points apart at most, per distance; of a warp, at the origin.
+        rate: (N,) of a warp, how fast its angle changes at most, per distance.
+    """
+
+    numbers: slice
+    moves: np.ndarray
+    steep: Floats
+    rate: Floats
 
 
-def _inverse(frame: list[float]) -> tuple[float, ...]:
-    """Linear part (row by row) and shift of the map that a frame (6,) is the inverse of."""
+def _step(factors: Array) -> Affine | Warp:
+    """The map of six numbers (6, P), or the warp of three."""
+    if len(factors) == 6:
+        return Affine((tuple(factors[:3]), tuple(factors[3:])))
+    return Warp(factors[0], tuple(factors[1:]))
+
+
+def _stretches(a: Floats, b: Floats, c: Floats, d: Floats) -> tuple[Floats, Floats]:
+    """The smallest and largest singular value of matrices [[a, b], [c, d]]; see `scenelang.graph.spaces`."""
+    largest = 0.5 * (np.hypot(a + d, c - b) + np.hypot(a - d, c + b))
+    return np.where(largest > 0, abs(a * d - b * c) / largest, 0.0), largest
+
+
+def _inverse(frame: Floats) -> tuple[Floats, ...]:
+    """Linear part (row by row) and shift of the maps that frames (6, N) are the inverses of."""
     a, b, x, c, d, y = frame
     det = a * d - b * c
-    if det == 0.0:
+    if (det == 0.0).any():
         raise ProgramError("a damaged program: a frame without an inverse")
     a, b, c, d = d / det, -b / det, -c / det, a / det
-    if not max(abs(a), abs(b), abs(c), abs(d)) < MOST:  # before squares of it overflow
+    if not (np.max([abs(a), abs(b), abs(c), abs(d)], 0) < MOST).all():  # before squares of it overflow
         raise ProgramError("a damaged program: a frame beyond float32")
     return a, b, c, d, -(a * x + b * y), -(c * x + d * y)
-
-
-def local_points(xp: Arrays, frame: ObjectFrame, p: Array) -> Array:
-    """Leaf coordinates of world points, both (d, M)."""
-    if frame.wild:
-        return xp.narrow(xp.stack(way_back(xp, frame.steps, list(xp.wide(p))), 0).clip(-FAR, FAR))
-    return xp.stack(way_back(xp, frame.steps, list(p)), 0) if frame.steps else p
 
 
 def way_back(xp: Arrays, steps: Iterable[Affine | Warp], p: Point) -> Point:

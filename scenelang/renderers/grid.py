@@ -11,6 +11,8 @@ from scenelang.elements.element import Element
 from scenelang.elements.pyramid import unpacked
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
+from scenelang.renderers.network import RADIUS
+from scenelang.renderers.slopes import CELLS, NODE, RADII, STEEP, Slopes, around
 from scenelang.tensors import TensorError
 
 
@@ -76,6 +78,28 @@ class GridShape(Lattice):
         found, off = self.at(at), q - at
         beyond = (off * off).sum(0)
         return self.xp.select(beyond > 0, self.xp.sqrt(found * found + beyond), found)
+
+    def slopes(self) -> Slopes:
+        """How fast the distance in the plane changes; nothing is known of grids that end inside."""
+        n, side = self._side, 2 * RADIUS / CELLS
+        grid = self.xp.to_numpy(self._flat).astype(np.float64).reshape(n, n)
+        rows, columns = (abs(np.diff(grid, axis=axis)) * self.half for axis in (0, 1))
+        # of each cell the largest slopes along x and along y: along each they change linearly over a cell
+        steep = np.hypot(np.maximum(rows[:, 1:], rows[:, :-1]), np.maximum(columns[1:], columns[:-1]))
+        if min(grid[[0, -1]].min(), grid[:, [0, -1]].min()) < 0:
+            steep = np.full_like(steep, np.inf)
+        first = np.clip((-RADIUS + side * np.arange(CELLS) + 1.0) * self.half, 0, n - 1)
+        last = np.clip((-RADIUS + side * np.arange(1, CELLS + 1) + 1.0) * self.half, 0, n - 1)
+        spans = [(int(a), max(int(np.ceil(b)), int(a) + 1)) for a, b in zip(first, last, strict=True)]
+        spans = [(min(a, n - 2), max(min(b, n - 1), min(a, n - 2) + 1)) for a, b in spans]
+        across = np.stack([steep[:, a:b].max(1) for a, b in spans], 1)
+        found = np.stack([across[a:b].max(0) for a, b in spans])
+        found = np.maximum(found.T, 1.0)  # outside, one along the way there
+        more = [
+            (around(found, int(np.ceil(radius / side))) - STEEP).clip(0.0) * np.hypot(radius, NODE)
+            for radius in RADII
+        ]
+        return Slopes(np.stack(more), 1.0)
 
     def field(self, q: Array, gradient: bool) -> Array:
         """Distances (1, M), or these and how they change (1 + d, M).

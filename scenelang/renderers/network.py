@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -79,6 +80,7 @@ class FramedNetwork:
     """
 
     config: FramedConfig
+    slopes: Mapping[bytes, Any] = MappingProxyType({})  # proved `Slopes`, by the bytes of codes
     layout: Layout = PLANE_LAYOUT
     xp: ClassVar[Arrays]
     codes: Any  # (geometries, C)

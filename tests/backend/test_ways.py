@@ -50,7 +50,7 @@ def test_sampling_is_counted() -> None:
     model = open_model("shapes2d")
     drawn = {s: draw_program(program, model, threads=1, samples=s) for s in ("adaptive", "four", "one")}
     assert drawn["one"].refined == 0
-    assert drawn["four"].refined == 64 * 64
+    assert 0 < drawn["four"].refined == drawn["four"].met < 64 * 64  # the others have one colour
     assert 0 < drawn["adaptive"].refined < 64 * 64 / 4
     assert drawn["one"].pairs < drawn["adaptive"].pairs < drawn["four"].pairs
     quick = draw_program(program, model, threads=1, samples="quick")

@@ -13,7 +13,7 @@ from scenelang.lifting.layout import PLANE_LAYOUT, Layout
 from scenelang.reference.field import carry_back, distance_scale
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.arrays_torch import TORCH
-from scenelang.renderers.frames import local_points, read_frame
+from scenelang.renderers.frames import Frames
 
 CODE = (0.5, -1.0, 2.0, 3.0)
 
@@ -68,11 +68,40 @@ def test_vector_carries_points_back_as_the_reference_does(inner: int, outer: int
     rng = np.random.default_rng(100 + inner * 10 + outer)
     levels = random_levels(rng, inner, outer)
     p = rng.uniform(-2, 2, (2, 50))
-    frame = read_frame(lift_many([levels], [CODE])[0])
-    want = carry_back(steps_of(levels), p)
-    np.testing.assert_allclose(local_points(NUMPY, frame, p), want, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(local_points(TORCH, frame, torch.from_numpy(p)), want, rtol=1e-9, atol=1e-9)
-    assert frame.scale == pytest.approx(distance_scale(steps_of(levels)), rel=1e-9)
+    frames, objects = Frames(lift_many([levels], [CODE])), np.zeros(50, int)
+    want = np.array(carry_back(steps_of(levels), p))
+    found, radius = frames.blocks(objects, p, np.zeros(50))
+    np.testing.assert_allclose(found, want, rtol=1e-9, atol=1e-9)
+    assert not radius.any()
+    # in float32, angles are off by as much as they are large
+    off = 1e-6 * (1 + abs(want).max()) * (1 + abs(frames.numbers).max()) ** 2
+    short = p.astype(np.float32)
+    np.testing.assert_allclose(frames.local(NUMPY, objects, short), want, rtol=0, atol=off)
+    np.testing.assert_allclose(frames.local(TORCH, objects, torch.from_numpy(short)), want, rtol=0, atol=off)
+    assert frames.scale == pytest.approx(distance_scale(steps_of(levels)), rel=1e-9)
+
+
+@pytest.mark.parametrize("objects", [[0, 1, 2], [2], [2, 2, 2, 1]], ids=str)
+def test_objects_of_different_chains_are_carried_together(objects: list[int]) -> None:
+    """Steps that only few, or most, of them have."""
+    levels = [random_levels(np.random.default_rng(i), *size) for i, size in enumerate(SIZES[:3])]
+    p = np.random.default_rng(1).uniform(-1, 1, (2, 4, len(objects))).astype(np.float32)
+    found = Frames(lift_many(levels, [CODE] * 3)).local(NUMPY, np.array(objects), p)
+    for i, at in enumerate(objects):
+        np.testing.assert_allclose(found[..., i], carry_back(steps_of(levels[at]), p[..., i]), atol=1e-3)
+
+
+@pytest.mark.parametrize(("inner", "outer"), SIZES)
+@pytest.mark.parametrize("size", [0.02, 0.5])
+def test_discs_are_carried_into_discs(inner: int, outer: int, size: float) -> None:
+    rng = np.random.default_rng(3 * inner + outer)
+    levels = random_levels(rng, inner, outer)
+    p = rng.uniform(-2, 2, (2, 400))
+    angle, share = rng.uniform(0, 2 * np.pi, 400), np.sqrt(rng.uniform(0, 1, 400))
+    near = p + size * share * np.stack([np.cos(angle), np.sin(angle)])
+    frames = Frames(lift_many([levels], [CODE]))
+    q, radius = frames.blocks(np.zeros(400, int), p, np.full(400, size))
+    assert (np.hypot(*(np.array(carry_back(steps_of(levels), near)) - q)) <= radius * (1 + 1e-9)).all()
 
 
 @pytest.mark.parametrize("strength", [1.0, 1e-3])
@@ -82,7 +111,7 @@ def test_points_near_the_leaf_move_no_faster_than_the_frame_says(
 ) -> None:
     rng = np.random.default_rng(inner + outer)
     levels = random_levels(rng, inner, outer, strength)
-    frame = read_frame(lift_many([levels], [CODE])[0])
+    frames = Frames(lift_many([levels], [CODE]))
     x, y = rng.uniform(-4, 4, (2, 20000))
     step = 1e-5
     qx, qy = carry_back(steps_of(levels), (x, y))
@@ -91,7 +120,7 @@ def test_points_near_the_leaf_move_no_faster_than_the_frame_says(
         speed = np.hypot(rx - qx, ry - qy) / step
         near = np.hypot(qx, qy) <= 1
         assert near.any()
-        assert speed[near].max() <= frame.growth * (1 + 1e-3)
+        assert speed[near].max() <= frames.growth * (1 + 1e-3)
 
 
 @pytest.mark.parametrize(("inner", "outer"), SIZES)
@@ -99,8 +128,8 @@ def test_points_near_the_leaf_move_no_faster_than_the_frame_says(
 def test_boxes_hold_discs(inner: int, outer: int, radius: float) -> None:
     rng = np.random.default_rng(7 * inner + outer)
     levels = random_levels(rng, inner, outer)
-    frame = read_frame(lift_many([levels], [CODE])[0])
-    xmin, ymin, xmax, ymax = frame.box(radius)
+    frames = Frames(lift_many([levels], [CODE]))
+    (xmin, ymin), (xmax, ymax) = (corner[:, 0] for corner in frames.boxes(np.array([radius])))
     x, y = rng.uniform(-2, 2, (2, 20000)) * max(xmax - xmin, ymax - ymin)
     within = np.hypot(*carry_back(steps_of(levels), (x, y))) <= radius
     outside = (x < xmin) | (x > xmax) | (y < ymin) | (y > ymax)

@@ -20,7 +20,6 @@ from scenelang.models.load import load_model
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
 from scenelang.program.compile import compile_scene
-from scenelang.renderers.coverage import CORNER
 from scenelang.renderers.draw import draw
 from scenelang.renderers.field import SLACK
 
@@ -75,7 +74,7 @@ def test_cost_of_a_drawing() -> None:
 
 
 def test_pixels_that_no_object_reaches_are_not_evaluated() -> None:
-    """A leaf reaches its unit disc, a little more for what the network may bulge, and a corner of a pixel."""
+    """A leaf reaches its unit disc, and a little more for what the network may bulge."""
     side, radius = 200, 0.4
     scene = nsg.loads(f"canvas({side}, {side}); star {{ scale({radius}); }}")
     model = load_model("shapes2d")
@@ -83,14 +82,13 @@ def test_pixels_that_no_object_reaches_are_not_evaluated() -> None:
     drawing = draw_program(program, model, threads=1)
     across = (np.arange(side) + 0.5) * 2 / side - 1
     far = np.hypot(across[:, None], across[None, :])
-    reach = radius * (1 + SLACK) + CORNER * 2 / side
-    assert drawing.met == int((far <= reach).sum())
+    disc = int((far <= radius * (1 + SLACK)).sum())
+    assert 0.2 * disc < drawing.met < 0.9 * disc  # much of the disc is proved to show one colour
     arguments = (model.framed, program)
     assert draw(*arguments, skip=False).met == side * side
     assert draw(*arguments, threads=3, tile=999).met == drawing.met
     everywhere = draw(*arguments, samples="four")
-    assert drawing.met * 0.95 < everywhere.met <= drawing.met
-    assert everywhere.refined == side * side
+    assert everywhere.refined == everywhere.met == drawing.met
 
 
 def test_the_choice_says_why() -> None:

@@ -19,6 +19,7 @@ from scenelang.renderers.draw import draw
 from scenelang.renderers.field import Field
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.network import FramedConfig
+from scenelang.renderers.raster import raster
 from scenelang.scene.schema import Object, Scale, Scene, Translate
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")
@@ -97,21 +98,24 @@ def test_streaming_equals_the_network_it_was_trained_as(model: Model) -> None:
     """The inference path (channels first, folded weights, skipping off) against `Framed.trace`."""
     network = model.network
     for program in programs("chains", 4):
-        field = Field(network, program.vectors, program.tokens)
-        p = torch.from_numpy(np.random.default_rng(0).uniform(-1, 1, (2, 500)).astype(np.float32))
-        shade = Coverage(field, skip=False).shade(p)
-        skipping = Coverage(field).shade(p)
-        torch.testing.assert_close(skipping.picture[3], shade.picture[3], atol=2e-3, rtol=0)
-        q = torch.stack([field.local(r, p) for r in field.rows])
-        scale = torch.tensor([r.frame.scale for r in field.rows])
+        field, count = Field(network, program.vectors, program.tokens), len(program)
+        canvas = (24, 16)
+        grid = raster(canvas, range(16))
+        tile = Coverage(field, skip=False).tile(canvas, range(16), "one")
+        shown = torch.from_numpy(tile.picture.reshape(-1, 4).T.copy())
+        p = torch.from_numpy(grid.centres((np.arange(24), np.zeros(24, int)), 16)[:, ::16].copy())
+        p = p.reshape(2, -1)
+        every = np.repeat(np.arange(count), p.shape[1])
+        q = field.frames.local(field.xp, every, p.repeat(1, count)).reshape(2, count, -1).swapaxes(0, 1)
+        scale = torch.from_numpy(field.frames.scale.astype(np.float32))
         codes = torch.from_numpy(program.vectors[:, :4].copy())
-        colours = torch.stack([r.colour[:, 0] for r in field.rows])
+        colours = field.colours.T
         tokens = torch.from_numpy(program.tokens.astype(np.int64))
         trace = network.trace(q[None], scale[None], codes[None], colours[None], tokens[None])
         coverage = (0.5 - trace.margin[0, -1] / 4).clamp(0, 1)
-        torch.testing.assert_close(shade.picture[3], coverage, atol=2e-3, rtol=0)
+        torch.testing.assert_close(shown[3], coverage, atol=2e-3, rtol=0)
         colour = trace.colour[0, -1] * coverage[:, None]
-        torch.testing.assert_close(shade.picture[:3].T, colour, atol=4e-3, rtol=0)
+        torch.testing.assert_close(shown[:3].T, colour, atol=4e-3, rtol=0)
 
 
 def test_an_object_out_of_sight_costs_nothing_and_shows_nothing(model: Model) -> None:

@@ -1,0 +1,67 @@
+"""Textures on what pixels of the plane show, looked up when all objects are met and where they are seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenelang.renderers.arrays import Array
+from scenelang.renderers.field import NO_TEXTURE, SMOOTH, Field, Trace
+from scenelang.renderers.meetings import Meetings
+
+QUARTER = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)
+"""Where the samples of a pixel lie (2, 4), pixels from its centre."""
+CORNER = 0.36  # pixels from the centre to a sample, a little rounded up
+NARROW = 1 / 16  # of a pixel by the width of a blend: above it colours change much across the pixel
+LEAST = 1e-4  # of a colour, that counts as part of what a point shows
+
+
+def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
+    """Which pixels (groups, B), of a side, may have samples in a narrow blend with a texture."""
+    xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
+    found = xp.full((trace.paint.shape[0], len(meetings.columns)), 0.0, field.like) > 0
+    worn = np.zeros(len(meetings.columns), bool)
+    worn[place[field.texture[objects] != NO_TEXTURE]] = True
+    width = field.widths[objects]
+    narrow = (field.tokens[objects] == SMOOTH) & (px > NARROW * width) & ~meetings.pairs.open & worn[place]
+    gap = xp.array((width + CORNER * px * (1 + field.frames.stretch[objects])).astype(np.float32), field.like)
+    for part in meetings.slots():
+        if narrow[part].any():
+            some = found[:, : part.stop - part.start]
+            some |= (abs(trace.margin[:, part]) < gap[part]) & xp.array(narrow[part], field.like)
+    return found
+
+
+def add_textures(
+    field: Field, meetings: Meetings, trace: Trace, p: Array, memory: Array, seen: Array, px: float
+) -> None:
+    """Add the textures that points show to their colours.
+
+    Args:
+        p: the points (2, groups, B).
+        memory: state and register (groups, S + 3, B).
+        seen: (groups, B) of which points.
+        px: side of the pixels for which textures are looked up four times, world units; 0: once.
+    """
+    xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
+    shares = trace.shares(meetings, seen)
+    groups, columns = seen.shape
+    offsets = xp.array(QUARTER * np.float32(px), p)[:, :, None] if px else None
+    total = xp.full((3, groups * columns), 0.0, p)
+    texture = field.texture[objects]
+    for number in np.unique(texture[texture != NO_TEXTURE]).tolist():
+        pairs = np.flatnonzero(texture == number)
+        share = xp.take(shares, xp.array(pairs, p)).reshape(-1)
+        some = xp.where(share > LEAST)
+        if not len(some):
+            continue
+        group, pair = np.divmod(xp.to_numpy(some), len(pairs))
+        pair = pairs[pair]
+        index = xp.array(group * columns + place[pair], p)
+        spots = xp.take(p.reshape(2, -1), index)
+        if offsets is not None:
+            spots = spots[:, None] + offsets
+        q = field.frames.local(xp, objects[pair], spots)
+        found = field.textures[number].at(q.reshape(2, -1)).reshape(3, -1, len(pair))
+        xp.add(total, index, found.mean(1) * xp.take(share, some))
+    s = field.network.config.state
+    memory[:, s : s + 3] += total.reshape(3, groups, columns).swapaxes(0, 1)
