@@ -52,19 +52,12 @@ class Kept:
         reach, frames = scene.reach, scene.frames
         low, high = frames.boxes(reach + _ROOM_PX * px * frames.growth)
         low, high = (np.where(np.isinf(reach), end, y[1]) for end, y in ((-np.inf, low), (np.inf, high)))
-        colours = np.ascontiguousarray(scene.xp.to_numpy(scene.colours).T)
-        brought = [bytes(32) if held is None else bytes.fromhex(held.digest) for held in scene.brought]
-        paints = [
-            hashlib.sha256(repr(held and (held.element.digest, held.steps)).encode()).digest()
-            for held in scene.paints
-        ]
-        rows = np.concatenate(
-            [
-                np.ascontiguousarray(part).view(np.uint8).reshape(len(reach), -1)
-                for part in (scene.vectors, colours, scene.tokens, reach)
-            ]
-            + [np.frombuffer(b"".join(part), np.uint8).reshape(-1, 32) for part in (brought, paints)],
-            1,
+        brought = [held and held.digest for held in scene.brought]
+        paints = [held and (held.element.digest, held.steps) for held in scene.paints]
+        looks = [hashlib.sha256(repr(pair).encode()).digest() for pair in zip(brought, paints, strict=True)]
+        shown = (
+            *(scene.vectors, scene.xp.to_numpy(scene.colours).T, scene.tokens, reach),
+            np.frombuffer(b"".join(looks), np.uint8).reshape(-1, 32),
         )
         common = (
             repr((type(scene.xp).__name__, program.canvas, program.background, list(tiles))).encode()
@@ -74,8 +67,9 @@ class Kept:
         for tile in tiles:
             top = (height / 2 - tile.start + _ROOM_PX) * px
             bottom = (height / 2 - tile.start - LEVELS[0] * -(-len(tile) // LEVELS[0]) - _ROOM_PX) * px
-            reaching = rows[(low <= top) & (high >= bottom)]
-            keys.append(hashlib.sha256(common + reaching.tobytes()).digest())
+            reaching = (low <= top) & (high >= bottom)
+            what = b"".join(part[reaching].tobytes() for part in shown)
+            keys.append(hashlib.sha256(common + what).digest())
         return keys
 
 
