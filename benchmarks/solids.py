@@ -37,7 +37,7 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
 from scenelang.image import encoded
-from scenelang.lab.frontier.closed import ClosedForms
+from scenelang.lab.frontier.closed import closed_forms
 from scenelang.measure.metrics import flip
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
@@ -102,7 +102,7 @@ def ways() -> dict[str, Draw]:
         usable_cores(),
         load_arrays(MODEL).network,
         open_model(MODEL),
-        ClosedForms(MODEL),
+        closed_forms(MODEL),
     )
     return {
         "network, numpy": lambda program: draw_objects(arrays, program, threads=cores),

@@ -106,10 +106,7 @@ class Field:
         codes = np.array([np.frombuffer(code, np.float32) for code in found], np.float32)
         self.codes = codes = codes.reshape(len(found), self.layout.code)
         """Of the leaves in use (K, C): decoders are computed together."""
-        layers, far = network.decoder_weights(xp.array(codes, self.like))
-        self.shapes: list[Decoder | GridShape] = [
-            Decoder([(xp.packed(w[i]), b[i]) for w, b in layers], far) for i in range(len(codes))
-        ]
+        self.shapes: list[Decoder | GridShape] = [*network.decoders(xp.array(codes, self.like))]
         self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
         for element in dict.fromkeys(element for element in self.brought if element is not None):
             if network.config.features != 1:
@@ -211,7 +208,7 @@ class Field:
 
     def _decoded(self, shape: Decoder | GridShape, q: Array, far: bool) -> Array:
         """Features (F, M) in leaf units."""
-        if isinstance(shape, GridShape):
+        if not isinstance(shape, Decoder):
             return shape.distance(q)[None]
         parts = []
         for start in range(0, q.shape[1], CHUNK):

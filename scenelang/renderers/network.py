@@ -105,6 +105,11 @@ class FramedNetwork:
             layers.append((mixed.reshape(len(code), *w.shape[1:]).swapaxes(1, 2), one @ b))
         return Decoder(layers, self.far[:, None])
 
+    def decoders(self, codes: Array) -> list[Decoder]:
+        """Of each of the codes (M, C), mixed together and contiguous."""
+        layers, far = self.decoder_weights(codes)
+        return [Decoder([(self.xp.packed(w[i]), b[i]) for w, b in layers], far) for i in range(len(codes))]
+
     def cell_weights(self) -> tuple[Array, ...]:
         """The `Cell`, with tokens in front.
 

@@ -1,12 +1,15 @@
-"""The rival that draws solids by formulas: what it draws is exact but for how the renderer marches."""
+"""The rival that draws by formulas: exact but for how the renderer marches, and which samples it takes."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.lab.frontier.closed import ClosedForms
+from scenelang.lab.frontier.closed import ExactShape, closed_forms
+from scenelang.reference.field import SECTORS, leaf_distance
 from scenelang.renderers.draw import draw_objects
+from tests.passes.random_scenes import blob_scene, random_scene
 from tests.pictures import premultiplied, psnr_db
 
 SCENES = {
@@ -59,7 +62,39 @@ def test_formulas_draw_the_exact_picture(name: str) -> None:
     light = "" if "light(" in objects else "light(position = [1.5, 2.5, 1.5], power = 16, color = #fc8);"
     scene = nsg.loads(f"nsg 1; canvas(64, 64); {light} {objects}")
     program, exact = nsg.compile(scene), nsg.render(scene, backend="reference")
-    image = draw_objects(ClosedForms("solids3d"), program, samples="four").image
+    image = draw_objects(closed_forms("solids3d"), program, samples="four").image
     drawn, exact = premultiplied(image), premultiplied(exact)
     print(f"{psnr_db(drawn, exact):.1f} dB")
     assert psnr_db(drawn, exact) > least_db
+
+
+@pytest.mark.parametrize("geometry", SECTORS)
+def test_shapes_of_the_plane_are_the_reference_s(geometry: str) -> None:
+    rng, shape = np.random.default_rng(1), ExactShape(geometry)
+    p = rng.normal(0, 1.5, (2, 20_000))
+    q = p + rng.normal(0, 0.3, p.shape)
+    np.testing.assert_allclose(shape.distance(p), leaf_distance(geometry, p), rtol=0, atol=1e-12)
+    moved = np.hypot(*(p - q))
+    assert (abs(shape.distance(p) - shape.distance(q)) <= shape.rise(p, moved) + 1e-12).all()
+
+
+def test_formulas_draw_the_exact_picture_of_the_plane() -> None:
+    """All tokens, warps and widths of blends; a sample may lie within rounding of an outline."""
+    field, seen, off = closed_forms("shapes2d"), set(), 0
+    for seed in range(30):
+        scene = (random_scene if seed % 3 else blob_scene)(seed).model_copy(update={"canvas": (72, 56)})
+        try:
+            program = nsg.compile(scene)
+        except nsg.SceneError:
+            continue
+        seen |= {*program.tokens.tolist()}
+        drawn, exact = (
+            premultiplied(image)
+            for image in (
+                draw_objects(field, program, samples="four").image,
+                nsg.render(scene, backend="reference"),
+            )
+        )
+        off += int((abs(drawn - exact).max(-1) > 1 / 255).sum())
+    assert seen == {0, 1, 2, 3}
+    assert off <= 4

@@ -41,6 +41,9 @@ def test_a_small_run(measured: Frontier) -> None:
         "shapes2d, one sample",
         "shapes2d, draft",
         "shapes2d, nothing skipped",
+        "exact field",
+        "exact field, four samples",
+        "exact field, one sample",
         "exact reference, 1 spp",
         "exact reference, 4 spp",
         "exact reference, 16 spp",
@@ -66,7 +69,7 @@ def test_a_small_run(measured: Frontier) -> None:
         assert Path("out", name).stat().st_size > 10_000
     page = Path("out/frontier.html").read_text("utf-8")
     data = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
-    assert [len(p["pictures"]) for p in data["points"]] == [2] * 8
+    assert [len(p["pictures"]) for p in data["points"]] == [2] * 11
 
 
 @pytest.mark.slow

@@ -49,9 +49,9 @@ def command(
     """Measure time and error of every way to draw the scenes of MODEL's set, side by side, in one run.
 
     That is all shipped models of the set, with and without skipping and with other samplings, the exact
-    reference, of solids the exact field in the renderer's own march, and the time of the paper's streaming
-    renderer at full size. Writes frontier.json,
-    frontier.png and frontier.html, which needs no other file, into FOLDER.
+    field in the network's place with all that the renderer skips, the exact reference, and the time of the
+    paper's streaming renderer at full size. Writes frontier.json, frontier.png and frontier.html, which needs
+    no other file, into FOLDER.
 
     With --verify draws other scenes and counts in how many the promised errors of the shipped frontier are
     kept, writes verified.json, and exits with 1 if that is under 95 %.

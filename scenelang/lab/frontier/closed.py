@@ -1,20 +1,101 @@
-"""The solids' field by its formulas in place of the network, with all that the renderer saves: its rival."""
+"""The exact field by formulas in place of the network, with all that the renderer saves: its rival."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
-from scenelang.reference.field import TORUS, leaf_distance
+from scenelang.reference.field import SECTORS, TORUS, leaf_distance
 from scenelang.renderers.arrays import Array, Layers
-from scenelang.renderers.field import SMOOTH, SUBTRACT, UNION
+from scenelang.renderers.field import BLEND, SMOOTH, SUBTRACT, UNION
+from scenelang.renderers.network import FramedArrays, FramedConfig
+from scenelang.renderers.slopes import Floats
 from scenelang.renderers.solid.network import Cell, SolidArrays, Wanted
 
+SHARP = 1e6  # per world unit: gates of the plane's cell open within a millionth
 
-class ClosedForms(SolidArrays):
+
+class ExactShape:
+    """A leaf of the plane in place of a decoder: its distance, which changes by no more than a point moves.
+
+    A point is mirrored into the half sector that one segment bounds (`scenelang.reference.field.SECTORS`) and
+    turned, so that the segment lies along an axis.
+    """
+
+    def __init__(self, geometry: str) -> None:
+        n, phase, outer, inner = SECTORS[geometry]
+        self._first = math.cos(phase), math.sin(phase)
+        self._mirrors: list[tuple[float, float, bool]] = []
+        sector, most = math.pi / n, n  # angles lie in [0, most sectors]
+        while most > 1:
+            at = -(-most // 3)
+            self._mirrors.append((math.cos(at * sector), math.sin(at * sector), 2 * at < most))
+            most = at
+        u, v = inner * math.cos(sector) - outer, inner * math.sin(sector)
+        self._outer, self._length = outer, math.hypot(u, v)
+        self._along = u / self._length, v / self._length
+
+    def distance(self, q: Array) -> Array:
+        """Distances (M,), in leaf units, at leaf coordinates (2, M)."""
+        cos, sin = self._first
+        x, y = q
+        u, v = cos * x + sin * y, abs(cos * y - sin * x)
+        for cos, sin, beyond in self._mirrors:
+            past = np.maximum(cos * v - sin * u, 0.0)
+            u += 2 * sin * past
+            v -= 2 * cos * past
+            v = abs(v) if beyond else v
+        u -= self._outer
+        cos, sin = self._along
+        off, gap = sin * u - cos * v, cos * u + sin * v
+        gap -= gap.clip(0.0, self._length)
+        return np.copysign(np.sqrt(gap * gap + off * off), off)
+
+    def rise(self, q: Floats, radius: Floats) -> Floats:
+        """By how much distances (M,) at leaf coordinates (2, M) differ at most from those within radii."""
+        return radius
+
+
+class ClosedPlane(FramedArrays):
+    """What `FramedArrays` has learned, computed: distances, albedo, and a cell with the weights of the fold.
+
+    Args:
+        model: whose Programs are drawn.
+    """
+
+    def __init__(self, model: str) -> None:
+        self.__dict__.update(vars(load_arrays(model).network))
+        shapes = [ExactShape(geometry) for geometry in load_manifest(model).geometries]
+        self.config = FramedConfig(self.config.code, self.config.material_code)
+        self.slopes = {code.tobytes(): shape for code, shape in zip(self.codes, shapes, strict=True)}
+        self.read_slope = np.float32(math.log(4 * SHARP))
+        s, k = SHARP, 0.5 / BLEND
+        shut = [0.0, 0.0, -1.0]
+        # of each token the gates of distance and colour: lines in (d, D), and their biases
+        gates = [
+            ([-s, s, 0.5], [-s, s, 0.5], [-s, 0.0, 0.5]),  # d < D; d < D or d < 0
+            ([-k, k, 0.5], [-k, k, 0.5], shut),
+            ([-s, -s, 0.5], shut, shut),  # -d > D
+            ([s, -s, 0.5], shut, shut),  # d > D
+        ]
+        lines = np.array(gates, np.float32).swapaxes(1, 2)  # (TOKENS, d and D and bias, S + L)
+        self.cell_lines, self.cell_bias = lines[:, :2], lines[:, 2]
+        self.cell_gain = np.zeros_like(self.cell_bias)
+        self.candidate = np.array([1.0, 1.0, -1.0, 1.0], np.float32)[:, None, None]
+        self.bump = np.array([0.0, BLEND, 0.0, 0.0], np.float32)[:, None]
+
+    def decoders(self, codes: Array) -> list[Any]:
+        return [self.slopes[code.tobytes()] for code in codes]
+
+    def object_albedo(self, material_code: Array) -> Array:
+        return np.ones((len(material_code), 3), np.float32)
+
+
+class ClosedSolids(SolidArrays):
     """What `SolidArrays` has learned, computed: distances, their gradients, looks and the fold.
 
     Args:
@@ -68,6 +149,11 @@ class ClosedForms(SolidArrays):
 
     def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:
         return np.where(cell.own[0] == SUBTRACT, -take, take), 1 - take
+
+
+def closed_forms(model: str) -> ClosedPlane | ClosedSolids:
+    """The exact field of a model's Programs."""
+    return (ClosedPlane if load_manifest(model).dimension == 2 else ClosedSolids)(model)
 
 
 def _joined(token: Any, k: Array, state: Array, d: Array) -> Array:

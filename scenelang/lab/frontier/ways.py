@@ -16,7 +16,7 @@ from scenelang.backend.small import draw_small
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.image import Image, from_samples
-from scenelang.lab.frontier.closed import ClosedForms
+from scenelang.lab.frontier.closed import closed_forms
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.models.weights import read_facts
 from scenelang.program.compile import compile_scene
@@ -26,6 +26,13 @@ from scenelang.renderers.streaming import Streaming, StreamingConfig
 from scenelang.scene.schema import Scene
 
 FULL = 256  # pixels along a side at which the paper's renderer is timed
+TITLES: dict[Samples, str] = {
+    "adaptive": "",
+    "four": ", four samples",
+    "one": ", one sample",
+    "draft": ", draft",
+    "quick": ", quick",
+}
 Draw = Callable[[], Image]
 Prepare = Callable[[Scene], Draw]
 """Compiles a scene, which is not timed, and returns what draws it, which is."""
@@ -79,7 +86,9 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
     side = manifest.sizes[0][0] if manifest.sizes else 0
 
     def way(title: str, why_not: str | None = None, **options: Any) -> Way:
-        words = [f"--{key} {value}" for key, value in options.items() if key != "skip"]
+        words = [
+            f"--{key} {value}" for key, value in options.items() if key != "skip" and value != "adaptive"
+        ]
         if manifest.renderer == "reading":
             options["skip"] = False  # every sample reads every object
         line = " ".join(["scenelang render scene.nsg -o scene.png --model", name, *words])
@@ -98,22 +107,22 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
             **options,
         )
 
-    yield way(name)
-    if manifest.renderer in ("framed", "solid"):
-        yield way(f"{name}, four samples", samples="four")
-        yield way(f"{name}, one sample", samples="one")
-        yield way(f"{name}, draft", samples="draft")
+    known: dict[str, tuple[Samples, ...]] = {
+        "framed": ("adaptive", "four", "one", "draft"),
+        "solid": ("adaptive", "four", "one", "draft", "quick"),
+    }
+    for samples in known.get(manifest.renderer, ("adaptive",)):
+        yield way(name + TITLES[samples], samples=samples)
     if manifest.renderer == "framed":
         yield way(f"{name}, nothing skipped", "the same picture, later", skip=False)
-    if manifest.renderer == "solid":
-        yield way(f"{name}, quick", samples="quick")
-        for title, samples in (("", "adaptive"), (", four samples", "four"), (", quick", "quick")):
+    for samples in known.get(manifest.renderer, ()) if name == base else ():
+        if samples != "draft":
             yield Way(
-                f"exact field{title}",
+                f"exact field{TITLES[samples]}",
                 _formulas(name, threads, samples),
                 renderer="exact field",
-                samples=samples,  # type: ignore[arg-type]
-                why_not="formulas in place of the network, in the same march",
+                samples=samples,
+                why_not="formulas in place of the network, all else alike",
             )
 
 
@@ -136,9 +145,9 @@ def _neural(name: str, side: int, threads: int, **options: Any) -> Prepare:
     return prepare
 
 
-def _formulas(name: str, threads: int, samples: str) -> Prepare:
+def _formulas(name: str, threads: int, samples: Samples) -> Prepare:
     def prepare(scene: Scene) -> Draw:
-        program, field = compile_scene(scene, model=name), ClosedForms(name)
+        program, field = compile_scene(scene, model=name), closed_forms(name)
         return lambda: draw_objects(field, program, threads=threads, samples=samples).image
 
     return prepare
