@@ -1,31 +1,32 @@
-"""Where the time of a warm frame in the plane goes, and how far it is from its products alone.
+"""Where the time of a warm frame in the plane goes, and what the exact field takes in the network's place.
 
-    python benchmarks/floor.py [--frames N] [--library LIBRARY] [--scene NAME ...] [--against CHECKOUT]
+    python -m benchmarks.floor [--frames N] [--scene NAME ...]            shares by part, on numpy
+    python -m benchmarks.floor --exact [...]                              formulas beside the network
+    python -m benchmarks.floor --against CHECKOUT [--library torch] [...] another checkout beside this one
 
-Processor time of one thread. Each frame is of a Program that was not drawn before in it. Shares are
-of the renderer's modules, what numpy and torch spend on their behalf included; *floor* is what products of
-the decoder take at the rate of a large float32 product on the same core. With ``--against`` a process of
-another checkout draws each Program in turn with this one, several times, of which the least counts, and
-pictures are compared.
+Processor time of one thread. Each frame is of a Program of its own, and nothing is kept between frames.
+Medians are over frames, of each of which the least of several drawings counts, the rivals' in turn. *Floor*
+is what the decoder's products take at the rate of a large float32 product on the same core. Of each part: its
+share of the frame, calls of numpy, operations, and bytes read and written; *Python* is what no call of numpy
+takes. With ``--against`` a process of another checkout draws the same Programs, and pictures are compared.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import copy
-import cProfile
 import json
 import os
-import pstats
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,37 +35,42 @@ from scenelang.backend.options import keep_memory
 from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.framed import load_arrays
 from scenelang.program.program import Program
-from scenelang.renderers.draw import Drawing, draw_objects
+from scenelang.renderers.draw import draw_objects
 
 ROUNDS = 5  # of which the least counts: others interrupt
 SIDE = 768  # of the matrices whose product's rate is the floor's
+MODEL = "shapes2d"
+Rival = Callable[[int], "Frame"]
 
 
-def stars(count: int, scale: float, side: int) -> Callable[[int], Any]:
+class Frame(NamedTuple):
+    """What a frame took; ``picture`` is (H, W, 3)."""
+
+    seconds: float
+    pairs: int
+    refined: int
+    met: int
+    picture: Any
+
+
+def stars(frame: int, count: int, scale: float, side: int) -> Any:
     """Stars strewn over a canvas, others for each frame."""
-
-    def made(frame: int) -> Any:
-        at = 100_000 * frame
-        return nsg.loads(
-            f"canvas({side}, {side}); for (i in 0..<{count}) {{ star {{ scale({scale}); rotate(7deg * i); "
-            f"translate(2 * rand(i + {at}) - 1, 2 * rand(i + {at + 50_000}) - 1); }} }}"
-        )
-
-    return made
+    at = 100_000 * frame
+    return nsg.loads(
+        f"canvas({side}, {side}); for (i in 0..<{count}) {{ star {{ scale({scale}); rotate(7deg * i); "
+        f"translate(2 * rand(i + {at}) - 1, 2 * rand(i + {at + 50_000}) - 1); }} }}"
+    )
 
 
-def of_set(name: str) -> Callable[[int], Any]:
+def of_set(frame: int, name: str) -> Any:
     """Scenes of an evaluation set."""
-    return lambda frame: random_scene(np.random.default_rng([2021, frame]), SETS[name])
+    return random_scene(np.random.default_rng([2021, frame]), SETS[name])
 
 
 SCENES: dict[str, Callable[[int], Any]] = {
-    "shapes2d": of_set("shapes2d"),
-    "chains": of_set("chains"),
-    "many": of_set("many"),
-    "crowd": of_set("crowd"),
-    "200 stars": stars(200, 0.08, 256),
-    "10,000 small stars": stars(10_000, 0.008, 1024),
+    **{name: partial(of_set, name=name) for name in ("shapes2d", "chains", "many", "crowd")},
+    "200 stars": partial(stars, count=200, scale=0.08, side=256),
+    "10,000 small stars": partial(stars, count=10_000, scale=0.008, side=1024),
 }
 
 
@@ -72,167 +78,165 @@ def programs(name: str, frames: int) -> list[Program]:
     """Programs of scenes that something is seen of; one more than frames, as the first one warms up."""
     found: list[Program] = []
     for frame in range(10 * frames + 10):
-        try:
-            found.append(nsg.compile(SCENES[name](frame), model="shapes2d"))
-        except nsg.SceneError:
-            continue
+        with contextlib.suppress(nsg.SceneError):
+            found.append(nsg.compile(SCENES[name](frame), model=MODEL))
         if len(found) > frames:
             break
     return found
 
 
 def network(library: str) -> Any:
-    """The network that a library draws with, on one core."""
+    """What draws, on one core."""
+    keep_memory()
+    if library == "exact":
+        from scenelang.lab.frontier.closed import closed_forms
+
+        return closed_forms(MODEL)
     if library == "numpy":
-        return load_arrays("shapes2d").network
+        return load_arrays(MODEL).network
     import torch
 
     from scenelang.models.load import load_model
 
     torch.set_num_threads(1)
-    return load_model("shapes2d").network
+    return load_model(MODEL).network
 
 
-def timed(net: Any, program: Program) -> tuple[float, Drawing]:
-    """Seconds of a frame, and what was drawn."""
-    started = time.process_time()
-    drawing = draw_objects(net, program)
-    return time.process_time() - started, drawing
+def here(net: Any, made: Sequence[Program]) -> Rival:
+    """Draws the frames of Programs in this process."""
+
+    def draw(index: int) -> Frame:
+        program = copy.copy(made[index])
+        started = time.process_time()
+        drawn = draw_objects(net, program)
+        seconds = time.process_time() - started
+        return Frame(seconds, drawn.pairs, drawn.refined, drawn.met, np.asarray(drawn.image))
+
+    return draw
+
+
+def worker(draw: Rival, folder: str) -> None:
+    """Draw a frame for each line of the input; a line of JSON says what it took."""
+    for line in sys.stdin:
+        frame = draw(int(line))
+        np.save(f"{folder}/picture.npy", frame.picture)
+        print(json.dumps(frame[:-1]), flush=True)
+
+
+@contextlib.contextmanager
+def elsewhere(root: str, name: str, frames: int, library: str) -> Iterator[Rival]:
+    """Draws frames by the code of a checkout in a process of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        line = [sys.executable, __file__, "--worker", folder, "--frames", str(frames)]
+        environment = {**os.environ, "PYTHONPATH": root, "OMP_NUM_THREADS": "1"}
+        with subprocess.Popen(
+            [*line, "--library", library, "--scene", name],
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        ) as process:
+            assert process.stdin is not None
+            assert process.stdout is not None
+
+            def draw(index: int) -> Frame:
+                print(index, file=process.stdin, flush=True)
+                return Frame(*json.loads(process.stdout.readline()), np.load(f"{folder}/picture.npy"))
+
+            yield draw
+            process.stdin.close()
+
+
+def race(rivals: Sequence[Rival], frames: int) -> list[list[Frame]]:
+    """The frames of each rival; they draw in turn, several times, of which the least counts."""
+    found: list[list[Frame]] = [[] for _ in rivals]
+    for index in range(frames + 1):
+        turns = [[rival(index) for rival in rivals] for _ in range(ROUNDS)]
+        for own, drawn in zip(found, zip(*turns, strict=True), strict=True):
+            own.append(min(drawn, key=lambda frame: frame.seconds))
+    return [own[1:] for own in found]
+
+
+def told(title: str, frames: Sequence[Frame], rate: float) -> str:
+    """Medians of frames; the floor is of a rate of operations a second."""
+    seconds, pairs, refined, met = (statistics.median(f[at] for f in frames) for at in range(4))
+    each = sum(2 * w.shape[1] * w.shape[2] for w in load_arrays(MODEL).network.decoder_w)
+    floor = f", floor {1e3 * pairs * each / rate:.2f} ms at {rate / 1e9:.0f} GFLOP/s" if rate else ""
+    counts = f"{pairs:,.0f} pairs met, {met:,.0f} pixels asked, {refined:,.0f} of them four times"
+    return f"{title}: {1e3 * seconds:.2f} ms; {counts}{floor}"
+
+
+def against(ours: Sequence[Frame], theirs: Sequence[Frame], title: str) -> str:
+    """How two rivals compare, frame by frame."""
+    ratio = statistics.median(b.seconds / a.seconds for a, b in zip(ours, theirs, strict=True))
+    off = [abs(a.picture - b.picture).max(2) for a, b in zip(ours, theirs, strict=True)]
+    worst, many = 255 * max(one.max() for one in off), sum(int((one > 1 / 255).sum()) for one in off)
+    return f"{title} takes {ratio:.2f} times as long; worst pixel {worst:.2f}/255, {many} by more than 1/255"
+
+
+def shares(net: Any, made: Sequence[Program], frames: Sequence[Frame]) -> Iterator[str]:
+    """Lines of what the parts of frames take; calls are the same each time, and of each the least counts."""
+    from benchmarks.counted import counting
+
+    total: dict[str, Any] = {}
+    for index in range(1, len(made)):
+        turns = []
+        for _ in range(ROUNDS):
+            with counting() as calls:
+                here(net, made)(index)
+            turns.append(calls)
+        for part, seconds, *counts in [min(own, key=lambda c: c.seconds) for own in zip(*turns, strict=True)]:
+            total[part] = total.get(part, 0.0) + np.array([seconds, 1, *counts])
+    whole = sum(frame.seconds for frame in frames)
+    for part, took in sorted(total.items(), key=lambda item: -item[1][0]):
+        calls, operations, moved = took[1:] / len(frames)
+        each = f"{calls:7,.0f} calls {operations / 1e6:8.2f} MFLOP {moved / 1e6:8.2f} MB"
+        yield f"  {part:16}{took[0] / whole:5.0%} {each}"
+    yield f"  {'Python':16}{1 - sum(took[0] for took in total.values()) / whole:5.0%}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--frames", type=int, default=12, metavar="N")
+    parser.add_argument("--library", choices=("numpy", "torch", "exact"), default="numpy")
+    parser.add_argument("--scene", action="append", choices=SCENES)
+    parser.add_argument("--exact", action="store_true")
+    parser.add_argument("--against", metavar="CHECKOUT")
+    parser.add_argument("--worker", metavar="FOLDER", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    for name in given.scene or SCENES:
+        if given.against:
+            with contextlib.ExitStack() as stack:
+                roots = str(Path(__file__).parents[1]), given.against
+                rivals = [stack.enter_context(elsewhere(r, name, given.frames, given.library)) for r in roots]
+                ours, theirs = race(rivals, given.frames)
+            print(f"{name}, {told(given.library, ours, 0)}; {against(ours, theirs, given.against)}")
+            continue
+        made = programs(name, given.frames)
+        nets = {library: network(library) for library in [given.library, *["exact"] * given.exact]}
+        rivals = [here(net, made) for net in nets.values()]
+        if given.worker:
+            worker(rivals[0], given.worker)
+            return
+        raced = race(rivals, len(made) - 1)
+        rate = gemm_rate()
+        for (library, net), frames in zip(nets.items(), raced, strict=True):
+            print(f"{name}, {told(library, frames, rate)}")
+            for line in shares(net, made, frames) if library != "torch" else ():
+                print(line, flush=True)
+        if given.exact:
+            print(f"{name}, {against(raced[1], raced[0], 'the network')}", flush=True)
 
 
 def gemm_rate() -> float:
     """Floating-point operations a second of a large product."""
     a = np.random.default_rng(0).random((SIDE, SIDE), np.float32)
     taken = []
-    for _ in range(5):
+    for _ in range(ROUNDS):
         started = time.process_time()
         a @ a
         taken.append(time.process_time() - started)
     return float(2 * SIDE**3 / min(taken))
-
-
-def shares(net: Any, made: list[Program]) -> dict[str, float]:
-    """Shares of the time by the module that spends it."""
-    profile = cProfile.Profile()
-    for program in made:
-        profile.runcall(draw_objects, net, program)
-    stats: Any = pstats.Stats(profile).stats  # type: ignore[attr-defined]
-    spent = {function: entry[2] for function, entry in stats.items()}
-    for _ in range(8):  # what numpy and helpers spend is their callers'
-        for function, (_, _, _, _, callers) in stats.items():
-            if _own(function[0]) or not callers:
-                continue
-            amount, spent[function] = spent[function], 0.0
-            weights = {caller: entry[3] + 1e-12 for caller, entry in callers.items()}
-            for caller, weight in weights.items():
-                spent[caller] = spent.get(caller, 0.0) + amount * weight / sum(weights.values())
-    found: Counter[str] = Counter()
-    for (file, _, function_name), seconds in spent.items():
-        found[f"{Path(file).stem}.{function_name}" if _own(file) else "rest"] += seconds
-    return {name: seconds / sum(found.values()) for name, seconds in found.most_common(14)}
-
-
-def _own(file: str) -> bool:
-    return "/renderers/" in file and "/arrays" not in file
-
-
-def worker(name: str, frames: int, library: str, folder: str) -> None:
-    """Draw a frame for each line of the input; a line of JSON says what it took."""
-    keep_memory()
-    net, made = network(library), programs(name, frames)
-    print("ready", flush=True)
-    for line in sys.stdin:
-        index = int(line)
-        seconds, drawing = timed(net, copy.copy(made[index]))
-        np.save(f"{folder}/{index}.npy", np.asarray(drawing.image))
-        print(json.dumps([seconds, drawing.pairs, drawing.refined]), flush=True)
-
-
-def compared(name: str, frames: int, library: str, checkout: str) -> None:
-    """Frames of this checkout and of another in turn."""
-    with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
-        sides = []
-        for at, root in enumerate((str(Path(__file__).parents[1]), checkout)):
-            out = Path(folder, str(at))
-            out.mkdir()
-            sides.append(
-                subprocess.Popen(
-                    [
-                        *(sys.executable, __file__, "--worker", str(out), "--frames", str(frames)),
-                        *("--library", library, "--scene", name),
-                    ],
-                    env={**os.environ, "PYTHONPATH": root, "OMP_NUM_THREADS": "1"},
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    text=True,
-                )
-            )
-        for side in sides:
-            side.stdout.readline()  # type: ignore[union-attr]
-        taken: list[list[float]] = [[], []]
-        worst, most = 0.0, 0
-        for index in range(frames + 1):
-            least = [float("inf")] * 2
-            for turn in range(2 * ROUNDS):
-                at, side = turn % 2, sides[turn % 2]
-                side.stdin.write(f"{index}\n")  # type: ignore[union-attr]
-                side.stdin.flush()  # type: ignore[union-attr]
-                seconds = json.loads(side.stdout.readline())[0]  # type: ignore[union-attr]
-                least[at] = min(least[at], seconds)
-            for found, seconds in zip(taken, least, strict=True):
-                found.append(seconds)
-            ours, theirs = (np.load(f"{folder}/{at}/{index}.npy") for at in (0, 1))
-            off = abs(ours - theirs)
-            worst, most = max(worst, float(off.max())), most + int((off.max(2) > 1 / 255).sum())
-        for side in sides:  # type: ignore[assignment]
-            side.stdin.close()  # type: ignore[union-attr]
-            side.wait()
-    now, before = (1e3 * statistics.median(side[1:]) for side in taken)
-    ratio = statistics.median(b / a for a, b in list(zip(*taken, strict=True))[1:])
-    print(
-        f"{name}, {library}: {now:.2f} ms, before {before:.2f} ms, {ratio:.2f} times as fast; "
-        f"worst pixel {255 * worst:.2f}/255, {most} pixels by more than 1/255",
-        flush=True,
-    )
-
-
-def measured(name: str, frames: int, library: str) -> None:
-    """A frame's time, its products, and shares."""
-    keep_memory()
-    net, made = network(library), programs(name, frames)
-    each = sum(2 * w.shape[1] * w.shape[2] for w in net.decoder_w)
-    rate, taken, pairs, refined, met = gemm_rate(), [], [], [], []
-    for program in made:
-        seconds, drawing = timed(net, program)
-        taken.append(seconds)
-        pairs.append(drawing.pairs)
-        refined.append(drawing.refined)
-        met.append(drawing.met)
-    frame, count = statistics.median(taken[1:]), statistics.median(pairs[1:])
-    floor = count * each / rate
-    print(
-        f"{name}, {library}: {1e3 * frame:.2f} ms; {count:,.0f} meetings, {count * each / 1e6:.0f} MFLOP, "
-        f"floor {1e3 * floor:.2f} ms at {rate / 1e9:.0f} GFLOP/s, {floor / frame:.0%}; "
-        f"{statistics.median(met[1:]):,.0f} pixels met, {statistics.median(refined[1:]):,.0f} refined"
-    )
-    print("  " + ", ".join(f"{part} {share:.0%}" for part, share in shares(net, made).items()), flush=True)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--frames", type=int, default=12, metavar="N")
-    parser.add_argument("--library", choices=("numpy", "torch"), default="numpy")
-    parser.add_argument("--scene", action="append", choices=SCENES)
-    parser.add_argument("--against", metavar="CHECKOUT")
-    parser.add_argument("--worker", metavar="FOLDER", help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    for name in given.scene or SCENES:
-        if given.worker:
-            worker(name, given.frames, given.library, given.worker)
-        elif given.against:
-            compared(name, given.frames, given.library, given.against)
-        else:
-            measured(name, given.frames, given.library)
 
 
 if __name__ == "__main__":
