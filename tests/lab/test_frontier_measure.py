@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import scenelang as nsg
 from scenelang.lab.frontier import measure, verify, ways
 from scenelang.lab.frontier.verify import Case
 from scenelang.measure.frontier import Errors, Frontier, between
@@ -15,6 +16,7 @@ from tests.cli.conftest import Folder
 from tests.cli.conftest import folder as folder
 from tests.cli.test_choosing import ladder
 from tests.cli.test_choosing import shipped as shipped
+from tests.work import lines_run
 
 
 @pytest.fixture
@@ -25,7 +27,6 @@ def measured(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> Frontier:
     monkeypatch.setattr(measure, "SIDES", (32,))
     monkeypatch.setattr(measure, "FITTED", 1)
     monkeypatch.setattr(measure, "CONVERGED", 1)
-    monkeypatch.setattr(measure, "REPEATS", 1)
     result = folder.run("lab", "frontier", "shapes2d", "-o", "out", "--scenes", "2", "--seed", "5")
     assert result.exit_code == 0, result.output
     assert "points lie between the fastest and the nearest" in result.stdout
@@ -76,7 +77,7 @@ def test_a_small_run(measured: Frontier) -> None:
 def test_a_small_run_of_solids(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     """The exact field draws in the same march: as near as the network, and never chosen."""
     monkeypatch.setattr(ways, "_paper", lambda base: iter(()))
-    for name, value in (("SIDE", 48), ("SIDES", ()), ("FITTED", 1), ("REPEATS", 1)):
+    for name, value in (("SIDE", 48), ("SIDES", ()), ("FITTED", 1)):
         monkeypatch.setattr(measure, name, value)
     result = folder.run("lab", "frontier", "solids3d", "-o", "out", "--scenes", "2", "--seed", "5")
     assert result.exit_code == 0, result.output
@@ -95,6 +96,14 @@ def test_a_small_run_of_solids(folder: Folder, monkeypatch: pytest.MonkeyPatch) 
     assert flips["exact field"] < flips["solids3d, one sample"] < flips["solids3d, draft"]
     assert not points["exact field"].offered
     assert points["solids3d, quick"].cost is not None
+
+
+def test_nothing_is_kept_between_frames() -> None:
+    """A scene that was drawn before takes as many lines of Python again, by ways that share what is loaded."""
+    scenes = [nsg.loads(f"canvas(96, 96); {'star { scale(0.4); twirl(1); }' * n} square;") for n in (2, 1)]
+    for way in (way for way in ways.ways_of("shapes2d", 1) if way.renderer in ("framed", "exact field")):
+        counts = [lines_run(way.prepare(scene)) for scene in [*scenes, scenes[1]]]
+        assert counts[1] == counts[2] > 500, way.name
 
 
 @pytest.mark.parametrize(

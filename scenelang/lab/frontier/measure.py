@@ -1,7 +1,8 @@
 """One run that takes the time and the error of every way to draw, side by side.
 
-Each scene is drawn by all ways in turn, beginning with another one each time, so that a machine that slows
-down slows all of them. Ways that take long draw fewer scenes; the file says how many.
+Each scene is drawn once by all ways in turn, beginning with another one each time, so that a machine that
+slows down slows all of them. Each frame is of a Program that was compiled for it and not drawn before, and no
+renderer keeps anything between frames. Ways that take long draw fewer scenes; the file says how many.
 """
 
 from __future__ import annotations
@@ -40,7 +41,6 @@ SLOW_S = 20.0  # a way draws so long at most, but at least on `LEAST` scenes
 LEAST = 4
 COMPARED = 30  # scenes of ways that are measured for comparison and promise nothing
 TIMED = 8  # scenes of ways of which only the time is taken
-REPEATS = 2
 SIDE = 256  # pixels along a side of the scenes
 SIDES = (128, 512)  # further canvases that times are fitted on
 MANY = "many"  # set of more objects that times are fitted on
@@ -53,8 +53,7 @@ MARGIN = 1.25  # of 40 scenes without it, one scene in ten of another seed was w
 class Record:
     """What was measured of a way."""
 
-    ms: list[float] = field(default_factory=list)  # of each scene, the least of the repeats
-    all_ms: list[float] = field(default_factory=list)  # of every frame
+    ms: list[float] = field(default_factory=list)  # of each scene
     # of each scene
     flip: list[float] = field(default_factory=list)
     psnr: list[float] = field(default_factory=list)
@@ -86,8 +85,8 @@ def measure_frontier(
     ways = ways_of(base, threads)
     records = {way.name: Record() for way in ways}
     scene_at = scenes_of(open_model(base), usual_set(manifest), seed, SIDE)
-    first = scene_at(0)
-    quota = {way.name: _quota(way, first, scenes, threads) for way in ways}
+    spare = scene_at(scenes)
+    quota = {way.name: _quota(way, spare, scenes, threads) for way in ways}
     stick = yardstick()
     for index in range(scenes):
         scene = scene_at(index)
@@ -106,14 +105,14 @@ def measure_frontier(
         set=usual_set(manifest),
         seed=seed,
         scenes=scenes,
-        canvas=first.canvas,
+        canvas=spare.canvas,
         threads=threads,
         clock="processor" if threads == 1 else "wall",
         machine=machine(),
         revision=revision(),
         torch=torch.__version__.split("+")[0],
         yardstick_ms=(stick + yardstick()) / 2,
-        streaming_ms=statistics.median(paper.all_ms) if paper is not None else 0.0,
+        streaming_ms=statistics.median(paper.ms) if paper is not None else 0.0,
         converged={n: float(np.mean(r.converged)) for n, r in records.items() if r.converged},
         points=tuple(sorted(points, key=lambda p: p.ms.median)),
     )
@@ -136,11 +135,10 @@ def _timed(run: Draw, threads: int) -> tuple[float, Image]:
 
 def _quota(way: Way, scene: Scene, scenes: int, threads: int) -> int:
     """How many scenes a way draws; its first frames, which load and warm up, are not counted."""
-    run = way.prepare(scene)
-    run()
-    ms, _ = _timed(run, threads)
+    for _ in range(2):
+        ms, _ = _timed(way.prepare(scene), threads)
     most = TIMED if not way.drawn else scenes if way.offered else COMPARED
-    return max(1, min(scenes, most, max(LEAST, int(1000 * SLOW_S / (REPEATS * ms)))))
+    return max(1, min(scenes, most, max(LEAST, int(1000 * SLOW_S / ms))))
 
 
 def _one_scene(
@@ -156,22 +154,15 @@ def _one_scene(
     many = None
     if index < CONVERGED and manifest.dimension == 2:  # with 64 samples a picture of solids takes minutes
         many = over_white(reference_of(scene, manifest, per_side=8))
-    runs = [(way, way.prepare(scene)) for way in ways]
-    best: dict[str, float] = {}
-    shown: dict[str, Image] = {}
-    for _ in range(REPEATS):
-        for way, run in runs:
-            ms, shown[way.name] = _timed(run, threads)
-            records[way.name].all_ms.append(ms)
-            best[way.name] = min(ms, best.get(way.name, math.inf))
-    for way, _ in runs:
+    drawn = [(way, *_timed(run, threads)) for way, run in [(way, way.prepare(scene)) for way in ways]]
+    for way, ms, image in drawn:
         record = records[way.name]
-        record.ms.append(best[way.name])
+        record.ms.append(ms)
         record.loads.append(load)
-        record.fitted.append(best[way.name])
+        record.fitted.append(ms)
         if not way.drawn:
             continue
-        picture = _white(enlarged(shown[way.name], (exact.shape[1], exact.shape[0])))
+        picture = _white(enlarged(image, (exact.shape[1], exact.shape[0])))
         record.flip.append(flip(picture, exact))
         record.psnr.append(psnr(picture, exact))
         if index < SHOWN:
@@ -194,19 +185,19 @@ def _other_loads(
     plain, many = (scenes_of(model, name, seed, SIDE) for name in (usual_set(manifest), MANY))
     # of solids others than those of `SIDE`: they differ more in what a pixel takes
     offset = 0 if manifest.dimension == 2 else 1000
-    cases = [(plain(offset + i), (side, side)) for side in SIDES for i in range(FITTED)]
-    cases += [(scene, scene.canvas) for scene in map(many, range(FITTED))]
-    for done, (scene, canvas) in enumerate(cases):
+    cases = [(plain(offset + i), (side, side), i) for side in SIDES for i in range(FITTED + 1)]
+    cases += [(many(i), many(i).canvas, i) for i in range(FITTED + 1)]
+    for done, (scene, canvas, index) in enumerate(cases):
         scene = scene.model_copy(update={"canvas": canvas})
         load = load_of(compile_scene(scene, model=base))
         for way in ways:
             record = records[way.name]
             if (way.side and canvas != plain(0).canvas) or statistics.median(record.ms) > 1000:
                 continue
-            run = way.prepare(scene)
-            ms = min(_timed(run, threads)[0] for _ in range(REPEATS + 1))
-            record.loads.append(load)
-            record.fitted.append(ms)
+            ms, _ = _timed(way.prepare(scene), threads)
+            if index:  # the first of its kind finds its memory
+                record.loads.append(load)
+                record.fitted.append(ms)
         report("other canvases and counts", done + 1, len(cases))
 
 
@@ -241,7 +232,7 @@ def _point(way: Way, record: Record, paper: Record | None) -> Point:
         **shared,
         offered=way.offered,
         scenes=len(record.ms),
-        ms=Times(statistics.median(record.all_ms), float(np.percentile(record.all_ms, 95))),
+        ms=Times(statistics.median(record.ms), float(np.percentile(record.ms, 95))),
         ratio_to_streaming=_ratio(paper, record),
         flip=errors,
         psnr=quality,

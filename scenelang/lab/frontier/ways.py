@@ -12,11 +12,12 @@ import torch
 
 from scenelang.backend.neural import draw_program, open_model
 from scenelang.backend.options import Samples
-from scenelang.backend.small import draw_small
+from scenelang.backend.small import choose_drawer, draw_small
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.image import Image, from_samples
 from scenelang.lab.frontier.closed import closed_forms
+from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.models.weights import read_facts
 from scenelang.program.compile import compile_scene
@@ -126,21 +127,19 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
             )
 
 
-def _neural(name: str, side: int, threads: int, **options: Any) -> Prepare:
+def _neural(name: str, side: int, threads: int, samples: Samples = "adaptive", skip: bool = True) -> Prepare:
+    """By the library that `render` draws a picture with."""
+
     def prepare(scene: Scene) -> Draw:
         if side:
             scene = scene.model_copy(update={"canvas": (side, side)})
         program = compile_scene(scene, model=name)
-        if program.stage is not None:  # as `render` draws them
-            return lambda: (
-                draw_small(program, threads=threads, samples=options.get("samples", "adaptive")).image
-            )
-        model = open_model(name)
-
-        def run() -> Image:
-            return draw_program(program, model, threads=threads, **options).image
-
-        return run
+        if choose_drawer(program, samples=samples).library == "torch":
+            model = open_model(name)
+            return lambda: draw_program(program, model, threads=threads, samples=samples, skip=skip).image
+        if skip:
+            return lambda: draw_small(program, threads=threads, samples=samples).image
+        return lambda: draw_objects(load_arrays(name).network, program, samples=samples, skip=skip).image
 
     return prepare
 
