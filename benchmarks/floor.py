@@ -34,12 +34,12 @@ import scenelang as nsg
 from scenelang.backend.options import keep_memory
 from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.framed import load_arrays
+from scenelang.models.manifest import load_manifest
 from scenelang.program.program import Program
 from scenelang.renderers.draw import draw_objects
 
 ROUNDS = 5  # of which the least counts: others interrupt
 SIDE = 768  # of the matrices whose product's rate is the floor's
-MODEL = "shapes2d"
 Rival = Callable[[int], "Frame"]
 
 
@@ -64,14 +64,24 @@ def stars(frame: int, count: int, scale: float, side: int) -> Any:
 
 def of_set(frame: int, name: str) -> Any:
     """Scenes of an evaluation set."""
-    return random_scene(np.random.default_rng([2021, frame]), SETS[name])
+    return random_scene(
+        np.random.default_rng([2021, frame]), SETS[name], load_manifest(model_of(name)).textures
+    )
 
 
 SCENES: dict[str, Callable[[int], Any]] = {
-    **{name: partial(of_set, name=name) for name in ("shapes2d", "chains", "many", "crowd")},
+    **{
+        name: partial(of_set, name=name)
+        for name in ("shapes2d", "chains", "many", "crowd", "textures2d-mixed")
+    },
     "200 stars": partial(stars, count=200, scale=0.08, side=256),
     "10,000 small stars": partial(stars, count=10_000, scale=0.008, side=1024),
 }
+
+
+def model_of(name: str) -> str:
+    """What draws a scene."""
+    return "textures2d" if name.startswith("textures") else "shapes2d"
 
 
 def programs(name: str, frames: int) -> list[Program]:
@@ -79,27 +89,27 @@ def programs(name: str, frames: int) -> list[Program]:
     found: list[Program] = []
     for frame in range(10 * frames + 10):
         with contextlib.suppress(nsg.SceneError):
-            found.append(nsg.compile(SCENES[name](frame), model=MODEL))
+            found.append(nsg.compile(SCENES[name](frame), model=model_of(name)))
         if len(found) > frames:
             break
     return found
 
 
-def network(library: str) -> Any:
+def network(library: str, model: str) -> Any:
     """What draws, on one core."""
     keep_memory()
     if library == "exact":
         from scenelang.lab.frontier.closed import closed_forms
 
-        return closed_forms(MODEL)
+        return closed_forms(model)
     if library == "numpy":
-        return load_arrays(MODEL).network
+        return load_arrays(model).network
     import torch
 
     from scenelang.models.load import load_model
 
     torch.set_num_threads(1)
-    return load_model(MODEL).network
+    return load_model(model).network
 
 
 def here(net: Any, made: Sequence[Program]) -> Rival:
@@ -160,7 +170,7 @@ def race(rivals: Sequence[Rival], frames: int) -> list[list[Frame]]:
 def told(title: str, frames: Sequence[Frame], rate: float) -> str:
     """Medians of frames; the floor is of a rate of operations a second."""
     seconds, pairs, refined, met = (statistics.median(f[at] for f in frames) for at in range(4))
-    each = sum(2 * w.shape[1] * w.shape[2] for w in load_arrays(MODEL).network.decoder_w)
+    each = sum(2 * w.shape[1] * w.shape[2] for w in load_arrays("shapes2d").network.decoder_w)
     floor = f", floor {1e3 * pairs * each / rate:.2f} ms at {rate / 1e9:.0f} GFLOP/s" if rate else ""
     counts = f"{pairs:,.0f} pairs met, {met:,.0f} pixels asked, {refined:,.0f} of them four times"
     return f"{title}: {1e3 * seconds:.2f} ms; {counts}{floor}"
@@ -213,7 +223,9 @@ def main() -> None:
             print(f"{name}, {told(given.library, ours, 0)}; {against(ours, theirs, given.against)}")
             continue
         made = programs(name, given.frames)
-        nets = {library: network(library) for library in [given.library, *["exact"] * given.exact]}
+        nets = {
+            library: network(library, model_of(name)) for library in [given.library, *["exact"] * given.exact]
+        }
         rivals = [here(net, made) for net in nets.values()]
         if given.worker:
             worker(rivals[0], given.worker)
@@ -221,7 +233,7 @@ def main() -> None:
         raced = race(rivals, len(made) - 1)
         rate = gemm_rate()
         for (library, net), frames in zip(nets.items(), raced, strict=True):
-            print(f"{name}, {told(library, frames, rate)}")
+            print(f"{name}, {told(library, frames, rate if library != 'exact' else 0)}")
             for line in shares(net, made, frames) if library != "torch" else ():
                 print(line, flush=True)
         if given.exact:

@@ -99,7 +99,7 @@ def test_a_small_run_of_solids(folder: Folder, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_nothing_is_kept_between_frames() -> None:
-    """A scene that was drawn before takes as many lines of Python again, by ways that share what is loaded."""
+    """A scene that was drawn before takes as many lines of Python again."""
     scenes = [nsg.loads(f"canvas(96, 96); {'star { scale(0.4); twirl(1); }' * n} square;") for n in (2, 1)]
     for way in (way for way in ways.ways_of("shapes2d", 1) if way.renderer in ("framed", "exact field")):
         counts = [lines_run(way.prepare(scene)) for scene in [*scenes, scenes[1]]]
