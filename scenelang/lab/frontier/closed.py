@@ -89,7 +89,7 @@ class ClosedPlane(FramedArrays):
         self.bump = np.array([0.0, BLEND, 0.0, 0.0], np.float32)[:, None]
 
     def decoders(self, codes: Array) -> list[Any]:
-        return [self.slopes[code.tobytes()] for code in codes]
+        return [self.slopes.get(code.tobytes()) for code in codes]  # rows of elements have none
 
     def object_albedo(self, material_code: Array) -> Array:
         return np.ones((len(material_code), 3), np.float32)
