@@ -102,7 +102,7 @@ def test_no_point_breaks_the_slopes_of_an_element(side: int) -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_point_breaks_intervals_through_the_cell(seed: int) -> None:
-    """Streams of all tokens: samples of the distances, folded one by one, with all objects and with some."""
+    """Streams of all tokens: samples of distances and colours, folded one by one, with all objects and some."""
     rng, blocks, most = RNG(seed), 300, 7
     count = rng.integers(1, most, blocks)
     block = np.repeat(np.arange(blocks), count)
@@ -112,14 +112,16 @@ def test_no_point_breaks_intervals_through_the_cell(seed: int) -> None:
     cell = Cell(*table[:3], table[3][:, 0])
     middle = rng.normal(0, 0.4, len(block)) * rng.choice([0.02, 1], len(block))
     rise = np.where(rng.uniform(0, 1, len(block)) < 0.05, 1e9, 10 ** rng.uniform(-4, -0.3, len(block)))
-    colours = rng.choice(2, (3, len(block))).astype(float)
+    dark = rng.choice(2, (3, len(block))).astype(float)
+    bright = np.where(rng.uniform(0, 1, len(block)) < 0.3, 1.0, dark)  # of textures nothing is known
     never = np.zeros(len(block), bool)
     meetings, source = meetings_of(Pairs(block, np.arange(len(block)), never, never, rise))
     part = Cell(*(p[..., source] for p in cell))
     slope = float(np.exp(NETWORK.read_slope)) / 4
     ends = Interval(*((middle + side * rise)[source].astype(np.float32) for side in (-1, 1)))
+    tints = Interval(*(tint[:, source].astype(np.float32) for tint in (dark, bright)))
     with np.errstate(all="ignore"):
-        found = shown(meetings, ends, part, colours[:, source].astype(np.float32), 1.0, slope)
+        found = shown(meetings, ends, part, tints, 1.0, slope)
     shut, opened = np.empty((2, len(block)), bool)
     shut[source], opened[source] = found.shut, found.open
     assert 0.05 < shut.mean() < 0.95
@@ -128,6 +130,7 @@ def test_no_point_breaks_intervals_through_the_cell(seed: int) -> None:
     low[:, meetings.columns], high[:, meetings.columns] = found.picture
     for _ in range(60):
         d = middle + np.minimum(rise, 0.5) * rng.choice([-1, 1, 0, rng.uniform(-1, 1)], len(block))
+        colours = dark + rng.choice([0, 1, rng.uniform(0, 1)], dark.shape) * (bright - dark)
         state, shade = np.ones(blocks), np.zeros((3, blocks))
         less, dull = state.copy(), shade.copy()  # without what is said not to matter
         for i in np.lexsort((block, np.arange(len(block)))):
