@@ -102,7 +102,7 @@ def test_no_point_breaks_the_slopes_of_an_element(side: int) -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_point_breaks_intervals_through_the_cell(seed: int) -> None:
-    """Streams of all tokens: samples of distances and colours, folded one by one, with all objects and some."""
+    """Streams of all tokens: distances and colours at random, folded one by one, all objects and some."""
     rng, blocks, most = RNG(seed), 300, 7
     count = rng.integers(1, most, blocks)
     block = np.repeat(np.arange(blocks), count)
