@@ -66,7 +66,7 @@ def read_json(data: bytes, *, most_depth: int = _JSON_DEPTH) -> Any:
     text = data.decode("utf-8")
     if depth_of_json(text) > most_depth:
         raise ValueError(f"brackets nested deeper than {most_depth}")
-    return json.loads(text, object_pairs_hook=_once, parse_constant=_no_number)
+    return json.loads(text, object_pairs_hook=_once, parse_constant=no_number)
 
 
 def depth_of_json(text: str) -> int:
@@ -83,7 +83,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _no_number(constant: str) -> float:
+def no_number(constant: str) -> float:
     raise ValueError(f"{constant} is not a JSON number")
 
 

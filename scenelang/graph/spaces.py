@@ -88,7 +88,7 @@ class Plane(Space):
             return None
         if any(isinstance(step, Affine) for step in steps[:-1]):
             return None
-        return outline.inner, _inverted(affine.composed(steps))
+        return outline.inner, affine.inverted(affine.composed(steps))
 
 
 def flattened(rows: Rows) -> Rows:
@@ -118,15 +118,6 @@ def _similarity(rows: Rows) -> tuple[float, float] | None:
     if abs(a + d) <= near and abs(b - c) <= near:
         return s, -1.0
     return None
-
-
-def _inverted(rows: Rows) -> Rows:
-    """The inverse of a map of the plane; raises ZeroDivisionError for a singular one."""
-    a, b, x = rows[0], rows[1], rows[3]
-    c, d, y = rows[4], rows[5], rows[7]
-    det = a * d - b * c
-    p, q, r, s = d / det, -b / det, -c / det, a / det
-    return (p, q, 0.0, -(p * x + q * y), r, s, 0.0, -(r * x + s * y), 0.0, 0.0, 1.0, 0.0)
 
 
 def _grown(box: tuple[float, float, float, float]) -> Box:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from difflib import SequenceMatcher
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from lsprotocol import types
 
@@ -18,9 +18,6 @@ from scenelang.diagnostics.span import Span
 from scenelang.lsp.text import Lines
 from scenelang.lsp.workspace import Document, uri_of
 from scenelang.syntax.incremental import difference
-
-if TYPE_CHECKING:
-    from scenelang.lsp.workspace import Document
 
 
 def to_location(span: Span, document: Document) -> types.Location:

@@ -236,8 +236,8 @@ class _Maker:
             yield Item(name, Kind.EnumMember, text, "a", kind, words.MATERIALS.get(name, ""), True)
         for symbol in self.names.visible(self.cursor.offset):
             stmt = symbol.node
-            held = self.docs.elements(self.document, stmt) if isinstance(stmt, nodes.Import) else ()
-            if any(element.material for element in held):
+            zoo = self.docs.zoo(self.document, stmt) if isinstance(stmt, nodes.Import) else None
+            if zoo is not None and zoo.materials:
                 yield self._symbol(symbol)
 
     # ------------------------------------------------------------ expressions

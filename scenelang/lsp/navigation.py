@@ -242,13 +242,8 @@ def _entry(stmt: nodes.Stmt) -> tuple[str, types.SymbolKind, Any, tuple[nodes.St
             detail = f"({', '.join(arg.span.text for arg in stmt.args)})" if stmt.args else ""
             return stmt.kind, Kind.Struct, stmt.keyword, stmt.body.statements, detail
         case nodes.Call() if stmt.name.text in STAGE and stmt.args is not None and stmt.body is None:
-            return (
-                stmt.name.text,
-                Kind.Field,
-                stmt.name.span,
-                (),
-                f"({', '.join(a.span.text for a in stmt.args)})",
-            )
+            detail = f"({', '.join(arg.span.text for arg in stmt.args)})"
+            return stmt.name.text, Kind.Field, stmt.name.span, (), detail
         case nodes.For():
             return f"for {stmt.variable.text}", Kind.Array, stmt.variable.span, stmt.body.statements, ""
         case nodes.If():

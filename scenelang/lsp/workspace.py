@@ -18,7 +18,6 @@ from pygls.uris import from_fs_path, to_fs_path
 from scenelang.diagnostics.diagnostic import Diagnostic, Fix, Label
 from scenelang.diagnostics.diagnostic import Edit as Change
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.elements.element import Element
 from scenelang.elements.zoo import SUFFIX, Zoo, load_zoo
 from scenelang.evaluate.loader import Unreadable, read_source
 from scenelang.lsp.text import Encoding, Lines, applied
@@ -203,11 +202,6 @@ class Workspace:
         if library.is_reserved(text):
             return self.by_path(library.find(text))
         return self.by_path(self._place(document, text))
-
-    def elements(self, document: Document, stmt: nodes.Import) -> tuple[Element, ...]:
-        """The elements that an import brings; none where its file is scene text or damaged."""
-        zoo = self.zoo(document, stmt)
-        return () if zoo is None else zoo.elements
 
     def zoo(self, document: Document, stmt: nodes.Import) -> Zoo | None:
         """The file of elements that an import brings, if it is one."""

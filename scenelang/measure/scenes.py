@@ -69,11 +69,6 @@ def sets_of(manifest: Manifest) -> dict[str, Callable[[Rng], Scene]]:
     }
 
 
-def _scenes_with(meshes: str) -> Callable[[Rng], Scene]:
-    """What makes a random scene of the solids of a file of elements."""
-    return partial(random_solid, config=replace(SOLID_SETS["meshes3d"], meshes=meshes))
-
-
 def usual_set(manifest: Manifest) -> str:
     """The set that speed and accuracy of a model's set are measured on: of solids one that has everything."""
     return "mixed" if manifest.dimension == 3 else manifest.set
@@ -90,7 +85,8 @@ def scenes_of(model: Model, name: str, seed: int, side: int | None = None) -> Ca
         side: shorter side of the canvas in pixels; by default that of the set.
     """
     manifest = model.manifest
-    make = _scenes_with(name) if name.endswith(SUFFIX) else sets_of(manifest)[name]
+    brought = replace(SOLID_SETS["meshes3d"], meshes=name)
+    make = partial(random_solid, config=brought) if name.endswith(SUFFIX) else sets_of(manifest)[name]
     least = LEAST_COVER
     if manifest.dimension == 2:
         least *= min(1.0, SETS[name].size ** 2)  # a tenth of the size covers a hundredth as much

@@ -18,7 +18,7 @@ from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.files import depth_of_json
+from scenelang.files import depth_of_json, no_number
 from scenelang.scene import modifiers, nodes
 from scenelang.scene.data import SceneData
 from scenelang.scene.fields import said
@@ -186,7 +186,7 @@ def _node_depth(scene: SceneData) -> int:
 
 def _read_deep(source: SourceFile, kind: type[S]) -> S:
     try:
-        data = json.loads(source.text, parse_constant=_refuse)
+        data = json.loads(source.text, parse_constant=no_number)
     except ValueError as error:
         raise _no_json(error, source) from None
     if isinstance(data, dict) and isinstance(data.get("nodes"), list):
@@ -213,10 +213,6 @@ def _build(data: Any, adapter: TypeAdapter[Any], source: SourceFile, path: tuple
         raise SceneError(_problems(error, source, path)) from None
 
 
-def _refuse(constant: str) -> float:
-    raise ValueError(f"{constant} is not a JSON number")
-
-
 def _failure(message: str, span: Span | None = None, help: str | None = None) -> SceneError:
     return SceneError([Diagnostic("E0313", message, span, help=help)])
 
@@ -234,7 +230,7 @@ def _problems(error: ValidationError, source: SourceFile, path: tuple[Key, ...] 
     found = error.errors(include_url=False, include_input=False)[:_MAX_SHOWN]
     if found[0]["type"] == "json_invalid":
         try:
-            json.loads(source.text, parse_constant=_refuse)
+            json.loads(source.text, parse_constant=no_number)
         except ValueError as wrong:
             return list(_no_json(wrong, source).diagnostics)
         return [Diagnostic("E0313", found[0]["msg"].lower(), None)]

@@ -27,8 +27,6 @@ class Phase:
     streams: int  # streams B of a batch; for leaves alone the factor on the number of points of each
     decoder_rate: float = 1.0  # the decoder's learning rate as a share of the cell's; 0 leaves it as it is
     rate: float = 1.0  # the phase's highest learning rate as a share of the whole training's
-    # share of streams of unions and smooth unions only, in place of the scenes' own
-    smooth: float | None = None
     forced: bool = False  # start every step from the exact state instead of the network's own
 
 

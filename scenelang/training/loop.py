@@ -7,7 +7,6 @@ import math
 import subprocess
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -92,14 +91,13 @@ def train(
     started = saved = time.perf_counter()
     while done < config.iterations:
         phase, into = _phase_at(config, done)
-        share = config.rate * phase.rate * _schedule(into, phase.iterations)
+        share = config.rate * phase.rate * schedule(into, phase.iterations)
         optimiser.param_groups[0]["lr"] = share
         optimiser.param_groups[1]["lr"] = share * phase.decoder_rate
         for parameter in decoder:
             parameter.requires_grad_(phase.decoder_rate > 0)
         if phase.objects:
-            drawn = config.scenes if phase.smooth is None else replace(config.scenes, smooth=phase.smooth)
-            batch = random_batch(phase.streams, phase.objects, drawn, scenes)
+            batch = random_batch(phase.streams, phase.objects, config.scenes, scenes)
             loss, parts = image_loss(network, batch, forced=phase.forced)
         else:
             loss, parts = leaf_loss(network, leaf_batch(phase.streams * config.scenes.points, scenes))
@@ -164,7 +162,7 @@ def _phase_at(config: TrainConfig, iteration: int) -> tuple[Any, int]:
     raise IndexError(iteration)
 
 
-def _schedule(iteration: int, iterations: int) -> float:
+def schedule(iteration: int, iterations: int) -> float:
     """Warm-up, then half a cosine down to one hundredth."""
     warm = min(1.0, (iteration + 1) / WARM_UP)
     return warm * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * iteration / iterations)))

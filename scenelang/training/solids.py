@@ -27,7 +27,7 @@ from scenelang.renderers.solid.parameters import Solids
 from scenelang.training.checkpoint import load_tensors, save_tensors
 from scenelang.training.config import SolidsConfig
 from scenelang.training.leaves import LEAVES, Points, half_rays, leaf_points
-from scenelang.training.loop import Report, revision
+from scenelang.training.loop import Report, revision, schedule
 from scenelang.words import TOKENS
 
 MATERIALS = {"diffuse": (1.0, 1.0, 1.0, 0.0), "volumetric": (1.0, 1.0, 1.0, 1.0)}  # albedo and medium
@@ -42,7 +42,7 @@ def fit_decoders(
     mine = [network.codes, *network.decoder_w, *network.decoder_b]
     optimiser = torch.optim.Adam(mine, lr=rate, betas=(0.9, 0.99), fused=True)
     for step in range(steps):
-        optimiser.param_groups[0]["lr"] = rate * _schedule(step, steps)
+        optimiser.param_groups[0]["lr"] = rate * schedule(step, steps)
         losses = []
         for leaf, code in zip(LEAVES, network.codes, strict=True):
             data = leaf_points(leaf, points, g, torch.float32)
@@ -106,7 +106,7 @@ def fit_segments(network: Solids, steps: int, g: torch.Generator, points: int = 
     optimiser = torch.optim.Adam(fitted, lr=0.01, betas=(0.9, 0.99), fused=True)
     last, error = max(1, steps // 10), 0.0
     for step in range(steps):
-        optimiser.param_groups[0]["lr"] = 0.01 * _schedule(step, steps)
+        optimiser.param_groups[0]["lr"] = 0.01 * schedule(step, steps)
         some = torch.randint(0, told.shape[1], (points,), generator=g)
         x = told[:, some]
         for i, (w, b) in enumerate(zip(fitted[:3], fitted[3:], strict=True)):
@@ -195,7 +195,7 @@ def _fit_cell(
     known, told = torch.tensor(list(MATERIALS.values())), torch.zeros(len(TOKENS))
     last = max(1, steps // 10)
     for step in range(steps):
-        optimiser.param_groups[0]["lr"] = 0.01 * _schedule(step, steps)
+        optimiser.param_groups[0]["lr"] = 0.01 * schedule(step, steps)
         past, own = torch.randn((2, points), generator=g) * 10 ** (
             3 * torch.rand((2, points), generator=g) - 2.5
         )
@@ -222,11 +222,6 @@ def _fit_cell(
         if step >= steps - last:
             told += torch.stack(losses).detach() / last
     return told
-
-
-def _schedule(step: int, steps: int) -> float:
-    """Warm-up, then half a cosine down to one hundredth."""
-    return min(1.0, (step + 1) / 200) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * step / steps)))
 
 
 def train_solids(

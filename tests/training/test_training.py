@@ -158,21 +158,13 @@ def test_a_decoder_gets_the_cell_of_a_model(tmp_path: Path) -> None:
     assert found["decoder_w.1"].shape == (5, 8, 8)
 
 
-def test_a_phase_has_a_rate_and_blends_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A phase at a rate of nothing leaves the weights where they are; the drawn share is the phase's."""
+def test_a_phase_has_a_rate_of_its_own(tmp_path: Path) -> None:
+    """A phase at a rate of nothing leaves the weights where they are."""
     first = Phase(3, 2, 2)
     config = replace(tiny_config(), phases=(first,))
     train(config, tmp_path / "one")
-    shares: list[float] = []
-
-    def watched(b: int, n: int, scenes: SceneConfig, g: torch.Generator) -> Batch:
-        shares.append(scenes.smooth)
-        return random_batch(b, n, scenes, g)
-
-    monkeypatch.setattr("scenelang.training.loop.random_batch", watched)
-    longer = replace(config, phases=(first, Phase(3, 2, 2, rate=0.0, smooth=0.9)))
+    longer = replace(config, phases=(first, Phase(3, 2, 2, rate=0.0)))
     train(longer, tmp_path / "two")
     one, _ = load_tensors(tmp_path / "one" / "weights.safetensors")
     two, _ = load_tensors(tmp_path / "two" / "weights.safetensors")
     assert all(torch.equal(one[name], two[name]) for name in one)
-    assert shares == [config.scenes.smooth] * 3 + [0.9] * 3
