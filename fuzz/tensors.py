@@ -43,6 +43,11 @@ def parts(data: bytes) -> tuple[dict[str, Any], bytes] | None:
     return (outer, data[8 + length :]) if isinstance(outer, dict) else None
 
 
+def quoted(words: str) -> list[bytes]:
+    """Words in quotes, as headers and JSON have them."""
+    return [f'"{word}"'.encode() for word in words.split()]
+
+
 def joined(outer: Any, body: bytes) -> bytes:
     """The bytes of a file."""
     text = trees.dump(outer)

@@ -7,7 +7,7 @@ import zlib
 from random import Random
 from typing import Any
 
-from fuzz import trees
+from fuzz import tensors, trees
 from fuzz.target import Target, hold
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.error import SceneError
@@ -112,7 +112,7 @@ def dictionary() -> list[bytes]:
         "asset version scene scenes nodes name children mesh camera skin matrix translation rotation scale"
     )
     words += " extensions meshes primitives material materials pbrMetallicRoughness baseColorFactor"
-    return [b"glTF", b"JSON", b'"2.0"', *(f'"{word}"'.encode() for word in words.split())]
+    return [b"glTF", b"JSON", b'"2.0"', *tensors.quoted(words)]
 
 
 TARGET = Target(

@@ -80,10 +80,7 @@ def seeds() -> list[bytes]:
 def dictionary() -> list[bytes]:
     """Words of the headers."""
     words = "vectors tokens bounds objects places dtype shape data_offsets F32 I8 I32 __metadata__ scenelang"
-    return [
-        f'"{word}"'.encode()
-        for word in (*words.split(), *["canvas", "background", "model", "weights", "files"])
-    ]
+    return tensors.quoted(f"{words} canvas background model weights files")
 
 
 TARGET = Target(

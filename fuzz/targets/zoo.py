@@ -62,12 +62,8 @@ def seeds() -> list[bytes]:
 
 def dictionary() -> list[bytes]:
     """Words of the headers."""
-    words = (
-        "form pyramid picture colours sizes coding webp av1 about elements materials groups dimension cells"
-    )
-    return [
-        f'"{word}"'.encode() for word in (*words.split(), "U8", "dtype", "data_offsets", "shape", "format")
-    ]
+    words = "form pyramid picture colours sizes coding webp av1 about elements materials groups dimension"
+    return tensors.quoted(f"{words} cells U8 dtype data_offsets shape format")
 
 
 TARGET = Target(

@@ -12,13 +12,13 @@ import pytest
 import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.elements.zoo import zoo_bytes
-from scenelang.evaluate.evaluation import load_scene
 from scenelang.measure.metrics import psnr
 from scenelang.models.manifest import load_manifest
 from scenelang.program.check import check_compiles
 from scenelang.program.compile import compile_scene, find_model
 from scenelang.program.program import program_bytes
 from scenelang.program.reading import parse_program
+from tests.elements.scenes import IMPORT, good, load
 from tests.elements.shapes import ball, element, square, torus
 from tests.test_architecture import loaded_by
 
@@ -32,23 +32,6 @@ def folder(tmp_path: Path) -> Path:
     zoo = zoo_bytes([element(torus, "ring", levels=5), *flat])
     (tmp_path / "zoo.safetensors").write_bytes(zoo)
     return tmp_path
-
-
-def load(folder: Path, text: str, **files: str) -> tuple[nsg.Scene | None, list[tuple[str, str]]]:
-    for name, said in {"scene": text, **files}.items():
-        (folder / f"{name}.nsg").write_text(said, "utf-8")
-    found = Diagnostics()
-    scene, _ = load_scene(folder / "scene.nsg", diagnostics=found)
-    return scene, [(d.code, d.message) for d in found]
-
-
-def good(folder: Path, text: str, **files: str) -> nsg.Scene:
-    scene, found = load(folder, text, **files)
-    assert scene is not None, found
-    return scene
-
-
-IMPORT = 'import "zoo.safetensors" as zoo;\n'
 
 
 def test_an_element_is_drawn_as_the_shape_it_is(folder: Path) -> None:

@@ -9,17 +9,14 @@ from typing import Any
 import pytest
 
 import scenelang as nsg
-from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.elements.zoo import zoo_bytes
-from scenelang.evaluate.evaluation import load_scene
 from scenelang.formatting import format_text
 from scenelang.interchange.schemas import scene_schema
 from scenelang.program.check import check
 from scenelang.program.compile import compile_scene
+from tests.elements.scenes import IMPORT, good, load
 from tests.elements.shapes import element, noise, torus
 from tests.test_architecture import loaded_by
-
-IMPORT = 'import "zoo.safetensors" as zoo;\n'
 
 
 @pytest.fixture
@@ -34,19 +31,9 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def load(folder: Path, text: str, **files: str) -> tuple[nsg.Scene | None, list[tuple[str, str]]]:
-    for name, said in {"scene": text, **files}.items():
-        (folder / f"{name}.nsg").write_text(said, "utf-8")
-    found = Diagnostics()
-    scene, _ = load_scene(folder / "scene.nsg", diagnostics=found)
-    return scene, [(d.code, d.message) for d in found]
-
-
 def worn(folder: Path, text: str, **files: str) -> list[nsg.Material | None]:
-    scene, found = load(folder, IMPORT + text, **files)
-    assert scene is not None, found
-    again, _ = load(folder, scene.to_nsg())
-    assert again is not None
+    scene = good(folder, IMPORT + text, **files)
+    again = good(folder, scene.to_nsg())
     assert again.nodes == scene.nodes
     assert nsg.Scene.from_json(scene.to_json(), root=folder) == scene
     assert compile_scene(again).digest() == compile_scene(scene).digest()

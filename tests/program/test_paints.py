@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from safetensors.numpy import load, save
 
 import scenelang as nsg
 from scenelang.program.compile import compile_scene
 from scenelang.program.paints import Paint
 from scenelang.program.program import Program, ProgramError, program_bytes
 from scenelang.program.reading import parse_program
+from tests.elements.scenes import changed
 from tests.elements.shapes import element, noise, square
 
 BARK, STONE = noise(5, 7), noise(3, 3, name="stone", seed=1)
@@ -54,15 +53,6 @@ def test_the_digest_is_that_of_what_is_worn() -> None:
     assert made[0].digest() == program(bark, stone, worn=[1, 0]).digest()
 
 
-def changed(change: Callable[[dict[str, Any], dict[str, Any]], object]) -> bytes:
-    data = program_bytes(painted_program())
-    size = int.from_bytes(data[:8], "little")
-    header = json.loads(json.loads(data[8 : 8 + size])["__metadata__"]["scenelang"])
-    tensors = load(data)
-    change(header, tensors)
-    return save(tensors, metadata={"scenelang": json.dumps(header)})
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -85,7 +75,7 @@ def changed(change: Callable[[dict[str, Any], dict[str, Any]], object]) -> bytes
 )
 def test_damaged_files(change: Callable[[dict[str, Any], dict[str, Any]], object], words: str) -> None:
     with pytest.raises(ProgramError, match=words):
-        parse_program(changed(change))
+        parse_program(changed(program_bytes(painted_program()), change))
 
 
 @pytest.mark.parametrize(

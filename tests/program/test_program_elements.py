@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from safetensors.numpy import load, save
 
 import scenelang as nsg
 from scenelang.elements.zoo import Zoo
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program, ProgramError, program_bytes
 from scenelang.program.reading import parse_program
+from tests.elements.scenes import changed
 from tests.elements.shapes import ball, element, torus
 
 
@@ -24,17 +23,11 @@ def compiled() -> Program:
     return compile_scene(nsg.Scene(elements=zoo, nodes=objects))
 
 
-def changed(change: Callable[[dict[str, Any], dict[str, Any]], object]) -> bytes:
-    data = program_bytes(compiled())
-    size = int.from_bytes(data[:8], "little")
-    header = json.loads(json.loads(data[8 : 8 + size])["__metadata__"]["scenelang"])
-    tensors = load(data)
-    change(header, tensors)
-    return save(tensors, metadata={"scenelang": json.dumps(header)})
-
-
 def test_nothing_changed() -> None:
-    assert parse_program(changed(lambda header, tensors: None)).digest() == compiled().digest()
+    assert (
+        parse_program(changed(program_bytes(compiled()), lambda header, tensors: None)).digest()
+        == compiled().digest()
+    )
 
 
 @pytest.mark.parametrize(
@@ -57,7 +50,7 @@ def test_nothing_changed() -> None:
 )
 def test_damaged_files(change: Callable[[dict[str, Any], dict[str, Any]], object], words: str) -> None:
     with pytest.raises(ProgramError, match=words):
-        parse_program(changed(change))
+        parse_program(changed(program_bytes(compiled()), change))
 
 
 def test_an_element_of_the_plane_is_not_drawn_in_space() -> None:
