@@ -21,7 +21,7 @@ except ModuleNotFoundError as error:
 from scenelang.backend.options import Samples, keep_memory
 from scenelang.backend.options import usable_cores as usable_cores
 from scenelang.elements.element import credit_of
-from scenelang.models.load import Model, ModelError, load_model, place_of
+from scenelang.models.load import Model, ModelError, Network, load_model, place_of
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing, Kept, draw_objects
 from scenelang.renderers.framed import Framed
@@ -87,6 +87,17 @@ def _one_torch_thread() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
+def _by_kernel(network: Network, program: Program, samples: Samples) -> Drawing | None:
+    """The picture by one kernel, None where that cannot draw it: of solids, or on a CPU."""
+    if not isinstance(network, Framed) or place_of(network).type != "cuda":
+        return None
+    try:
+        from scenelang.renderers.device.draw import draw_on_device
+    except ModuleNotFoundError:  # Triton comes with builds of torch for CUDA on Linux
+        return None
+    return draw_on_device(network, program, samples)
+
+
 def draw_program(
     program: Program,
     model: Model,
@@ -124,7 +135,10 @@ def draw_program(
         try:
             program.check_weights(model.digest)
             if isinstance(network, Framed | Solids):
-                drawing = draw_objects(
+                drawing = _by_kernel(network, program, samples) if skip else None
+                if drawing is not None and progress is not None:
+                    progress(1.0)
+                drawing = drawing or draw_objects(
                     network,
                     program,
                     threads=threads,

@@ -86,9 +86,10 @@ def render(
             pictures, and torch others on CUDA where there is any.
         threads: tiles that torch draws at the same time; by default as many as there are usable cores.
         samples: of a pixel: ``"four"`` as the language defines, ``"adaptive"``, four near outlines and one
-            elsewhere, which looks the same, ``"one"``, which is faster and has hard edges, or ``"draft"``,
-            one for each 2 x 2 pixels, enlarged. ``"quick"`` is ``"adaptive"`` with less care for solids:
-            steps that may pass what is thinner than 0.04, as those of ``"one"`` and ``"draft"`` may.
+            elsewhere (on CUDA four in the plane), which looks the same, ``"one"``, which is faster and has
+            hard edges, or ``"draft"``, one for each 2 x 2 pixels, enlarged. ``"quick"`` is ``"adaptive"``
+            with less care for solids: steps that may pass what is thinner than 0.04, as those of ``"one"``
+            and ``"draft"`` may.
         progress: called with the share done, in [0, 1], from any thread.
 
     Returns:

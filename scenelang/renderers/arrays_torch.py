@@ -34,7 +34,10 @@ class Torch(Arrays):
     minimum, maximum, select = torch.minimum, torch.maximum, torch.where
 
     def array(self, values: np.ndarray, like: Tensor) -> Tensor:
-        return torch.from_numpy(values).to(like.device)
+        found = torch.from_numpy(values)
+        if like.device.type == "cuda":  # from page-locked memory, for which the host need not wait
+            found = found.pin_memory()
+        return found.to(like.device, non_blocking=True)
 
     def full(self, shape: tuple[int, ...], value: float, like: Tensor) -> Tensor:
         return like.new_full(shape, value)

@@ -214,7 +214,7 @@ class Coverage:
             every = np.ones(len(block), bool)
             rate = np.full(len(block), np.inf)
             return side, meetings_of(Pairs(block, objects, ~every, every, rate))[0]
-        pairs = self._candidates(grid)
+        pairs = self.candidates(grid)
         side = LEVELS[0]
         pairs = self._looked(grid, pairs, side, tile)
         for smaller in LEVELS[1:]:
@@ -224,7 +224,7 @@ class Coverage:
             pairs = self._looked(grid, pairs, side, tile)
         return side, meetings_of(pairs)[0]
 
-    def _candidates(self, grid: Raster) -> Pairs:
+    def candidates(self, grid: Raster) -> Pairs:
         """Objects at the largest blocks that their bounds meet."""
         side, frames, reach = LEVELS[0], self.field.frames, self.field.reach
         size = side * grid.px

@@ -116,9 +116,7 @@ def draw_objects(
         ProgramError: as `draw`, or the Program and the network are of different dimensions.
     """
     if samples == "draft":
-        width, height = program.canvas
-        half = replace(program, canvas=(-(-width // 2), -(-height // 2)))
-        drawing = draw_objects(network, half, threads=threads, samples="one", progress=progress)
+        drawing = draw_objects(network, halved(program), threads=threads, samples="one", progress=progress)
         return replace(drawing, image=enlarged(drawing.image, program.canvas))
     if network.layout.dimension == 2:
         if program.stage is not None:
@@ -214,7 +212,22 @@ def draw(
             list(pool.map(one, range(len(tiles))))
     if kept is not None and seen is not None:
         kept.picture, kept.keys = out.copy(), seen
-    if not np.isfinite(out.sum()):
-        raise ProgramError("a damaged program: numbers that the network cannot draw with")
     cost = [sum(getattr(t, name) for t in drawn) for name in ("pairs", "refined", "met")]
-    return Drawing(from_samples(out[..., :3], out[..., 3] if background is None else None), *cost)
+    return Drawing(as_image(out), *cost)
+
+
+def halved(program: Program) -> Program:
+    """The same on a canvas with half of the columns and half of the rows."""
+    width, height = program.canvas
+    return replace(program, canvas=(-(-width // 2), -(-height // 2)))
+
+
+def as_image(picture: npt.NDArray[np.float32]) -> Image:
+    """The image of a picture (H, W, 3), or (H, W, 4) of premultiplied colour and coverage.
+
+    Raises:
+        ProgramError: some of it is not finite.
+    """
+    if not np.isfinite(picture.sum()):
+        raise ProgramError("a damaged program: numbers that the network cannot draw with")
+    return from_samples(picture[..., :3], picture[..., 3] if picture.shape[2] == 4 else None)

@@ -171,10 +171,19 @@ class Field:
         """Whether some object wears a texture."""
         return bool(self.textures)
 
+    @property
+    def nothing(self) -> float:
+        """The state of points that have met nothing."""
+        return float(EMPTY * self.widest / BLEND)
+
+    def cells(self, objects: np.ndarray) -> Cell:
+        """Cells of objects, which come last, on the host."""
+        return Cell(*(part.take(self._cell[objects], -1) for part in self._host))
+
     def empty(self, groups: int, count: int, register: int = 3) -> Array:
         """State and register (groups, S + R, count) of points that have met nothing."""
         memory = self.xp.full((groups, self.network.config.state + register, count), 0.0, self.like)
-        memory[:, 0] = EMPTY * self.widest / BLEND
+        memory[:, 0] = self.nothing
         return memory
 
     def features(self, objects: np.ndarray, q: Array, far: np.ndarray) -> Array:
@@ -281,12 +290,11 @@ class Field:
         objects = meetings.pairs.object
         rise = rise + np.float32(ROUNDING[1]) * (1 + abs(middle))
         distance = Interval(middle - rise, middle + rise)
-        kind = self._cell[objects]
-        cell = Cell(*(part.take(kind, -1) for part in self._host))
+        cell = self.cells(objects)
         dark = np.asarray(self.xp.to_numpy(self.colours)).take(objects, -1)
         colours = Interval(dark, np.where(self.texture[objects] == NO_TEXTURE, dark, 1.0))
         with np.errstate(all="ignore"):
-            return shown(meetings, distance, cell, colours, EMPTY * self.widest / BLEND, self.slope)
+            return shown(meetings, distance, cell, colours, self.nothing, self.slope)
 
 
 def _numbered(things: list[Any]) -> tuple[list[Any], np.ndarray]:

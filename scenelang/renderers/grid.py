@@ -56,17 +56,17 @@ class Lattice:
 
     def __init__(self, xp: Arrays, flat: Array, side: int, d: int) -> None:
         self.xp, self.d, self.half = xp, d, (side - 1) / 2
-        self._flat, self._side = flat, side
+        self.nodes, self.side = flat, side
         self._corners = [0, side] if d == 2 else [0, side, side * side, side * side + side]
 
     def at(self, q: Array) -> Array:
         """Values (…, M) at points (d, M) of the cube."""
         place = (q + 1.0) * self.half
-        cell = self.xp.whole(place).clip(0, self._side - 2)
+        cell = self.xp.whole(place).clip(0, self.side - 2)
         first = cell[0]
         for axis in range(1, self.d):
-            first = first * self._side + cell[axis]
-        return blended(self.xp, self._flat, first, [*(place - self.xp.narrow(cell))], self._corners)
+            first = first * self.side + cell[axis]
+        return blended(self.xp, self.nodes, first, [*(place - self.xp.narrow(cell))], self._corners)
 
 
 class GridShape(Lattice):
@@ -81,8 +81,8 @@ class GridShape(Lattice):
 
     def slopes(self) -> Slopes:
         """How fast the distance in the plane changes; nothing is known of grids that end inside."""
-        n, side = self._side, 2 * RADIUS / CELLS
-        grid = self.xp.to_numpy(self._flat).astype(np.float64).reshape(n, n)
+        n, side = self.side, 2 * RADIUS / CELLS
+        grid = self.xp.to_numpy(self.nodes).astype(np.float64).reshape(n, n)
         rows, columns = (abs(np.diff(grid, axis=axis)) * self.half for axis in (0, 1))
         # of each cell the largest slopes along x and along y: along each they change linearly over a cell
         steep = np.hypot(np.maximum(rows[:, 1:], rows[:, :-1]), np.maximum(columns[1:], columns[:-1]))

@@ -35,7 +35,7 @@ class Texture:
     """
 
     def __init__(self, xp: Arrays, paint: Paint, frame: np.ndarray, like: Array, light: bool) -> None:
-        self._xp, self._steps = xp, paint.steps
+        self._xp, self.steps = xp, paint.steps
         values = _nodes(paint.element, light)
         flat = xp.array(values.reshape(3, -1), like)
         self._lattice = Lattice(xp, flat, len(values[0]), 3) if values.ndim == 4 else None
@@ -43,25 +43,25 @@ class Texture:
             raise ProgramError("a texture's frame beyond float32")
         # from leaf coordinates to shares of the picture's sides, from its upper left corner
         (a, b, u), (c, d, v) = frame.astype(np.float64).reshape(2, 3).tolist()
-        self._place = Affine(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
-        self._flat, self._sides = flat, values.shape[-2:]
-        across = abs(np.array([row[:2] for row in self._place.rows])).max() if values.ndim == 3 else 0.5
+        self.place = Affine(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
+        self.texels, self.sides = flat, values.shape[-2:]
+        across = abs(np.array([row[:2] for row in self.place.rows])).max() if values.ndim == 3 else 0.5
         self.detail = float(across) * max(values.shape)
         """Texels that a way of a leaf unit may cross, about."""
 
     def at(self, q: Array) -> Array:
         """Colours (3, M) at leaf coordinates (d, M)."""
         found = self._picture(q) if self._lattice is None else self._lattice.at(q.clip(-1.0, 1.0))
-        return stepped(self._xp, found, self._steps)
+        return stepped(self._xp, found, self.steps)
 
     def _picture(self, q: Array) -> Array:
-        xp, (high, wide) = self._xp, self._sides
+        xp, (high, wide) = self._xp, self.sides
         cells, shares = [], []
-        for share, count in zip(self._place(xp, [q[0], q[1]]), (wide - 2, high - 2), strict=True):
+        for share, count in zip(self.place(xp, [q[0], q[1]]), (wide - 2, high - 2), strict=True):
             place = (share - xp.floor(share)) * count + 0.5  # among the texels and the one before the first
             cells.append(xp.whole(place))
             shares.append(place - xp.narrow(cells[-1]))
-        return blended(xp, self._flat, cells[1] * wide + cells[0], shares[::-1], [0, wide])
+        return blended(xp, self.texels, cells[1] * wide + cells[0], shares[::-1], [0, wide])
 
 
 @lru_cache(maxsize=32)

@@ -1,0 +1,178 @@
+"""Programs of the plane drawn on a device: one upload, one launch, one download, nothing waited for between.
+
+The host says which objects can reach which blocks of pixels, from the Program alone, and makes the weights of
+its leaves. Everything goes up in one piece of page-locked memory; `kernel.py` does the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from scenelang.image import enlarged
+from scenelang.program.paints import STEPS
+from scenelang.program.program import Program
+from scenelang.renderers.coverage import Coverage
+from scenelang.renderers.device.kernel import draw_blocks
+from scenelang.renderers.draw import Drawing, as_image, halved
+from scenelang.renderers.field import Field
+from scenelang.renderers.framed import Framed
+from scenelang.renderers.grid import GridShape
+from scenelang.renderers.meetings import Pairs
+from scenelang.renderers.network import Decoder, FramedArrays
+from scenelang.renderers.raster import LEVELS, Raster, raster
+from scenelang.renderers.texture import Texture
+
+WIDTHS = 16, 32  # of decoders: the least of a product in Triton, and the most for which there is room
+ALIGNED = 4  # words: Triton compiles a kernel once more for arrays that begin elsewhere
+KINDS = list(STEPS)  # of steps of colour, by the place at which the kernel knows them
+WARPS = 8  # of 32 threads, for the 256 samples of a block
+
+
+def draw_on_device(network: Framed, program: Program, samples: str = "adaptive") -> Drawing | None:
+    """Draw a Program as `draw_objects` does, with four samples a pixel where that is adaptive.
+
+    Returns:
+        The drawing, None of what the kernel does not know: solids, decoders of more than 32 units, features
+        beside a distance, a state of more than one number, and frames that need float64.
+
+    Raises:
+        ProgramError: as `scenelang.renderers.draw.draw`.
+    """
+    if samples == "draft":
+        found = draw_on_device(network, halved(program), "one")
+        return found and replace(found, image=enlarged(found.image, program.canvas))
+    config = network.config
+    if program.stage or not config.features == config.state == 1 or config.decoder_width > WIDTHS[1]:
+        return None
+    host = on_host(network, tuple((id(p), p._version) for p in network.parameters()))
+    field = Field(host, program.vectors, program.tokens, program.brought(), program.paints())
+    if field.frames.wild.any():
+        return None
+    grid = raster(program.canvas, range(program.canvas[1]))
+    pairs = Coverage(field, prove=False).candidates(grid)
+    count = 1 if samples == "one" else 4
+    picture = start(field, grid, pairs, program.background, count, network.codes).cpu().numpy()
+    met = LEVELS[0] ** 2 * len(np.unique(pairs.block))
+    return Drawing(as_image(picture), LEVELS[0] ** 2 * len(pairs) * count, met * (count > 1), met)
+
+
+def start(
+    field: Field, grid: Raster, pairs: Pairs, background: Sequence[float] | None, samples: int, like: Tensor
+) -> Tensor:
+    """A picture (H, W, 3), or without a background premultiplied (H, W, 4), that a device has begun to draw.
+
+    Args:
+        field: on the host.
+        pairs: of objects and the raster's largest blocks.
+        like: a tensor that lies on the device.
+    """
+    (width, height), across = grid.canvas, grid.wide // LEVELS[0]
+    blocks = across * grid.high // LEVELS[0]
+    starts = pairs.block.searchsorted(np.arange(blocks + 1))
+    config = field.network.config
+    rows, wide = _rows(field), WIDTHS[config.decoder_width > WIDTHS[0]]
+    parts, weights = _weights(field, wide)
+    behind = np.asarray(() if background is None else background, np.float32)
+    out = like.new_empty((height, width, len(behind) or 4))
+    there = upload([starts, pairs.object, rows, parts, weights, behind], out.device)
+    launch(
+        blocks,
+        *(out, *there, width, height, across, grid.left, grid.top, grid.px, field.nothing, field.slope),
+        SIDE=LEVELS[0],
+        SAMPLES=samples,
+        CHANNELS=out.shape[2],
+        ROW=rows.shape[1],
+        OUTER=field.layout.outer,
+        INNER=field.layout.inner,
+        WIDTH=wide,
+        LINES=config.paint_lines,
+    )
+    return out
+
+
+def upload(parts: Sequence[np.ndarray], device: torch.device) -> list[Tensor]:
+    """Arrays as int32 or float32 tensors on a device, by one copy that the host does not wait for."""
+    typed = [part.astype(np.float32 if part.dtype.kind == "f" else np.int32) for part in parts]
+    ends = np.cumsum([-(-part.size // ALIGNED) * ALIGNED for part in typed]).tolist()
+    held = torch.empty(ends[-1], dtype=torch.int32, pin_memory=device.type == "cuda")
+    words, begins = held.numpy(), [0, *ends]
+    for part, begin in zip(typed, begins, strict=False):
+        words[begin : begin + part.size] = part.view(np.int32).ravel()
+    there = held.to(device, non_blocking=True)
+    return [
+        there[begin : begin + part.size].view(torch.float32 if part.dtype.kind == "f" else torch.int32)
+        for part, begin in zip(typed, begins, strict=False)
+    ]
+
+
+def launch(programs: int, *arguments: Any, **sizes: int) -> None:
+    """Start the kernel."""
+    draw_blocks[(programs,)](*arguments, **sizes, num_warps=WARPS)
+
+
+@lru_cache(maxsize=4)
+def on_host(network: Framed, versions: tuple[tuple[int, int], ...]) -> FramedArrays:
+    """A network's parameters as numpy arrays, fetched again when they have changed."""
+    found = FramedArrays(network.config, {k: v.cpu().numpy() for k, v in network.state_dict().items()})
+    found.layout = network.layout
+    return found
+
+
+def _rows(field: Field) -> np.ndarray:
+    """What the kernel knows of each object (N, ROW)."""
+    count, layout = len(field.tokens), field.layout
+    cell = field.cells(np.arange(count))
+    lines = np.concatenate([cell.lines, cell.bias[:, None]], 1)  # (1 + L, 3, N)
+    parts = [
+        field.vectors[:, layout.frame.start : layout.inner_warps.stop],
+        field.frames.scale[:, None],
+        field.colours.T,
+        lines.reshape(3 * len(lines), count).T,
+        cell.candidate[0].T,
+        cell.bump.T,
+    ]
+    return np.concatenate(parts, 1, dtype=np.float32)
+
+
+def _weights(field: Field, wide: int) -> tuple[np.ndarray, np.ndarray]:
+    """What the kernel's ``parts`` are of each object (N, 6), and its ``weights``."""
+    shapes = [s.nodes if isinstance(s, GridShape) else _decoder(s, wide) for s in field.shapes]
+    textures = [_texture(texture) for texture in field.textures]
+    weights = [np.empty(0, np.float32), *shapes, *textures]
+    begins = np.cumsum([part.size for part in weights])
+    sides = [shape.side if isinstance(shape, GridShape) else 0 for shape in field.shapes]
+    looks = [(len(texture.steps), *texture.sides) for texture in field.textures]
+    shape = np.stack([begins[: len(shapes)], np.array(sides, int)], 1)
+    texture = np.concatenate([begins[len(shapes) : -1, None], np.reshape(looks, (-1, 3))], 1)
+    none = np.zeros((1, 4))  # which the last place is, and so that of `NO_TEXTURE`
+    parts = [shape[field.shape], np.concatenate([texture, none])[field.texture]]
+    return np.concatenate(parts, 1).astype(np.int32), np.concatenate(weights)
+
+
+def _texture(texture: Texture) -> np.ndarray:
+    """The place in the picture, the steps with numbers to come to four, and the texels."""
+    steps = np.zeros((len(texture.steps), 4), np.float32)
+    for row, (kind, *numbers) in zip(steps, texture.steps, strict=True):
+        row[0], row[1 : 1 + len(numbers)] = KINDS.index(kind), numbers
+    place = np.array(texture.place.rows, np.float32)
+    return np.concatenate([part.ravel() for part in (place, steps, texture.texels)])
+
+
+def _decoder(decoder: Decoder, wide: int) -> np.ndarray:
+    """Weights in the order in which the kernel reads them, of layers widened by units that answer nothing."""
+    (w0, b0), (w1, b1), (w2, b2) = decoder.layers
+    units = (0, wide - len(b0))
+    parts = [
+        np.pad(w0.T, ((0, 0), units)),
+        np.pad(b0, units),
+        np.pad(w1.T, (units, units)),
+        *(np.pad(b1, units), np.pad(w2[0], units), b2, decoder.far),
+    ]
+    return np.concatenate([part.ravel() for part in parts])

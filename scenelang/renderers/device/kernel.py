@@ -1,0 +1,246 @@
+"""The framed renderer's field and coverage in one kernel of Triton: a program for each block of pixels.
+
+What it computes is `scenelang.renderers.network`, `frames.py`, `grid.py` and four samples a pixel. Everything
+stays in registers from a sample's place to its pixel's colour, so that a frame is one launch, however many
+objects meet however many blocks. M are a block's samples, those of a pixel side by side.
+"""
+
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator"
+
+from __future__ import annotations
+
+import triton
+import triton.language as tl
+
+from scenelang.graph.looks import LUMA
+from scenelang.program.paints import STEPS
+from scenelang.renderers.network import RADIUS
+
+_RIM = tl.constexpr(RADIUS)
+_RED, _GREEN, _BLUE = (tl.constexpr(weight) for weight in LUMA)
+_COLOR, _GRAYSCALE = (tl.constexpr(list(STEPS).index(name)) for name in ("color", "grayscale"))
+
+
+@triton.jit
+def _unit(x):
+    return tl.minimum(tl.maximum(x, 0.0), 1.0)
+
+
+@triton.jit
+def _affine(x, y, numbers):
+    """Points behind the map of six numbers."""
+    a, b, u = tl.load(numbers), tl.load(numbers + 1), tl.load(numbers + 2)
+    c, d, v = tl.load(numbers + 3), tl.load(numbers + 4), tl.load(numbers + 5)
+    return a * x + b * y + u, c * x + d * y + v
+
+
+@triton.jit
+def _warp(x, y, numbers):
+    """Points behind the warp of three numbers."""
+    twirl, bend_x, bend_y = tl.load(numbers), tl.load(numbers + 1), tl.load(numbers + 2)
+    if (twirl != 0.0) | (bend_x != 0.0) | (bend_y != 0.0):
+        angle = bend_x * x + bend_y * y + twirl * tl.sqrt_rn(x * x + y * y)
+        cos, sin = tl.cos(angle), tl.sin(angle)
+        x, y = x * cos + y * sin, y * cos - x * sin
+    return x, y
+
+
+@triton.jit
+def _learned(x, y, weights, WIDTH: tl.constexpr):
+    """Distances (M,) by a decoder: two layers, a third, and the growth beyond the rim."""
+    unit = tl.arange(0, WIDTH)
+    radius = tl.sqrt_rn(x * x + y * y)
+    shrink = _RIM / tl.maximum(radius, _RIM)
+    hidden = (x * shrink)[:, None] * tl.load(weights + unit)[None, :]
+    hidden += (y * shrink)[:, None] * tl.load(weights + WIDTH + unit)[None, :]
+    hidden = tl.maximum(hidden + tl.load(weights + 2 * WIDTH + unit)[None, :], 0.0)
+    weights += 3 * WIDTH
+    inner = tl.load(weights + unit[:, None] * WIDTH + unit[None, :])
+    weights += WIDTH * WIDTH
+    # in float32: TF32, the default, would be off by up to 0.002
+    hidden = tl.dot(hidden, inner, input_precision="ieee") + tl.load(weights + unit)[None, :]
+    found = tl.sum(tl.maximum(hidden, 0.0) * tl.load(weights + WIDTH + unit)[None, :], 1)
+    far = tl.load(weights + 2 * WIDTH + 1)
+    return found + tl.load(weights + 2 * WIDTH) + tl.maximum(radius - _RIM, 0.0) * far
+
+
+@triton.jit
+def _edge(nodes, first, share):
+    """Values (M,) between nodes and the ones behind them."""
+    a = tl.load(nodes + first)
+    return a + (tl.load(nodes + first + 1) - a) * share
+
+
+@triton.jit
+def _between(nodes, first, wide, across, down):
+    """Values (M,) between nodes and the ones behind and below them."""
+    a, b = _edge(nodes, first, across), _edge(nodes, first + wide, across)
+    return a + (b - a) * down
+
+
+@triton.jit
+def _grid(x, y, nodes, side):
+    """Distances (M,) by a grid of nodes over [-1, 1]^2, and beyond it the least that they can be."""
+    inside_x = tl.minimum(tl.maximum(x, -1.0), 1.0)
+    inside_y = tl.minimum(tl.maximum(y, -1.0), 1.0)
+    half = (side - 1).to(tl.float32) * 0.5
+    place_x, place_y = (inside_x + 1.0) * half, (inside_y + 1.0) * half
+    row, column = tl.minimum(place_x.to(tl.int32), side - 2), tl.minimum(place_y.to(tl.int32), side - 2)
+    across, down = place_y - column.to(tl.float32), place_x - row.to(tl.float32)
+    found = _between(nodes, row * side + column, side, across, down)
+    beyond = (x - inside_x) * (x - inside_x) + (y - inside_y) * (y - inside_y)
+    return tl.where(beyond > 0.0, tl.sqrt_rn(found * found + beyond), found)
+
+
+@triton.jit
+def _texture(x, y, numbers, steps, high, wide):
+    """Colours of a picture, which repeats: numbers are a map, steps of colour, and three planes of texels."""
+    u, v = _affine(x, y, numbers)
+    numbers += 6
+    nodes = numbers + 4 * steps
+    place_x = (u - tl.floor(u)) * (wide - 2).to(tl.float32) + 0.5
+    place_y = (v - tl.floor(v)) * (high - 2).to(tl.float32) + 0.5
+    column = tl.minimum(tl.maximum(place_x.to(tl.int32), 0), wide - 2)
+    line = tl.minimum(tl.maximum(place_y.to(tl.int32), 0), high - 2)
+    across, down, first = place_x - column.to(tl.float32), place_y - line.to(tl.float32), line * wide + column
+    red = _between(nodes, first, wide, across, down)
+    green = _between(nodes + high * wide, first, wide, across, down)
+    blue = _between(nodes + 2 * high * wide, first, wide, across, down)
+    for _ in range(steps):
+        kind, amount = tl.load(numbers), tl.load(numbers + 1)
+        if kind == _COLOR:
+            red, green, blue = red * amount, green * tl.load(numbers + 2), blue * tl.load(numbers + 3)
+        elif kind == _GRAYSCALE:
+            luma = _RED * red + _GREEN * green + _BLUE * blue
+            red += amount * (luma - red)
+            green += amount * (luma - green)
+            blue += amount * (luma - blue)
+        else:
+            red, green, blue = _turned(red, green, blue, amount)
+        red, green, blue = _unit(red), _unit(green), _unit(blue)
+        numbers += 4
+    return red, green, blue
+
+
+@triton.jit
+def _turned(red, green, blue, turns):
+    """Colours with another hue of HSV."""
+    value, least = tl.maximum(tl.maximum(red, green), blue), tl.minimum(tl.minimum(red, green), blue)
+    chroma = value - least
+    sixth = 1.0 / tl.maximum(chroma, 1e-12)
+    others = tl.where(value == green, (blue - red) * sixth + 2.0, (red - green) * sixth + 4.0)
+    hue = tl.where(value == red, (green - blue) * sixth, others) / 6.0 + turns
+    hue = (hue - tl.floor(hue)) * 6.0
+    red = least + chroma * _unit(tl.abs(hue - 3.0) - 1.0)
+    green = least + chroma * _unit(2.0 - tl.abs(hue - 2.0))
+    return red, green, least + chroma * _unit(2.0 - tl.abs(hue - 4.0))
+
+
+@triton.jit
+def _mean(x, SAMPLES: tl.constexpr):
+    """Means of pixels' samples."""
+    return tl.sum(tl.reshape(x, (x.shape[0] // SAMPLES, SAMPLES)), 1) / SAMPLES
+
+
+@triton.jit(do_not_specialize=["width", "height", "across"])
+def draw_blocks(
+    out,  # (height, width, CHANNELS): over a background, else premultiplied colour and coverage
+    starts,  # (blocks + 1,): where in `objects` those of each block begin
+    objects,  # (pairs,)
+    rows,  # (N, ROW): the way to the leaf, scale, colour, cell
+    parts,  # (N, 6): where in `weights` its shape begins; the side of its grid, 0 for a decoder; where its
+    # texture begins, how many steps that has, and its lines and columns, 0 for none
+    weights,
+    background,  # (3,)
+    width,
+    height,
+    across,  # blocks in a row
+    left,  # world coordinates of the middle of the first pixel
+    top,
+    px,  # world units
+    empty,  # the state before the first object
+    slope,  # of coverage
+    SIDE: tl.constexpr,  # of a block, pixels
+    SAMPLES: tl.constexpr,  # of a pixel: 1 or 4
+    CHANNELS: tl.constexpr,
+    ROW: tl.constexpr,
+    OUTER: tl.constexpr,  # warps
+    INNER: tl.constexpr,
+    WIDTH: tl.constexpr,  # of decoders
+    LINES: tl.constexpr,  # of the gate of colour
+):
+    block = tl.program_id(0)
+    pixel = tl.arange(0, SIDE * SIDE * SAMPLES) // SAMPLES
+    column, line = (block % across) * SIDE + pixel % SIDE, (block // across) * SIDE + pixel // SIDE
+    which = tl.arange(0, SIDE * SIDE * SAMPLES) % SAMPLES
+    off = 0.25 if SAMPLES == 4 else 0.0
+    world_x = left + (column.to(tl.float32) + off * (2 * (which % 2) - 1).to(tl.float32)) * px
+    world_y = top - (line.to(tl.float32) + off * (2 * (which // 2) - 1).to(tl.float32)) * px
+
+    nothing = tl.zeros((SIDE * SIDE * SAMPLES,), tl.float32)
+    state, red, green, blue = nothing + empty, nothing, nothing, nothing
+    for pair in range(tl.load(starts + block), tl.load(starts + block + 1)):
+        number = tl.load(objects + pair)
+        row = rows + number * ROW
+        x, y = _affine(world_x, world_y, row)
+        row += 6
+        for _ in tl.static_range(OUTER):
+            x, y = _warp(x, y, row)
+            row += 3
+        x, y = _affine(x, y, row)
+        row += 6
+        for _ in tl.static_range(INNER):
+            x, y = _warp(x, y, row)
+            row += 3
+
+        part = parts + number * 6
+        shape, side = weights + tl.load(part), tl.load(part + 1)
+        if side > 0:
+            distance = _grid(x, y, shape, side)
+        else:
+            distance = _learned(x, y, shape, WIDTH)
+        distance *= tl.load(row)
+
+        # the cell: lines in what it is shown and what it remembers, the first of them the gate of the state
+        cell = row + 4
+        take = _unit(tl.load(cell) * distance + tl.load(cell + 1) * state + tl.load(cell + 2))
+        paint = nothing
+        for _ in tl.static_range(LINES):
+            cell += 3
+            level = tl.load(cell) * distance + tl.load(cell + 1) * state + tl.load(cell + 2)
+            paint = tl.maximum(paint, level)
+        paint = tl.minimum(paint, 1.0)
+        candidate, bump = tl.load(cell + 3) * distance, tl.load(cell + 4)
+        state = state + take * (candidate - state) - take * (1.0 - take) * bump
+        wide = tl.load(part + 5)
+        if wide > 0:
+            own_red, own_green, own_blue = _texture(
+                x, y, weights + tl.load(part + 2), tl.load(part + 3), tl.load(part + 4), wide
+            )
+        else:
+            own_red, own_green = nothing + tl.load(row + 1), nothing + tl.load(row + 2)
+            own_blue = nothing + tl.load(row + 3)
+        red += paint * (own_red - red)
+        green += paint * (own_green - green)
+        blue += paint * (own_blue - blue)
+
+    alpha = _unit(0.5 - state * slope)
+    red, green, blue = (
+        _mean(red * alpha, SAMPLES),
+        _mean(green * alpha, SAMPLES),
+        _mean(blue * alpha, SAMPLES),
+    )
+    alpha = _mean(alpha, SAMPLES)
+    pixel = tl.arange(0, SIDE * SIDE)
+    column, line = (block % across) * SIDE + pixel % SIDE, (block // across) * SIDE + pixel // SIDE
+    inside = (column < width) & (line < height)
+    out += (line * width + column) * CHANNELS
+    if CHANNELS == 4:
+        tl.store(out + 3, alpha, inside)
+    else:
+        red += (1.0 - alpha) * tl.load(background)
+        green += (1.0 - alpha) * tl.load(background + 1)
+        blue += (1.0 - alpha) * tl.load(background + 2)
+    tl.store(out, red, inside)
+    tl.store(out + 1, green, inside)
+    tl.store(out + 2, blue, inside)

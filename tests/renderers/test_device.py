@@ -1,0 +1,254 @@
+"""The kernel for GPUs: on one where there is one, else by Triton's interpreter."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+from scenelang.backend import neural
+from scenelang.elements.zoo import Zoo
+from scenelang.measure.sets import SETS, random_scene
+from scenelang.models.framed import load_arrays
+from scenelang.models.load import load_model
+from scenelang.models.manifest import load_manifest
+from scenelang.program.program import Program
+from scenelang.renderers.coverage import Coverage
+from scenelang.renderers.draw import draw_objects
+from scenelang.renderers.field import Field
+from scenelang.renderers.raster import raster
+from tests.elements.shapes import element, square
+from tests.pictures import premultiplied
+from tests.renderers.test_field import SCENES
+from tests.renderers.test_textures import at_random
+
+torch = pytest.importorskip("torch")
+HERE = "cuda" if torch.cuda.is_available() else "cpu"
+os.environ["TRITON_INTERPRET"] = "01"[HERE == "cpu"]  # is read when Triton is imported
+pytest.importorskip("triton")
+from torch.utils._python_dispatch import TorchDispatchMode  # noqa: E402
+
+from scenelang.renderers.device import draw as device  # noqa: E402
+
+EQUAL = 1 / 255
+"""Of a channel; by the interpreter none is off by more than 0.0001."""
+
+
+def network(model: str = "shapes2d"):
+    return load_model(model, HERE).framed
+
+
+def program(scene: nsg.Scene | str, canvas: tuple[int, int] = (20, 12), **changes: object) -> Program:
+    scene = nsg.loads(scene) if isinstance(scene, str) else scene
+    return nsg.compile(scene.model_copy(update={"canvas": canvas, **changes}))
+
+
+def assert_draws(p: Program, samples: str = "adaptive") -> None:
+    """What numpy draws with as many samples."""
+    found = device.draw_on_device(network(p.model), p, samples)
+    usual = draw_objects(
+        load_arrays(p.model).network, p, samples="four" if samples == "adaptive" else samples
+    )
+    assert found is not None
+    assert found.image.shape == usual.image.shape
+    assert np.ptp(usual.image) > 0.2
+    np.testing.assert_allclose(premultiplied(found.image), premultiplied(usual.image), rtol=0, atol=EQUAL)
+
+
+@pytest.mark.parametrize("name", ["subtract", "intersect", "smooth after a cut", "deformed", "thin"])
+def test_draws_what_numpy_draws(name: str) -> None:
+    assert_draws(program(SCENES[name], background=None))
+
+
+def evaluated(name: str, seed: int) -> nsg.Scene:
+    """A scene of an evaluation set."""
+    textures = load_manifest("textures2d").textures if SETS[name].textures else ()
+    return random_scene(np.random.default_rng([7, seed]), SETS[name], textures)
+
+
+@pytest.mark.parametrize("name", ["shapes2d", "chains", "large", "tiny", "textures2d-mixed"])
+def test_draws_evaluation_sets(name: str) -> None:
+    assert_draws(program(evaluated(name, 1), (33, 17)))
+
+
+@pytest.mark.parametrize("samples", ["one", "draft"])
+def test_samples_as_asked(samples: str) -> None:
+    assert_draws(program(SCENES["unions"], (24, 20)), samples)
+
+
+def test_decoders_narrower_than_a_product() -> None:
+    assert_draws(nsg.compile(nsg.loads(SCENES["deformed"]).sized((16, 16)), model="shapes2d-w8"))
+
+
+def test_draws_elements() -> None:
+    """Inside and beyond their grids, which are coarse enough to be told from the shape."""
+    square_of_eight = element(square, "made", cells=4, levels=2, d=2)
+    zoo = nsg.Elements.of("zoo", "z", Zoo({"made": square_of_eight}, "0" * 64))
+    objects = [
+        nsg.Object("zoo.made", [nsg.Scale(0.7, 0.5), nsg.Rotate.degrees(20)]),
+        nsg.Object("star", [nsg.Scale(0.4), nsg.Translate(0.5, 0.3)]),
+    ]
+    assert_draws(program(nsg.Scene(elements=zoo, nodes=[nsg.Boolean("smooth", objects)]), background=None))
+
+
+@pytest.mark.parametrize(("name", "seed"), [("unions", 0), ("deformed blends", 2), ("subtract", 3)])
+def test_draws_textures(name: str, seed: int) -> None:
+    assert_draws(at_random(program(SCENES[name]), seed))
+
+
+def test_nothing_to_draw() -> None:
+    p = program("canvas(9, 9); background(#204060); star { translate(9, 9); }", (9, 9))
+    found = device.draw_on_device(network(), p)
+    assert found is not None
+    np.testing.assert_allclose(
+        found.image, np.broadcast_to(np.array([32, 64, 96]) / 255, (9, 9, 3)), atol=1e-6
+    )
+
+
+def test_leaves_what_it_does_not_know() -> None:
+    wild = program("star { scale(3e9); } square { scale(0.3); }")
+    assert device.draw_on_device(network(), wild) is None
+    for change in ({"state": 2}, {"features": 2}, {"decoder_width": 33}):
+        net = network()
+        net.config = dataclasses.replace(net.config, **change)
+        assert device.draw_on_device(net, program(SCENES["unions"])) is None
+
+
+def test_changed_weights_are_fetched_again() -> None:
+    net, p = network(), program(SCENES["unions"])
+    before = device.draw_on_device(net, p)
+    with torch.no_grad():
+        net.albedo += 0.5
+    after = device.draw_on_device(net, p)
+    assert abs(after.image - before.image).max() > 0.1
+
+
+class Copies(TorchDispatchMode):
+    """Counts what torch is asked to do."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seen: Counter[str] = Counter()
+
+    def __torch_dispatch__(self, func, types, args=(), kwargs=None):
+        self.seen[func.overloadpacket.__name__] += 1
+        return func(*args, **kwargs or {})
+
+
+def begun(p: Program, like: object = None) -> object:
+    """A frame on a device, by default on one whose tensors have no numbers: whoever waits for one fails."""
+    field = Field(load_arrays("shapes2d").network, p.vectors, p.tokens)
+    grid = raster(p.canvas, range(p.canvas[1]))
+    like = torch.empty(0, device="meta") if like is None else like
+    return device.start(field, grid, Coverage(field).candidates(grid), p.background, 4, like)
+
+
+def test_a_frame_waits_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One copy up, one launch, and a picture that is on its way."""
+    launched = []
+    monkeypatch.setattr(device, "launch", lambda *a, **k: launched.append(a))
+    with Copies() as copies:
+        out = begun(program(SCENES["small"]))
+    assert out.device.type == "meta"
+    assert len(launched) == 1
+    assert copies.seen["_to_copy"] == 1
+    assert set(copies.seen) <= {"_to_copy", "empty", "new_empty", "slice", "view", "detach"}
+
+
+@pytest.mark.parametrize(
+    "wait", [lambda x: x.sum().item(), lambda x: x[x > 0], lambda x: x.nonzero(), lambda x: x.cpu()]
+)
+def test_a_frame_that_waits_is_found_out(monkeypatch: pytest.MonkeyPatch, wait) -> None:
+    monkeypatch.setattr(device, "launch", lambda _, out, *a, **k: wait(out))
+    with pytest.raises((RuntimeError, NotImplementedError)):
+        begun(program(SCENES["unions"]))
+
+
+def test_render_takes_the_kernel_where_the_network_lies_on_a_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    launched, share = [], []
+    launch = device.launch
+    monkeypatch.setattr(device, "launch", lambda *a, **k: (launched.append(a), launch(*a, **k)))
+    monkeypatch.setattr(neural, "place_of", lambda _: SimpleNamespace(type="cuda"))
+    p, model = program(SCENES["unions"]), load_model("shapes2d", HERE)
+    found = neural.draw_program(p, model, progress=share.append)
+    assert (len(launched), share) == (1, [1.0])
+    neural.draw_program(p, model, skip=False)
+    assert len(launched) == 1
+    np.testing.assert_allclose(found.image, neural.draw_program(p, model, samples="four").image, atol=1e-6)
+
+
+COMPILE = """
+import sys
+from triton import compile
+from triton.backends.compiler import GPUTarget
+from triton.compiler import ASTSource
+from scenelang.renderers.device.kernel import draw_blocks
+INTEGERS, POINTERS = ("width", "height", "across"), ("starts", "objects", "parts")
+NUMBERS = ("left", "top", "px", "empty", "slope")
+types = {n: "constexpr" if n.isupper() else "i32" if n in INTEGERS else "fp32" if n in NUMBERS
+         else "*i32" if n in POINTERS else "*fp32" for n in draw_blocks.arg_names}
+sizes = dict(SIDE=8, ROW=42, OUTER=3, INNER=2, LINES=2, **eval(sys.argv[2]))
+built = compile(ASTSource(draw_blocks, types, sizes), target=GPUTarget("cuda", int(sys.argv[1]), 32),
+                options={"num_warps": 8})
+print(len(built.asm["cubin"]), built.metadata.shared)
+"""
+
+
+LARGE, SMALL = {"SAMPLES": 4, "CHANNELS": 3, "WIDTH": 32}, {"SAMPLES": 1, "CHANNELS": 4, "WIDTH": 16}
+
+
+@pytest.mark.parametrize(
+    ("generation", "sizes"),
+    [
+        (90, SMALL),
+        *(
+            pytest.param(*other, marks=pytest.mark.slow)
+            for other in ((75, LARGE), (80, LARGE), (90, LARGE), (100, LARGE))
+        ),
+    ],
+)
+def test_compiles_for_gpus_that_are_not_here(generation: int, sizes: dict[str, int], tmp_path: Path) -> None:
+    """To their machine code, by the assembler that Triton brings, and there is room for it."""
+    command = [sys.executable, "-c", COMPILE, str(generation), repr(sizes)]
+    environment = {**os.environ, "TRITON_INTERPRET": "0", "TRITON_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    instructions, shared = map(int, done.stdout.split())
+    assert instructions > 10_000
+    assert shared < 48 << 10
+
+
+@pytest.mark.gpu
+def test_cuda_waits_for_nothing() -> None:
+    """CUDA's own check, from the upload to the launch."""
+    p, net = program(SCENES["small"], (256, 256)), network()
+    device.draw_on_device(net, p)  # compiles
+    torch.cuda.set_sync_debug_mode("error")
+    try:
+        begun(p, net.codes)
+    finally:
+        torch.cuda.set_sync_debug_mode("default")
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("name", SETS)
+def test_cuda_draws_evaluation_sets(name: str) -> None:
+    for seed in range(4):
+        scene = evaluated(name, seed)
+        assert_draws(program(scene, scene.canvas))
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("material", ["diffuse", "volumetric"])
+def test_cuda_draws_solids(material: str) -> None:
+    scene = nsg.loads(f"canvas(96, 64); sphere {{ material {material}; }} torus {{ translate(1, 0, 0); }}")
+    found = [nsg.render(scene, device=where) for where in ("cuda", "auto")]
+    np.testing.assert_allclose(*found, rtol=0, atol=2 / 255)
