@@ -21,12 +21,13 @@ from scenelang.renderers.draw import Drawing, Kept, draw_objects
 
 MOST_MS: Final = 250.0
 """Work up to which numpy draws: a quarter of the least that importing torch was seen to take."""
-_NS: Final = (0.0, 160e3, 60.0, 55.0, 4600.0)
+_NS: Final = (4.3e6, 11e3, 11.0, 0.0, 3600.0)
 """Nanoseconds of a frame, an object, a pixel, a meeting and a pixel around bounds (`Load.row`).
 
-Fitted to 195 pictures of the examples and of random scenes up to 600 x 400, by least relative error, on one
-core; 90 of 100 took 0.75 to 1.8 times as long.
+`python -m benchmarks.work` fits them and `_SHARES` to the examples and random scenes on several canvases.
 """
+_SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
+"""Of that, what other ways to sample take."""
 
 
 class Drawer(NamedTuple):
@@ -60,11 +61,8 @@ def choose_drawer(program: Program, device: Device = "auto", samples: Samples = 
 
 def work_ms(program: Program, samples: Samples = "adaptive") -> float:
     """What drawing a Program takes on one core of the machine that was measured, in milliseconds."""
-    frame, objects, pixels, meetings, outline = load_of(program).row(skip=True)
-    each = {"four": 4.0, "draft": 0.25}.get(samples, 1.0)
-    edges = outline if samples in ("adaptive", "quick") else 0.0
-    row = frame, objects, each * pixels, each * meetings, edges
-    return sum(n * ns for n, ns in zip(row, _NS, strict=True)) / 1e6
+    row = load_of(program).row(skip=True)
+    return _SHARES.get(samples, 1.0) * sum(n * ns for n, ns in zip(row, _NS, strict=True)) / 1e6
 
 
 def draw_small(
