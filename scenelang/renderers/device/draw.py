@@ -99,7 +99,7 @@ def start(
 
 def upload(parts: Sequence[np.ndarray], device: torch.device) -> list[Tensor]:
     """Arrays as int32 or float32 tensors on a device, by one copy that the host does not wait for."""
-    typed = [part.astype(np.float32 if part.dtype.kind == "f" else np.int32) for part in parts]
+    typed = [part.astype(np.float32 if part.dtype.kind == "f" else np.int32, copy=False) for part in parts]
     ends = np.cumsum([-(-part.size // ALIGNED) * ALIGNED for part in typed]).tolist()
     held = torch.empty(ends[-1], dtype=torch.int32, pin_memory=device.type == "cuda")
     words, begins = held.numpy(), [0, *ends]
@@ -168,11 +168,8 @@ def _texture(texture: Texture) -> np.ndarray:
 def _decoder(decoder: Decoder, wide: int) -> np.ndarray:
     """Weights in the order in which the kernel reads them, of layers widened by units that answer nothing."""
     (w0, b0), (w1, b1), (w2, b2) = decoder.layers
-    units = (0, wide - len(b0))
-    parts = [
-        np.pad(w0.T, ((0, 0), units)),
-        np.pad(b0, units),
-        np.pad(w1.T, (units, units)),
-        *(np.pad(b1, units), np.pad(w2[0], units), b2, decoder.far),
-    ]
-    return np.concatenate([part.ravel() for part in parts])
+    rows, units = np.zeros((wide + 6, wide), np.float32), len(b0)
+    rows[:2, :units], rows[2, :units] = w0.T, b0
+    rows[3 : 3 + units, :units], rows[wide + 3, :units] = w1.T, b1
+    rows[wide + 4, :units], rows[wide + 5, :2] = w2[0], (b2[0], decoder.far[0, 0])
+    return rows.reshape(-1)
