@@ -92,10 +92,10 @@ def _by_kernel(network: Network, program: Program, samples: Samples) -> Drawing 
     if not isinstance(network, Framed) or place_of(network).type != "cuda":
         return None
     try:
-        from scenelang.renderers.device.draw import draw_on_device
+        from scenelang.renderers.device.draw import draw_on_device, ready
     except ModuleNotFoundError:  # Triton comes with builds of torch for CUDA on Linux
         return None
-    return draw_on_device(network, program, samples)
+    return draw_on_device(network, program, samples) if ready() else None
 
 
 def draw_program(

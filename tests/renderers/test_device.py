@@ -9,6 +9,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -177,12 +178,25 @@ def test_render_takes_the_kernel_where_the_network_lies_on_a_gpu(monkeypatch: py
     launch = device.launch
     monkeypatch.setattr(device, "launch", lambda *a, **k: (launched.append(a), launch(*a, **k)))
     monkeypatch.setattr(neural, "place_of", lambda _: SimpleNamespace(type="cuda"))
+    monkeypatch.setattr(device, "ready", lambda: True)
     p, model = program(SCENES["unions"]), load_model("shapes2d", HERE)
     found = neural.draw_program(p, model, progress=share.append)
     assert (len(launched), share) == (1, [1.0])
     neural.draw_program(p, model, skip=False)
+    monkeypatch.setattr(device, "ready", lambda: False)
+    neural.draw_program(p, model)
     assert len(launched) == 1
     np.testing.assert_allclose(found.image, neural.draw_program(p, model, samples="four").image, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "failure", [RuntimeError, ImportError, subprocess.CalledProcessError(1, "gcc"), None]
+)
+def test_is_ready_where_triton_can_start_kernels(monkeypatch: pytest.MonkeyPatch, failure) -> None:
+    """That is with a driver, which Triton builds with a C compiler."""
+    driver = mock.Mock(get_current_target=mock.Mock(side_effect=failure))
+    monkeypatch.setattr(device.triton.runtime, "driver", SimpleNamespace(active=driver))
+    assert device.ready.__wrapped__() == (failure is None)
 
 
 COMPILE = """

@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from subprocess import SubprocessError
 from typing import Any
 
 import numpy as np
 import torch
+import triton
 from torch import Tensor
 
 from scenelang.image import enlarged
@@ -33,6 +35,15 @@ WIDTHS = 16, 32  # of decoders: the least of a product in Triton, and the most f
 ALIGNED = 4  # words: Triton compiles a kernel once more for arrays that begin elsewhere
 KINDS = list(STEPS)  # of steps of colour, by the place at which the kernel knows them
 WARPS = 8  # of 32 threads, for the 256 samples of a block
+
+
+@lru_cache
+def ready() -> bool:
+    """Whether Triton can start kernels: it looks for a device, and builds a library with a C compiler."""
+    try:
+        return triton.runtime.driver.active.get_current_target() is not None
+    except (ImportError, OSError, RuntimeError, SubprocessError):
+        return False
 
 
 def draw_on_device(network: Framed, program: Program, samples: str = "adaptive") -> Drawing | None:
