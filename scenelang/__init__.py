@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from scenelang.animation.timing import FramesError as FramesError
     from scenelang.backend.options import RenderError as RenderError
     from scenelang.backend.outputs import render_outputs as render_outputs
+    from scenelang.backend.prove import prove as prove
     from scenelang.backend.render import render as render
     from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
     from scenelang.diagnostics.diagnostic import Diagnostics as Diagnostics
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from scenelang.image import Image as Image
     from scenelang.measure.metrics import compare as compare
     from scenelang.outputs import Outputs as Outputs
+    from scenelang.outputs import Proof as Proof
     from scenelang.program.check import check as check
     from scenelang.program.check import check_text as check_text
     from scenelang.program.check import fix_text as fix_text
@@ -70,8 +72,9 @@ _HOME: Final = {
     "scenelang.animation.timing": "FramesError",
     "scenelang.backend.options": "RenderError",
     "scenelang.backend.outputs": "render_outputs",
+    "scenelang.backend.prove": "prove",
     "scenelang.backend.render": "render",
-    "scenelang.outputs": "Outputs",
+    "scenelang.outputs": "Outputs Proof",
     "scenelang.diagnostics.diagnostic": "Diagnostic Diagnostics",
     "scenelang.diagnostics.error": "SceneError",
     "scenelang.evaluate.evaluation": "load loads",

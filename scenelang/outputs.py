@@ -21,15 +21,58 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-Output = Literal["depth", "normal", "object", "alpha"]
+Output = Literal["depth", "normal", "object", "alpha", "proof"]
 PLANE: tuple[Output, ...] = ("object", "alpha")
 """What 2D pictures have."""
 DEEP = 0.01
 """World units in a medium where its object is asked for, where it is as deep."""
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
+PROVED = 1 / 255
+"""Of a channel: a pixel that is proved to be so near the exact one counts as right."""
 Floats = npt.NDArray[np.float32]
 Source = dict[str, str | int]
 """Of an object its ``geometry``, and ``file``, ``line`` and ``column`` where they are known."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proof:
+    """How far a picture may be from the exact one; row 0 is the top.
+
+    Args:
+        bound: float32 (H, W), no less than the largest difference of a pixel's channels, in [0, 1] and, where
+            there is alpha, times that.
+        redrawn: pixels that were drawn again.
+    """
+
+    bound: Floats
+    redrawn: int = 0
+
+    @property
+    def share(self) -> float:
+        """Of pixels that are proved right to `PROVED`."""
+        return float((self.bound <= PROVED).mean())
+
+    @property
+    def worst(self) -> float:
+        """The largest bound."""
+        return float(self.bound.max())
+
+    def facts(self) -> dict[str, Any]:
+        """The figures, as JSON data."""
+        left = int((self.bound > PROVED).sum())
+        return {"to": PROVED, "share": self.share, "left": left, "worst": self.worst, "redrawn": self.redrawn}
+
+    def told(self) -> str:
+        """What to say about it."""
+        left = int((self.bound > PROVED).sum())
+        rest = f"; {left:,} are not, by at most {255 * self.worst:.0f}/255" if left else ""
+        again = f", {self.redrawn:,} of them drawn again" if self.redrawn else ""
+        return f"{_share(self.share)} of pixels proved right to 1/255{again}{rest}"
+
+
+def _share(share: float) -> str:
+    """Per cent, rounded down so that only all are 100 %."""
+    return f"{int(share * 1e5) / 1e3:g} %"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +92,7 @@ class Outputs:
         alpha: float32 (H, W), in [0, 1], how much of the pixel objects cover, ground and background left out;
             a medium covers 1 - its transmittance.
         objects: what the numbers in ``object`` are, in order.
+        proof: bounds of the picture's pixels.
     """
 
     depth: Floats | None = None
@@ -56,6 +100,7 @@ class Outputs:
     object: npt.NDArray[np.int32] | None = None
     alpha: Floats | None = None
     objects: Mapping[int, Source] | None = None
+    proof: Proof | None = None
 
     def only(self, wanted: Sequence[Output], sources: Mapping[int, Source]) -> Outputs:
         """Those that are asked for, with what ``sources`` says of the objects that are seen."""
@@ -80,6 +125,8 @@ class Outputs:
             said |= {"axes": "world"}
         elif name == "object":
             said |= {"objects": [{"index": n, **source} for n, source in (self.objects or {}).items()]}
+        elif self.proof is not None and name == "proof":
+            said |= self.proof.facts()
         return said
 
     def range(self) -> tuple[float | None, float | None]:
@@ -92,7 +139,8 @@ class Outputs:
         """What to say about the file of an output."""
         if name != "depth":
             seen = f"{len(self.objects or ())} objects seen"
-            return {"normal": "normals in world axes", "object": seen}.get(name, "coverage by objects")
+            known = {"normal": "normals in world axes", "object": seen, "proof": "bounds of pixels"}
+            return known.get(name, "coverage by objects")
         near, far = self.range()
         return "no surface" if near is None else f"depth from {near:.6g} to {far:.6g} scene units"
 
@@ -100,12 +148,13 @@ class Outputs:
         """An output as a PNG of 16 bits.
 
         Depth is ``65535 near / depth``, 0 for none; a normal ``65535 (n + 1) / 2``; alpha ``65535 alpha``;
-        objects are their numbers.
+        a bound of a proof 65535 of it, rounded up; objects are their numbers.
 
         Raises:
             ValueError: a number has more than 16 bits.
         """
-        facts, values = self.facts(name), np.asarray(getattr(self, name), np.float64)
+        found = getattr(self, name)
+        facts, values = self.facts(name), np.asarray(getattr(found, "bound", found), np.float64)
         if name == "depth":
             values = 65535.0 * (facts["near"] or 0.0) / values
             facts["stored"] = "65535 near / depth, 0 for none"
@@ -115,6 +164,9 @@ class Outputs:
         elif name == "alpha":
             values = 65535.0 * values
             facts["stored"] = "65535 alpha"
+        elif name == "proof":
+            values = np.ceil(65535.0 * values.clip(0.0, 1.0))
+            facts["stored"] = "65535 bound"
         elif values.max(initial=0.0) > 65535.0:
             raise ValueError("objects numbered beyond 65535, which only .exr holds")
         return png16(np.floor(values + 0.5).astype(np.uint16), json.dumps(facts))
@@ -122,6 +174,7 @@ class Outputs:
     def layers(self) -> dict[str, Floats]:
         """The channels of an EXR."""
         single = {"depth.Z": self.depth, "object.id": self.object, "alpha.A": self.alpha}
+        single |= {"proof.bound": None if self.proof is None else self.proof.bound}
         found = {name: np.asarray(v, np.float32) for name, v in single.items() if v is not None}
         if self.normal is not None:
             found |= {f"normal.{axis}": self.normal[..., at] for at, axis in enumerate("XYZ")}

@@ -48,6 +48,7 @@ ORDER = (
     "scenelang.models.slopes",
     "scenelang.models.solid",
     "scenelang.models.framed",
+    "scenelang.proof",
     "scenelang.models.load",
     "scenelang.fitting",
     "scenelang.training",

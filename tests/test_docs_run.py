@@ -21,7 +21,7 @@ import pytest
 from scenelang.cli.main import main
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("index", "tutorial", "cookbook", "embedding", "language", "formatting", "data", "elements")
+PAGES = ("index", "tutorial", "cookbook", "embedding", "language", "formatting", "data", "elements", "proof")
 SLOW = ("animation",)
 _BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```\n(?:\n```text\n(.*?)^```$)?", re.MULTILINE | re.DOTALL)
 VENV = ".venv/bin/"

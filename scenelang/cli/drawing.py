@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from scenelang.image import Image
     from scenelang.measure.choose import Choice
     from scenelang.measure.frontier import Frontier, Limits, Point
-    from scenelang.outputs import Output, Outputs
+    from scenelang.outputs import Output, Outputs, Proof
     from scenelang.program.program import Program
 
 Draw = Callable[[Job, Callable[[float], None]], "Image"]
@@ -74,15 +74,41 @@ def exact(request: Request, clock: Clock) -> Draw:
 def job_outputs(
     job: Job, wanted: tuple[Output, ...], model: str | None, threads: int | None, *, exactly: bool
 ) -> Outputs:
-    """What is known beside the picture, of the network or exactly."""
+    """What is known beside the picture, of the network or exactly, its proof aside."""
     from scenelang.backend.outputs import exact_outputs, neural_outputs
+    from scenelang.outputs import Outputs
 
+    wanted = tuple([name for name in wanted if name != "proof"])
+    if not wanted:
+        return Outputs()
     if not exactly:
         assert job.program is not None
         return neural_outputs(job.program, wanted, threads)
     assert job.source is not None
     assert job.source.scene is not None
     return exact_outputs(job.source.scene, wanted, spans=job.source.spans, model=model)
+
+
+def check_proof(limits: Limits, backend: str) -> None:
+    """Raise `click.UsageError` where a proof is asked for with what it does not go with."""
+    if limits or backend == "reference":
+        other = "--max-ms and --max-flip" if limits else "--backend reference, whose pictures are exact"
+        raise click.UsageError(f"A proof is of what the scene's model draws; leave out {other}.")
+
+
+def proved(draw: Draw, clock: Clock, redraw: bool, proofs: list[Proof]) -> Draw:
+    """Draw, perhaps again where it is not proved right, and append a proof of each picture."""
+    from scenelang.backend.prove import prove_drawn
+
+    def both(job: Job, progress: Callable[[float], None]) -> Image:
+        assert job.program is not None
+        *_, graph = job.graphs.values()
+        with clock("prove"):
+            image, proof = prove_drawn(graph, job.program.model, lambda: draw(job, progress), redraw)
+        proofs.append(proof)
+        return image
+
+    return both
 
 
 # ---------------------------------------------------------------- by the frontier

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -132,25 +133,37 @@ def _error(layers: Layers, nodes: Floats, axis: Floats, near: float, slack: floa
     for dx, dy in ((0, 0), (0.3, 0.3), (-0.3, 0.3), (0.3, -0.3), (-0.3, -0.3)):
         p = centres + NODE * np.array([dx, dy])
         seen = np.maximum(seen, abs(distances(layers, p) - _bilinear(nodes, cells, p, axis)[0]))
-    found, half = np.zeros((len(at), len(at))), NODE / 2
+    found = np.zeros((len(at), len(at)))
     seen_at = np.zeros_like(found)
     seen_at[cells[:, 1], cells[:, 0]] = seen
+
+    def wide(cells: npt.NDArray[np.intp], p: Floats, half: float) -> npt.NDArray[np.bool_]:
+        place = cells[:, 1], cells[:, 0]
+        here, most = _differ(layers, nodes, cells, p, half, axis)
+        np.maximum.at(seen_at, place, here)
+        left: npt.NDArray[np.bool_] = most > np.maximum(near, slack * seen_at[place])
+        left &= half > _FINEST
+        np.maximum.at(found, (place[0][~left], place[1][~left]), most[~left])
+        return left
+
+    bounded(cells, centres, NODE / 2, wide)
+    return found
+
+
+def bounded(
+    cells: npt.NDArray[np.intp],
+    centres: Floats,
+    half: float,
+    wide: Callable[[npt.NDArray[np.intp], Floats, float], npt.NDArray[np.bool_]],
+) -> None:
+    """Branch and bound: ask of boxes, each within a cell, which are too wide, and then of their quarters."""
     while len(centres):
-        left = []
-        for first in range(0, len(centres), _BATCH):
-            part = slice(first, first + _BATCH)
-            place = cells[part, 1], cells[part, 0]
-            here, most = _differ(layers, nodes, cells[part], centres[part], half, axis)
-            np.maximum.at(seen_at, place, here)
-            wide = (most > np.maximum(near, slack * seen_at[place])) & (half > _FINEST)
-            np.maximum.at(found, (place[0][~wide], place[1][~wide]), most[~wide])
-            left.append(np.flatnonzero(wide) + first)
-        kept = np.concatenate(left)
+        parts = [slice(first, first + _BATCH) for first in range(0, len(centres), _BATCH)]
+        kept = np.concatenate([wide(cells[part], centres[part], half) for part in parts])
         half /= 2
         quarters = half * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])
         centres = (centres[kept][:, None] + quarters).reshape(-1, 2)
         cells = np.repeat(cells[kept], 4, 0)
-    return found
 
 
 def _bilinear(nodes: Floats, cells: npt.NDArray[np.intp], p: Floats, axis: Floats) -> tuple[Floats, ...]:
@@ -167,6 +180,14 @@ def _differ(
     layers: Layers, nodes: Floats, cells: npt.NDArray[np.intp], p: Floats, half: float, axis: Floats
 ) -> tuple[Floats, Floats]:
     """|f - g| at points p, and bounds of it over boxes about them, each within a cell."""
+    answer, slope, doubt = answered(layers, p, half)
+    value, flat, twist = _bilinear(nodes, cells, p, axis)
+    here = abs(answer - value)
+    return here, here + half * (abs(slope - flat) + doubt + half * twist[:, None]).sum(1)
+
+
+def answered(layers: Layers, p: Floats, half: float) -> tuple[Floats, Floats, Floats]:
+    """A decoder's distances (M,), and derivatives (M, 2) over boxes: a middle, and a spread about it."""
     (w1, b1), (w2, b2), (w3, b3) = layers
     first = p @ w1.T + b1
     mean, spread = _open(first, abs(w1).sum(1) * half)
@@ -177,15 +198,20 @@ def _differ(
     mean, spread = _open(second, (abs(middle) + radius).sum(1) * half)
     slope = (mean[:, None] * middle) @ w3[0]
     doubt = (spread[:, None] * abs(middle) + (mean + spread)[:, None] * radius) @ abs(w3[0])
-    value, flat, twist = _bilinear(nodes, cells, p, axis)
-    here = abs(np.maximum(second, 0.0) @ w3[0] + b3[0] - value)
-    return here, here + half * (abs(slope - flat) + doubt + half * twist[:, None]).sum(1)
+    return np.maximum(second, 0.0) @ w3[0] + b3[0], slope, doubt
 
 
 def _open(inputs: Floats, radius: Floats) -> tuple[Floats, Floats]:
     """How far open units with inputs within a radius are: a middle, and a spread about it."""
     sure = (inputs >= radius) | (inputs <= -radius)
     return np.where(sure, inputs > 0, 0.5), np.where(sure, 0.0, 0.5)
+
+
+def short(values: Floats, end: float) -> npt.NDArray[np.float16]:
+    """Numbers in 16 bits, rounded towards an infinite end."""
+    found = values.astype(np.float16)
+    past = np.sign(end) * (values - found) > 0
+    return np.where(past, np.nextafter(found, np.float16(end)), found)
 
 
 def slopes_file(model: str) -> bytes:
@@ -196,11 +222,10 @@ def slopes_file(model: str) -> bytes:
     for code in network.codes:  # one by one, as their weights are mixed where one is drawn alone
         layers = [(w[0], b[0]) for w, b in network.decoder_weights(code[None]).layers]
         found.append(proved_slack(layers))
-    cells = np.stack(found)
-    short = cells.astype(np.float16)
-    short = np.where(short < cells, np.nextafter(short, np.float16(np.inf)), short)
     header = {"weights": digest, "node": NODE, "steep": STEEP}
-    data: bytes = save({"cells": short}, {"scenelang": json.dumps({"format": 1, **header})})
+    data: bytes = save(
+        {"cells": short(np.stack(found), np.inf)}, {"scenelang": json.dumps({"format": 1, **header})}
+    )
     return data
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from scenelang.evaluate.session import Defines
     from scenelang.image import Image
     from scenelang.measure.frontier import Limits
-    from scenelang.outputs import Output, Outputs
+    from scenelang.outputs import Output, Outputs, Proof
 
 
 @click.command("render")
@@ -60,10 +61,12 @@ if TYPE_CHECKING:
     "--output",
     "outputs",
     multiple=True,
-    type=click.Choice(("depth", "normal", "object", "alpha")),
+    type=click.Choice(("depth", "normal", "object", "alpha", "proof")),
     help="Write this beside the picture too, to OUT's STEM.depth.png and so on, or into an .exr; may be "
     "given several times.",
 )
+@click.option("--prove", is_flag=True, help="Prove how far pixels are from the exact picture at most (2D).")
+@click.option("--redraw", is_flag=True, help="With a proof: draw again what is not proved right to 1/255.")
 @click.option(
     "--max-ms",
     type=click.FloatRange(0, min_open=True),
@@ -99,6 +102,8 @@ def command(
     backend: options.Backend,
     samples: Samples,
     outputs: tuple[Output, ...],
+    prove: bool,
+    redraw: bool,
     max_ms: float | None,
     max_flip: float | None,
     device: Literal["auto", "cpu", "cuda"],
@@ -125,17 +130,21 @@ def command(
     With --output, PNG files have 16 bits and say what they hold in a text `scenelang`; an .exr holds the
     picture and all outputs as layers of floats.
 
+    With --prove, --redraw or --output proof, the share of pixels that are proved right is told, and the
+    largest bound of the others. The output has each pixel's.
+
     With --max-ms or --max-flip each scene is drawn by what was measured to suffice, model and samples; -v
     says which, why, and what was next.
     """
     from scenelang.cli.animation import Requested, animate, wanted_target
-    from scenelang.cli.drawing import check_options, chosen, exact, job_outputs, neural
+    from scenelang.cli.drawing import check_options, check_proof, chosen, exact, job_outputs, neural, proved
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import PROGRAM
     from scenelang.cli.outputs import check_outputs, targets
     from scenelang.measure.frontier import Limits
 
     outputs = tuple(dict.fromkeys(outputs))
+    prove = prove or redraw or "proof" in outputs
     clock = Clock()
     wanted = Requested(frames, fps, jobs, palette, dither, backend, device, threads, strict, verbose, outputs)
     _ = wanted.frames
@@ -145,12 +154,14 @@ def command(
         raise click.UsageError("--frames and --fps take one scene.")
     limits = Limits(max_ms, max_flip)
     check_options(ctx, limits, device)
+    if prove:
+        check_proof(limits, backend)
     request = Request(defines, model, root, frame or 0, size)
     source = None
     if len(files) == 1 and frame is None and not files[0].endswith(PROGRAM):
         target = wanted_target(files[0], out, wanted)
         if target is not None:
-            _only_stills(limits, samples)
+            _only_stills(limits, samples, prove)
             done = animate(files[0], out, target, request, wanted)
             if isinstance(done, int):
                 ctx.exit(done)
@@ -159,7 +170,7 @@ def command(
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
     paths = targets(files, out)
     check_outputs(paths, outputs)
-    inputs, code = _prepared(files, request, clock, strict, backend, verbose, source)
+    inputs, code = _prepared(files, request, clock, strict, backend, verbose or prove, source, prove)
     ready = [(job, path) for job, path in zip(inputs, paths, strict=True) if job and not job.failed(strict)]
     if not ready:
         ctx.exit(code)
@@ -171,6 +182,9 @@ def command(
         draw = exact(request, clock)
     else:
         draw = neural(clock, device, threads, samples)
+    proofs: list[Proof] = []
+    if prove:
+        draw = proved(draw, clock, redraw, proofs)
     told: list[str] = []
     with Bar() as bar:
         for index, (job, path) in enumerate(ready):
@@ -178,6 +192,10 @@ def command(
                 with clock("outputs"):
                     found = job_outputs(job, outputs, request.model, threads, exactly=backend == "reference")
             image = draw(job, partial(_part, bar, index, len(ready)))
+            if proofs:
+                told.append(f"{path}: {proofs[-1].told()}")
+            if "proof" in outputs:
+                found = replace(found, proof=proofs[-1])
             with clock("save"):
                 if outputs:
                     told += _saved(image, found, path)
@@ -212,6 +230,7 @@ def _prepared(
     backend: str,
     verbose: bool,
     source: SourceFile | None,
+    prove: bool,
 ) -> tuple[list[Job | None], int]:
     """Every input read and compiled, None where it cannot be read; reports mistakes; the exit code so far."""
     from scenelang.cli.inputs import merged, unused_defines
@@ -227,8 +246,9 @@ def _prepared(
             jobs.append(None)
             code = 2
             continue
-        if backend == "reference" and job.program is not None:
-            job.trouble = "the reference draws scenes; a program keeps only what the network needs"
+        if (prove or backend == "reference") and job.program is not None and job.source is None:
+            does = "a proof is of a scene" if prove else "the reference draws scenes"
+            job.trouble = f"{does}; a program keeps only what the network needs"
         if job.trouble is not None:
             say_trouble(f"{name}: {job.trouble}")
         jobs.append(job)
@@ -244,8 +264,8 @@ def _part(bar: Bar, index: int, count: int, share: float) -> None:
     bar("drawing", index + share, count)
 
 
-def _only_stills(limits: Limits, samples: str) -> None:
+def _only_stills(limits: Limits, samples: str, prove: bool) -> None:
     """Refuse for animations what chooses or changes how one picture is drawn."""
-    if limits or samples != "adaptive":
-        what = "--max-ms and --max-flip are" if limits else "--samples is"
+    if limits or samples != "adaptive" or prove:
+        what = "--max-ms and --max-flip are" if limits else "a proof is" if prove else "--samples is"
         raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")

@@ -1,0 +1,67 @@
+"""Pictures with a proof in one call: `scenelang.prove`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from scenelang.backend.options import Device, RenderError, Samples, keep_memory
+from scenelang.outputs import Proof
+from scenelang.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from scenelang.graph.nodes import Graph
+    from scenelang.image import Image
+
+
+def prove(
+    scene: Scene,
+    image: Image | None = None,
+    *,
+    redraw: bool = False,
+    size: tuple[int, int] | None = None,
+    device: Device = "auto",
+    threads: int | None = None,
+    samples: Samples = "adaptive",
+) -> tuple[Image, Proof]:
+    """Draw a Scene of the plane, and prove how far each pixel is from the exact picture at most.
+
+    Args:
+        scene: what to draw.
+        image: its picture, whoever drew it; by default it is drawn by the network, as `render` does.
+        redraw: draw pixels again that are not proved right to 1/255. Then all are, but those of elements.
+        size, device, threads, samples: as for `render`.
+
+    Returns:
+        The picture, and bounds of its pixels.
+
+    Raises:
+        SceneError: the Scene cannot be compiled.
+        RenderError: nothing is proved of such pictures (solids, models with a learned lifting), the picture
+            is of another size, or it cannot be drawn.
+    """
+    from scenelang.backend.render import render
+    from scenelang.program.compile import compile_scene
+
+    graphs: dict[str, Graph] = {}
+    program = compile_scene(scene if size is None else scene.sized(size), after=graphs.__setitem__)
+    *_, graph = graphs.values()
+
+    def draw() -> Image:
+        return render(program, device=device, threads=threads, samples=samples) if image is None else image
+
+    return prove_drawn(graph, program.model, draw, redraw)
+
+
+def prove_drawn(graph: Graph, model: str, draw: Callable[[], Image], redraw: bool) -> tuple[Image, Proof]:
+    """A picture of what all passes left, and its proof; raises as `prove`, before it is drawn."""
+    from scenelang.models.manifest import load_manifest
+    from scenelang.models.weights import ModelError
+    from scenelang.proof.picture import ProofError, known_errors, prove_image
+
+    keep_memory()
+    try:
+        known_errors(manifest := load_manifest(model))
+        return prove_image(graph, manifest, draw(), redraw=redraw)
+    except (ProofError, ModelError) as error:
+        raise RenderError(str(error)) from None

@@ -1,0 +1,1 @@
+"""How far a picture of the plane may differ from the exact one at most, proved pixel by pixel."""

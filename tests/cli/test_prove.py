@@ -1,0 +1,71 @@
+"""`scenelang render --prove`: what is told, which files are written, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import scenelang as nsg
+from scenelang.outputs import PROVED
+from tests.cli.conftest import Folder
+from tests.cli.test_outputs import said
+
+STARS = "star { scale(0.8); twirl(0.7); } smooth star { translate(0.3, 0.2); scale(0.7); }"
+TEXT = f"canvas(90, 60);\nchain {{ {STARS} }}\n"
+
+
+def test_a_proof_is_told_and_written(folder: Folder) -> None:
+    name = folder.write("a.nsg", TEXT)
+    _, proof = nsg.prove(nsg.loads(TEXT))
+    assert proof.share < 1
+    plain = folder.run("render", name, "-o", "p.png")
+    assert (plain.exit_code, plain.stderr) == (0, "")
+    ran = folder.run("render", name, "-o", "q.png", "--prove")
+    left = int((proof.bound > PROVED).sum())
+    assert ran.stderr == f"q.png: {proof.told()}\n"
+    assert f"{left} are not, by at most {255 * proof.worst:.0f}/255" in ran.stderr
+    assert (folder.path / "q.png").read_bytes() == (folder.path / "p.png").read_bytes()
+    ran = folder.run("render", name, "-o", "r.png", "--output", "proof", "--output", "alpha")
+    assert (ran.exit_code, ran.stderr.count("\n")) == (0, 3)
+    assert said("r.proof.png") == {"output": "proof", **proof.facts(), "stored": "65535 bound"}
+    stored = np.asarray(Image.open("r.proof.png"), np.float64)
+    np.testing.assert_array_equal(stored, np.ceil(65535.0 * proof.bound.astype(np.float64)))
+
+
+def test_what_is_not_proved_is_drawn_again(folder: Folder) -> None:
+    name = folder.write("a.nsg", TEXT)
+    ran = folder.run("render", name, "-o", "p.png", "--redraw", "-v")
+    assert ran.exit_code == 0
+    assert "p.png: 100 % of pixels proved right to 1/255" in ran.stderr
+    exact = nsg.render(nsg.loads(TEXT), backend="reference").to_uint8().astype(int)
+    assert abs(np.asarray(Image.open("p.png"), int) - exact).max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "why"),
+    [
+        ("sphere { scale(0.5); }", (), "solids are not proved"),
+        (
+            'model "shapes2d-streaming"; canvas(32, 32); background(#fff); square { }',
+            (),
+            "learned where points lie",
+        ),
+        (TEXT, ("--backend", "reference"), "pictures are exact"),
+        (TEXT, ("--max-ms", "5"), "leave out --max-ms"),
+        ("animate(1, 3);" + TEXT, ("--frames", "0..1"), "a proof is for single pictures"),
+    ],
+)
+def test_what_cannot_be_proved_is_told(folder: Folder, text: str, options: tuple[str, ...], why: str) -> None:
+    name = folder.write("a.nsg", text)
+    out = "p-%d.png" if "--frames" in options else "p.png"
+    ran = folder.run("render", name, "-o", out, "--prove", *options)
+    assert ran.exit_code == 2
+    assert why in " ".join(ran.stderr.split())
+    assert not list(folder.path.glob("p*"))
+
+
+def test_a_compiled_program_has_no_proof(folder: Folder) -> None:
+    assert folder.run("compile", folder.write("a.nsg", TEXT), "-o", "a.safetensors").exit_code == 0
+    ran = folder.run("render", "a.safetensors", "-o", "p.png", "--prove")
+    assert (ran.exit_code, "a proof is of a scene" in ran.stderr) == (1, True)
