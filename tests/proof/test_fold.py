@@ -47,7 +47,7 @@ def test_no_sample_leaves_its_interval(seed: int, most: int, behind: Array) -> N
     )
     left = np.empty(len(block), bool)
     left[source] = told.left
-    sure, far = 0, np.full(60, 1e9)
+    sure, far = 0, np.full(60, 100.0)
     for column, number in enumerate(meetings.columns):
         pairs = np.flatnonzero(block == number)
         share = rng.uniform(-1, 1, (len(pairs), 60)) ** rng.choice([1, 0], (1, 60), p=[0.7, 0.3])
