@@ -222,10 +222,10 @@ LARGE, SMALL = {"SAMPLES": 4, "CHANNELS": 3, "WIDTH": 32}, {"SAMPLES": 1, "CHANN
 @pytest.mark.parametrize(
     ("generation", "sizes"),
     [
-        (90, SMALL),
+        (90, LARGE),
         *(
             pytest.param(*other, marks=pytest.mark.slow)
-            for other in ((75, LARGE), (80, LARGE), (90, LARGE), (100, LARGE))
+            for other in ((75, LARGE), (80, LARGE), (90, SMALL), (100, LARGE))
         ),
     ],
 )
@@ -235,8 +235,8 @@ def test_compiles_for_gpus_that_are_not_here(generation: int, sizes: dict[str, i
     environment = {**os.environ, "TRITON_INTERPRET": "0", "TRITON_CACHE_DIR": str(tmp_path)}
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    instructions, shared = map(int, done.stdout.split())
-    assert instructions > 10_000
+    code, shared = map(int, done.stdout.split())
+    assert 10_000 < code < 500_000, "loops unrolled over warps make it ten times as long, and registers spill"
     assert shared < 48 << 10
 
 

@@ -184,12 +184,12 @@ def draw_blocks(
         row = rows + number * ROW
         x, y = _affine(world_x, world_y, row)
         row += 6
-        for _ in tl.static_range(OUTER):
+        for _ in range(OUTER):  # unrolled the code would be ten times as long
             x, y = _warp(x, y, row)
             row += 3
         x, y = _affine(x, y, row)
         row += 6
-        for _ in tl.static_range(INNER):
+        for _ in range(INNER):
             x, y = _warp(x, y, row)
             row += 3
 
