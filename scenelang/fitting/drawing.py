@@ -22,11 +22,7 @@ _UNSEEN: Final = {"mask": "masks", "marker": "markers", "filter": "filters", "cl
 
 
 def read_outline(data: bytes, suffix: str) -> Outline:
-    """A drawing (.svg), or the dark or opaque part of a picture, in the bytes of a file.
-
-    Raises:
-        FitError: it is damaged, empty or too large, or draws nothing.
-    """
+    """A drawing (.svg), or the dark or opaque part of a picture, in the bytes of a file."""
     return Outline(*(drawn(data) if suffix == ".svg" else traced(data)))
 
 
@@ -34,9 +30,6 @@ def drawn(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
     """The layers of a drawing in the order of painting, y up, and what there is to say of it.
 
     Gradients are their mean colours, what is not opaque is mixed with white.
-
-    Raises:
-        FitError: it is damaged.
     """
     with needed("svgelements"):
         import svgelements

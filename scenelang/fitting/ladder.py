@@ -142,9 +142,6 @@ def fit(
         about: what the element says of itself, beside its figures.
         report: called with each that was tried.
         progress: called with nodes along an axis of what grows, and the share of it that is done.
-
-    Raises:
-        FitError: the shape encloses nothing.
     """
     started, worked, spent = time.monotonic(), time.process_time(), 0.0
     long_s = max(LONG_S, budget_s) if budget_s < np.inf else LONG_S

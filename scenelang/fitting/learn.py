@@ -35,15 +35,8 @@ def learn(
     not made again. So work that was interrupted is taken up by asking for it again.
 
     Args:
-        files: meshes, drawings and pictures.
-        name: of the one element; by default that of the file.
-        say: is told in lines what is found and tried.
+        files, out, name, say: as for `scenelang.learn`, which raises the same.
         progress: is told what is done, how far it is and how far that goes.
-
-    Raises:
-        OSError: ``out`` cannot be read or written.
-        FitError: files cannot be made elements, a line for each; the others were.
-        ValueError: names that scenes cannot say, or twice the same.
     """
     names = names_of(files, wish, name)
     held = _writable(out)

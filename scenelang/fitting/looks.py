@@ -81,9 +81,6 @@ def look_of(mesh: Any, linear: bool, textures: dict[int, npt.NDArray[np.uint8]])
     Args:
         linear: whether the numbers of its file are, as those of glTF.
         textures: those that were read before, by `id`.
-
-    Raises:
-        ValueError: a texture is too large.
     """
     visual, faces = mesh.visual, np.asarray(mesh.faces)
     tint = np.ones((len(faces), 3, 3), np.float32)
@@ -127,22 +124,14 @@ def _texture(image: Any) -> npt.NDArray[np.uint8]:
 
 def white(count: int) -> Look:
     """The look of triangles of which nothing is said."""
-    return Look(
-        np.ones((count, 3, 3), np.float32),
-        np.zeros(count, bool),
-        np.zeros((count, 3, 2), np.float32),
-        np.full(count, -1, np.int32),
-    )
+    tint, uv = np.ones((count, 3, 3), np.float32), np.zeros((count, 3, 2), np.float32)
+    return Look(tint, np.zeros(count, bool), uv, np.full(count, -1, np.int32))
 
 
 def joined(looks: Sequence[Look]) -> Look:
     """The look of the triangles of all, in order."""
     shift = np.cumsum([0, *(len(look.images) for look in looks)])
     image = [np.where(a.image >= 0, a.image + s, -1) for a, s in zip(looks, shift, strict=False)]
-    return Look(
-        np.concatenate([look.tint for look in looks]),
-        np.concatenate([look.linear for look in looks]),
-        np.concatenate([look.uv for look in looks]),
-        np.concatenate(image).astype(np.int32),
-        tuple(image for look in looks for image in look.images),
-    )
+    tint, linear, uv = (np.concatenate([getattr(a, n) for a in looks]) for n in ("tint", "linear", "uv"))
+    images = tuple(image for look in looks for image in look.images)
+    return Look(tint, linear, uv, np.concatenate(image).astype(np.int32), images)

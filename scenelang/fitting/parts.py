@@ -5,6 +5,7 @@ Of parts that are copies of each other, turned, mirrored, larger or smaller, the
 
 from __future__ import annotations
 
+from itertools import chain, count
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -47,9 +48,6 @@ def brought(
         name: of the whole.
         folder: where the file lies.
         apart: whether its parts are elements of their own; if left out, those of drawings are.
-
-    Raises:
-        FitError: it is damaged, empty or too large, encloses nothing, or has too many parts.
     """
     if suffix in drawing.MOST_OF:
         return drawn_parts(drawing.read_outline(data, suffix), name, apart)
@@ -59,11 +57,7 @@ def brought(
 
 
 def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
-    """A part by its number, or the whole for 0.
-
-    Raises:
-        FitError: as `brought`, or there is no such part.
-    """
+    """A part by its number, or the whole for 0."""
     if suffix in drawing.MOST_OF:
         drawn = drawing.read_outline(data, suffix)
         if number == 0:
@@ -83,25 +77,12 @@ def said(text: str) -> str:
     return "".join(c if c.isascii() and c.isalnum() else "_" for c in text).strip("_")
 
 
-def named(word: str, taken: set[str]) -> str:
-    """A name as scenes can say it, and not taken."""
-    name = said(word)
-    found, count = name, 1
-    while found in taken:
-        count += 1
-        found = f"{name}_{count}"
-    return found
-
-
 def solid_parts(found: list[Solid], name: str, sign: Sign, apart: bool) -> Brought:
     """What a file of meshes brings.
 
     Args:
         name: of the whole.
         apart: whether its solids are elements of their own.
-
-    Raises:
-        FitError: it encloses nothing, or has too many parts.
     """
     whole = solids.whole(found, sign)
     if not apart or len(found) < 2:
@@ -120,7 +101,9 @@ def solid_parts(found: list[Solid], name: str, sign: Sign, apart: bool) -> Broug
                 centre, size = larger * rows @ like.centre + shift, larger * like.size
                 break
         else:
-            called = named(f"{name}_{solid.name}", {*shapes, name})
+            word = said(f"{name}_{solid.name}")
+            tried = chain([word], (f"{word}_{k}" for k in count(2)))
+            called = next(other for other in tried if other not in shapes and other != name)
             shapes[called], numbers[called] = mesh, number
             firsts.append((solid, mesh, called))
         turn = () if abs(rows - np.eye(3)).max() < _ALIKE else tuple(map(tuple, rows.tolist()))
@@ -173,11 +156,7 @@ def _alike(one: Look | None, other: Look | None) -> bool:
 
 
 def drawn_parts(whole: Outline, name: str, apart: bool | None) -> Brought:
-    """What a drawing brings: what it paints in one colour after another, each a part.
-
-    Raises:
-        FitError: it has too many parts.
-    """
+    """What a drawing brings: what it paints in one colour after another, each a part."""
     painted = [(colour, Outline(layers)) for colour, layers in whole.painted()]
     if len(painted) < 2 or apart is False or (apart is None and len(painted) > MOST_PARTS):
         colours = {colour for colour, _ in painted if colour}

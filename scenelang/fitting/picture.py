@@ -79,9 +79,6 @@ def read_picture(data: bytes, side: int = TEXELS) -> Picture:
 
     Args:
         side: most texels along the longer side.
-
-    Raises:
-        FitError: it is damaged or too large.
     """
     with opened(data) as file:
         notes = [f"{file.width} × {file.height} pixels"]
