@@ -16,6 +16,7 @@ from scenelang.diagnostics.span import Span
 from scenelang.syntax import nodes
 from scenelang.syntax.lexer import Report, Tokens
 from scenelang.syntax.tables import tables
+from scenelang.words import RESERVED
 
 Arguments = tuple[tuple[nodes.Argument, ...], int]
 Keyword = tuple[Any, Span]
@@ -243,7 +244,8 @@ class Builder:
 
     def import_(self, word: int, path: int, as_: int, alias: nodes.Name, last: int) -> nodes.Stmt:
         span = self._span(word, last)
-        if not alias.text or self.starts[path] == self.ends[path]:
+        possible = alias.text.isascii() and alias.text.isidentifier() and alias.text not in RESERVED
+        if not possible or self.starts[path] == self.ends[path]:
             return nodes.BadStmt(span)
         return nodes.Import(span, self.string(path), alias)
 

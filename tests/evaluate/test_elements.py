@@ -114,6 +114,8 @@ def test_names_come_through_other_files(folder: Path) -> None:
         (f"{IMPORT} zoo.rng {{ }}", "E0212", "`zoo` has no `rng`"),
         (f"{IMPORT} let a = zoo.ring;", "E0213", "is a geometry, not a value"),
         (f"{IMPORT} zoo.ring(2);", "E0308", "takes no arguments"),
+        ('import "zoo.safetensors" as if;', "E0110", "`if` is a keyword"),
+        ('import "zoo.safetensors" as ..;', "E0109", "expected a name"),
         ('import "none.safetensors" as zoo;', "E0214", "no such file"),
         ('import "../zoo.safetensors" as zoo;', "E0215", "outside the import root"),
         ('import "text.safetensors" as zoo; zoo.ring { }', "E0217", "not a file of elements"),
