@@ -107,7 +107,7 @@ class _Mender:
         while kinds[limit] in (self.opening, self.closing):
             limit += 1
         end = min(limit + _BEHIND, len(kinds) - 1)
-        surplus, missing = (self.closing, self.opening) if opens else (self.opening, self.closing)
+        missing = self.opening if opens else self.closing
         wanted, at_end = (missing,) * count, Repair(stop, 0, (missing,))
         goes_on = kinds[first] == self.closing and kinds[first + 1] == self.otherwise
         stack = (self.in_if if goes_on else self.in_block).copy()
@@ -134,9 +134,6 @@ class _Mender:
             if not advance(stack, kinds[at]):
                 break
         got, mend = max(found, key=lambda one: (one[0], -one[1].cost, one[1].at), default=(-1, at_end))
-        if got <= misfit < end:  # another mistake is in the way: the end of the line is as good a guess
-            last = [index for index in places if kinds[index] == surplus and index < limit][-1:]
-            return (Repair(last[0], 1, ()) if opens and last else at_end), False
         return mend, got == end
 
     def _mends(self, stack: list[int], at: int, stop: int, limit: int, wanted: Kinds) -> Iterator[Repair]:

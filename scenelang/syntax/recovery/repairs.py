@@ -133,9 +133,6 @@ class Search:
                 prefixes.append((at, prefix.copy()))
             advance(prefix, self.kinds[at])
         found = self._try_all(prefix, self.at)
-        if prefixes:
-            at, prefix = prefixes[-1]
-            found += self._try(prefix, at, self._misspelt(at))
         for at, prefix in prefixes:
             if self._begins_statement(at):
                 found += self._try(prefix, at, self._broken_off(prefix, at, 0.7 - 0.1 * (self.at - at)))
