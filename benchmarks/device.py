@@ -17,7 +17,7 @@ import time
 import numpy as np
 import torch
 
-from benchmarks.floor import SCENES, programs
+from benchmarks.floor import SCENES, model_of, programs
 from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
 from scenelang.renderers.device import draw as device
@@ -47,7 +47,8 @@ class Watched:
 
 def measured(name: str, frames: int) -> None:
     """One line for a scene."""
-    net, host = load_model("shapes2d", "cuda" if HERE else "cpu").framed, load_arrays("shapes2d").network
+    model = model_of(name)
+    net, host = load_model(model, "cuda" if HERE else "cpu").framed, load_arrays(model).network
     watched = device.launch = Watched()
     rows, worst, most = [], 0.0, 0
     for program in programs(name, frames):
