@@ -2,6 +2,7 @@
 
     python -m benchmarks.floor [--frames N] [--scene NAME ...]            shares by part, on numpy
     python -m benchmarks.floor --exact [...]                              formulas beside the network
+    python -m benchmarks.floor --threads 2 [...]                          wall time, beside that of one thread
     python -m benchmarks.floor --against CHECKOUT [--library torch] [...] another checkout beside this one
 
 Processor time of one thread. Each frame is of a Program of its own, and nothing is kept between frames.
@@ -112,14 +113,15 @@ def network(library: str, model: str) -> Any:
     return load_model(model).network
 
 
-def here(net: Any, made: Sequence[Program]) -> Rival:
-    """Draws the frames of Programs in this process."""
+def here(net: Any, made: Sequence[Program], threads: int = 0) -> Rival:
+    """Draws the frames of Programs in this process, in wall time if a number of threads is given."""
+    clock = time.perf_counter if threads else time.process_time
 
     def draw(index: int) -> Frame:
         program = copy.copy(made[index])
-        started = time.process_time()
-        drawn = draw_objects(net, program)
-        seconds = time.process_time() - started
+        started = clock()
+        drawn = draw_objects(net, program, threads=threads or 1)
+        seconds = clock() - started
         return Frame(seconds, drawn.pairs, drawn.refined, drawn.met, np.asarray(drawn.image))
 
     return draw
@@ -211,6 +213,7 @@ def main() -> None:
     parser.add_argument("--library", choices=("numpy", "torch", "exact"), default="numpy")
     parser.add_argument("--scene", action="append", choices=SCENES)
     parser.add_argument("--exact", action="store_true")
+    parser.add_argument("--threads", type=int, metavar="N")
     parser.add_argument("--against", metavar="CHECKOUT")
     parser.add_argument("--worker", metavar="FOLDER", help=argparse.SUPPRESS)
     given = parser.parse_args()
@@ -230,6 +233,12 @@ def main() -> None:
         if given.worker:
             worker(rivals[0], given.worker)
             return
+        if given.threads:
+            net = nets[given.library]
+            several, one = race([here(net, made, given.threads), here(net, made, 1)], len(made) - 1)
+            title = f"{given.library} on {given.threads} threads"
+            print(f"{name}, {told(title, several, 0)}; {against(several, one, 'one')}", flush=True)
+            continue
         raced = race(rivals, len(made) - 1)
         rate = gemm_rate()
         for (library, net), frames in zip(nets.items(), raced, strict=True):
