@@ -28,7 +28,8 @@ from scenelang.renderers.texture import Texture
 UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
 BLEND = 0.15  # world units: the width of the blends that the cell is trained on
-FARTHER = 2.0  # widths of a blend at which objects cannot change it
+FARTHER = 1.3  # widths of a blend at which objects cannot change where its outline lies
+FARTHEST = 3.0  # widths at which they cannot by any number of blends, but for 10⁻⁶ world units
 CHUNK = 1024  # points that go through a decoder at once; their activations stay in the nearest caches
 ROUNDING = 1e-4, 2e-6  # leaf units, and share of a distance and world units, by which float32 may be off
 NO_TEXTURE = -1
@@ -121,12 +122,13 @@ class Field:
         widths = self.vectors[:, layout.blend].astype(np.float64)
         self.widths = widths = np.where((widths > 0) & (self.tokens == SMOOTH), widths, BLEND)
         """Of the blends by which objects join (N,), world units."""
-        # the widest of the smooth unions from each row on, 0 for none
-        blends = np.where(self.tokens == SMOOTH, np.where(widths > 0, widths, BLEND), 0.0)
-        after = np.maximum.accumulate(blends[::-1])[::-1]
+        # of the smooth unions from each row on the widest, and the sum; 0 for none
+        blends = np.where(self.tokens == SMOOTH, widths, 0.0)[::-1]
+        after, total = np.maximum.accumulate(blends)[::-1], np.cumsum(blends)[::-1]
         self.widest = max([BLEND, *after[:1].tolist()])
         every = (self.tokens == INTERSECT) | ((self.tokens == SUBTRACT) & (after > 0))
-        self.reach = np.where(every, np.inf, 1.0 + SLACK + FARTHER * after / self.frames.scale)
+        beyond = np.minimum(FARTHER * total, FARTHEST * after) / self.frames.scale
+        self.reach = np.where(every, np.inf, 1.0 + SLACK + beyond)
         kinds, self._cell = _numbered(list(zip(self.tokens.tolist(), widths.tolist(), strict=True)))
         tokens = [token for token, _ in kinds]
         lines, bias, candidate, bump = (

@@ -103,3 +103,12 @@ def test_nothing_that_shows_is_ruled_out(
             assert off < 1 / 255, (name, type(net).__name__, off)
             met += [way.met for way in ways]
     assert met[0] < 0.7 * met[1]
+
+
+def test_what_is_out_of_reach_moves_no_outline_by_long_rows_of_blends() -> None:
+    """A row of 32, one sample of which lies 10⁻⁵ from the outline."""
+    p = nsg.compile(FLAT.probes["blends"].make(rng_of(2021, 1), 32), model="shapes2d")
+    field = Field(load_arrays("shapes2d").network, p.vectors, p.tokens)
+    ways = [Coverage(field, skip=skip).tile(p.canvas, range(160, 168), "four") for skip in (True, False)]
+    assert abs(ways[0].picture - ways[1].picture).max() < 1 / 255
+    assert ways[0].pairs < 0.7 * ways[1].pairs
