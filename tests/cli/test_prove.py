@@ -11,7 +11,8 @@ from scenelang.outputs import PROVED
 from tests.cli.conftest import Folder
 from tests.cli.test_outputs import said
 
-STARS = "star { scale(0.8); twirl(0.7); } smooth star { translate(0.3, 0.2); scale(0.7); }"
+RED = "material flat { color(#d33); }"
+STARS = f"star {{ scale(0.8); twirl(0.7); {RED} }} smooth star {{ translate(0.3, 0.2); scale(0.7); }}"
 TEXT = f"canvas(90, 60);\nchain {{ {STARS} }}\n"
 
 
