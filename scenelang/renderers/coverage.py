@@ -22,7 +22,7 @@ from scenelang.renderers.arrays import Array
 from scenelang.renderers.field import Field, Trace
 from scenelang.renderers.meetings import Index, Meetings, Pairs, meetings_of
 from scenelang.renderers.network import RADIUS
-from scenelang.renderers.raster import LEVELS, Raster, raster
+from scenelang.renderers.raster import LEVELS, ROUNDING, Raster, raster
 from scenelang.renderers.worn import CORNER, QUARTER, add_textures, blending
 
 ENOUGH = 1 << 14  # pairs of an object and a pixel up to which blocks are not looked at again
@@ -30,7 +30,6 @@ PAIRS = 1 << 14  # of an object and a point that are met at a time
 NEAR = 0.85  # pixels: farther from an outline a pixel has one colour
 MANY = 0  # objects a pixel above which it is asked which of them matter to its samples
 FLAT = 1e-4  # of a channel: a block that is known so well has one colour
-_ROUNDING = 1e-6  # world units
 
 
 @dataclass(slots=True)
@@ -220,32 +219,13 @@ class Coverage:
         for smaller in LEVELS[1:]:
             if len(pairs) * side * side <= ENOUGH:
                 break
-            pairs, side = _split(pairs, grid.wide // side, side // smaller), smaller
+            pairs, side = pairs.split(grid.wide // side, side // smaller), smaller
             pairs = self._looked(grid, pairs, side, tile)
         return side, meetings_of(pairs)[0]
 
     def candidates(self, grid: Raster) -> Pairs:
         """Objects at the largest blocks that their bounds meet."""
-        side, frames, reach = LEVELS[0], self.field.frames, self.field.reach
-        size = side * grid.px
-        every = np.isinf(reach)
-        low, high = frames.boxes(np.where(every, 0.0, reach))
-        corner = grid.left - grid.px / 2, grid.top + grid.px / 2
-        most = np.array([grid.wide // side, grid.high // side])
-        first = np.stack([low[0] - corner[0], corner[1] - high[1]]) - _ROUNDING
-        last = np.stack([high[0] - corner[0], corner[1] - low[1]]) + _ROUNDING
-        first = np.floor((first / size).clip(0, most[:, None])).astype(np.intp)
-        last = np.ceil((last / size).clip(0, most[:, None])).astype(np.intp)
-        first, last = np.where(every, 0, first), np.where(every, most[:, None], last)
-        across, down = (last - first).clip(0)
-        counts = across * down
-        objects = np.repeat(np.arange(len(counts)), counts)
-        at = np.arange(len(objects)) - np.repeat(np.cumsum(counts) - counts, counts)
-        y, x = np.divmod(at, across[objects])
-        block = (first[1][objects] + y) * most[0] + first[0][objects] + x
-        by = np.argsort(block, kind="stable")
-        none = np.zeros(len(by), bool)
-        return Pairs(block[by], objects[by], none, none, np.full(len(by), np.inf))
+        return grid.reached(self.field.frames, self.field.reach)
 
     def _looked(self, grid: Raster, pairs: Pairs, side: int, tile: Tile) -> Pairs:
         """What pairs are left of some when their blocks have been looked at."""
@@ -253,7 +233,7 @@ class Coverage:
         across, down = grid.place(pairs.block, side)
         half = side / 2 - 0.5
         centre = np.stack([grid.left + (across + half) * grid.px, grid.top - (down + half) * grid.px])
-        world = side * grid.px / 2**0.5 + _ROUNDING
+        world = side * grid.px / 2**0.5 + ROUNDING
         q, radius = field.frames.blocks(objects, centre, np.full(len(objects), world))
         length = np.hypot(*q)
         with np.errstate(invalid="ignore"):
@@ -296,22 +276,6 @@ class Coverage:
         left &= later - after - opened == 0
         kept = replace(pairs, open=opened).take(np.flatnonzero(left))
         return kept, meetings.columns[flat], ((low + high) / 2).T[flat]
-
-
-def _split(pairs: Pairs, wide: int, parts: int) -> Pairs:
-    """The same pairs of blocks that are smaller in both directions by a factor.
-
-    Args:
-        wide: larger blocks in a row.
-    """
-    down, across = np.divmod(pairs.block, wide)
-    at = np.arange(parts)
-    block = (
-        ((down * parts)[:, None, None] + at[:, None]) * (wide * parts) + (across * parts)[:, None, None] + at
-    )
-    block = block.reshape(-1)
-    by = np.argsort(block, kind="stable")
-    return replace(pairs.take(by // parts**2), block=block[by])
 
 
 def _portions(meetings: Meetings, points: int) -> list[tuple[int, Meetings]]:

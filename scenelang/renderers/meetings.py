@@ -7,7 +7,7 @@ with so many objects, and column i is its i-th pair.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,26 @@ class Pairs:
         return Pairs(
             self.block[index], self.object[index], self.open[index], self.far[index], self.rate[index]
         )
+
+    @classmethod
+    def of(cls, block: Index, objects: Index) -> Pairs:
+        """Pairs of which nothing else is known, sorted by block."""
+        by = np.argsort(block, kind="stable")
+        none = np.zeros(len(by), bool)
+        return cls(block[by], objects[by], none, none, np.full(len(by), np.inf))
+
+    def split(self, wide: int, parts: int) -> Pairs:
+        """The same pairs of blocks that are smaller in both directions by a factor.
+
+        Args:
+            wide: larger blocks in a row.
+        """
+        down, across = np.divmod(self.block, wide)
+        at = np.arange(parts)
+        first = (down * parts * wide + across) * parts
+        block = (first[:, None, None] + at[:, None] * (wide * parts) + at).reshape(-1)
+        by = np.argsort(block, kind="stable")
+        return replace(self.take(by // parts**2), block=block[by])
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenelang.renderers.meetings import Index
+from scenelang.renderers.frames import Floats, Frames
+from scenelang.renderers.meetings import Index, Pairs
 
 LEVELS = 8, 4  # sides of blocks, pixels
+ROUNDING = 1e-6  # world units
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +22,7 @@ class Raster:
         canvas: width, and rows of pixels that are wanted.
         wide, high: pixels up to the ends of the last blocks.
         left, top: world coordinates of the middle of the first pixel.
+        largest: side of the largest blocks, pixels.
     """
 
     px: float
@@ -28,6 +31,7 @@ class Raster:
     high: int
     left: float
     top: float
+    largest: int = LEVELS[0]
 
     def place(self, block: Index, side: int) -> tuple[Index, Index]:
         """Column and row of the first pixels of blocks, numbered from the top row of them down."""
@@ -57,11 +61,31 @@ class Raster:
         found[1] = ((self.top - self.px * place[1]) - steps)[:, None]
         return found.reshape(2, side * side, -1)
 
+    def reached(self, frames: Frames, reach: Floats) -> Pairs:
+        """Objects at the largest blocks where they may be within their reach (N,), leaf units."""
+        size = self.largest * self.px
+        every = np.isinf(reach)
+        low, high = frames.boxes(np.where(every, 0.0, reach))
+        corner = self.left - self.px / 2, self.top + self.px / 2
+        most = np.array([[self.wide], [self.high]]) // self.largest
+        first = np.stack([low[0] - corner[0], corner[1] - high[1]]) - ROUNDING
+        last = np.stack([high[0] - corner[0], corner[1] - low[1]]) + ROUNDING
+        # a box of what are no numbers is everywhere
+        first = np.floor(np.fmin(np.fmax(first / size, 0), most)).astype(np.intp)
+        last = np.ceil(np.fmax(np.fmin(last / size, most), 0)).astype(np.intp)
+        first, last = np.where(every, 0, first), np.where(every, most, last)
+        across, down = (last - first).clip(0)
+        counts = across * down
+        objects = np.repeat(np.arange(len(counts)), counts)
+        at = np.arange(len(objects)) - np.repeat(np.cumsum(counts) - counts, counts)
+        y, x = np.divmod(at, across[objects])
+        return Pairs.of((first[1][objects] + y) * most[0] + first[0][objects] + x, objects)
 
-def raster(canvas: tuple[int, int], rows: range) -> Raster:
+
+def raster(canvas: tuple[int, int], rows: range, largest: int = LEVELS[0]) -> Raster:
     """The blocks that hold some rows of a picture."""
     width, height = canvas
     px = 2 / min(width, height)  # world units
-    wide, high = (-(-n // LEVELS[0]) * LEVELS[0] for n in (width, len(rows)))
+    wide, high = (-(-n // largest) * largest for n in (width, len(rows)))
     left, top = (0.5 - width / 2) * px, (height / 2 - 0.5 - rows.start) * px
-    return Raster(px, (width, len(rows)), wide, high, left, top)
+    return Raster(px, (width, len(rows)), wide, high, left, top, largest)

@@ -1,0 +1,90 @@
+"""A compiled scene as its proof sees it: exact ways to the leaves, and what is certain at points there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenelang.graph.chain import split_levels
+from scenelang.graph.nodes import Graph
+from scenelang.graph.spaces import PLANE
+from scenelang.lifting.exact import lift_many
+from scenelang.lifting.layout import PLANE_LAYOUT as LAYOUT
+from scenelang.models.manifest import Manifest
+from scenelang.proof.errors import Errors
+from scenelang.proof.fold import INTERSECT, NOTHING, SMOOTH, SUBTRACT, UNION, Enclosure, Floats
+from scenelang.reference.field import carry_back, leaf_distance
+from scenelang.reference.textures import colour_at
+from scenelang.renderers.frames import Frames
+from scenelang.renderers.meetings import Index
+from scenelang.words import TOKENS
+
+TAME = 1e-9  # leaf units: what float64 loses on the way to a leaf, times ten, where maps are not extreme
+
+
+class Stream:
+    """N objects.
+
+    Args:
+        graph: that all passes have left.
+        manifest: of the model that it was compiled for.
+        known: of geometries, by their names.
+
+    Attributes:
+        frames: ways from the world to the leaves, in float64.
+        tokens, widths: (N,) operators, and widths of blends.
+        reach: (N,) leaf units from its origin beyond which an object has no say. Without it the fold is the
+            same, or both folds are so far outside of everything that the blends to come, each of which brings
+            them nearer by its width at most, leave them outside.
+    """
+
+    def __init__(self, graph: Graph, manifest: Manifest, known: dict[str, Errors]) -> None:
+        self._leaves = [leaf for _, leaf in graph.rows()]
+        levels = [split_levels(leaf.steps, manifest.limits, PLANE) for leaf in self._leaves]
+        self.frames = Frames(lift_many(levels, [(0.0,) * LAYOUT.code] * len(levels), LAYOUT))
+        self.tokens = np.array([TOKENS[op] for op, _ in graph.rows()], np.intp)
+        self.tokens[:1] = UNION
+        self.widths = np.array([link.k for link in graph.root.links])
+        blends = np.where(self.tokens == SMOOTH, self.widths, 0.0)[::-1].cumsum()[::-1]
+        every = (self.tokens == INTERSECT) | ((self.tokens == SUBTRACT) & (blends > 0))
+        self.reach = np.where(every, np.inf, 1.0 + blends / self.frames.scale)
+        names = [leaf.geometry for leaf in self._leaves]
+        self._known = {name: errors for name, errors in known.items() if name not in graph.elements}
+        self._shapes = {name: np.array([own == name for own in names]) for name in dict.fromkeys(names)}
+        numbers = abs(self.frames.numbers)
+        largest = [numbers[slot].max(0, initial=1.0) for slot in (LAYOUT.frame, LAYOUT.middle)]
+        self._rounding = TAME * (1 + 1e-5 * self.frames.stretch * largest[0] * largest[1])
+        self._plain = np.array([leaf.look.colour() for leaf in self._leaves]).reshape(-1, 3).T
+        self._painted = np.array([leaf.look.element is not None for leaf in self._leaves], bool)
+
+    def distance(self, which: Index, q: Floats, exactly: bool) -> Enclosure:
+        """Exact distances (P,) of objects (P,) at leaf coordinates (2, P), leaf units.
+
+        Args:
+            exactly: by the language's formulas, not by learned distances.
+        """
+        low, high = np.full(len(which), -NOTHING), np.full(len(which), NOTHING)
+        finite = np.isfinite(q).all(0)
+        for name, own in self._shapes.items():
+            some = np.flatnonzero(own[which] & finite)
+            if not len(some):
+                continue
+            p, rounding = q[:, some], self._rounding[which[some]]
+            if name not in self._known:  # somewhere in the unit disc
+                length = np.hypot(*p)
+                found = Enclosure(length - 1, length + 1)
+            elif exactly:
+                found = Enclosure(*[leaf_distance(name, p)] * 2)
+            else:
+                found = self._known[name].exact(p)
+            low[some], high[some] = found.low - rounding, found.high + rounding
+        return Enclosure(low, high)
+
+    def colour(self, which: Index, q: Floats, sampled: bool) -> Enclosure:
+        """Colours (3, P) of objects at leaf coordinates, or in regions about them, which textures vary in."""
+        low, high = self._plain[:, which], self._plain[:, which]
+        for at in np.unique(which[self._painted[which]]).tolist():
+            some, look = which == at, self._leaves[at].look
+            low[:, some], high[:, some] = 0.0, 1.0
+            if sampled:
+                low[:, some] = high[:, some] = colour_at(look, carry_back(look.texture, q[:, some])).T
+        return Enclosure(low, high)
