@@ -87,7 +87,7 @@ def test_the_same_bytes_each_time_and_in_any_company() -> None:
 
 
 def test_small_work_is_numpy_s() -> None:
-    small, wide, many = program(STAR), program(STAR, canvas=(4000, 3000)), program(CLOUD)
+    small, wide, many = program(STAR), program(STAR, canvas=(8000, 6000)), program(CLOUD)
     assert choose_drawer(small).library == "numpy"
     assert choose_drawer(wide).library == choose_drawer(many).library == "torch"
     assert work_ms(small) < MOST_MS < min(work_ms(wide), work_ms(many))
