@@ -75,7 +75,7 @@ def render(
     A small picture is drawn by numpy, which saves importing torch; how much there is to draw is counted from
     the Program alone. A model is loaded when it is first drawn with and then kept. The same Program, device
     and number of threads give the same picture bit for bit; other devices and numbers, and the two
-    libraries, the same within 1/255, of solids 2/255.
+    libraries, the same within 1/255, of solids 2/255, where as many samples are taken.
 
     Args:
         program_or_scene: what to draw.

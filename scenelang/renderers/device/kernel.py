@@ -225,12 +225,8 @@ def draw_blocks(
         blue += paint * (own_blue - blue)
 
     alpha = _unit(0.5 - state * slope)
-    red, green, blue = (
-        _mean(red * alpha, SAMPLES),
-        _mean(green * alpha, SAMPLES),
-        _mean(blue * alpha, SAMPLES),
-    )
-    alpha = _mean(alpha, SAMPLES)
+    red, green = _mean(red * alpha, SAMPLES), _mean(green * alpha, SAMPLES)
+    blue, alpha = _mean(blue * alpha, SAMPLES), _mean(alpha, SAMPLES)
     pixel = tl.arange(0, SIDE * SIDE)
     column, line = (block % across) * SIDE + pixel % SIDE, (block // across) * SIDE + pixel // SIDE
     inside = (column < width) & (line < height)
