@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from rich.filesize import decimal
 
 from scenelang.animation.clip import Clip
 from scenelang.animation.targets import PICTURES, Target, TargetError, find_target, is_animation
@@ -188,7 +189,7 @@ def summary(made: RenderResult, seconds: float) -> str:
     """A line about what was written."""
     first, last = made.files[0], made.files[-1]
     name = f"{first} … {last.name}" if len(made.files) > 1 else str(first)
-    size = readable(sum(file.stat().st_size for file in made.files))
+    size = decimal(sum(file.stat().st_size for file in made.files))
     parts = [f"{made.frames} frame{'s' * (made.frames != 1)}", size]
     if made.resumed:
         parts.append(f"{made.resumed} kept from a run before")
@@ -209,12 +210,3 @@ def strays(target: Target, made: RenderResult) -> str | None:
     if not others:
         return None
     return f"`{target.path}` also holds {len(others)} such files of another run, `{min(others)}` among them"
-
-
-def readable(size: float) -> str:
-    """Human-readable byte count."""
-    for unit in ("B", "kB", "MB", "GB"):
-        if size < 1000 or unit == "GB":
-            break
-        size /= 1000
-    return f"{size:.0f} {unit}" if size >= 100 or unit == "B" else f"{size:.1f} {unit}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from scenelang.models.manifest import OPTIONAL
 from scenelang.scene.schema import Scene
 
 _DRAFT: Final = "https://json-schema.org/draft/2020-12/schema"
@@ -111,7 +112,7 @@ def manifest_schema() -> dict[str, Any]:
             "white": {"description": "whether it draws over white alone", "type": "boolean"},
             "textures": {**words, "description": "materials that are elements in textures.safetensors"},
         },
-        optional=("layout", "set", "sizes", "white", "outlines", "fixed_stage", "any_blend", "textures"),
+        optional=OPTIONAL,
         title="Manifest",
         description="What a model states about itself.",
     )

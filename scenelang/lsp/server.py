@@ -251,11 +251,10 @@ class Server(LanguageServer):
             self.workspace_inlay_hint_refresh(None)
 
     def changed(self, path: Path | None, but: str = "") -> None:
-        """Check again what imports a file."""
-        if path is not None:
-            for other in self.docs.importers(path):
-                if other.uri != but:
-                    self.schedule(other)
+        """Check again the open buffers whose last evaluation asked for a file."""
+        for other in list(self.docs.open.values()):
+            if other.uri != but and other.checked is not None and path in other.checked.wanted:
+                self.schedule(other)
 
     def shutdown(self) -> None:
         for uri in list(self.docs.open):

@@ -178,10 +178,6 @@ class Workspace:
         """What open files hold, for imports."""
         return {d.path: d.text for d in self.open.values() if d.path is not None}
 
-    def importers(self, path: Path) -> list[Document]:
-        """Open buffers whose last evaluation asked for a file."""
-        return [d for d in self.open.values() if d.checked is not None and path in d.checked.wanted]
-
     def known(self) -> Iterator[Document]:
         """Every document: open ones, then the scenes in the client's folders."""
         yield from list(self.open.values())

@@ -16,6 +16,7 @@ from scenelang.words import STAGE
 ROOT = Path(__file__).parent
 MOST: Final = 1e300  # bound of the numbers in ranges
 _MOST_BYTES: Final = 1 << 20
+OPTIONAL: Final = ("layout", "set", "sizes", "white", "outlines", "fixed_stage", "any_blend", "textures")
 _LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
 """Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""
 _RANGES: Final = {
@@ -116,33 +117,23 @@ class Manifest:
         data = read_json(text)
         if not isinstance(data, dict) or data.pop("format", None) != 1:
             raise ValueError("not a model manifest of format 1")
-        data = {
-            "set": data.get("name"),
-            "layout": "plane",
-            "sizes": [],
-            "white": False,
-            "outlines": {},
-            "fixed_stage": False,
-            "any_blend": False,
-            "textures": [],
-            **data,
-        }
-        if data.keys() != _KINDS.keys():
-            raise ValueError(f"fields missing or unknown: {', '.join(sorted(data.keys() ^ _KINDS.keys()))}")
-        for key, fits in _KINDS.items():
-            if not fits(data[key]):
+        if wrong := {*data, *OPTIONAL} ^ _KINDS.keys():
+            raise ValueError(f"fields missing or unknown: {', '.join(sorted(wrong))}")
+        data.setdefault("set", data["name"])
+        for key, value in data.items():
+            if not _KINDS[key](value):
                 raise ValueError(f"field `{key}` does not hold what it should")
         if data["default_material"] not in data["materials"]:
             raise ValueError("the default material is not one of the materials")
-        if set(data["textures"]) & set(data["materials"]):
+        if set(data.get("textures", ())) & set(data["materials"]):
             raise ValueError("a texture with the name of a material")
         words = ("geometries", "materials", "transforms", "material_ops", "textures")
-        lists = {key: tuple(data[key]) for key in words}
+        lists = {key: tuple(data[key]) for key in words if key in data}
         trained = {key: (float(low), float(high)) for key, (low, high) in data["trained"].items()}
-        sizes = tuple((width, height) for width, height in data["sizes"])
+        sizes = tuple((width, height) for width, height in data.get("sizes", ()))
         outlines = {
             name: Outline(tuple((float(x), float(y)) for x, y in shape["corners"]), float(shape["inner"]))
-            for name, shape in data["outlines"].items()
+            for name, shape in data.get("outlines", {}).items()
         }
         return Manifest(**{**data, **lists, "trained": trained, "sizes": sizes, "outlines": outlines})
 
