@@ -59,8 +59,8 @@ def _sampled(
     """Means (H, W, 3) of the four samples of every pixel."""
     px = 2 / min(width, height)  # world units
     quarter = torch.tensor([-0.25, 0.25], dtype=torch.float64)
-    x = ((torch.arange(width, dtype=torch.float64)[:, None] + 0.5 + quarter - width / 2) * px).float()
-    y = ((height / 2 - 0.5 - torch.arange(height, dtype=torch.float64)[:, None] + quarter) * px).float()
+    x = ((torch.arange(width, dtype=torch.float64)[:, None] + 0.5 + quarter - width / 2) * px).to(v)
+    y = ((height / 2 - 0.5 - torch.arange(height, dtype=torch.float64)[:, None] + quarter) * px).to(v)
     rows = max(1, TILE // (4 * width))
     parts = []
     for top in range(0, height, rows):
@@ -68,7 +68,7 @@ def _sampled(
         across, down = x[None, :, None, :], band[:, None, :, None]
         grid = torch.stack([across + 0 * down, down + 0 * across], -1)  # (rows, W, 2, 2, 2)
         shape = grid.shape[:2]
-        colours = network(v, t, grid.reshape(1, -1, 2).to(v.device))[0]
+        colours = network(v, t, grid.reshape(1, -1, 2))[0]
         parts.append(colours.view(*shape, 4, 3).mean(2))
         if progress is not None:
             progress(min(1.0, (top + rows) / height))

@@ -6,7 +6,6 @@ import dataclasses
 import os
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
 from unittest import mock
@@ -28,6 +27,7 @@ from scenelang.renderers.field import Field
 from scenelang.renderers.raster import raster
 from tests.elements.shapes import element, square
 from tests.pictures import premultiplied
+from tests.renderers.copies import Asked
 from tests.renderers.test_field import SCENES
 from tests.renderers.test_textures import at_random
 
@@ -35,8 +35,6 @@ torch = pytest.importorskip("torch")
 HERE = "cuda" if torch.cuda.is_available() else "cpu"
 os.environ["TRITON_INTERPRET"] = "01"[HERE == "cpu"]  # is read when Triton is imported
 pytest.importorskip("triton")
-from torch.utils._python_dispatch import TorchDispatchMode  # noqa: E402
-
 from scenelang.renderers.device import draw as device  # noqa: E402
 
 EQUAL = 1 / 255
@@ -132,18 +130,6 @@ def test_changed_weights_are_fetched_again() -> None:
     assert abs(after.image - before.image).max() > 0.1
 
 
-class Copies(TorchDispatchMode):
-    """Counts what torch is asked to do."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.seen: Counter[str] = Counter()
-
-    def __torch_dispatch__(self, func, types, args=(), kwargs=None):
-        self.seen[func.overloadpacket.__name__] += 1
-        return func(*args, **kwargs or {})
-
-
 def begun(p: Program, like: object = None) -> object:
     """A frame on a device, by default on one whose tensors have no numbers: whoever waits for one fails."""
     field = Field(load_arrays("shapes2d").network, p.vectors, p.tokens)
@@ -156,12 +142,12 @@ def test_a_frame_waits_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """One copy up, one launch, and a picture that is on its way."""
     launched = []
     monkeypatch.setattr(device, "launch", lambda *a, **k: launched.append(a))
-    with Copies() as copies:
+    with Asked() as asked:
         out = begun(program(SCENES["small"]))
     assert out.device.type == "meta"
     assert len(launched) == 1
-    assert copies.seen["_to_copy"] == 1
-    assert set(copies.seen) <= {"_to_copy", "empty", "new_empty", "slice", "view", "detach"}
+    assert asked.seen["upload"] == 1
+    assert set(asked.seen) <= {"upload", "empty", "new_empty", "slice", "view", "detach"}
 
 
 @pytest.mark.parametrize(

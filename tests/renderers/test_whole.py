@@ -10,6 +10,7 @@ from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.reading import Reading, ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 from scenelang.renderers.whole import draw_whole
+from tests.renderers.copies import Asked
 
 Colour = tuple[float, float, float]
 WHITE: Colour = (1.0, 1.0, 1.0)
@@ -49,6 +50,17 @@ def test_a_pixel_is_the_mean_of_its_four_samples() -> None:
         with torch.no_grad():
             expected = network(v, t, torch.tensor([points]))[0].mean(0).clamp(0, 1).numpy()
         np.testing.assert_allclose(picture[row, column], expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("canvas", [(64, 80), (8, 8)])
+def test_a_picture_waits_for_nothing_on_a_device(canvas: tuple[int, int]) -> None:
+    """Everything is on its way before the first number is asked for, of a device that has none."""
+    streaming = Streaming(StreamingConfig(resolution=8, width=1 / 32)).eval()
+    network, share = (streaming if canvas == (8, 8) else reading()).to("meta"), []
+    with Asked() as asked, pytest.raises(NotImplementedError, match="Cannot copy out of meta"):
+        draw_whole(network, some(3, canvas), progress=share.append)
+    assert share[-1] == 1.0
+    assert asked.seen["upload"] <= 4
 
 
 def test_streaming_draws_its_own_size_alone() -> None:
