@@ -130,6 +130,13 @@ def test_changed_weights_are_fetched_again() -> None:
     assert abs(after.image - before.image).max() > 0.1
 
 
+def test_draws_with_weights_that_were_loaded_for_inference() -> None:
+    """Torch keeps no versions of those."""
+    with torch.inference_mode():
+        found = device.draw_on_device(network(), program(SCENES["unions"], (8, 8)))
+    assert np.ptp(found.image) > 0.2
+
+
 def begun(p: Program, like: object = None) -> object:
     """A frame on a device, by default on one whose tensors have no numbers: whoever waits for one fails."""
     field = Field(load_arrays("shapes2d").network, p.vectors, p.tokens)
@@ -142,7 +149,7 @@ def test_a_frame_waits_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """One copy up, one launch, and a picture that is on its way."""
     launched = []
     monkeypatch.setattr(device, "launch", lambda *a, **k: launched.append(a))
-    with Asked() as asked:
+    with Asked() as asked, torch.device("meta"):  # whatever device others have made the default
         out = begun(program(SCENES["small"]))
     assert out.device.type == "meta"
     assert len(launched) == 1

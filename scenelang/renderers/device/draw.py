@@ -62,7 +62,8 @@ def draw_on_device(network: Framed, program: Program, samples: str = "adaptive")
     config = network.config
     if program.stage or not config.features == config.state == 1 or config.decoder_width > WIDTHS[1]:
         return None
-    host = on_host(network, tuple((id(p), p._version) for p in network.parameters()))
+    versions = [(id(p), 0 if p.is_inference() else p._version) for p in network.parameters()]
+    host = on_host(network, tuple(versions))
     field = Field(host, program.vectors, program.tokens, program.brought(), program.paints())
     if field.frames.wild.any():
         return None
@@ -112,7 +113,7 @@ def upload(parts: Sequence[np.ndarray], device: torch.device) -> list[Tensor]:
     """Arrays as int32 or float32 tensors on a device, by one copy that the host does not wait for."""
     typed = [part.astype(np.float32 if part.dtype.kind == "f" else np.int32, copy=False) for part in parts]
     ends = np.cumsum([-(-part.size // ALIGNED) * ALIGNED for part in typed]).tolist()
-    held = torch.empty(ends[-1], dtype=torch.int32, pin_memory=device.type == "cuda")
+    held = torch.empty(ends[-1], dtype=torch.int32, device="cpu", pin_memory=device.type == "cuda")
     words, begins = held.numpy(), [0, *ends]
     for part, begin in zip(typed, begins, strict=False):
         words[begin : begin + part.size] = part.view(np.int32).ravel()
