@@ -78,6 +78,7 @@ def shown(
         kept = _capped(Interval(low[:n], high[:n]), cell.lines[0, 1, part], 1.0 - own.low[0, part])
         d = Interval(distance.low[part], distance.high[part])
         taken = _capped(d, -cell.lines[0, 0, part], past[0] + cell.bias[0, part])
+        taken = Interval(*(np.where(given[part], *pair) for pair in zip(d, taken, strict=True)))
         a, b = taken.low * cell.candidate[0, 0, part], taken.high * cell.candidate[0, 0, part]
         dent = bump[part] * (keeps & takes)
         low[:n] = np.minimum(

@@ -23,7 +23,7 @@ from scenelang.renderers.field import Field, Trace
 from scenelang.renderers.meetings import Index, Meetings, Pairs, meetings_of
 from scenelang.renderers.network import RADIUS
 from scenelang.renderers.raster import LEVELS, ROUNDING, Raster, raster
-from scenelang.renderers.worn import CORNER, QUARTER, add_textures, blending
+from scenelang.renderers.worn import CORNER, QUARTER, add_textures, blending, ties
 
 ENOUGH = 1 << 14  # pairs of an object and a pixel up to which blocks are not looked at again
 PAIRS = 1 << 14  # of an object and a point that are met at a time
@@ -104,7 +104,8 @@ class Coverage:
         if samples == "one":
             return self._picture(meetings, p, tile)
         field = self.field
-        trace = field.trace(p.shape[1], len(meetings.pairs)) if field.textured else None
+        traced = field.textured or field.blended
+        trace = field.trace(p.shape[1], len(meetings.pairs)) if traced else None
         q, d, memory = self.ask(meetings, p, tile, trace)
         edge = abs(memory[:, 0]) / field.unit
         rate = self.xp.array((1 / self.field.frames.stretch[meetings.pairs.object]).astype(np.float32), p)
@@ -115,8 +116,10 @@ class Coverage:
         near = edge < NEAR * px
         if trace is not None:
             seen = memory[:, 0] * field.slope < 0.5
-            near = near | (seen & blending(field, meetings, trace, px))
-            add_textures(field, meetings, trace, p, memory, seen & ~near, px)
+            near = near | (seen & ties(field, meetings, trace, px))
+            if field.textured:
+                near = near | (seen & blending(field, meetings, trace, px))
+                add_textures(field, meetings, trace, p, memory, seen & ~near, px)
         picture = field.picture(memory)
         close = self.xp.to_numpy(near)
         column, group = np.nonzero((close if wanted is None else close & wanted).T)

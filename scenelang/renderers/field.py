@@ -169,6 +169,11 @@ class Field:
         return self.network.config.state == self.network.config.features == 1
 
     @property
+    def blended(self) -> bool:
+        """Whether some object joins by a blend."""
+        return bool((self.tokens == SMOOTH).any())
+
+    @property
     def textured(self) -> bool:
         """Whether some object wears a texture."""
         return bool(self.textures)

@@ -1,11 +1,11 @@
-"""Textures on what pixels of the plane show, looked up when all objects are met and where they are seen."""
+"""What pixels show besides outlines: textures, looked up when all objects are met, and lines in blends."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from scenelang.renderers.arrays import Array
-from scenelang.renderers.field import NO_TEXTURE, SMOOTH, Field, Trace
+from scenelang.renderers.field import NO_TEXTURE, SMOOTH, UNION, Field, Trace
 from scenelang.renderers.meetings import Meetings
 
 QUARTER = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)
@@ -18,7 +18,7 @@ LEAST = 1e-4  # of a colour, that counts as part of what a point shows
 def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
     """Which pixels (groups, B), of a side, may have samples in a narrow blend with a texture."""
     xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
-    found = xp.full((trace.paint.shape[0], len(meetings.columns)), 0.0, field.like) > 0
+    found = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
     worn = np.zeros(len(meetings.columns), bool)
     worn[place[field.texture[objects] != NO_TEXTURE]] = True
     width = field.widths[objects]
@@ -29,6 +29,21 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
             some = found[:, : part.stop - part.start]
             some |= (abs(trace.margin[:, part]) < gap[part]) & xp.array(narrow[part], field.like)
     return found
+
+
+def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
+    """Which pixels (groups, B), of a side, may see where one object's colour gives way to another's.
+
+    In a union, outside both of them, that is not an outline, but a later blend may show it.
+    """
+    xp, token = field.xp, field.tokens[meetings.pairs.object]
+    joins, blends = (xp.array(token == kind, field.like) for kind in (UNION, SMOOTH))
+    tied, shown = (0.0 * trace.paint[:, : len(meetings.columns)] > 0 for _ in range(2))
+    for part in meetings.slots():
+        n, paint = part.stop - part.start, trace.paint[:, part]
+        shown[:, :n] |= tied[:, :n] & blends[part] & (paint > LEAST) & (paint < 1 - LEAST)
+        tied[:, :n] |= joins[part] & (abs(trace.margin[:, part]) < 2 * CORNER * px)
+    return shown
 
 
 def add_textures(

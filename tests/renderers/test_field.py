@@ -137,6 +137,19 @@ def test_over_a_background_and_as_straight_alpha(network) -> None:
     np.testing.assert_allclose(over[covered][:, :3], straight, rtol=0, atol=5 * EQUAL)
 
 
+def test_a_blend_shows_lines_between_colours_that_are_no_outlines(network) -> None:
+    """Between two squares the nearer one's colour counts; a third one blends over the gap."""
+    sides = [
+        leaf("square", c, f"scale(0.3); translate({x}, 0);") for c, x in (("#f00", -0.34), ("#0f0", 0.35))
+    ]
+    p = program(
+        f"chain {{ {' '.join(sides)} smooth {leaf('square', '#fff', 'scale(0.2); translate(0, 0.26);')} }}"
+    )
+    found, drawing = drawn(network, p)
+    assert 0 < drawing.refined < drawing.met / 2
+    np.testing.assert_allclose(found, drawn(network, p, samples="four")[0], rtol=0, atol=0.01)
+
+
 def test_without_refining_a_pixel_is_its_centre(network) -> None:
     for name in ("unions", "smooth", "small"):
         p = program(SCENES[name])
