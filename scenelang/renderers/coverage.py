@@ -125,28 +125,41 @@ class Coverage:
         column, group = np.nonzero((close if wanted is None else close & wanted).T)
         if not len(column):
             return picture
-        some, source = meetings.some(column)
-        if self.prove and len(source) > MANY * len(column):
-            # what matters to the four samples, given the distances in the middle
-            place = some.places()
-            by = np.argsort(place, kind="stable")
-            source, place = source[by], place[by]
-            pairs = replace(some.pairs.take(by), block=place)
-            middle = self.xp.to_numpy(d)[group[place], 0, source]
-            here = self.xp.to_numpy(q)[:, group[place], source].astype(np.float64)
-            rise = self.field.rise(pairs.object, here, pairs.rate * (CORNER * px))
-            some, _ = meetings_of(self._proved(pairs, middle, rise)[0])
-            column, group = column[some.columns], group[some.columns]
-        tile.refined += len(column)
-        flat = self.xp.array(group * p.shape[2] + column, p)
-        centres = self.xp.take(p.reshape(2, -1), flat)[:, None]
-        values = [picture[0, :, :0]]
-        for first, portion in _portions(some, 4):
-            last = first + len(portion.columns)
-            values.append(self._four(portion, centres[..., first:last], px, tile)[0])
+        many = meetings.counts()[column] > MANY
+        if self.prove and many.any():
+            left, kept = self._matter(meetings, column[many], group[many], px, q, d)
+            few = ~many
+            jobs = [(meetings.some(column[few])[0], column[few], group[few]), (left, *kept)]
+        else:
+            jobs = [(meetings.some(column)[0], column, group)]
         planes = self.xp.packed(picture.swapaxes(0, 1)).reshape(4, -1)
-        self.xp.put(planes, flat, self.xp.concat(values, 1))
+        for some, column, group in jobs:
+            tile.refined += len(column)
+            flat = self.xp.array(group * p.shape[2] + column, p)
+            centres = self.xp.take(p.reshape(2, -1), flat)[:, None]
+            for first, portion in _portions(some, 4):
+                last = first + len(portion.columns)
+                found = self._four(portion, centres[..., first:last], px, tile)[0]
+                self.xp.put(planes, flat[first:last], found)
         return planes.reshape(4, *p.shape[1:]).swapaxes(0, 1)
+
+    def _matter(
+        self, meetings: Meetings, column: Index, group: Index, px: float, q: Array, d: Array
+    ) -> tuple[Meetings, tuple[Index, Index]]:
+        """What matters to the four samples of pixels, given leaf coordinates and distances in their middles.
+
+        Pixels that are proved to show what their middles do are left out.
+        """
+        some, source = meetings.some(column)
+        place = some.places()
+        by = np.argsort(place, kind="stable")
+        source, place = source[by], place[by]
+        pairs = replace(some.pairs.take(by), block=place)
+        middle = self.xp.to_numpy(d)[group[place], 0, source]
+        here = self.xp.to_numpy(q)[:, group[place], source].astype(np.float64)
+        rise = self.field.rise(pairs.object, here, pairs.rate * (CORNER * px))
+        some, _ = meetings_of(self._proved(pairs, middle, rise)[0])
+        return some, (column[some.columns], group[some.columns])
 
     def owners(self, canvas: tuple[int, int], rows: range) -> np.ndarray:
         """Numbers (rows, width), from 1, of the objects that paint pixels' centres, 0 where none does."""
