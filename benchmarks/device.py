@@ -1,6 +1,6 @@
 """Frames in the plane on a GPU beside those of one core, and how far their pictures are apart.
 
-    python -m benchmarks.device [--frames N] [--scene NAME ...]
+    python -m benchmarks.device [--frames N] [--scene NAME ...] [--warps N]
 
 Wall-clock time, medians. Each frame is of a Program that was not drawn before in the process, after one that
 warms up (and, the first time, compiles the kernel). *Host* ends when the kernel is on its way, *kernel* is
@@ -81,7 +81,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--frames", type=int, default=12, metavar="N")
     parser.add_argument("--scene", action="append", choices=SCENES)
+    parser.add_argument("--warps", type=int, default=device.WARPS, metavar="N", help="of 32 threads, a block")
     given = parser.parse_args()
+    device.WARPS = given.warps
     torch.set_num_threads(1)
     print(torch.cuda.get_device_name() if HERE else "no CUDA device: the host's part alone")
     for name in given.scene or SCENES:
