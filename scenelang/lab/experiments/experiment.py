@@ -24,6 +24,7 @@ from scenelang.lab.about import about
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, pictures, random_scenes
 from scenelang.lab.designs.students import Student
 from scenelang.lab.designs.studies import Study
+from scenelang.lab.experiments.lpips import Lpips, LpipsError, load_lpips
 from scenelang.lab.experiments.runs import EXPERIMENTS, Run
 from scenelang.measure.metrics import MOST_DB, compare
 from scenelang.measure.scenes import summarise
@@ -162,7 +163,26 @@ def _figures(shown: Tensor, exact: Tensor) -> dict[str, Any]:
         # a network that came to nothing draws what is not a number; its picture is grey
         a, b = (v.nan_to_num(0.5).permute(1, 2, 0).numpy() for v in (one, other))
         cases.append(compare(a, b))
-    return summarise(cases)
+    return summarise(cases) | {"lpips": _lpips(shown, exact)}
+
+
+def _lpips(shown: Tensor, exact: Tensor) -> dict[str, float] | None:
+    """LPIPS of VGG16 features, mean; None where its weights are not installed."""
+    try:
+        distance = _vgg()
+    except LpipsError:
+        return None
+    with torch.no_grad():
+        found = [
+            float(distance(a.nan_to_num(0.5), b)) * len(a)
+            for a, b in zip(torch.split(shown, CHUNK), torch.split(exact, CHUNK), strict=True)
+        ]
+    return {"mean": round(sum(found) / len(shown), 4)}
+
+
+@lru_cache(maxsize=1)
+def _vgg() -> Lpips:
+    return load_lpips()
 
 
 def _strips(run: Run, shown: Tensor, exact: Tensor, folder: Path) -> str:

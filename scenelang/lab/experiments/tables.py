@@ -20,7 +20,7 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def figures(run: Result) -> list[str]:
     """A run's cells under `HEAD`."""
-    lpips = run.get("lpips")  # of runs that were measured when it was
+    lpips = run["lpips"]
     return [
         f"{run['psnr']['mean']:.2f}",
         f"{run['psnr']['worst']:.2f}",
