@@ -42,15 +42,22 @@ class Proof:
         bound: float32 (H, W), no less than the largest difference of a pixel's channels, in [0, 1] and, where
             there is alpha, times that.
         redrawn: pixels that were drawn again.
+        unknown: elements in the scene, of whose shapes nothing is proved.
     """
 
     bound: Floats
     redrawn: int = 0
+    unknown: tuple[str, ...] = ()
 
     @property
     def share(self) -> float:
         """Of pixels that are proved right to `PROVED`."""
         return float((self.bound <= PROVED).mean())
+
+    @property
+    def left(self) -> int:
+        """How many pixels are not."""
+        return int((self.bound > PROVED).sum())
 
     @property
     def worst(self) -> float:
@@ -59,20 +66,17 @@ class Proof:
 
     def facts(self) -> dict[str, Any]:
         """The figures, as JSON data."""
-        left = int((self.bound > PROVED).sum())
-        return {"to": PROVED, "share": self.share, "left": left, "worst": self.worst, "redrawn": self.redrawn}
+        figures = {"share": self.share, "left": self.left, "worst": self.worst, "redrawn": self.redrawn}
+        return {"to": PROVED, **figures, "unknown": list(self.unknown)}
 
     def told(self) -> str:
         """What to say about it."""
-        left = int((self.bound > PROVED).sum())
-        rest = f"; {left:,} are not, by at most {255 * self.worst:.0f}/255" if left else ""
+        percent = int(self.share * 1e5) / 1e3  # rounded down, so that only all are 100
         again = f", {self.redrawn:,} of them drawn again" if self.redrawn else ""
-        return f"{_share(self.share)} of pixels proved right to 1/255{again}{rest}"
-
-
-def _share(share: float) -> str:
-    """Per cent, rounded down so that only all are 100 %."""
-    return f"{int(share * 1e5) / 1e3:g} %"
+        rest = f"; {self.left:,} are not, by at most {255 * self.worst:.0f}/255" if self.left else ""
+        names = " and ".join(f"`{name}`" for name in self.unknown)
+        unknown = f"; nothing is proved of the shape of {names}" if names else ""
+        return f"{percent:g} % of pixels proved right to 1/255{again}{rest}{unknown}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

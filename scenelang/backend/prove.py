@@ -29,7 +29,8 @@ def prove(
     Args:
         scene: what to draw.
         image: its picture, whoever drew it; by default it is drawn by the network, as `render` does.
-        redraw: draw pixels again that are not proved right to 1/255. Then all are, but those of elements.
+        redraw: draw pixels again that are not proved right to 1/255. Then all are, but where an element may
+            be seen, and where a sample lies on an outline to the last digits.
         size, device, threads, samples: as for `render`.
 
     Returns:

@@ -57,15 +57,17 @@ def prove_image(
         found = _off(drawn, band.shown)
         if redraw and (bad := found > PROVED).any():
             band.draw(bad & (_off(band.shown.low, band.shown) > PROVED))
-            drawn[bad] = (band.shown.low[bad] + band.shown.high[bad]) / 2
+            middle = (band.shown.low + band.shown.high) / 2
+            bad &= _off(middle, band.shown) <= PROVED  # what stays open stays as it was drawn
+            drawn[bad] = middle[bad]
             found = _off(drawn, band.shown)
             redrawn += int(bad.sum())
-        bound[part.start : part.stop] = found + ROUNDING
+        bound[part.start : part.stop] = found
     if redrawn:
         credit = image.credit
         image = from_samples(picture[..., :3], picture[..., 3] if clear else None)
         image.credit = credit
-    return image, Proof(bound, redrawn)
+    return image, Proof(bound, redrawn, stream.unknown)
 
 
 def _off(drawn: Floats, shown: Enclosure) -> Floats:
@@ -74,7 +76,7 @@ def _off(drawn: Floats, shown: Enclosure) -> Floats:
     worst = far[..., 0]
     for channel in range(1, far.shape[-1]):
         worst = np.maximum(worst, far[..., channel])
-    return worst
+    return worst + ROUNDING
 
 
 def known_errors(manifest: Manifest) -> dict[str, Errors]:

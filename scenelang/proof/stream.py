@@ -35,6 +35,7 @@ class Stream:
         reach: (N,) leaf units from its origin beyond which an object has no say. Without it the fold is the
             same, or both folds are so far outside of everything that the blends to come, each of which brings
             them nearer by its width at most, leave them outside.
+        unknown: geometries of which nothing is known but that they lie in the unit disc.
     """
 
     def __init__(self, graph: Graph, manifest: Manifest, known: dict[str, Errors]) -> None:
@@ -49,6 +50,7 @@ class Stream:
         self.reach = np.where(every, np.inf, 1.0 + blends / self.frames.scale)
         names = [leaf.geometry for leaf in self._leaves]
         self._known = {name: errors for name, errors in known.items() if name not in graph.elements}
+        self.unknown = tuple(sorted(set(names) - self._known.keys()))
         self._shapes = {name: np.array([own == name for own in names]) for name in dict.fromkeys(names)}
         numbers = abs(self.frames.numbers)
         largest = [numbers[slot].max(0, initial=1.0) for slot in (LAYOUT.frame, LAYOUT.middle)]
@@ -69,7 +71,7 @@ class Stream:
             if not len(some):
                 continue
             p, rounding = q[:, some], self._rounding[which[some]]
-            if name not in self._known:  # somewhere in the unit disc
+            if name in self.unknown:
                 length = np.hypot(*p)
                 found = Enclosure(length - 1, length + 1)
             elif exactly:

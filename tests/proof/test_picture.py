@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,15 @@ import pytest
 
 import scenelang as nsg
 from scenelang.backend.options import RenderError
+from scenelang.elements.zoo import zoo_bytes
 from scenelang.measure.scenes import sets_of
 from scenelang.measure.sets import SETS
 from scenelang.models.manifest import load_manifest
 from scenelang.outputs import PROVED
 from scenelang.proof import errors, picture
 from scenelang.scene.schema import Scene
+from tests.elements.scenes import IMPORT, good
+from tests.elements.shapes import element, square
 from tests.passes.random_scenes import blob_scene, random_scene
 from tests.pictures import premultiplied
 
@@ -97,13 +101,40 @@ def test_other_scenes(text: str, least: float) -> None:
     assert proof.share >= least
 
 
-def test_textures_are_proved_and_elements_left_open() -> None:
+def test_textures_are_proved() -> None:
     scene = nsg.loads(
         "canvas(80, 60);\nstar { scale(0.7); material bricks { hue(0.2turn); } }\nsquare { scale(0.2); }"
     )
     image, proof = nsg.prove(scene)
     assert broken(scene, image, proof) == 0
     assert proof.share > 0.97
+
+
+def test_nothing_is_said_of_an_element(tmp_path: Path) -> None:
+    """Pixels beyond the disc that it fills are proved, and those in it stay as they were drawn."""
+    (tmp_path / "zoo.safetensors").write_bytes(zoo_bytes([element(square, "tile", d=2)]))
+    tile = "zoo.tile { scale(0.4); translate(-0.4, 0); }"
+    scene = good(
+        tmp_path,
+        f"{IMPORT}canvas(80, 60); background(#000);\n{tile} star {{ scale(0.3); translate(0.7, 0); }}",
+    )
+    image, proof = nsg.prove(scene, redraw=True)
+    y, x = np.mgrid[:60, :80]
+    length = np.hypot((x - 39.5) / 30 + 0.4, (y - 29.5) / 30)
+    disc = length < 0.4
+    assert (proof.bound <= PROVED)[length > 0.42].all()
+    assert (proof.bound > 0.9)[disc].mean() > 0.9
+    np.testing.assert_array_equal(image[disc], nsg.render(scene)[disc])
+    assert proof.facts()["unknown"] == ["zoo.tile"]
+    assert proof.told().endswith("nothing is proved of the shape of `zoo.tile`")
+
+
+def test_a_sample_on_an_outline_stays_open() -> None:
+    """Beside one to the last digits the exact picture hangs on how it is computed."""
+    scene = nsg.loads("canvas(32, 32); background(#000);\nsquare { scale(sqrt(0.5)); translate(1 / 64, 0); }")
+    image, proof = nsg.prove(scene, redraw=True)
+    assert broken(scene, image, proof) == 0
+    assert proof.left == 2 * 16  # those along two of its sides
 
 
 def test_what_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
