@@ -39,7 +39,6 @@ class Case:
 
     index: int  # in its set
     last: str  # the word that joins the last object of the stream
-    objects: int  # rows of the Program
     figures: dict[str, float]  # psnr and psnr_uncapped (dB), ssim, flip
 
 
@@ -110,7 +109,7 @@ def evaluate_set(
         exact = exact_of(scene, model.manifest, kept)
         uncapped = psnr(over_white(picture), over_white(exact), UNCAPPED_DB)
         figures = {**compare(picture, exact), "psnr_uncapped": uncapped}
-        cases.append(Case(index, _last_word(program.tokens), len(program), figures))
+        cases.append(Case(index, _last_word(program.tokens), figures))
         report(name, index + 1, count)
     worst = sorted(cases, key=lambda c: c.figures["psnr_uncapped"])[:SHOWN]
     summary = {
