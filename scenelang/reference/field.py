@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.graph.nodes import BLEND, Fold, Leaf, Node
+from scenelang.graph.nodes import BLEND, Leaf, Node
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.reference.textures import colour_at
 from scenelang.words import TOKENS
@@ -216,12 +216,13 @@ def evaluate(
     big_d, big_c = np.full(p[0].shape, np.inf), np.zeros((*p[0].shape, 1 if owners else 3))
     for index, link in enumerate(node.links):
         d, c = evaluate(link.node, p, steps, owners=owners, brought=brought)
-        empty = isinstance(link.node, Fold) and not link.node.links
         if index == 0:
             big_d, big_c = d, c
-        elif not (empty and link.op == "smooth"):  # nothing blends with the empty set
+        else:
+            # nothing blends with the empty set, which is infinitely far from everywhere
+            empty = np.isinf(big_d).all() or np.isinf(d).all()
+            token = TOKENS["union" if empty and link.op == "smooth" else link.op]
             with np.errstate(invalid="ignore"):
-                token = TOKENS[link.op]
                 if owners:
                     big_d, share = combine(big_d, 0.0 * c, d, 0.0 * c + 1.0, token, link.k)
                     big_c = np.where(share > 0.5, c, big_c)

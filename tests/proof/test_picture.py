@@ -123,7 +123,7 @@ def test_nothing_is_said_of_an_element(tmp_path: Path) -> None:
     length = np.hypot((x - 39.5) / 30 + 0.4, (y - 29.5) / 30)
     disc = length < 0.4
     assert (proof.bound <= PROVED)[length > 0.42].all()
-    assert (proof.bound > 0.9)[disc].mean() > 0.9
+    assert (proof.bound > 0.2)[disc].all()
     np.testing.assert_array_equal(image[disc], nsg.render(scene)[disc])
     assert proof.facts()["unknown"] == ["zoo.tile"]
     assert proof.told().endswith("nothing is proved of the shape of `zoo.tile`")

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.measure.sets import SETS, random_scene
@@ -102,3 +103,21 @@ def test_later_objects_are_drawn_over_earlier_ones() -> None:
     blue = Object(geometry="star", material=Material(name="flat", ops=(Color(rgb=(0, 0, 1)),)))
     image = picture(Scene(canvas=(9, 9), nodes=(Chain(children=(Link(node=red), Link(node=blue))),)))
     assert image[4, 4].tolist() == [0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    "nothing",
+    [
+        "group { }",
+        "group { group { } }",
+        "subtract { group { } star { } }",
+        "intersect { star { } group { } }",
+    ],
+)
+def test_nothing_blends_with_the_empty_set(nothing: str) -> None:
+    """However it is written, and whichever comes first."""
+    canvas, shape = "canvas(16, 16); background(#000);", "square { scale(0.5); }"
+    alone = nsg.render(nsg.loads(f"{canvas} {shape}"), backend="reference")
+    for both in (f"{shape} {nothing}", f"{nothing} {shape}"):
+        found = nsg.render(nsg.loads(f"{canvas} smooth {{ {both} }}"), backend="reference")
+        np.testing.assert_array_equal(found, alone)
