@@ -20,16 +20,17 @@ from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
 from scenelang.models.manifest import load_manifest
+from scenelang.program.paints import Paint
 from scenelang.program.program import Program
 from scenelang.renderers.coverage import Coverage
 from scenelang.renderers.draw import draw_objects
 from scenelang.renderers.field import Field
 from scenelang.renderers.raster import raster
-from tests.elements.shapes import element, square
+from tests.elements.shapes import element, noise, square
 from tests.pictures import premultiplied
 from tests.renderers.copies import Asked
 from tests.renderers.test_field import SCENES
-from tests.renderers.test_textures import at_random
+from tests.renderers.test_textures import at_random, dressed
 
 torch = pytest.importorskip("torch")
 HERE = "cuda" if torch.cuda.is_available() else "cpu"
@@ -95,12 +96,18 @@ def test_draws_elements() -> None:
         nsg.Object("zoo.made", [nsg.Scale(0.7, 0.5), nsg.Rotate.degrees(20)]),
         nsg.Object("star", [nsg.Scale(0.4), nsg.Translate(0.5, 0.3)]),
     ]
-    assert_draws(program(nsg.Scene(elements=zoo, nodes=[nsg.Boolean("smooth", objects)]), background=None))
+    blend = nsg.Boolean("smooth", objects, k=1.2)  # so wide that what lies beyond the grid shows
+    assert_draws(program(nsg.Scene(elements=zoo, nodes=[blend]), background=None))
 
 
 @pytest.mark.parametrize(("name", "seed"), [("unions", 0), ("deformed blends", 2), ("subtract", 3)])
 def test_draws_textures(name: str, seed: int) -> None:
     assert_draws(at_random(program(SCENES[name]), seed))
+
+
+def test_colours_are_clamped_after_each_step() -> None:
+    steps = ("color", 3.0, 1.5, 0.2), ("grayscale", 0.5)
+    assert_draws(dressed(program("square { scale(0.8); }"), [Paint(noise(7, 5), steps)]))
 
 
 def test_nothing_to_draw() -> None:
