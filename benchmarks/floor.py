@@ -1,4 +1,4 @@
-"""Where the time of a warm frame in the plane goes, and what the exact field takes in the network's place.
+"""Where the time of a warm frame goes, and what the exact field takes in the network's place.
 
     python -m benchmarks.floor [--frames N] [--scene NAME ...]            shares by part, on numpy
     python -m benchmarks.floor --exact [...]                              formulas beside the network
@@ -10,6 +10,7 @@ Medians are over frames, of each of which the least of several drawings counts, 
 is what the decoder's products take at the rate of a large float32 product on the same core. Of each part: its
 share of the frame, calls of numpy, operations, and bytes read and written; *Python* is what no call of numpy
 takes. With ``--against`` a process of another checkout draws the same Programs, and pictures are compared.
+Frames of solids have neither floor nor shares here.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ import numpy as np
 import scenelang as nsg
 from scenelang.backend.options import keep_memory
 from scenelang.measure.sets import SETS, random_scene
+from scenelang.measure.solid_sets import SOLID_SETS, random_solid
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.program.program import Program
@@ -63,6 +65,28 @@ def stars(frame: int, count: int, scale: float, side: int) -> Any:
     )
 
 
+SOLIDS = {
+    "three diffuse solids": """
+      sphere { scale(0.6); translate(0, 0.6, 0); material diffuse { color(#e8c060); } }
+      torus { scale(1.2, 1.2, 0.4); rotate(TURN, axis = X); material diffuse { color(#4070e0); } }
+      sphere { scale(0.4); translate(1.0, -0.5, 0.4); material diffuse { color(#d04030); } }""",
+    "two media and a solid": """
+      sphere { scale(0.6); translate(-0.6, 0.2, 0); material volumetric { color(#5080ff); } }
+      torus { scale(0.7); rotate(TURN, axis = X); translate(0.7, -0.1, 0.2);
+        material volumetric { color(#e09050); } }
+      sphere { scale(0.35); translate(0.2, 0.4, -1); material diffuse { color(#e8c060); } }""",
+    "a mesh": "m.bunny { scale(1.2); rotate(TURN, axis = Y); material diffuse { color(#c96); } }",
+    "a mesh of mist": "m.bunny { scale(0.9); rotate(TURN, axis = Y); material volumetric { color(#c96); } }",
+    "a torus of mist": "torus { scale(0.9); rotate(TURN, axis = Y); material volumetric { color(#c96); } }",
+}
+
+
+def solids(frame: int, name: str, side: int = 256) -> Any:
+    """Solids, turned a little further in each frame."""
+    text = SOLIDS[name].replace("TURN", f"{60 + frame}deg")
+    return nsg.loads(f'nsg 1; import "std/meshes" as m; canvas({side}, {side}); {text}')
+
+
 def of_set(frame: int, name: str) -> Any:
     """Scenes of an evaluation set."""
     return random_scene(
@@ -70,11 +94,18 @@ def of_set(frame: int, name: str) -> Any:
     )
 
 
+def of_solid_set(frame: int, name: str) -> Any:
+    """Scenes of an evaluation set of solids."""
+    return random_solid(np.random.default_rng([2021, frame]), SOLID_SETS[name])
+
+
 SCENES: dict[str, Callable[[int], Any]] = {
     **{
         name: partial(of_set, name=name)
         for name in ("shapes2d", "chains", "many", "crowd", "textures2d-mixed")
     },
+    **{name: partial(solids, name=name) for name in SOLIDS},
+    **{f"solids, {name}": partial(of_solid_set, name=name) for name in SOLID_SETS},
     "200 stars": partial(stars, count=200, scale=0.08, side=256),
     "10,000 small stars": partial(stars, count=10_000, scale=0.008, side=1024),
 }
@@ -82,6 +113,8 @@ SCENES: dict[str, Callable[[int], Any]] = {
 
 def model_of(name: str) -> str:
     """What draws a scene."""
+    if name in SOLIDS or name.startswith("solids"):
+        return "solids3d"
     return "textures2d" if name.startswith("textures") else "shapes2d"
 
 
@@ -240,10 +273,11 @@ def main() -> None:
             print(f"{name}, {told(title, several, 0)}; {against(several, one, 'one')}", flush=True)
             continue
         raced = race(rivals, len(made) - 1)
-        rate = gemm_rate()
+        flat = model_of(name) != "solids3d"
+        rate = gemm_rate() if flat else 0.0
         for (library, net), frames in zip(nets.items(), raced, strict=True):
             print(f"{name}, {told(library, frames, rate if library != 'exact' else 0)}")
-            for line in shares(net, made, frames) if library != "torch" else ():
+            for line in shares(net, made, frames) if flat and library != "torch" else ():
                 print(line, flush=True)
         if given.exact:
             print(f"{name}, {against(raced[1], raced[0], 'the network')}", flush=True)

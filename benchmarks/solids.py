@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 
 import scenelang as nsg
+from benchmarks.floor import SOLIDS
 from scenelang.backend.neural import draw_program, open_model, usable_cores
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
@@ -45,24 +46,14 @@ from scenelang.program.program import Program
 from scenelang.reference.samples import sample_points
 from scenelang.reference.solid.field import Field
 from scenelang.reference.solid.image import radiance, solid_image
+from scenelang.renderers.arrays import SMOOTH_BLOCK as BLOCK
 from scenelang.renderers.draw import Drawing, draw_objects
-from scenelang.renderers.solid.network import BLOCK
 from tests.reference import mitsuba_scenes, povray
 
 MODEL, SIDE, MIDDLE = "solids3d", 256, 96
 WINDOW = slice((SIDE - MIDDLE) // 2, (SIDE + MIDDLE) // 2)
 OUT = Path("docs/results/solid-rivals.json")
-SCENES = {
-    "three diffuse solids": """
-      sphere { scale(0.6); translate(0, 0.6, 0); material diffuse { color(#e8c060); } }
-      torus { scale(1.2, 1.2, 0.4); rotate(TURN, axis = X); material diffuse { color(#4070e0); } }
-      sphere { scale(0.4); translate(1.0, -0.5, 0.4); material diffuse { color(#d04030); } }""",
-    "two media and a solid": """
-      sphere { scale(0.6); translate(-0.6, 0.2, 0); material volumetric { color(#5080ff); } }
-      torus { scale(0.7); rotate(TURN, axis = X); translate(0.7, -0.1, 0.2);
-        material volumetric { color(#e09050); } }
-      sphere { scale(0.35); translate(0.2, 0.4, -1); material diffuse { color(#e8c060); } }""",
-}
+SCENES = {name: SOLIDS[name] for name in ("three diffuse solids", "two media and a solid")}
 GRIDS = [["-A"]]
 GRIDS += [["+AM1", f"+A{limit}", f"+R{side}"] for side in (2, 3) for limit in (0.3, 0.1, 0.03)]
 GRIDS += [["+AM2", f"+A{limit}", f"+R{side}"] for side in (2, 3, 4) for limit in (0.3, 0.1, 0.03)]
