@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,6 +17,17 @@ Array = Any  # a numpy array, or a torch tensor on any device
 BLOCK = 256
 """Points of a product: larger ones are split among cores by OpenBLAS, whose threads wait for each other."""
 Layers = Sequence[tuple[Array, Array]]  # weights (…, out, in) and biases (…, out)
+SMOOTH_BLOCK = 2048  # points that go through smooth layers at once
+
+
+class Smooth(list[tuple[Array, Array]]):
+    """Layers with SiLU between."""
+
+    @cached_property
+    def joined(self) -> list[Array]:
+        """Weights with biases as a last column, of numpy; of hidden layers half of them."""
+        joined = [np.concatenate([w, b[:, None]], 1) for w, b in self]
+        return [*(w / 2 for w in joined[:-1]), joined[-1]]
 
 
 class Arrays:
@@ -27,6 +39,7 @@ class Arrays:
     copy: ClassVar[Any] = staticmethod(np.copy)
     packed: ClassVar[Any] = staticmethod(np.ascontiguousarray)  # the same entries, contiguous in memory
     where: ClassVar[Any] = staticmethod(lambda mask: mask.nonzero()[0])  # indices (k,) of a mask (M,)
+    order: ClassVar[Any] = staticmethod(lambda x: x.argsort(kind="stable"))  # indices that sort (M,)
     exp: ClassVar[Any] = np.exp
     log: ClassVar[Any] = np.log
     cos: ClassVar[Any] = np.cos
@@ -102,12 +115,23 @@ class Arrays:
         """``1 / (1 + exp(-x))``."""
         return 1.0 / (1.0 + np.exp(-x))
 
-    def silu(self, x: Array) -> Array:
-        """``x sigmoid(x)``, in place."""
-        found = np.negative(x)
-        np.exp(found, out=found)
-        found += 1.0
-        return np.divide(x, found, out=x)
+    def smooth(self, x: Array, layers: Smooth) -> Array:
+        """Layers with SiLU between: (out, M) of (in, M)."""
+        found = np.empty((len(layers[-1][1]), x.shape[1]), x.dtype)
+        for start in range(0, x.shape[1], SMOOTH_BLOCK):
+            into = found[:, start : start + SMOOTH_BLOCK]
+            inputs = np.ones((len(x) + 1, into.shape[1]), x.dtype)  # a last row for the biases
+            inputs[:-1] = x[:, start : start + SMOOTH_BLOCK]
+            for weights in layers.joined[:-1]:
+                half = weights @ inputs  # a sigmoid(a) is h + h tanh(h), h = a / 2
+                if len(inputs) != len(half) + 1:
+                    inputs = np.ones((len(half) + 1, into.shape[1]), x.dtype)
+                units = inputs[:-1]
+                np.tanh(half, out=units)
+                units += 1.0
+                units *= half
+            np.matmul(layers.joined[-1], inputs, out=into)
+        return found
 
     def take(self, x: Array, index: Array) -> Array:
         """Entries (…, k) of (…, M)."""

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import linear, silu
 
-from scenelang.renderers.arrays import Array, Arrays, Layers
+from scenelang.renderers.arrays import Array, Arrays, Layers, Smooth
 
 
 def _where(mask: Tensor) -> Tensor:
@@ -29,6 +29,7 @@ class Torch(Arrays):
     copy = staticmethod(Tensor.clone)
     packed = staticmethod(Tensor.contiguous)
     where = staticmethod(_where)
+    order = staticmethod(lambda x: x.argsort(stable=True))
     exp, log, cos, sin = torch.exp, torch.log, torch.cos, torch.sin
     sqrt, floor = torch.sqrt, torch.floor
     minimum, maximum, select = torch.minimum, torch.maximum, torch.where
@@ -88,8 +89,10 @@ class Torch(Arrays):
     def sigmoid(self, x: Tensor) -> Tensor:
         return x.sigmoid()
 
-    def silu(self, x: Tensor) -> Tensor:
-        return silu(x, inplace=True)
+    def smooth(self, x: Tensor, layers: Smooth) -> Tensor:
+        for layer in layers[:-1]:
+            x = silu(self.dense(x, *layer), inplace=not torch.is_grad_enabled())
+        return self.dense(x, *layers[-1])
 
     def take(self, x: Tensor, index: Tensor) -> Tensor:
         return x.index_select(-1, index)  # many times as fast as a subscript

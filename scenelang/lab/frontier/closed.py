@@ -10,7 +10,7 @@ import numpy as np
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.reference.field import SECTORS, TORUS, leaf_distance
-from scenelang.renderers.arrays import Array, Layers
+from scenelang.renderers.arrays import Array, Smooth
 from scenelang.renderers.field import BLEND, SMOOTH, SUBTRACT, UNION
 from scenelang.renderers.network import FramedArrays, FramedConfig
 from scenelang.renderers.slopes import Floats
@@ -108,9 +108,9 @@ class ClosedSolids(SolidArrays):
         self.geometries = manifest.geometries
         self.media = np.array([material == "volumetric" for material in manifest.materials], np.float32)
 
-    def decoder(self, code: Array) -> Layers:
+    def decoder(self, code: Array) -> Smooth:
         """The index of the geometry in the place of weights."""
-        return [(abs(self.codes - code).sum(1).argmin(), code)]
+        return Smooth([(abs(self.codes - code).sum(1).argmin(), code)])
 
     def look(self, material_code: Array) -> Array:
         nearest = abs(self.material_codes - material_code[..., None, :]).sum(-1).argmin(-1)
@@ -121,7 +121,7 @@ class ClosedSolids(SolidArrays):
         token_, width_, none = (np.full((1, 1), value, np.float32) for value in (token, width, 0.0))
         return (Cell(token_, width_, none, none, none),) * len(Wanted)
 
-    def field(self, q: Array, layers: Layers, gradient: bool) -> Array:
+    def field(self, q: Array, layers: Smooth, gradient: bool) -> Array:
         geometry = self.geometries[layers[0][0]]
         if not gradient:
             return leaf_distance(geometry, q)[None]
@@ -146,6 +146,13 @@ class ClosedSolids(SolidArrays):
             register = register + paint * (look[-len(register) :] - register)
             register[-1] = np.where(paint > 0.5, look[-1], memory[-1])
         return np.concatenate([joined[:1], register]), joined[1]
+
+    def box(self, layers: Smooth) -> np.ndarray:
+        half = np.array([1.0, TORUS[1] if self.geometries[layers[0][0]] == "torus" else 1.0, 1.0], np.float32)
+        return np.stack([-half, half])
+
+    def alone(self, reach: Array, cell: Cell) -> Array:
+        return 0 * reach + 1
 
     def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:
         return np.where(cell.own[0] == SUBTRACT, -take, take), 1 - take

@@ -15,9 +15,10 @@ from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stag
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.solid.field import Meeting, SolidField
 from scenelang.renderers.solid.lookups import EVEN, INTO, Lookups
-from scenelang.renderers.solid.march import CAREFUL, Pace, Piece, Trail, Work, march
+from scenelang.renderers.solid.march import CAREFUL, Pace, Work, march
 from scenelang.renderers.solid.network import Wanted
 from scenelang.renderers.solid.passes import BEGIN, END, INF
+from scenelang.renderers.solid.rays import Piece, Trail
 
 CLEAR = 2e-4  # world units before a surface where rays from the light end
 PARTS = 3  # of pieces of which nodes do not tell enough

@@ -9,9 +9,9 @@ import numpy as np
 from scenelang.graph.stage import EXTINCTION, Camera
 from scenelang.renderers.arrays import Array
 from scenelang.renderers.solid.field import SolidField
-from scenelang.renderers.solid.march import Piece, Trail
 from scenelang.renderers.solid.network import Wanted
 from scenelang.renderers.solid.passes import Passes
+from scenelang.renderers.solid.rays import Piece, Trail
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
 EVEN = 2  # how much more evenly than the light that the medium takes nodes lie

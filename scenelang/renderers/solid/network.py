@@ -25,14 +25,14 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from scenelang.lifting.layout import SOLID_LAYOUT, Layout
-from scenelang.renderers.arrays import NUMPY, Array, Arrays, Layers
+from scenelang.renderers.arrays import NUMPY, SMOOTH_BLOCK, Array, Arrays, Smooth
 from scenelang.renderers.network import TOKENS
+from scenelang.renderers.solid.boxes import decoder_box
 
 EMPTY = 100.0  # world units: the distance where nothing has been met
 RADIUS = 3.0  # leaf units: the decoder sees points in this ball, farther ones at its rim
 BLEND = 0.15  # world units: the width of the blends that the cell is trained on
 SEGMENT = 5  # numbers that tell a ray in a leaf, see `folded`
-BLOCK = 2048  # points that go through the decoder at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,20 +91,20 @@ class SolidNetwork:
     candidate: Any  # (TOKENS,)
     bump: Any  # (TOKENS,)
 
-    def decoder(self, code: Array) -> Layers:
+    def decoder(self, code: Array) -> Smooth:
         """The decoder of a code (C,): each weight is linear in (code, 1)."""
         return self._layers(code, self.decoder_w, self.decoder_b)
 
-    def segment(self, code: Array) -> Layers:
+    def segment(self, code: Array) -> Smooth:
         """What answers for whole segments of a code (C,), likewise; nothing where the network has none."""
         return self._layers(code, self.segment_w, self.segment_b)
 
-    def _layers(self, code: Array, weights: Sequence[Array], biases: Sequence[Array]) -> Layers:
+    def _layers(self, code: Array, weights: Sequence[Array], biases: Sequence[Array]) -> Smooth:
         one = self.xp.concat([code, self.xp.full((1,), 1.0, code)], 0)
-        return [
+        return Smooth(
             (self.xp.packed((one @ w.reshape(len(w), -1)).reshape(w.shape[1:]).swapaxes(0, 1)), one @ b)
             for w, b in zip(weights, biases, strict=True)
-        ]
+        )
 
     def cell(self, token: int, width: float) -> tuple[Cell, ...]:
         """The cell of a token for blends of a width, with the gates of each of `Wanted`.
@@ -123,24 +123,22 @@ class SolidNetwork:
         """Colour and medium (…, 4) of material codes (…, material_code)."""
         return material_code @ self.albedo[:-1] + self.albedo[-1]
 
-    def field(self, q: Array, layers: Layers, gradient: bool) -> Array:
+    def field(self, q: Array, layers: Smooth, gradient: bool) -> Array:
         """Distances of leaf coordinates (3, M), leaf units: (1, M), or with their gradients (4, M).
 
         Of rays (5, M), as `folded` tells them, and a segment's layers: their lengths (1, M).
         """
-        ask = self._slopes if gradient else self._values
-        count = q.shape[1]
-        if count <= BLOCK:
-            return ask(q, layers)
-        return self.xp.concat([ask(q[:, i : i + BLOCK], layers) for i in range(0, count, BLOCK)], 1)
+        if not gradient:
+            return self.xp.smooth(q, layers)
+        parts = [q[:, i : i + SMOOTH_BLOCK] for i in range(0, q.shape[1], SMOOTH_BLOCK)]
+        return self.xp.concat([self._slopes(part, layers) for part in parts or [q]], 1)
 
-    def _values(self, q: Array, layers: Layers) -> Array:
-        """Distances (1, M)."""
-        for w, b in layers[:-1]:
-            q = self.xp.silu(self.xp.dense(q, w, b))
-        return self.xp.dense(q, *layers[-1])
+    def box(self, layers: Smooth) -> np.ndarray:
+        """The least and the greatest leaf coordinates (2, 3) of what a decoder shows."""
+        parts = [np.asarray(self.xp.to_numpy(part)) for layer in layers for part in layer]
+        return decoder_box(tuple(part.shape for part in parts), b"".join(part.tobytes() for part in parts))
 
-    def _slopes(self, q: Array, layers: Layers) -> Array:
+    def _slopes(self, q: Array, layers: Smooth) -> Array:
         """Distances and gradients (4, M), which go back through the layers."""
         xp, kept = self.xp, []
         for w, b in layers[:-1]:
@@ -183,6 +181,19 @@ class SolidNetwork:
         paint, kind = xp.largest(gates[1:n]), xp.largest(gates[n:])
         gate = xp.concat([paint] * (len(memory) - 2) + [kind], 0)
         return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
+
+    def alone(self, reach: Array, cell: Cell) -> Array:
+        """What distances (N,) of up to a reach (N,) are multiplied with where nothing has been met.
+
+        0 where a gate may not be open there.
+
+        Args:
+            reach: world units.
+            cell: of the objects' tokens, as for `Wanted.ALL`.
+        """
+        least, n = cell.past * EMPTY + cell.bias - abs(cell.own) * reach, 1 + self.config.paint_lines
+        gates = (least[:1], least[1:n], least[n:])
+        return cell.candidate[0] * (self.xp.least(self.xp.concat([*map(self.xp.largest, gates)], 0)) >= 1)
 
     def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:
         """How the distance behind an object changes with its own (M,) and with that before it (M,)."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from scenelang.elements.element import Element
 from scenelang.program.paints import Paint
-from scenelang.renderers.arrays import Array, Layers
+from scenelang.renderers.arrays import Array, Smooth
 from scenelang.renderers.field import SMOOTH, UNION
 from scenelang.renderers.grid import GridShape, grid_shape
+from scenelang.renderers.solid.boxes import element_box
 from scenelang.renderers.solid.frames import SolidFrame
-from scenelang.renderers.solid.network import BLEND, RADIUS, Cell, SolidNetwork
+from scenelang.renderers.solid.network import BLEND, RADIUS, Cell, SolidNetwork, Wanted
 from scenelang.renderers.solid.passes import SLACK, read_solids
 from scenelang.renderers.texture import Texture
 
@@ -48,6 +51,7 @@ class Objects:
             self._tables(vectors)
             self._textures(vectors[:, network.layout.geometry :], paints or none)
             self._decoders(vectors, brought or none)
+            self._alone()
         kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
         self.draws = all(solid.draws for solid in self.solids)
         """Whether all objects draw."""
@@ -128,19 +132,54 @@ class Objects:
             for key in ordered
             if isinstance(key, bytes)
         ]
-        self.decoders: list[Layers | GridShape] = [
+        self.decoders: list[Smooth | GridShape] = [
             *map(network.decoder, learned),
             *(grid_shape(key, xp, network.codes) for key in ordered if isinstance(key, Element)),
         ]
         self.decoder = xp.array(np.array([number[key] for key in keys], np.float32), network.codes)
+        boxes = [
+            element_box(key) if isinstance(key, Element) else network.box(decoder)  # type: ignore[arg-type]
+            for key, decoder in zip(ordered, self.decoders, strict=True)
+        ]
+        self.solids = [
+            solid.within(xp, boxes[number[key]], network.codes)
+            for key, solid in zip(keys, self.solids, strict=True)
+        ]
         plain = [
             element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps
             for element, s in zip(brought, self.solids, strict=True)
         ]
         self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[-1] > 0.5)
         """1 where `segments.py` may answer."""
-        known = len(network.segment_w) and float(self.asked.sum())
+        self.answered = bool(self.asked.sum() > 0)
+        """Whether that is so of any."""
+        known = len(network.segment_w) and self.answered
         self.segments = [network.segment(code) for code in learned] if known else []
+
+    def _alone(self) -> None:
+        """What holds where an object is the first that is met, or the only one."""
+        xp, like, solids = self.xp, self.network.codes, self.solids
+        reach = np.array([2 * s.radius * s.frame.scale for s in solids], np.float32)
+        self.first = self.network.alone(xp.array(reach, like), self.cells[Wanted.ALL])
+        """What distances (N,) of objects that are met first are multiplied with; 0: the cell has to say."""
+        drawn = xp.array(np.array([s.draws for s in solids], np.float32), like)
+        self.open = bool(((self.first > 0) | (drawn == 0)).all())
+        """Whether that is so of no object that draws."""
+        self.factor = self.first * self.scale
+        """World units for a leaf unit of objects that are met alone."""
+        self.special = [
+            i
+            for i, s in enumerate(solids)
+            if s.draws and (s.radius > RADIUS or s.frame.steps or s.frame.amount)
+        ]
+        """Objects to which more than a map leads, or that are displaced."""
+        self.groups = len(self.decoders) + len(self.special)
+        """Of objects that are met alone: those of each decoder, and each special one."""
+        group = 1 * self.decoder
+        for at, i in enumerate(self.special):
+            group[i] = len(self.decoders) + at
+        self.group = xp.select((self.first > 0) & (drawn > 0), group, 0 * group - 1)
+        """Of each object that draws its group, else -1."""
 
     def worn(self, objects: Array, p: Array) -> Array:
         """Colours (3, P) of objects, whatever else is at points p (3, P)."""
@@ -225,6 +264,28 @@ class Objects:
             xp.put(g, index, frame.pulled(xp, p, xp.take(g, index)))
         return d * scale, (xp.take(self.linear, objects) * g[:, None]).sum(0) * scale
 
+    def decoded(self, at: Array, bounds: Sequence[int]) -> Array:
+        """Leaf distances (P,) at points (3, P) behind objects' maps, group by group, with bounds between."""
+        ask = [*(partial(self._field, decoder=decoder, gradient=False) for decoder in self.decoders)]
+        ask += [partial(self._special, i) for i in self.special]
+        pieces = zip(ask, pairwise(bounds), strict=True)
+        parts = [told(at[:, a:b])[0] for told, (a, b) in pieces if a < b]
+        return parts[0] if len(parts) == 1 else self.xp.concat(parts, 0)
+
+    def _special(self, i: int, at: Array) -> Array:
+        """Leaf distances (1, P) of an object at points (3, P) behind its map."""
+        xp, frame = self.xp, self.solids[i].frame
+        q = frame.local(xp, at)
+        place, beyond = q, 0.0
+        if self.solids[i].radius > RADIUS:
+            length = xp.sqrt((q * q).sum(0))
+            place, beyond = q * (RADIUS / length.clip(RADIUS)), (length - RADIUS).clip(0.0)
+        d = self._field(place, self.decoders[int(self.decoder[i])], False) + beyond
+        if not frame.amount:
+            return d
+        s = xp.sin(frame.frequency * q)
+        return d + frame.amount * (s[0] * s[1] * s[2])
+
     def _decoded(self, q: Array, objects: Array, gradient: bool) -> Array:
         """What decoders say at leaf coordinates (3, P): distances (1, P), or these and gradients (4, P)."""
         xp = self.xp
@@ -237,7 +298,7 @@ class Objects:
                 xp.put(found, index, self._field(xp.take(q, index), layers, gradient))
         return found
 
-    def _field(self, q: Array, decoder: Layers | GridShape, gradient: bool) -> Array:
+    def _field(self, q: Array, decoder: Smooth | GridShape, gradient: bool) -> Array:
         if isinstance(decoder, GridShape):
             return decoder.field(q, gradient)
         return self.network.field(q, decoder, gradient)

@@ -13,9 +13,10 @@ from scenelang.renderers.solid.draw import TILE, directions, rough
 from scenelang.renderers.solid.field import SolidField
 from scenelang.renderers.solid.light import Lighting
 from scenelang.renderers.solid.lookups import INTO
-from scenelang.renderers.solid.march import Trail, march
+from scenelang.renderers.solid.march import march
 from scenelang.renderers.solid.network import Wanted
 from scenelang.renderers.solid.passes import INF
+from scenelang.renderers.solid.rays import Trail
 
 ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 

@@ -7,7 +7,7 @@ however many objects the scene has.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from scenelang.renderers.solid.frames import SolidFrame, read_solid_frame
 from scenelang.renderers.solid.network import SolidNetwork
 
 INF = float("inf")
+SMALL = 1.7  # a side of a box that is worth the asking
 SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball
 OBJECT, WAY, BEGIN, END, RATE, SLOT = 0, slice(1, 4), 4, 5, 6, 7  # what a slot of a ray has, and how many
 
@@ -33,6 +34,7 @@ class Solid:
         ball: radius of the ball around that behind the frame's outer map.
         rate: how fast its world distance changes in it at most, per step of 1 behind the map.
         centre, extent: a ball (3,) of the world around that.
+        box: behind the map the least and the greatest coordinates (3, 1) of what it changes, if known.
     """
 
     frame: SolidFrame
@@ -42,11 +44,19 @@ class Solid:
     rate: float
     centre: Array
     extent: float
+    box: tuple[Array, Array] | None = None
 
     @property
     def draws(self) -> bool:
         """Whether something may be seen, where it is met, of what was empty before."""
         return self.token in (UNION, SMOOTH)
+
+    def within(self, xp: Arrays, box: np.ndarray, like: Array) -> Solid:
+        """The same with its leaf's box (2, 3), where an affine map leads to the leaf and the box is small."""
+        if (box[1] - box[0]).min() > SMALL or self.frame.steps:
+            return self
+        low, high = (box[:, :, None] + np.reshape([-1, 1], (2, 1, 1)) * (self.radius - 1)).astype(np.float32)
+        return replace(self, box=(xp.array(low, like), xp.array(high, like)))
 
 
 def read_solids(network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) -> list[Solid]:
@@ -102,7 +112,13 @@ class Passes(NamedTuple):
 
 
 def find_passes(
-    xp: Arrays, solids: Sequence[Solid], origin: Array, origins: Array, way: Array, limit: Array
+    xp: Arrays,
+    solids: Sequence[Solid],
+    origin: Array,
+    origins: Array,
+    way: Array,
+    limit: Array,
+    tight: bool = True,
 ) -> tuple[Array, Passes]:
     """Which of M rays (k,) may meet something that draws, and the balls that these pass.
 
@@ -113,11 +129,12 @@ def find_passes(
         origins: the same behind the map of each object (3, N).
         way: unit directions (3, M).
         limit: where the rays end (M,).
+        tight: whether objects' boxes count too.
     """
     low, high, found = 0 * way[0], limit, []
     filled, drawn = xp.whole(low), low > 0
     for i, solid in reversed(list(enumerate(solids))):
-        rays, values = _crossed(xp, solid, origin, origins[:, i], way, low, high)
+        rays, values = _crossed(xp, solid, origin, origins[:, i], way, low, high, tight)
         if solid.token == INTERSECT:  # outside its ball nothing is left of what came before
             low, high = 0 * way[0] + INF, 0 * way[0] - INF
             xp.put(low, rays, values[BEGIN])
@@ -136,12 +153,14 @@ def find_passes(
         rays, slot, values = (xp.concat(parts, -1) for parts in zip(*found, strict=True))
         place = xp.take(placed(xp, some, filled), rays)
         kept = xp.where(place >= 0)
-        xp.put(slots.reshape(SLOT, -1), xp.take(slot * count + place, kept), xp.take(values, kept))
+        if len(kept) < len(place):
+            place, slot, values = (xp.take(each, kept) for each in (place, slot, values))
+        xp.put(slots.reshape(SLOT, -1), slot * count + place, values)
     return some, Passes(slots, origins)
 
 
 def _crossed(
-    xp: Arrays, solid: Solid, origin: Array, start: Array, way: Array, low: Array, high: Array
+    xp: Arrays, solid: Solid, origin: Array, start: Array, way: Array, low: Array, high: Array, tight: bool
 ) -> tuple[Array, Array]:
     """Which rays (k,) pass an object's ball between low and high, and their slots (SLOT, k) for it."""
     near, to = None, solid.centre - origin
@@ -156,6 +175,10 @@ def _crossed(
     left = solid.ball**2 - closest[0] * closest[0] - closest[1] * closest[1] - closest[2] * closest[2]
     half = xp.sqrt((left / square).clip(0.0))
     begin, end = xp.maximum(middle - half, low), xp.minimum(middle + half, high)
+    if tight and solid.box is not None:
+        first, last = ((side - start[:, None]) / a for side in solid.box)
+        begin = xp.maximum(begin, xp.largest(xp.minimum(first, last))[0])
+        end = xp.minimum(end, xp.least(xp.maximum(first, last)))
     hit = xp.where((left > 0) & (begin <= end))
     values = xp.concat([square[None], a, begin[None], end[None], solid.rate * xp.sqrt(square)[None]], 0)
     return hit if near is None else xp.take(near, hit), xp.take(values, hit)
