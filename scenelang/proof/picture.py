@@ -14,6 +14,7 @@ from scenelang.proof.regions import SIDES, Band
 from scenelang.proof.stream import Stream
 
 BAND = 1 << 17  # pixels at a time, at least a row of the largest regions
+CROWD = 32  # objects in reach of a place, above which fewer pixels are asked at a time
 ROUNDING = 2e-7  # of a channel: what is lost where pictures are kept in float32
 
 
@@ -50,7 +51,7 @@ def prove_image(
     if clear := graph.background is None:
         picture[..., :3] *= picture[..., 3:]
     bound, redrawn = np.empty((height, width), np.float32), 0
-    rows = -(-max(1, BAND // width) // SIDES[0]) * SIDES[0]
+    rows = -(-max(1, int(BAND / width / (1 + stream.crowd(graph.canvas) / CROWD))) // SIDES[0]) * SIDES[0]
     for top in range(0, height, rows):
         part = range(top, min(top + rows, height))
         band, drawn = Band(stream, graph.canvas, part, behind), picture[part.start : part.stop]

@@ -58,6 +58,13 @@ class Stream:
         self._plain = np.array([leaf.look.colour() for leaf in self._leaves]).reshape(-1, 3).T
         self._painted = np.array([leaf.look.element is not None for leaf in self._leaves], bool)
 
+    def crowd(self, canvas: tuple[int, int]) -> float:
+        """How many objects a place on the canvas is in reach of, in the mean."""
+        every, half = np.isinf(self.reach), np.array(canvas)[:, None] / min(canvas)
+        low, high = self.frames.boxes(np.where(every, 0.0, self.reach))
+        sides = np.where(every, 2 * half, np.fmin(high, half) - np.fmax(low, -half)).clip(0.0) / (2 * half)
+        return float((sides[0] * sides[1]).sum())
+
     def distance(self, which: Index, q: Floats, exactly: bool) -> Enclosure:
         """Exact distances (P,) of objects (P,) at leaf coordinates (2, P), leaf units.
 

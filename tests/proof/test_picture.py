@@ -16,6 +16,7 @@ from scenelang.measure.sets import SETS
 from scenelang.models.manifest import load_manifest
 from scenelang.outputs import PROVED
 from scenelang.proof import errors, picture
+from scenelang.proof.stream import Stream
 from scenelang.scene.schema import Scene
 from tests.elements.scenes import IMPORT, good
 from tests.elements.shapes import element, square
@@ -76,6 +77,14 @@ def test_bands_meet(monkeypatch: pytest.MonkeyPatch) -> None:
     again, banded = nsg.prove(scene, redraw=True)
     np.testing.assert_array_equal(banded.bound, proof.bound)
     np.testing.assert_array_equal(again, image)
+
+
+def test_fewer_pixels_are_asked_at_a_time_where_more_objects_reach_them() -> None:
+    scene = nsg.loads("canvas(64, 32); square { scale(9); } square { scale(0.5); translate(-1.5, 0.5); }")
+    graphs: dict[str, Any] = {}
+    nsg.compile(scene, after=graphs.__setitem__)
+    stream = Stream(graphs["linearise"], load_manifest("shapes2d"), {})
+    assert stream.crowd(scene.canvas) == pytest.approx(1 + 1 / 8)
 
 
 FAR = "".join(
