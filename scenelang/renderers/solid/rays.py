@@ -132,9 +132,9 @@ class Rays:
             self._finish(halvings)
 
     def _join(self) -> None:
-        """Let few rays that meet one object alone go along with others that meet several."""
+        """Let few rays that meet one object alone go along with as many or more that meet several."""
         xp, (alone, others) = self.xp, self.batches
-        if alone.left + alone.more and others.left + others.more:
+        if 0 < alone.left + alone.more <= others.left + others.more:
             index = xp.where(alone.alive)
             others.waiting += [(xp.take(alone.place, index), xp.take(alone.rows, index)), *alone.waiting]
             others.more += alone.left + alone.more
