@@ -21,6 +21,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.diagnostics.suggest import listing
+
 Output = Literal["depth", "normal", "object", "alpha", "proof"]
 PLANE: tuple[Output, ...] = ("object", "alpha")
 """What 2D pictures have."""
@@ -74,7 +76,7 @@ class Proof:
         percent = int(self.share * 1e5) / 1e3  # rounded down, so that only all are 100
         again = f", {self.redrawn:,} of them drawn again" if self.redrawn else ""
         rest = f"; {self.left:,} are not, by at most {255 * self.worst:.0f}/255" if self.left else ""
-        names = " and ".join(f"`{name}`" for name in self.unknown)
+        names = listing(f"`{name}`" for name in self.unknown)
         unknown = f"; nothing is proved of the shape of {names}" if names else ""
         return f"{percent:g} % of pixels proved right to 1/255{again}{rest}{unknown}"
 
