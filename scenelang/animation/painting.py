@@ -42,7 +42,7 @@ class Painter:
     clip: Clip  # the animation
     backend: Backend = "neural"
     device: Device = "auto"  # where the network runs
-    threads: int | None = None  # tiles drawn at the same time; by default one for each usable core
+    threads: int | None = None  # tiles drawn at the same time; by default as for `scenelang.render`
     # the picture before, of which what is the same is taken over
     kept: Kept | None = field(default=None, repr=False)
     load_s: float = 0.0  # what loading torch took
@@ -61,11 +61,12 @@ class Painter:
             from scenelang.backend.small import choose_drawer
 
             if choose_drawer(program, self.device).library == "numpy":
-                cores = () if program.stage is None else (self.split,)
+                cores = () if program.stage is None else (self.split(program),)
                 key = frame_key("numpy", _version("scenelang"), _version("numpy"), *cores, program.digest())
                 return Drawable(shot.number, key, shot, program, small=True)
         key = frame_key(
-            "neural", _version("scenelang"), _version("torch"), self.place, self.split, program.digest()
+            "neural",
+            *(_version("scenelang"), _version("torch"), self.place, self.split(program), program.digest()),
         )
         return Drawable(shot.number, key, shot, program)
 
@@ -78,14 +79,13 @@ class Painter:
         self.load_s += time.perf_counter() - started
         return choose_device(self.device)
 
-    @property
-    def split(self) -> int:
+    def split(self, program: Program) -> int:
         """How many threads a picture is split for, which shows in the last bits of its pixels."""
         if self.threads is not None:
             return self.threads
-        from scenelang.backend.options import usable_cores
+        from scenelang.backend.options import threads_for
 
-        return usable_cores()
+        return threads_for(program.canvas)
 
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
         """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit."""
@@ -97,7 +97,7 @@ class Painter:
 
         if self.kept is None and self.clip.reuse:
             self.kept = Kept()
-        place, split = None if frame.small else self.place, self.split
+        place, split = None if frame.small else self.place, self.split(frame.program)
         return paint(frame.program, place, threads=split, split=split, kept=self.kept, progress=progress)
 
     def draft(self, frame: Drawable) -> Image | None:
@@ -110,7 +110,7 @@ class Painter:
 
         width, height = program.canvas
         coarse = replace(program, canvas=(-(-width // DRAFT), -(-height // DRAFT)))
-        return enlarged(draw_small(coarse, samples="one", threads=self.split).image, program.canvas)
+        return enlarged(draw_small(coarse, samples="one", threads=self.threads).image, program.canvas)
 
     def outputs(self, frame: Drawable, wanted: Sequence[Output]) -> Outputs:
         """What is known of a frame beside its picture; raises as `scenelang.render_outputs`."""

@@ -236,7 +236,7 @@ def _helpers(
             return None
         if spent_s / drawn * left <= WORTH_S:
             return None
-    return Workers(jobs or usable_cores(), painter.split)
+    return Workers(jobs or usable_cores(), painter.split(frame.program))
 
 
 def _numbered(store: Store, target: Target, numbers: range, keys: Sequence[str]) -> list[Path]:

@@ -1,8 +1,7 @@
 """Programs drawn by torch: the device, the models that are loaded, and the process's threads and memory.
 
-Tiles are drawn in a pool of threads with one torch thread each. On two idle cores a frame of 256 x 256
-pixels takes 0.8 of the time of one thread so; torch's own threads gain half of that, and beside another
-busy process took up to thirty times as long, as they wait for each other after every small product.
+Tiles are drawn in a pool of threads with one torch thread each; torch's own threads wait for each other
+after every small product, and beside another busy process took up to thirty times as long.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ try:
     import torch
 except ModuleNotFoundError as error:
     raise RenderError("this is drawn by torch, which is not installed; pip install torch") from error
-from scenelang.backend.options import Samples, keep_memory
+from scenelang.backend.options import Samples, keep_memory, threads_for
 from scenelang.backend.options import usable_cores as usable_cores
 from scenelang.elements.element import credit_of
 from scenelang.models.load import Model, ModelError, Network, load_model, place_of
@@ -114,7 +113,7 @@ def draw_program(
     One drawing runs at a time, on all of ``threads``: torch's number of threads is the process's.
 
     Args:
-        threads: tiles drawn at the same time; by default one for each usable core.
+        threads: tiles drawn at the same time; by default as `threads_for` says.
         split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
         samples: of a pixel, as in `scenelang.render`, with framed and solids' renderers.
@@ -128,7 +127,7 @@ def draw_program(
     name, network = model.manifest.name, model.network
     if program.model != name:
         raise RenderError(f"a program for model `{program.model}`, not `{name}`")
-    threads = usable_cores() if threads is None else threads
+    threads = threads_for(program.canvas) if threads is None else threads
     if place_of(network).type != "cpu":
         threads, split = 1, 1  # the device is busy with one tile
     with _drawing, _one_torch_thread():

@@ -37,6 +37,16 @@ def keep_memory() -> bool:
     return all(mallopt(option, KEEP_BYTES) == 1 for option in (_M_MMAP_THRESHOLD, _M_TRIM_THRESHOLD))
 
 
+THREAD_PIXELS = 1 << 17
+"""Pixels of a picture for each thread that draws it: with fewer, threads wait for each other longer than they
+save (`python -m benchmarks.floor --threads 2`)."""
+
+
+def threads_for(canvas: tuple[int, int]) -> int:
+    """Threads that a picture is drawn by unless a caller says how many."""
+    return max(1, min(usable_cores(), canvas[0] * canvas[1] // THREAD_PIXELS))
+
+
 def usable_cores() -> int:
     """Cores that this process may run on."""
     if hasattr(os, "sched_getaffinity"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, get_args
 
-from scenelang.backend.options import Backend, RenderError, keep_memory, usable_cores
+from scenelang.backend.options import Backend, RenderError, keep_memory, threads_for
 from scenelang.backend.render import exact_graph, given
 from scenelang.outputs import PLANE, Output, Outputs, Source
 from scenelang.scene.schema import Scene
@@ -30,7 +30,7 @@ def render_outputs(
         outputs: which of ``"depth"``, ``"normal"``, ``"object"`` and ``"alpha"``; 2D has the last two.
         size: canvas in pixels instead of the Scene's.
         backend: ``"neural"`` asks the trained network, ``"reference"`` of a Scene the exact definition.
-        threads: of solids, by default as many as there are usable cores.
+        threads: of solids, by default as for `render`.
 
     Returns:
         Arrays (H, W) or (H, W, 3), None for what was not asked for.
@@ -66,7 +66,7 @@ def neural_outputs(program: Program, wanted: Sequence[Output], threads: int | No
         keep_memory()
         network, digest = load_arrays(program.model)
         program.check_weights(digest)
-        found = program_outputs(network, program, threads=threads or usable_cores())
+        found = program_outputs(network, program, threads=threads or threads_for(program.canvas))
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
     except (ModelError, ProgramError) as error:

@@ -84,7 +84,8 @@ def render(
             definition, which knows no boolean rule and none of a model's limits.
         device: where torch runs the network, whatever the picture's size; with ``"auto"`` numpy draws small
             pictures, and torch others on CUDA where there is any.
-        threads: tiles that torch draws at the same time; by default as many as there are usable cores.
+        threads: tiles drawn at the same time; by default one for each 131,072 pixels, but no more than there
+            are usable cores. Numpy draws the plane in one.
         samples: of a pixel: ``"four"`` as the language defines, ``"adaptive"``, four near outlines and one
             elsewhere (on CUDA four in the plane), which looks the same, ``"one"``, which is faster and has
             hard edges, or ``"draft"``, one for each 2 x 2 pixels, enlarged. ``"quick"`` is ``"adaptive"``

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Final, Literal, NamedTuple
 
 from scenelang.backend.load import load_of
-from scenelang.backend.options import Device, RenderError, Samples, keep_memory, usable_cores
+from scenelang.backend.options import Device, RenderError, Samples, keep_memory, threads_for
 from scenelang.elements.element import credit_of
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
@@ -50,7 +50,7 @@ def choose_drawer(program: Program, device: Device = "auto", samples: Samples = 
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
     if renderer == "solid":
-        return Drawer("numpy", "solids are, on every core")
+        return Drawer("numpy", "solids are")
     if renderer != "framed":
         return Drawer("torch", f"a `{renderer}` network is large work for any picture")
     ms = work_ms(program, samples)
@@ -74,7 +74,7 @@ def draw_small(
     threads: int | None = None,
     split: int | None = None,
 ) -> Drawing:
-    """Draw a Program by numpy, on one core, or solids on all.
+    """Draw a Program by numpy, on one core, or solids, if they are large, on several.
 
     Args:
         program: of any size, for a model with a framed or a solids' network.
@@ -94,7 +94,7 @@ def draw_small(
         drawing = draw_objects(
             network,
             program,
-            threads=threads or usable_cores(),
+            threads=threads or threads_for(program.canvas),
             split=split,
             kept=kept,
             samples=samples,

@@ -27,13 +27,15 @@ Draw = Callable[[Job, Callable[[float], None]], "Image"]
 
 def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) -> Draw:
     """Draw with trained networks."""
+    from scenelang.backend.options import threads_for
     from scenelang.backend.small import choose_drawer, draw_small
 
     def draw(job: Job, progress: Callable[[float], None]) -> Image:
         assert job.program is not None
         library, why = choose_drawer(job.program, device, samples)
         if library == "numpy":
-            place = "one core" if job.program.stage is None else "all cores"
+            cores = threads or threads_for(job.program.canvas) if job.program.stage else 1
+            place = "one core" if cores == 1 else f"{cores} cores"
             with clock("draw"):
                 drawing = draw_small(job.program, samples=samples, progress=progress, threads=threads)
         else:

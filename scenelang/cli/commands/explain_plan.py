@@ -42,11 +42,12 @@ def command(
     scene, program = source.scene, job.program
     if program is None or scene is None or job.failed():
         ctx.exit(1)
-    from scenelang.backend.neural import choose_device, open_model, usable_cores
+    from scenelang.backend.neural import choose_device, open_model
+    from scenelang.backend.options import threads_for
     from scenelang.measure.plan import plan_of
 
     opened = open_model(program.model, choose_device(device))
-    asked, cores = request.model is not None, threads or usable_cores()
+    asked, cores = request.model is not None, threads or threads_for(program.canvas)
     found = plan_of(scene, program, job.graphs, opened, asked=asked, spans=source.spans, threads=cores)
     plan: dict[str, Any] = {"version": 1, "file": file, **found}
     click.echo(json.dumps(plan, indent=2) if kind == "json" else _text(plan))
