@@ -26,7 +26,7 @@ from scenelang.renderers.raster import LEVELS, ROUNDING, Raster, raster
 from scenelang.renderers.worn import CORNER, QUARTER, add_textures, blending, ties
 
 ENOUGH = 1 << 14  # pairs of an object and a pixel up to which blocks are not looked at again
-PAIRS = 1 << 14  # of an object and a point that are met at a time
+PAIRS = 1 << 16  # of an object and a point that are met at a time
 NEAR = 0.85  # pixels: farther from an outline a pixel has one colour
 MANY = 2  # objects a pixel above which it is asked which of them matter to its samples
 FLAT = 1e-4  # of a channel: a block that is known so well has one colour
