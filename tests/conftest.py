@@ -7,6 +7,8 @@ import signal
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.browser import chromium, viewer_page  # noqa: F401, fixtures
+
 # Seconds decide no test, as they hang on the machine: neither those of an example nor those of drawing it.
 # The same cases every time: new ones are what fuzz/ looks for, by the hour.
 settings.register_profile(

@@ -54,8 +54,10 @@ ORDER = (
     "scenelang.training",
     "scenelang.backend",
     "scenelang.animation",
+    "scenelang.viewer",
     "scenelang.watching",
     "scenelang.measure",
+    "scenelang.play",
     "scenelang.cli",
     "scenelang.lab",
 )

@@ -1,0 +1,116 @@
+"""Programs as rows: what the viewer's shader draws of each object, in stream order.
+
+The page's own evaluator (``web/graph.js``) makes rows of a scene; rows of a Program never change.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from scenelang.graph.stage import Stage
+from scenelang.lifting.layout import LAYOUTS, Layout
+from scenelang.models.manifest import Manifest
+from scenelang.program.program import Program, ProgramError
+from scenelang.renderers.field import BLEND
+from scenelang.renderers.frames import Frames
+from scenelang.renderers.solid.frames import read_solid_frame
+from scenelang.words import TOKENS
+
+MOST_STEPS: Final = 24  # of a row, between the world and its leaf
+SMOOTH: Final = TOKENS["smooth"]
+
+Row = dict[str, Any]
+Step = list[Any]
+
+
+def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_codes: np.ndarray) -> list[Row]:
+    """Rows of a Program as JSON data, see docs/architecture.md.
+
+    Args:
+        program: compiled for the manifest's model.
+        codes: (geometries, C) of its weights.
+        material_codes: (materials, .) likewise.
+
+    Raises:
+        ProgramError: a vector is not one that a scene compiles to.
+    """
+    layout = LAYOUTS[manifest.layout]
+    forms = [at for at, element in enumerate(program.elements) if not element.material]
+    paints = [element for element in program.elements if element.material]
+    scales = _scales(program, layout)
+    rows = []
+    for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]
+        m = v[layout.geometry :]
+        matrix = m[layout.colour].reshape(3, 4)
+        if np.count_nonzero(matrix) != np.count_nonzero(matrix.diagonal()):
+            raise ProgramError("colours that mix channels, which no scene compiles to")
+        row = {
+            "token": int(program.tokens[i]),
+            "shape": _index(codes, v[: layout.code]) if form < 0 else len(codes) + forms.index(form),
+            "material": _index(material_codes, m[layout.material_code]),
+            "steps": _steps(v.astype(np.float64), layout),
+            "scale": scales[i],
+            "colour": matrix.diagonal().tolist(),
+            "paint": -1,
+            "amount": 0.0,
+            "frequency": 0.0,
+            "blend": float(v[layout.blend]) if program.tokens[i] == SMOOTH and v[layout.blend] > 0 else BLEND,
+            "object": program.numbers[i],
+        }
+        if layout.extras:
+            row["amount"], row["frequency"] = v[layout.geometry - 3 : layout.geometry - 1].tolist()
+        if worn >= 0:
+            paint = program.palette[worn]
+            row |= {"paint": paints.index(paint.element), "place": m[:6].tolist(), "paintSteps": paint.steps}
+        rows.append(row)
+    return rows
+
+
+def stage_of(stage: Stage) -> dict[str, Any]:
+    """A stage as JSON data, with the camera's axes."""
+    camera, light, ground = stage.camera, stage.light, stage.ground
+    return {
+        "eye": camera.eye,
+        "axes": camera.axes(),
+        "target": camera.target,
+        "fov": camera.fov_rad,
+        "light": light.position,
+        "power": light.power,
+        "lightRgb": light.rgb,
+        "ground": ground and {"y": ground.y, "rgb": ground.rgb},
+        "horizon": stage.horizon,
+        "zenith": stage.zenith,
+        "transparent": stage.transparent,
+    }
+
+
+def _index(known: np.ndarray, code: np.ndarray) -> int:
+    found = np.flatnonzero((known.astype(np.float32) == code).all(1))
+    if not len(found):
+        raise ProgramError("codes that are not the model's")
+    return int(found[0])
+
+
+def _scales(program: Program, layout: Layout) -> list[float]:
+    """World distances per leaf distance."""
+    g = program.vectors[:, : layout.geometry]
+    if layout.dimension == 2:
+        return list(Frames(g, layout).scale.tolist())
+    return [read_solid_frame(one, layout).scale for one in g]
+
+
+def _steps(v: np.ndarray, layout: Layout) -> list[Step]:
+    """The way of a world point to the leaf, outermost first."""
+    steps: list[Step] = []
+    for frame, warps in ((layout.frame, layout.outer_warps), (layout.middle, layout.inner_warps)):
+        if tuple(v[frame]) != layout.identity:
+            steps.append(["map", *v[frame].tolist()])
+        for a, b, c in v[warps].reshape(-1, 3).tolist():
+            if layout.dimension == 2:
+                steps += [["turn", a, b, c]] if a or b or c else []
+            else:
+                steps += [["turn", a, b]] if a or b else []
+                steps += [["twist", c]] if c else []
+    return steps

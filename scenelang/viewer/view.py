@@ -1,0 +1,117 @@
+"""The view: everything a page needs to draw a scene, as JSON data and one piece of arrays.
+
+Arrays are named in the data as ``[kind, offset, count]``, with a kind of `KINDS`, an offset in bytes into the
+blob, a multiple of 4, and a count of numbers.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from scenelang.models.framed import load_arrays
+from scenelang.models.manifest import load_manifest
+from scenelang.program.program import Program, ProgramError
+from scenelang.renderers.network import FramedArrays
+from scenelang.viewer.rows import rows_of, stage_of
+
+FORMAT: Final = 1
+KINDS: Final = {"float32": "f32", "uint8": "u8", "int16": "i16", "uint16": "u16", "int32": "i32"}
+
+
+class Store:
+    """Arrays one after the other, as they lie in the blob."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+        self._size = 0
+
+    def add(self, array: np.ndarray) -> list[Any]:
+        """Take in an array of a dtype of `KINDS` and return what names it in the data."""
+        data = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).tobytes()
+        name = [KINDS[array.dtype.name], self._size, array.size]
+        self._parts.append(data + bytes(-len(data) % 4))
+        self._size += len(self._parts[-1])
+        return name
+
+    def bytes(self) -> bytes:
+        """The blob."""
+        return b"".join(self._parts)
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What a page draws.
+
+    Args:
+        data: JSON data; docs/architecture.md has its parts.
+        blob: the arrays that it names.
+    """
+
+    data: dict[str, Any]
+    blob: bytes = field(repr=False)
+
+    def message(self) -> str:
+        """One JSON text: the data, and under ``blob`` the arrays, deflated (zlib) and in base64."""
+        packed = base64.b64encode(zlib.compress(self.blob, 9)).decode()
+        return json.dumps({**self.data, "blob": packed}, separators=(",", ":"), allow_nan=False)
+
+
+def view_of(program: Program, *, title: str = "", source: Sequence[tuple[str, str]] = ()) -> View:
+    """The view of a Program, whose numbers never change.
+
+    Args:
+        program: compiled for a shipped model.
+        title: of the page.
+        source: names and texts of the files that it was compiled from.
+
+    Raises:
+        ProgramError: it was compiled for other weights, or no page can draw its model.
+    """
+    manifest, store = load_manifest(program.model), Store()
+    if manifest.renderer not in ("framed", "solid"):
+        raise ProgramError(f"model `{manifest.name}` draws whole pictures, which no page does")
+    if manifest.lifting != "exact":
+        raise ProgramError(f"model `{manifest.name}` has learned transformations, which no page draws")
+    network, digest = load_arrays(program.model)
+    program.check_weights(digest)
+    albedo = network.material_codes @ network.albedo[:-1] + network.albedo[-1]
+    geometries = [{"name": name, "kind": "learned"} for name in manifest.geometries]
+    data = {
+        "format": FORMAT,
+        "title": title,
+        "canvas": program.canvas,
+        "dimension": manifest.dimension,
+        "model": {
+            "name": manifest.name,
+            "summary": manifest.summary,
+            "weights": digest,
+        },
+        "shader": {},
+        "network": {},
+        "shapes": geometries,
+        "materials": [
+            {"name": name, "albedo": row[:3].tolist(), "medium": float(row[3]) if len(row) > 3 else 0.0}
+            for name, row in zip(manifest.materials, albedo.astype(np.float64), strict=True)
+        ],
+        "paints": [],
+        "program": {
+            "rows": rows_of(program, manifest, network.codes, network.material_codes),
+            "stage": program.stage and stage_of(program.stage),
+            "background": program.background,
+        },
+        "form": None,
+        "params": [],
+        "fixed": [],
+        "animation": None,
+        "source": [{"name": name, "text": text} for name, text in source],
+        "licences": [],
+    }
+    assert isinstance(network, FramedArrays) == (manifest.dimension == 2)
+    return View(data, store.bytes())
