@@ -1,4 +1,4 @@
-"""`.ci/oracles`: comparisons that do not run count as failed."""
+"""`.ci/marked`: tests of a marker that do not run count as failed."""
 
 from __future__ import annotations
 
@@ -29,16 +29,18 @@ def program(path: Path, text: str) -> Path:
         ("other", "", True, 5),
     ],
 )
-def test_oracles_have_to_run(tmp_path: Path, mark: str, skip: str, fine: bool, code: int) -> None:
-    """The installer is left out."""
-    python = program(tmp_path / "python", f'[ "$2" = pip ] || exec "{sys.executable}" "$@"')
+def test_marked_tests_have_to_run(tmp_path: Path, mark: str, skip: str, fine: bool, code: int) -> None:
+    python = program(tmp_path / "python", f'exec "{sys.executable}" "$@"')
     program(tmp_path / "povray", "")
     module = tmp_path / "test_module.py"
     module.write_text(MODULE.format(mark=mark, skip=skip, fine=fine))
     path = f"{tmp_path}:{os.environ['PATH']}"
     arguments = [python, module, "-p", "no:cacheprovider", "--noconftest", "-W", "ignore"]
     done = subprocess.run(
-        [ROOT / ".ci/oracles", *arguments], env={**os.environ, "PATH": path}, capture_output=True, check=False
+        [ROOT / ".ci/marked", "oracle", "povray", *arguments],
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        check=False,
     )
     assert done.returncode == code, done.stderr
 
@@ -49,10 +51,10 @@ def test_a_missing_program_is_told(tmp_path: Path) -> None:
     for name in ("bash", "dirname"):
         os.symlink(f"/bin/{name}", tmp_path / name)
     done = subprocess.run(
-        ["/bin/bash", ROOT / ".ci/oracles", python],
+        ["/bin/bash", ROOT / ".ci/marked", "browser", "chromium", python],
         env={"PATH": str(tmp_path)},
         capture_output=True,
         text=True,
     )
     assert done.returncode == 1
-    assert "POV-Ray is not installed" in done.stderr
+    assert "chromium is not installed" in done.stderr
