@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -122,6 +123,11 @@ def spread(values: list[float], bad_end: int) -> dict[str, float]:
         "p5": round(float(np.percentile(values, bad_end)), 5),
         "worst": round(worst, 5),
     }
+
+
+def interval(values: Sequence[float]) -> float:
+    """Half the width of the 95 % interval of a mean, by its normal approximation."""
+    return round(1.96 * float(np.std(values, ddof=1)) / math.sqrt(len(values)), 3) if len(values) > 1 else 0.0
 
 
 def summarise(cases: Sequence[Mapping[str, float]]) -> dict[str, dict[str, float]]:

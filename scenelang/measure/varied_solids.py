@@ -98,6 +98,20 @@ def in_mist(rng: Rng, radius: float) -> Scene:
     return _beside(rng, Object("sphere", (Scale(radius), Translate(*EYE)), _look(rng, "volumetric")))
 
 
+def shadow(rng: Rng) -> Scene:
+    """A solid, and a medium between it and the light: the paper's Figure 5."""
+    (receiver,), (medium,) = (
+        [link.node for link in links(scene(rng, objects=(1, 1), media=media, spread=0.3))]
+        for media in (0.0, 1.0)
+    )
+    assert isinstance(receiver, Object)
+    assert isinstance(medium, Object)
+    towards = float(rng.uniform(0.3, 0.5)) * np.array(Light().position) + rng.uniform(-0.15, 0.15, 3)
+    moves = (*medium.transforms, Translate(*towards.tolist()))
+    between = Object(medium.geometry, moves, medium.material)
+    return Scene(nodes=(receiver, between), model="solids3d", canvas=BASE.canvas)
+
+
 def seen(rng: Rng, camera: Camera) -> Scene:
     """A base scene, seen from elsewhere."""
     return scene(rng).model_copy(update={"camera": camera})

@@ -28,7 +28,7 @@ from scenelang.lifting import exact
 from scenelang.lifting.layout import LAYOUTS
 from scenelang.lifting.learned import lift_geometry
 from scenelang.measure.metrics import flip, psnr
-from scenelang.measure.scenes import LEAST_COVER, coverage, reference_of, sized, spread
+from scenelang.measure.scenes import LEAST_COVER, coverage, interval, reference_of, sized, spread
 from scenelang.models.load import Model
 from scenelang.models.manifest import Manifest
 from scenelang.passes import OPTIONAL
@@ -202,11 +202,6 @@ def run_probe(model: Model, name: str, scenes: int, seed: int, report: Report = 
         "scenes": scenes,
         "rows": rows,
     }
-
-
-def interval(values: Sequence[float]) -> float:
-    """Half the width of the 95 % interval of a mean, by its normal approximation."""
-    return round(1.96 * float(np.std(values, ddof=1)) / math.sqrt(len(values)), 3) if len(values) > 1 else 0.0
 
 
 def order_of_disjoint(model: Model, scenes: int, seed: int) -> dict[str, float]:
