@@ -37,6 +37,7 @@ from scenelang.lab.experiments.charts import experiment_chart
 from scenelang.lab.experiments.charts import strips as experiment_strips
 from scenelang.lab.frontier.chart import frontier_chart
 from scenelang.lab.parsimony import parts_chart
+from scenelang.lab.shadows import measure_shadows
 from scenelang.measure.frontier import Frontier, frontier_path
 from scenelang.models.load import load_model
 from scenelang.models.manifest import load_manifest
@@ -218,6 +219,11 @@ def worst_cases(name: str, count: int, model: str = "shapes2d", folder: str = ""
     return png(shown.quantize(128))
 
 
+def shadows() -> bytes:
+    """Scenes in which a medium throws its shadow on a solid."""
+    return png(measure_shadows(load_model("solids3d"), 6, 2021, 128)[1].to_pil().quantize(256))
+
+
 def stability(dimension: int) -> bytes:
     """Charts of the stability suite, from what `scenelang lab stability` wrote: of every model measured."""
     paths = sorted((DOCS / "results").glob("stability*.json"), key=lambda path: len(path.name))
@@ -286,6 +292,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
             made[f"{name}.png"] = lambda model=model: frontier(model)
     made |= experiments()
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
+    made["shadows.png"] = shadows
     made["worst-solids.png"] = lambda: worst_cases("booleans", 6, "solids3d", "solids3d")
     return made
 

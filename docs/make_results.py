@@ -159,6 +159,24 @@ def texels() -> str:
     return markdown(("texels to a pixel", "mean PSNR, dB", "worst", "flicker", "worst"), rows)
 
 
+def shadows() -> str:
+    """The error inside shadows of media, with the command."""
+    found = json.loads((HERE / "results" / "solids3d" / "shadows.json").read_text())
+    rows = [
+        [what, *(f"{factor * found[name][k]:.2f}" for k in ("mean", "interval", "p5", "worst"))]
+        for what, name, factor in (
+            ("PSNR, dB, at most 50", "psnr", 1),
+            ("the same without the cap", "psnr_uncapped", 1),
+            ("of a picture without the shadow", "without", 1),
+            ("share of the shadow that is wrong, %", "wrong", 100),
+        )
+    ]
+    heads = ("inside the shadow", "mean", "± (95 %)", "5th percentile from the bad end", "worst")
+    command = f"scenelang lab shadows {found['model']} --scenes {found['scenes']} --side {found['canvas'][0]}"
+    said = f"`{command}`, seed {found['seed']}, revision `{found['revision'][:8]}`"
+    return f"{markdown(heads, rows)}\n\n{said}"
+
+
 def rivals() -> str:
     """What frames of solids cost, drawn by us and by others, with what `python -m benchmarks.solids` says."""
     path = HERE / "results" / "solid-rivals.json"
@@ -197,6 +215,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "blends": blends,
     "texels": texels,
     "rivals": rivals,
+    "shadows": shadows,
     **{name: experiment(name) for name in EXPERIMENTS},
 }
 """What stands between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``."""
