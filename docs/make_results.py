@@ -163,12 +163,12 @@ def shadows() -> str:
     """The error inside shadows of media, with the command."""
     found = json.loads((HERE / "results" / "solids3d" / "shadows.json").read_text())
     rows = [
-        [what, *(f"{factor * found[name][k]:.2f}" for k in ("mean", "interval", "p5", "worst"))]
-        for what, name, factor in (
-            ("PSNR, dB, at most 50", "psnr", 1),
-            ("the same without the cap", "psnr_uncapped", 1),
-            ("of a picture without the shadow", "without", 1),
-            ("share of the shadow that is wrong, %", "wrong", 100),
+        [what, *(f"{found[name][k]:.2f}" for k in ("mean", "interval", "p5", "worst"))]
+        for what, name in (
+            ("PSNR, dB, at most 50", "psnr"),
+            ("the same without the cap", "psnr_uncapped"),
+            ("of a picture without the shadow", "without"),
+            ("share of the shadow that is wrong, %", "wrong_percent"),
         )
     ]
     heads = ("inside the shadow", "mean", "± (95 %)", "5th percentile from the bad end", "worst")

@@ -2,7 +2,7 @@
 
 The shadow's mask is found from exact pictures alone: pixels that show the solid and no medium, and that are
 lit otherwise where the medium is taken away. Beside the error of the pixels stands the share of the shadow
-that is wrong: 0 is the exact shadow, and 1 is as wrong as a picture without one.
+that is wrong: 0 is the exact shadow, and 100 % is as wrong as a picture without one.
 """
 
 from __future__ import annotations
@@ -78,7 +78,8 @@ def measure_shadows(
                 "psnr": psnr(inside, whole, MOST_DB),
                 "psnr_uncapped": psnr(inside, whole, UNCAPPED_DB),
                 "without": psnr(lit[mask], whole, UNCAPPED_DB),
-                "wrong": float(np.abs(inside - whole).mean() / np.abs(lit[mask] - whole).mean()),
+                "wrong_percent": 100
+                * float(np.abs(inside - whole).mean() / np.abs(lit[mask] - whole).mean()),
                 "share": float(mask.mean()),
             }
         )
@@ -90,7 +91,7 @@ def measure_shadows(
 
 
 def _summary(found: Sequence[dict[str, float]]) -> dict[str, Any]:
-    bad_ends = {"wrong": 95}
+    bad_ends = {"wrong_percent": 95}
     return {
         name: spread([one[name] for one in found], bad_ends.get(name, 5))
         | {"interval": interval([one[name] for one in found])}

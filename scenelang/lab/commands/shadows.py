@@ -33,9 +33,9 @@ def command(model: str, scenes: int, side: int, seed: int, out: Path, weights: P
         summary, sheet = measure_shadows(loaded, scenes, seed, side, report=bar)
     common.write_json(out / "shadows.json", summary)
     sheet.save(out / "shadows.png")
-    inside, wrong = summary["psnr"], summary["wrong"]
+    inside, wrong = summary["psnr"], summary["wrong_percent"]
     click.echo(
         f"inside shadows: PSNR {inside['mean']:.2f} dB ± {inside['interval']:.2f} "
-        f"(worst {inside['worst']:.2f}), {wrong['mean']:.2%} of the shadow is wrong "
-        f"(worst {wrong['worst']:.2%}) on {scenes} scenes"
+        f"(worst {inside['worst']:.2f}), {wrong['mean']:.2f} % of the shadow is wrong "
+        f"(worst {wrong['worst']:.2f}) on {scenes} scenes"
     )
