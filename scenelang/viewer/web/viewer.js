@@ -1,0 +1,350 @@
+import { cameraText, orbited, panned, seenBy, zoomed } from "./camera.js";
+import { evaluateForm } from "./evaluate.js";
+import { Pace } from "./pace.js";
+import { planeDrawer } from "./plane.js";
+import { solidDrawer } from "./solid.js";
+
+const DRAWN_FROM = ["dimension", "shader", "network", "shapes", "materials", "paints"]; // what a drawer is made of
+
+/** A scene on a canvas. It draws when something has changed, and coarser while it cannot keep up. */
+export class Viewer {
+  #view;
+  #gl;
+  #drawer = null;
+  #program = null; // {rows, stage, background}: the last that could be made
+  #camera = null; // of the user; null for the scene's
+  #changed = null; // name of the param that was set last
+  #refused = false; // whether the params give no picture
+  #stale = true; // whether rows belong to other params or another frame
+  #dirty = false; // whether what is shown is not what is to be shown
+  #request = 0;
+  #origin = 0; // when frame 0 would have been shown, in ms
+  #pace;
+  #watchers = new Set();
+  #observers = [];
+  #shown = true;
+
+  /**
+   * @param {HTMLCanvasElement} canvas - drawn at the size that it has on the page, else at its own
+   * @param {object} view - as `readView` gives it
+   * @param {function} onchange - told {kind: "param" | "frame" | "play" | "camera" | "drawn" | "view"}
+   * @param {function} onerror - told {kind: "param" | "shader" | "lost", name, message}; a null message: over
+   * @throws {Error} where there is no WebGL2, or the shader does not compile
+   */
+  constructor(canvas, view, { onchange = () => {}, onerror = () => {} } = {}) {
+    this.canvas = canvas;
+    this.onerror = onerror;
+    this.params = defaults(view);
+    this.frame = 0;
+    this.playing = false;
+    this.size = [canvas.width, canvas.height];
+    pin(canvas, view.canvas);
+    this.#watchers.add(onchange);
+    this.#view = view;
+    this.#gl = canvas.getContext("webgl2", { antialias: false, depth: false, stencil: false });
+    if (!this.#gl) throw new Error("this browser has no WebGL2, or keeps it off");
+    this.#pace = new Pace(this.#gl, (coarse) => this.#ask(coarse));
+    this.#drawer = this.#made(view);
+    canvas.addEventListener("webglcontextlost", this);
+    canvas.addEventListener("webglcontextrestored", this);
+    this.#observe(new ResizeObserver(() => this.#touch()));
+    this.#observe(new IntersectionObserver(([entry]) => {
+      this.#shown = entry.isIntersecting;
+      this.#ask(false);
+    }));
+    this.#touch();
+  }
+
+  /** What draws: {draw, points, operations}. */
+  get drawer() {
+    return this.#drawer;
+  }
+
+  /** What is drawn: {rows, stage, background} of these params and this frame. */
+  get program() {
+    this.#evaluate();
+    const stage = this.#camera && this.#program.stage ? seenBy(this.#program.stage, this.#camera) : null;
+    return stage ? { ...this.#program, stage } : this.#program;
+  }
+
+  get view() {
+    return this.#view;
+  }
+
+  /** Show another view. Params that were moved stay where they are; a shader that can be is used again. */
+  set view(next) {
+    const before = this.#view;
+    if (!DRAWN_FROM.every((key) => alike(before[key], next[key]))) {
+      const drawer = this.#made(next);
+      this.#drawer.dispose();
+      this.#drawer = drawer;
+    }
+    const old = defaults(before);
+    const kinds = Object.fromEntries(before.params.map(({ name, kind }) => [name, kind]));
+    const params = defaults(next);
+    for (const { name, kind } of next.params) {
+      const moved = kinds[name] === kind && !alike(this.params[name], old[name]);
+      if (moved) params[name] = this.params[name];
+    }
+    this.params = params;
+    this.#view = next;
+    this.canvas.style.aspectRatio = next.canvas.join("/");
+    this.#program = null;
+    if (next.dimension !== before.dimension) this.#camera = null;
+    if (!next.animation) this.playing = false;
+    this.frame = Math.min(this.frame, this.frames - 1);
+    this.#origin = performance.now() - this.#elapsed();
+    this.#outdated("view");
+  }
+
+  // ---------------------------------------------------------------- params and time
+
+  /** Number of frames; 1 without an animation. */
+  get frames() {
+    return this.#view.animation?.frames ?? 1;
+  }
+
+  /** Give a param another value, in base units. */
+  set(name, value) {
+    this.params[name] = value;
+    this.#changed = name;
+    this.#outdated("param");
+  }
+
+  /** Give every param its default. */
+  reset() {
+    this.params = defaults(this.#view);
+    this.#outdated("param");
+  }
+
+  play() {
+    if (!this.#view.animation || this.playing) return;
+    if (!this.#view.animation.loop && this.frame === this.frames - 1) this.seek(0);
+    this.playing = true;
+    this.#origin = performance.now() - this.#elapsed();
+    this.#tell("play");
+    this.#touch();
+  }
+
+  pause() {
+    if (!this.playing) return;
+    this.playing = false;
+    this.#tell("play");
+    this.#touch();
+  }
+
+  /** Show a frame, from 0. */
+  seek(frame) {
+    this.frame = Math.max(0, Math.min(this.frames - 1, Math.round(frame)));
+    this.#origin = performance.now() - this.#elapsed();
+    this.#outdated("frame");
+  }
+
+  // ---------------------------------------------------------------- camera
+
+  /** {eye, target, fov}: the user's camera or the scene's; null in the plane. */
+  get camera() {
+    const stage = this.#camera ?? this.program.stage;
+    return stage ? { eye: [...stage.eye], target: [...stage.target], fov: stage.fov } : null;
+  }
+
+  /** Null gives the scene its own again. */
+  set camera(camera) {
+    this.#camera = camera;
+    this.#tell("camera");
+    this.#touch();
+  }
+
+  /** Whether the user has moved the camera. */
+  get moved() {
+    return this.#camera !== null;
+  }
+
+  /** Go round the target, in radians: to the right and upward. */
+  orbit(turn, rise) {
+    if (this.camera) this.camera = orbited(this.camera, turn, rise);
+  }
+
+  /** Make the distance from the target `factor` times as long. */
+  zoom(factor) {
+    if (this.camera) this.camera = zoomed(this.camera, factor);
+  }
+
+  /** Move what is seen to the right and upward, in shares of the shorter side. */
+  pan(right, up) {
+    if (this.camera) this.camera = panned(this.camera, right, up);
+  }
+
+  /** The camera as a line of a scene. */
+  cameraLine() {
+    return cameraText(this.camera);
+  }
+
+  // ---------------------------------------------------------------- drawing
+
+  /** Draw now, at full size. */
+  draw() {
+    this.#paint(1);
+  }
+
+  /** A PNG of what is shown, at full size. */
+  snapshot() {
+    this.draw();
+    return new Promise((done) => this.canvas.toBlob(done, "image/png"));
+  }
+
+  /** Be told of changes, as `onchange` is; returns what ends it. */
+  watch(watcher) {
+    this.#watchers.add(watcher);
+    return () => this.#watchers.delete(watcher);
+  }
+
+  dispose() {
+    cancelAnimationFrame(this.#request);
+    this.#request = -1; // never again
+    this.#pace.stop();
+    for (const observer of this.#observers) observer.disconnect();
+    this.canvas.removeEventListener("webglcontextlost", this);
+    this.canvas.removeEventListener("webglcontextrestored", this);
+    this.#drawer.dispose();
+    this.#watchers.clear();
+  }
+
+  handleEvent(event) {
+    if (event.type === "webglcontextlost") {
+      event.preventDefault(); // or it would not come back
+      this.#pace.stop();
+      this.onerror({ kind: "lost", message: "the graphics card was taken away for a moment" });
+      return;
+    }
+    try {
+      this.#drawer = this.#made(this.#view);
+      this.onerror({ kind: "lost", message: null });
+      this.#touch();
+    } catch (error) {
+      this.onerror({ kind: "shader", message: error.message });
+    }
+  }
+
+  #made(view) {
+    this.#pace.begin(view.dimension);
+    return (view.dimension === 3 ? solidDrawer : planeDrawer)(this.#gl, view);
+  }
+
+  #observe(observer) {
+    observer.observe(this.canvas);
+    this.#observers.push(observer);
+  }
+
+  #tell(kind) {
+    for (const watcher of this.#watchers) watcher({ kind });
+  }
+
+  #outdated(kind) {
+    this.#stale = true;
+    this.#tell(kind);
+    this.#touch();
+  }
+
+  #elapsed() {
+    return this.#view.animation ? (1000 * this.frame) / this.#view.animation.fps : 0;
+  }
+
+  /** Something has moved: draw at the next chance. */
+  #touch() {
+    this.#pace.touch();
+    this.#ask(true);
+  }
+
+  /** Have a frame drawn, if it is called for. */
+  #ask(dirty) {
+    this.#dirty ||= dirty;
+    if ((this.#dirty || this.playing) && this.#shown && this.#request === 0) {
+      this.#request = requestAnimationFrame((now) => this.#next(now));
+    }
+  }
+
+  #next(now) {
+    this.#request = 0;
+    if (this.#pace.busy || this.#gl.isContextLost()) return; // the end of the frame under way asks again
+    if (this.playing) this.#advance(now);
+    if (this.#dirty) this.#paint(this.#pace.scale(this.playing));
+    else this.#ask(false);
+  }
+
+  #advance(now) {
+    const { fps, loop } = this.#view.animation;
+    const at = Math.max(0, Math.floor(((now - this.#origin) * fps) / 1000 + 1e-6));
+    const frame = loop ? at % this.frames : Math.min(at, this.frames - 1);
+    if (frame !== this.frame) {
+      this.frame = frame;
+      this.#stale = this.#dirty = true;
+      this.#tell("frame");
+    }
+    if (!loop && at >= this.frames - 1) this.pause();
+  }
+
+  /** The rows of the present params and frame; where they cannot be made the last ones stay. */
+  #evaluate() {
+    if (!this.#stale && this.#program) return;
+    this.#stale = false;
+    const { form, program } = this.#view;
+    if (!form) {
+      this.#program = program;
+      return;
+    }
+    try {
+      this.#program = evaluateForm(form, { params: this.params, frame: this.frame, frames: this.frames });
+      if (this.#refused) this.onerror({ kind: "param", name: this.#changed, message: null });
+      this.#refused = false;
+    } catch (error) {
+      this.#program ??= program;
+      this.#refused = true;
+      this.onerror({ kind: "param", name: this.#changed, message: error.message });
+    }
+  }
+
+  #paint(scale) {
+    if (this.#gl.isContextLost()) return;
+    const program = this.program;
+    this.#dirty = false;
+    const [width, height] = this.#full().map((side) => Math.max(1, Math.round(side * scale)));
+    if (this.canvas.width !== width) this.canvas.width = width;
+    if (this.canvas.height !== height) this.canvas.height = height;
+    this.#pace.start(scale);
+    this.#drawer.draw(program, { width, height, scale });
+    this.#pace.end();
+    this.#tell("drawn");
+  }
+
+  /** Pixels of the screen that the canvas has. */
+  #full() {
+    const box = this.canvas.getBoundingClientRect();
+    if (!box.width || !box.height) return this.size;
+    return [box.width * devicePixelRatio, box.height * devicePixelRatio].map(Math.round);
+  }
+}
+
+/** Give a canvas the aspect of a scene, and where no style gives it a size the one that it has now. */
+function pin(canvas, [width, height]) {
+  canvas.style.aspectRatio = `${width}/${height}`;
+  const before = canvas.getBoundingClientRect();
+  canvas.width *= 2;
+  if (canvas.getBoundingClientRect().width !== before.width) canvas.style.width = `${before.width}px`;
+  canvas.width /= 2;
+}
+
+function defaults(view) {
+  return Object.fromEntries(view.params.map(({ name, value }) => [name, value]));
+}
+
+/** Whether two pieces of data are equal; typed arrays too. */
+function alike(a, b) {
+  if (a === b) return true;
+  if (typeof a !== "object" || typeof b !== "object" || a === null || b === null) return false;
+  const keys = Object.keys(a);
+  if (ArrayBuffer.isView(a)) {
+    return a.constructor === b.constructor && a.length === b.length && a.every((value, at) => value === b[at]);
+  }
+  return keys.length === Object.keys(b).length && keys.every((key) => alike(a[key], b[key]));
+}
