@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli.inputs import Input, Request, read_input, unused_defines
+from scenelang.cli.inputs import Input, Request, merged, read_input, unused_defines
+from scenelang.cli.main import describe
 from scenelang.cli.progress import Clock
-from scenelang.cli.say import say_diagnostics
+from scenelang.cli.say import say_diagnostics, say_trouble
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
@@ -98,6 +99,49 @@ def prepare(
             why = why_chosen(found.scene, request.model is not None)
             job.notes = [*program_notes(job.program, why), *_pass_notes(job.graphs)]
     return job
+
+
+def prepare_all(
+    files: Sequence[str],
+    request: Request,
+    clock: Clock,
+    *,
+    strict: bool = False,
+    compiled: bool = True,
+    verbose: bool = False,
+    source: SourceFile | None = None,
+    refusal: Callable[[Job], str | None] = lambda _: None,
+) -> tuple[list[Job | None], int]:
+    """Every input read and compiled, None where it cannot be read; reports mistakes.
+
+    Args:
+        strict: warnings count as errors.
+        compiled, verbose, source: as of `prepare`.
+        refusal: why a job is none for this command, if it is not.
+
+    Returns:
+        The jobs, and the exit code so far: 1 where a scene has mistakes, 2 where a file cannot be read.
+    """
+    jobs: list[Job | None] = []
+    code = 0
+    for name in files:
+        try:
+            job = prepare(name, request, clock, compiled=compiled, verbose=verbose, source=source)
+        except OSError as error:
+            say_trouble(describe(error))
+            jobs.append(None)
+            code = 2
+            continue
+        job.trouble = refusal(job) or job.trouble
+        if job.trouble is not None:
+            say_trouble(f"{name}: {job.trouble}")
+        jobs.append(job)
+    read = [job for job in jobs if job is not None]
+    unused = unused_defines(request) if read else []
+    say_diagnostics(merged([*(job.diagnostics for job in read), unused]))
+    if unused:
+        return [None] * len(jobs), max(code, 1)
+    return jobs, max(code, int(any(job.failed(strict) for job in read)))
 
 
 def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> tuple[Job, Input]:

@@ -11,7 +11,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Final
 
-MODULES: Final = ("store", "gl")
+MODULES: Final = ("store", "gl", "camera", "pace", "viewer", "dom", "steer", "controls", "page")
 """Of ``web/``; each stands behind what it imports."""
 
 _IMPORT: Final = re.compile(r'^import \{[^}]*\} from "[^"]*";\n', re.MULTILINE)

@@ -15,10 +15,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from scenelang.elements.element import credit_of
 from scenelang.models.framed import load_arrays
-from scenelang.models.manifest import load_manifest
+from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.network import FramedArrays
+from scenelang.viewer.describe import alternative
 from scenelang.viewer.rows import rows_of, stage_of
 
 FORMAT: Final = 1
@@ -92,6 +94,7 @@ def view_of(program: Program, *, title: str = "", source: Sequence[tuple[str, st
             "name": manifest.name,
             "summary": manifest.summary,
             "weights": digest,
+            "measured": _measured(manifest),
         },
         "shader": {},
         "network": {},
@@ -111,7 +114,21 @@ def view_of(program: Program, *, title: str = "", source: Sequence[tuple[str, st
         "fixed": [],
         "animation": None,
         "source": [{"name": name, "text": text} for name, text in source],
-        "licences": [],
+        "licences": [
+            {"name": element.name, "text": credit}
+            for element in program.elements
+            if (credit := credit_of([element]))
+        ],
     }
+    data["alt"] = alternative(data)
     assert isinstance(network, FramedArrays) == (manifest.dimension == 2)
     return View(data, store.bytes())
+
+
+def _measured(manifest: Manifest) -> dict[str, Any]:
+    """How far the model is from the exact picture on the scenes of its own set."""
+    figures = manifest.measured.get("sets", {}).get(manifest.set)
+    if figures is None:
+        return {}
+    cap = manifest.measured.get("psnr_cap_db")
+    return {"cap": cap, **{key: figures[key] for key in ("scenes", "psnr", "flip")}}

@@ -74,7 +74,7 @@ def test_threads_agree(folder: Folder) -> None:
         (("a.nsg", "-o", "a.xyz"), "suffix `.xyz`"),
         (("a.nsg", "-o", "a"), "a folder ends in a slash"),
         (("a.nsg", "-o", "none/a.png"), "no folder `none`"),
-        (("a.nsg", "b/a.nsg", "-o", "out"), "both be drawn to"),
+        (("a.nsg", "b/a.nsg", "-o", "out"), "both be written to"),
         (("a.nsg", "b.nsg", "-o", "a.nsg"), "is a file"),
         (("a.nsg", "b.nsg", "-o", "out.png"), "names a picture"),
         (("a.nsg", "-o", "a.png", "--size", "3"), "not a size such as"),

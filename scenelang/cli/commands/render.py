@@ -10,15 +10,12 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from scenelang.cli import options
-from scenelang.cli.main import Trouble, describe
+from scenelang.cli.main import Trouble
 from scenelang.cli.progress import Bar, Clock
-from scenelang.cli.say import say_diagnostics, say_trouble
 
 if TYPE_CHECKING:
     from scenelang.backend.options import Samples
-    from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import Job
-    from scenelang.diagnostics.span import SourceFile
     from scenelang.evaluate.session import Defines
     from scenelang.image import Image
     from scenelang.measure.frontier import Limits
@@ -139,7 +136,7 @@ def command(
     from scenelang.cli.animation import Requested, animate, wanted_target
     from scenelang.cli.drawing import check_options, check_proof, chosen, exact, job_outputs, neural, proved
     from scenelang.cli.inputs import Request
-    from scenelang.cli.jobs import PROGRAM
+    from scenelang.cli.jobs import PROGRAM, prepare_all
     from scenelang.cli.outputs import check_outputs, targets
     from scenelang.measure.frontier import Limits
 
@@ -170,7 +167,23 @@ def command(
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
     paths = targets(files, out)
     check_outputs(paths, outputs)
-    inputs, code = _prepared(files, request, clock, strict, backend, verbose or prove, source, prove)
+
+    def refusal(job: Job) -> str | None:
+        if not (prove or backend == "reference") or job.program is None or job.source is not None:
+            return None
+        does = "a proof is of a scene" if prove else "the reference draws scenes"
+        return f"{does}; a program keeps only what the network needs"
+
+    inputs, code = prepare_all(
+        files,
+        request,
+        clock,
+        strict=strict,
+        compiled=backend == "neural",
+        verbose=verbose or prove,
+        source=source,
+        refusal=refusal,
+    )
     ready = [(job, path) for job, path in zip(inputs, paths, strict=True) if job and not job.failed(strict)]
     if not ready:
         ctx.exit(code)
@@ -220,44 +233,6 @@ def _saved(image: Image, outputs: Outputs, path: Path) -> list[str]:
     except ValueError as error:
         raise Trouble(f"cannot write `{path}`: {error}") from None
     return [f"{file}: {outputs.told(name)}" for file, name in zip(files, outputs.names, strict=True)]
-
-
-def _prepared(
-    files: tuple[str, ...],
-    request: Request,
-    clock: Clock,
-    strict: bool,
-    backend: str,
-    verbose: bool,
-    source: SourceFile | None,
-    prove: bool,
-) -> tuple[list[Job | None], int]:
-    """Every input read and compiled, None where it cannot be read; reports mistakes; the exit code so far."""
-    from scenelang.cli.inputs import merged, unused_defines
-    from scenelang.cli.jobs import prepare
-
-    jobs: list[Job | None] = []
-    code = 0
-    for name in files:
-        try:
-            job = prepare(name, request, clock, compiled=backend == "neural", verbose=verbose, source=source)
-        except OSError as error:
-            say_trouble(describe(error))
-            jobs.append(None)
-            code = 2
-            continue
-        if (prove or backend == "reference") and job.program is not None and job.source is None:
-            does = "a proof is of a scene" if prove else "the reference draws scenes"
-            job.trouble = f"{does}; a program keeps only what the network needs"
-        if job.trouble is not None:
-            say_trouble(f"{name}: {job.trouble}")
-        jobs.append(job)
-    read = [job for job in jobs if job is not None]
-    unused = unused_defines(request) if read else []
-    say_diagnostics(merged([*(job.diagnostics for job in read), unused]))
-    if unused:
-        return [None] * len(jobs), max(code, 1)
-    return jobs, max(code, int(any(job.failed(strict) for job in read)))
 
 
 def _part(bar: Bar, index: int, count: int, share: float) -> None:

@@ -4,22 +4,22 @@ const NEAREST_POLE = 0.02; // an orbit stays this far from straight above and be
 const NEAREST_EYE = 0.05;
 const FARTHEST_EYE = 1e4;
 
-const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-const plus = (a, b, times = 1) => [a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2]];
-const crossed = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const unit = (a) => plus([0, 0, 0], a, 1 / Math.hypot(...a));
+const vecMinus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+const vecPlus = (a, b, times = 1) => [a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2]];
+const vecCross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const vecUnit = (a) => vecPlus([0, 0, 0], a, 1 / Math.hypot(...a));
 
 /** Unit vectors forward, right and up of a camera; seen straight along y, up is -z. */
 export function cameraAxes({ eye, target }) {
-  const forward = unit(minus(target, eye));
+  const forward = vecUnit(vecMinus(target, eye));
   const upright = Math.hypot(forward[0], forward[2]) > 1e-9;
-  const right = unit(crossed(forward, upright ? [0, 1, 0] : [0, 0, -1]));
-  return [forward, right, crossed(right, forward)];
+  const right = vecUnit(vecCross(forward, upright ? [0, 1, 0] : [0, 0, -1]));
+  return [forward, right, vecCross(right, forward)];
 }
 
 /** A camera that has gone round its target, by `turn` to the right and `rise` upward. */
 export function orbited(camera, turn, rise) {
-  const from = minus(camera.eye, camera.target);
+  const from = vecMinus(camera.eye, camera.target);
   const distance = Math.hypot(...from);
   const azimuth = Math.atan2(from[0], from[2]) + turn;
   const most = Math.PI / 2 - NEAREST_POLE;
@@ -27,24 +27,24 @@ export function orbited(camera, turn, rise) {
   const elevation = Math.max(-most, Math.min(most, height));
   const across = distance * Math.cos(elevation);
   const way = [across * Math.sin(azimuth), distance * Math.sin(elevation), across * Math.cos(azimuth)];
-  return { ...camera, eye: plus(camera.target, way) };
+  return { ...camera, eye: vecPlus(camera.target, way) };
 }
 
 /** A camera whose distance from its target is `factor` times as long. */
 export function zoomed(camera, factor) {
-  const from = minus(camera.eye, camera.target);
+  const from = vecMinus(camera.eye, camera.target);
   const distance = Math.hypot(...from);
   const wanted = Math.max(NEAREST_EYE, Math.min(FARTHEST_EYE, distance * factor));
-  return { ...camera, eye: plus(camera.target, from, wanted / distance) };
+  return { ...camera, eye: vecPlus(camera.target, from, wanted / distance) };
 }
 
 /** A camera moved so that what it looks at goes by (right, up), in shares of the canvas's shorter side. */
 export function panned(camera, right, up) {
   const [, side, above] = cameraAxes(camera);
-  const distance = Math.hypot(...minus(camera.eye, camera.target));
+  const distance = Math.hypot(...vecMinus(camera.eye, camera.target));
   const span = 2 * distance * Math.tan(camera.fov / 2);
-  const way = plus(plus([0, 0, 0], side, -right * span), above, -up * span);
-  return { ...camera, eye: plus(camera.eye, way), target: plus(camera.target, way) };
+  const way = vecPlus(vecPlus([0, 0, 0], side, -right * span), above, -up * span);
+  return { ...camera, eye: vecPlus(camera.eye, way), target: vecPlus(camera.target, way) };
 }
 
 /** A stage as another camera sees it. */

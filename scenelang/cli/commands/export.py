@@ -1,0 +1,81 @@
+"""``scenelang export``: scenes to pages that draw themselves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from scenelang.cli import options
+from scenelang.cli.progress import Clock
+from scenelang.cli.say import say_trouble
+
+if TYPE_CHECKING:
+    from scenelang.evaluate.session import Defines
+
+
+@click.command("export")
+@click.argument("files", nargs=-1, required=True, metavar="FILE…")
+@click.option("-o", "--out", required=True, metavar="OUT", help="A page (.html), or a folder.")
+@options.size
+@options.define
+@options.model
+@options.strict
+@options.root
+@options.verbose
+@click.pass_context
+def command(
+    ctx: click.Context,
+    files: tuple[str, ...],
+    out: str,
+    size: tuple[int, int] | None,
+    defines: Defines,
+    model: str | None,
+    strict: bool,
+    root: str | None,
+    verbose: bool,
+) -> None:
+    """Write scenes as web pages that draw themselves.
+
+    FILE is a scene, - for standard input, or a program that `scenelang compile` made (.safetensors). OUT is
+    a page; several scenes go into a folder, each as STEM.html. A page is one file and asks for nothing: send
+    it or put it anywhere. The scene runs in it by WebGL2: its params are sliders, its animation plays, and
+    the camera of a 3D scene can be moved.
+
+    Scenes with errors are reported and left out. Exits with 1 if there are any, 2 if a file cannot be read
+    or written.
+    """
+    from scenelang.cli.inputs import Request, stem_of
+    from scenelang.cli.jobs import prepare_all
+    from scenelang.cli.outputs import PAGE, targets
+    from scenelang.files import write_output
+    from scenelang.program.program import ProgramError
+    from scenelang.viewer.export import scene_view, still
+    from scenelang.viewer.page import page
+
+    clock = Clock()
+    paths = targets(files, out, PAGE)
+    jobs, code = prepare_all(files, Request(defines, model, root, 0, size), clock, strict=strict)
+    for job, path in zip(jobs, paths, strict=True):
+        if job is None or job.failed(strict) or job.program is None:
+            continue
+        found = job.source
+        scene, evaluation = (None, None) if found is None else (found.scene, found.evaluation)
+        try:
+            with clock("view"):
+                view = scene_view(job.program, scene, evaluation, title=stem_of(job.name))
+        except ProgramError as error:
+            say_trouble(f"{job.name}: {error}")
+            code = 2
+            continue
+        with clock("still picture"):
+            picture = still(job.program)
+        with clock("save"):
+            text = page(view, still=picture).encode()
+            write_output(path, text)
+        if verbose:
+            lines = "".join(f"\n  {note}" for note in (*job.notes, f"{len(text):,} bytes"))
+            click.echo(f"{job.name} -> {path}{lines}", err=True)
+    if verbose:
+        click.echo(clock.report(), err=True)
+    ctx.exit(code)

@@ -1,0 +1,135 @@
+"""Scenes as pages: files, Scenes and Programs to one HTML file each, `scenelang.export`."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from scenelang.backend.render import render
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
+from scenelang.evaluate.evaluation import Evaluation
+from scenelang.evaluate.loader import Unreadable, read_source
+from scenelang.files import write_output
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import Program
+from scenelang.program.reading import load_program
+from scenelang.scene import library
+from scenelang.scene.schema import Scene
+from scenelang.syntax import parse
+from scenelang.viewer.page import page
+from scenelang.viewer.view import View, view_of
+
+PROGRAM: Final = ".safetensors"
+STILL_SIDE: Final = 256
+_COLOURS: Final = 64
+_MOST_TEXT: Final = 20_000  # of a Scene, whose text nobody wrote
+
+
+def export(
+    source: str | os.PathLike[str] | Scene | Program,
+    out: str | os.PathLike[str],
+    *,
+    params: Mapping[str, Any] | None = None,
+    size: tuple[int, int] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    title: str | None = None,
+) -> None:
+    """Write an HTML page that draws a scene in any browser with WebGL2 and asks for nothing else.
+
+    Args:
+        source: a scene's file, whose params the page can change and whose animation it plays; or a compiled
+            Program's (.safetensors), a Scene or a Program, which are as they are.
+        out: the page.
+        params: values for a file's params that the page starts from; as for `scenelang.load`.
+        size: canvas in pixels instead of the scene's; the picture keeps its aspect.
+        model: draw with this model instead of the one that the scene names.
+        root: folder that imports cannot leave; by default the file's.
+        title: of the page; by default the name of the file.
+
+    Raises:
+        SceneError: the scene has errors.
+        ProgramError: the file is not a Program, or no page can draw its model.
+        RenderError: the model has no weights here.
+        ValueError: an argument says something of a file where there is none, or of a scene where there is a
+            Program.
+        OSError: a file cannot be read or written.
+    """
+    scene = source if isinstance(source, Scene) else None
+    evaluation = None
+    path = None if isinstance(source, Scene | Program) else Path(source)
+    if path is not None and path.suffix != PROGRAM:
+        scene, evaluation = _evaluated(path, params, model, root)
+    elif params or root is not None:
+        raise ValueError("params and root are for files of scenes")
+    if scene is not None:
+        program = compile_scene(scene if size is None else scene.sized(size), model=model)
+    elif size is not None or model is not None:
+        raise ValueError("size and model are for scenes; a program is compiled for its own")
+    else:
+        program = source if isinstance(source, Program) else load_program(Path(path or ""))
+    name = "" if path is None else path.stem
+    view = scene_view(program, scene, evaluation, title=name if title is None else title)
+    write_output(out, page(view, still=still(program)).encode())
+
+
+def scene_view(
+    program: Program, scene: Scene | None, evaluation: Evaluation | None, *, title: str = ""
+) -> View:
+    """The view of a compiled scene.
+
+    Args:
+        program: what the page shows first.
+        scene: what it was compiled from, where there is one.
+        evaluation: of the text of that scene, after the run that gave it, where there is one.
+        title: of the page.
+    """
+    source: list[tuple[str, str]] = []
+    if evaluation is not None:
+        first = evaluation.sources[0].name
+        own = [text for text in evaluation.sources if not library.holds(text)]
+        source = [(_shown(text.name, first), text.text) for text in own]
+    elif scene is not None and len(text := scene.to_nsg()) <= _MOST_TEXT:
+        source = [(f"{title or 'scene'}.nsg", text)]
+    return view_of(program, title=title, source=source)
+
+
+def still(program: Program) -> bytes:
+    """A small picture of a Program as PNG, in few colours."""
+    from PIL import Image as pillow
+
+    shrink = min(1.0, STILL_SIDE / max(program.canvas))
+    width, height = (max(1, round(side * shrink)) for side in program.canvas)
+    image = render(replace(program, canvas=(width, height))).to_pil()
+    method = pillow.Quantize.FASTOCTREE if image.mode == "RGBA" else pillow.Quantize.MEDIANCUT
+    data = io.BytesIO()
+    image.quantize(_COLOURS, method, dither=pillow.Dither.NONE).save(data, "PNG", optimize=True)
+    return data.getvalue()
+
+
+def _shown(name: str, first: str) -> str:
+    """What a page calls a file: by its place beside the scene's, and of others only their names."""
+    place = os.path.relpath(name, os.path.dirname(first)).replace(os.sep, "/")
+    return Path(name).name if place.startswith("../") else place
+
+
+def _evaluated(
+    path: Path, params: Mapping[str, Any] | None, model: str | None, root: str | os.PathLike[str] | None
+) -> tuple[Scene, Evaluation]:
+    found = Diagnostics()
+    try:
+        source = read_source(path, os.fspath(path))
+    except Unreadable as error:
+        found.add(error.code, f"cannot read `{path.name}`: {error}", None)
+        raise SceneError(found) from None
+    tree = parse(source, found)
+    evaluation = Evaluation(tree, diagnostics=found, defines=params, model=model, root=root, path=path)
+    scene, _ = evaluation.run(0)
+    if scene is None or found.errors:
+        raise SceneError(found)
+    return scene, evaluation

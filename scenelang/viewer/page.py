@@ -1,0 +1,81 @@
+"""The page: a view and all that draws it in one HTML file, which asks for nothing else."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+import unicodedata
+from html import escape
+from importlib.metadata import version
+from typing import Any, Final
+
+from scenelang.viewer.script import script, web
+from scenelang.viewer.view import View
+
+MOST_TITLE: Final = 200
+_POLICY: Final = (
+    "default-src 'none'; script-src '{script}'; style-src '{style}'; img-src data: blob:; "
+    "base-uri 'none'; form-action 'none'"
+)
+_SLOT: Final = re.compile(r"\[\[(\w+)\]\]")
+_INERT: Final = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
+
+
+def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
+    """An HTML file that draws a view; nothing in it comes from elsewhere, and its policy allows nothing to.
+
+    Args:
+        view: what it shows.
+        still: a PNG for browsers without WebGL2 or JavaScript.
+        embedded: leave out heading, sources and licences, for a frame in another page.
+    """
+    data = view.data
+    width, height = data["canvas"]
+    rows = 3 * len(data["params"]) + 3 * bool(data["animation"]) + 4 * (data["dimension"] == 3)
+    sizes = f":root{{--aspect:{width / height:.6f};--controls:{rows}rem}}\n"
+    style = sizes + web("controls.css") + web("page.css")
+    code = f"{script()}\nopenPage();\n"
+    alt = escape(plain(data["alt"]))
+    drawn = base64.b64encode(still).decode()
+    image = '<i id="still"></i>'
+    if still:
+        image = f'<img id="still" src="data:image/png;base64,{drawn}" alt="{alt}">'
+    parts = {
+        "policy": escape(_POLICY.format(script=_digest(code), style=_digest(style))),
+        "version": escape(version("scenelang")),
+        "title": escape(plain(data["title"])[:MOST_TITLE] or "scene"),
+        "style": style,
+        "kind": "embedded" if embedded else "whole",
+        "still": image,
+        "width": str(width),
+        "height": str(height),
+        "alt": alt,
+        "model": told(data["model"]),
+        "view": view.message().translate(_INERT),
+        "script": code,
+    }
+    return _SLOT.sub(lambda slot: parts[slot[1]], web("page.html"))
+
+
+def plain(text: str) -> str:
+    """A text whose controls, marks of direction among them, are written out, such as ⟨U+202E⟩."""
+    hidden = ("Cc", "Cf", "Cs", "Co", "Zl", "Zp")
+    return "".join(f"⟨U+{ord(c):04X}⟩" if unicodedata.category(c) in hidden else c for c in text)
+
+
+def told(model: dict[str, Any]) -> str:
+    """What the page says of its model, as HTML."""
+    name, summary = (f"<bdi>{escape(plain(model[key]))}</bdi>" for key in ("name", "summary"))
+    line = f"Drawn by the neural network {name} ({summary})"
+    figures = model.get("measured") or {}
+    if "flip" in figures:
+        line += (
+            f", which on {figures['scenes']} random scenes was {figures['psnr']:.1f} dB (PSNR, counted up to "
+            f"{figures['cap']:g}) and {figures['flip']:.4f} (mean FLIP) from the exact picture"
+        )
+    return f"{line}."
+
+
+def _digest(text: str) -> str:
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"

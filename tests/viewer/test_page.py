@@ -1,0 +1,145 @@
+"""The page as text: whole, inert whatever a scene's author wrote, and what it says."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import io
+import json
+import re
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+import scenelang as nsg
+from scenelang.viewer.describe import alternative, colour_name
+from scenelang.viewer.export import still
+from scenelang.viewer.page import page, plain
+from scenelang.viewer.script import MODULES, script, web
+from scenelang.viewer.view import view_of
+
+ODD = "</script><script>alert(1)</script><!-- ]]> [[script]] \u202e\u2066 & \" ' \u2028 \ud800"
+
+
+def test_the_policy_allows_the_pages_own_script_and_style_alone(tmp_path: Path) -> None:
+    nsg.export(nsg.loads("star;"), tmp_path / "a.html")
+    text = (tmp_path / "a.html").read_text("utf-8")
+    policy = html.unescape(re.search(r'Security-Policy" content="([^"]*)"', text)[1])  # type: ignore[index]
+    rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
+    for tag, rule in (('script type="module"', "script-src"), ("style", "style-src")):
+        inside = re.search(rf"<{tag}>(.*?)</{tag.split()[0]}>", text, re.DOTALL)[1]  # type: ignore[index]
+        digest = base64.b64encode(hashlib.sha256(inside.encode()).digest()).decode()
+        assert rules[rule] == f"'sha256-{digest}'"
+    assert rules["default-src"] == rules["base-uri"] == rules["form-action"] == "'none'"
+    assert rules["img-src"] == "data: blob:"
+    assert not re.search(r"\bsrc=(?!\"data:)|\bhref=(?!\"data:)|https?://|url\(|@import", text)
+    assert not re.search(r"\son\w+=|style=", text.partition("<script")[0])
+
+
+def test_what_an_author_wrote_is_inert() -> None:
+    view = view_of(nsg.compile(nsg.loads("star;")), title=ODD, source=[(ODD, ODD)])
+    text = page(view)
+    assert len(re.findall("<script", text)) == len(re.findall("</script", text)) == 2
+    assert "<!--" not in text
+    assert not re.search("[\u202a-\u202e\u2066-\u2069\u2028\ud800]", text)
+    assert "⟨U+202E⟩" in text
+    held = re.search(r'<script type="application/json" id="view">(.*?)</script>', text, re.DOTALL)
+    assert held is not None
+    assert json.loads(held[1])["source"] == [{"name": ODD, "text": ODD}]
+    text.replace("\ud800", "").encode()
+
+
+def test_names_of_scripts_differ() -> None:
+    """They share one scope, where a second function of a name would silently replace the first."""
+    names = [
+        name
+        for module in MODULES
+        for name in re.findall(
+            r"^(?:export )?(?:async )?(?:const|let|function\*?|class) (\w+)",
+            web(f"{module}.js"),
+            re.MULTILINE,
+        )
+    ]
+    assert sorted(names) == sorted(set(names))
+    assert not re.search(r"^\s*(import|export)\b|</script|<!--", script(), re.MULTILINE)
+    assert not re.search(
+        r"\beval\(|new Function|innerHTML|outerHTML|insertAdjacentHTML|document\.write", script()
+    )
+
+
+@pytest.mark.parametrize(
+    ("rgb", "name"),
+    [
+        ((1, 0, 0), "red"),
+        ((0.5, 0.5, 0.5), "grey"),
+        ((1, 1, 1), "white"),
+        ((0, 0, 0), "black"),
+        ((0.1, 0.2, 0.9), "blue"),
+        ((0.55, 0.27, 0.07), "brown"),
+        ((0.7, 0.9, 0.7), "light green"),
+        ((0, 0.2, 0), "dark green"),
+    ],
+)
+def test_colours_have_names(rgb: tuple[float, float, float], name: str) -> None:
+    assert colour_name(rgb) == name
+
+
+def test_a_picture_in_words() -> None:
+    data = view_of(
+        nsg.compile(
+            nsg.loads("background(#fff); square; subtract { star; } star { material flat { color(#00f); } }")
+        )
+    ).data
+    assert "square" in alternative(data)
+    told = alternative(data)
+    assert told.startswith("A picture of a s")
+    assert "blue" in told
+    assert told.endswith("on white.")
+    solid = nsg.compile(
+        nsg.loads("sphere { material diffuse { color(#f00); } } torus { translate(2, 0, 0); }")
+    )
+    assert alternative(view_of(solid).data).startswith("A 3D scene of a sphere and a torus, in red")
+    empty = nsg.compile(nsg.loads('model "shapes2d"; background(none);'))
+    assert alternative(view_of(empty).data) == "An empty picture."
+    moving = {**data, "animation": {"seconds": 4.0, "loop": True}}
+    assert alternative(moving).endswith("It moves for 4 seconds, over and over.")
+
+
+def test_stills_are_small_pictures() -> None:
+    program = nsg.compile(nsg.loads("canvas(600, 400); background(none); star { scale(0.5); }"))
+    data = still(program)
+    with Image.open(io.BytesIO(data)) as image:
+        assert (image.format, image.size) == ("PNG", (256, 171))
+        assert image.convert("RGBA").getpixel((0, 0))[3] == 0  # type: ignore[index]
+    assert len(data) < 4000
+
+
+def test_controls_are_written_out() -> None:
+    assert plain("a\u202eb\n\U0001f600é\x00") == "a⟨U+202E⟩b⟨U+000A⟩\U0001f600é⟨U+0000⟩"
+
+
+def test_export_refuses_what_has_no_meaning(tmp_path: Path) -> None:
+    program, out = nsg.compile(nsg.loads("star;")), tmp_path / "a.html"
+    for arguments in ({"params": {"k": 1}}, {"root": tmp_path}, {"size": (9, 9)}, {"model": "shapes2d"}):
+        with pytest.raises(ValueError, match="are for"):
+            nsg.export(program, out, **arguments)  # type: ignore[arg-type]
+    (tmp_path / "a.nsg").write_text("circle;")
+    with pytest.raises(nsg.SceneError):
+        nsg.export(tmp_path / "a.nsg", out)
+    with pytest.raises(OSError, match="none"):
+        nsg.export(tmp_path / "none.nsg", out)
+    assert not out.exists()
+
+
+def test_sources_are_named_from_the_scenes_folder(tmp_path: Path) -> None:
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib/dots.nsg").write_text("module dot() { star; }")
+    (tmp_path / "a.nsg").write_text('import "lib/dots.nsg" as dots; import "std/shapes" as s; dots.dot();')
+    nsg.export(tmp_path / "a.nsg", tmp_path / "a.html", size=(64, 32))
+    text = (tmp_path / "a.html").read_text("utf-8")
+    data = json.loads(re.search(r'id="view">(.*?)</script>', text, re.DOTALL)[1])  # type: ignore[index]
+    assert [one["name"] for one in data["source"]] == ["a.nsg", "lib/dots.nsg"]
+    assert str(tmp_path) not in text
+    assert data["canvas"] == [64, 32]
