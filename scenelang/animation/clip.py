@@ -77,6 +77,7 @@ class Clip:
         size: canvas in pixels, instead of the scene's.
         fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
             seconds × fps frames, and t and u follow.
+        texts: what imported files hold, by their resolved paths, instead of what is on the disk.
         reuse: keep what frames share; without it each frame is worked out by itself.
     """
 
@@ -91,6 +92,7 @@ class Clip:
         root: Path | None = None,
         size: tuple[int, int] | None = None,
         fps: float | None = None,
+        texts: Mapping[Path, str] | None = None,
         reuse: bool = True,
     ) -> None:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
@@ -106,6 +108,7 @@ class Clip:
                 root=root,
                 path=path,
                 fps=fps,
+                texts=texts,
                 replays=reuse,
             )
         )
