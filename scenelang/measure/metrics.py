@@ -91,12 +91,17 @@ def compare(picture: Array, reference: Array) -> dict[str, float]:
 # ---------------------------------------------------------------- side by side
 
 
-def side_by_side(picture: Array, reference: Array, label: str) -> Image:
-    """Network, reference and FLIP map in a row, with a line of text above (H + 14, 3 W + 8, 3)."""
+def side_by_side(picture: Array, reference: Array, label: str, *, plain: bool = False) -> Image:
+    """Network, reference and FLIP map in a row, with a line of text above (H + 14, 3 W + 8, 3).
+
+    Args:
+        plain: instead of the map, which needs the extra ``eval``, eight times how far each channel is off.
+    """
+    far = ("8 × difference", np.clip(8 * np.abs(picture - reference), 0, 1)) if plain else None
     parts = [
         ("network", picture),
         ("reference", reference),
-        ("FLIP", flip_map(picture, reference, magma=True)),
+        far or ("FLIP", flip_map(picture, reference, magma=True)),
     ]
     height, width = reference.shape[:2]
     sheet = pillow.new("RGB", (3 * width + 2 * GAP, height + TEXT), "white")
