@@ -1,0 +1,54 @@
+"""``scenelang play``: a page of this machine that edits scenes and shows them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from scenelang.cli.main import Trouble
+
+_PARTS = ("starlette", "uvicorn", "websockets", "watchfiles", "pygls", "lsprotocol")
+
+
+@click.command("play")
+@click.argument("path", default=".", metavar="[SCENE | FOLDER]", type=click.Path(path_type=Path))
+@click.option("--port", type=click.IntRange(1, 65535), metavar="N", help="By default 8766 or a free one.")
+@click.option("--host", default="127.0.0.1", metavar="H", help="Address to listen on; others can reach some.")
+@click.option("--no-browser", is_flag=True, help="Only print the address.")
+@click.option(
+    "--root",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    help="Folder that imports cannot leave; by default each scene's.",
+)
+def command(path: Path, port: int | None, host: str, no_browser: bool, root: Path | None) -> None:
+    """Edit scenes in a browser and see them while typing.
+
+    Opens a page with the scenes of a folder, by default this one. Nobody else reaches it: it listens to this
+    machine alone, and its address holds a token. Ctrl-C ends it, with exit code 130.
+    """
+    try:
+        from scenelang.play.app import Play
+        from scenelang.play.folder import Folder, fits
+        from scenelang.play.guard import is_loopback
+        from scenelang.play.serve import serve
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in _PARTS:
+            raise
+        raise Trouble(f"play needs {error.name}: pip install 'scenelang[play]'") from None
+    first = None
+    if path.is_file():
+        path, first = path.parent, path.name
+        if not fits(first):
+            raise click.UsageError(f"`{first}` is not the name of a scene, such as scene.nsg.")
+    elif not path.is_dir():
+        raise click.UsageError(f"there is neither a scene nor a folder `{path}`.")
+    if not is_loopback(host):
+        click.echo(
+            f"Warning: other machines reach {host}. Who gets hold of the address below, which is sent "
+            "unencrypted, can read and change the scenes of this folder and have this machine draw.",
+            err=True,
+        )
+    folder = Folder(path, root)
+    click.echo(f"Scenes of {folder.path}; Ctrl-C ends it.")
+    serve(Play(folder, first), host, port, browser=not no_browser, say=click.echo)

@@ -1,0 +1,313 @@
+"""What a process does for the page: views, pictures, figures and files, of a text that may not be saved yet.
+
+A job is JSON data: ``do`` (one of `DO`), ``path`` and ``name`` of the scene, its ``text``, ``texts`` of
+others by their paths, ``root``, ``params``, ``frame``, ``size``, and ``message``, to which the answer's data
+adds what was found.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from scenelang.animation.clip import Clip, Shot
+from scenelang.animation.painting import Drawable, Painter
+from scenelang.animation.run import Progress, make
+from scenelang.animation.store import frame_key
+from scenelang.animation.targets import find_target
+from scenelang.backend.options import RenderError
+from scenelang.backend.render import draw_exact
+from scenelang.backend.small import draw_small
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import Evaluation
+from scenelang.graph.nodes import Graph, Leaf, nodes
+from scenelang.image import Image
+from scenelang.measure.metrics import flip, over_white, psnr, side_by_side, ssim
+from scenelang.models.manifest import load_manifest
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import Program, ProgramError
+from scenelang.renderers.draw import Kept
+from scenelang.syntax import parse
+from scenelang.viewer.export import scene_view, still
+from scenelang.viewer.page import page
+from scenelang.viewer.view import View
+
+MOST_PIXELS: Final = 1 << 24
+MOST_TOLD: Final = 100  # problems of a scene
+_BY_NUMPY: Final = ("framed", "solid")  # renderers
+_KEPT: Final = Kept()
+_EXACT: dict[str, Image] = {}  # the last exact picture, by what it shows
+
+Job = dict[str, Any]
+Tell = Callable[[float], None]
+Done = tuple[dict[str, Any], bytes]
+
+
+class Trouble(Exception):
+    """A job that cannot be done; the message says why."""
+
+
+def do(job: Job, tell: Tell) -> Done:
+    """Do a job: a head, and the data that it is about; raises `Trouble`."""
+    try:
+        return DO[job["do"]](job, tell)
+    except SceneError as error:
+        first = error.diagnostics[0].message if error.diagnostics else "the scene has errors"
+        raise Trouble(first) from None
+    except (RenderError, ProgramError, ValueError) as error:
+        raise Trouble(str(error)) from None
+    except FileNotFoundError as error:
+        raise Trouble(f"there is no file {error.filename}") from None
+
+
+def warm() -> None:
+    """Load what the first job would otherwise wait for."""
+    _draw(Clip(SourceFile("", "square;"), size=(32, 32)), 0)
+
+
+# ---------------------------------------------------------------- views
+
+
+def _view(job: Job, tell: Tell) -> Done:
+    """The scene for the page's own shader, and what is wrong with it."""
+    started = time.perf_counter()
+    found = Diagnostics()
+    shown: View | None = None
+    evaluation = _evaluated(job, found)
+    try:
+        shown = _viewed(job, evaluation, found)[0]
+    except SceneError:
+        pass  # its diagnostics are `found`
+    except (ProgramError, FileNotFoundError) as error:
+        found.add("E0508", str(error), None)
+    data = {
+        **job["message"],
+        "view": shown and shown.message(),
+        "problems": [_problem(d) for d in found.items[:MOST_TOLD]],
+        "ms": _since(started),
+    }
+    return {"is": "done", "wanted": [str(path) for path in evaluation.wanted]}, _json(data)
+
+
+def _evaluated(job: Job, found: Diagnostics) -> Evaluation:
+    return Evaluation(
+        parse(SourceFile(job["path"], job["text"]), found),
+        diagnostics=found,
+        defines=job["params"],
+        path=Path(job["path"]),
+        root=job["root"],
+        texts=_texts(job),
+    )
+
+
+def _viewed(job: Job, evaluation: Evaluation, found: Diagnostics) -> tuple[View, Program]:
+    scene, spans = evaluation.run(0)
+    if scene is None or found.errors:
+        raise SceneError(found)
+    if job["size"] is not None:
+        scene = scene.sized((job["size"][0], job["size"][1]))
+    program = compile_scene(scene, spans=spans, diagnostics=found)
+    return scene_view(program, scene, evaluation, title=Path(job["name"]).stem), program
+
+
+def _problem(found: Diagnostic) -> dict[str, Any]:
+    line, column = found.span.source.position(found.span.start) if found.span is not None else (1, 1)
+    here = {"code": found.code, "severity": found.severity, "message": found.message}
+    return {**here, "line": line, "column": column}
+
+
+# ---------------------------------------------------------------- pictures
+
+
+def _network(job: Job, tell: Tell) -> Done:
+    clip = _clip(job)
+    image, ms = _draw(clip, job["frame"], tell)
+    return _picture(job, image, ms)
+
+
+def _reference(job: Job, tell: Tell) -> Done:
+    started = time.perf_counter()
+    image = _exact(job, _clip(job))
+    return _picture(job, image, {"draw": _since(started)})
+
+
+def _difference(job: Job, tell: Tell) -> Done:
+    clip = _clip(job)
+    drawn, ms = _draw(clip, job["frame"])
+    picture, exact = over_white(drawn), over_white(_exact(job, clip))
+    figures = _figures_of(picture, exact)
+    text = f"PSNR {figures['psnr']:.2f} dB"
+    if figures["flip"] is not None:
+        text += f"  FLIP {figures['flip']:.4f}"
+    return _picture(job, side_by_side(picture, exact, text, plain=figures["flip"] is None), ms, **figures)
+
+
+def _figures(job: Job, tell: Tell) -> Done:
+    started = time.perf_counter()
+    clip = _clip(job)
+    shot = _shot(clip, job["frame"])
+    objects = 0
+
+    def count(stage: str, graph: Graph) -> None:
+        nonlocal objects
+        if stage == "lower":
+            objects = sum(isinstance(node, Leaf) for node in nodes(graph.root))
+
+    program = compile_scene(shot.scene, spans=shot.spans, after=count)
+    compiled = _since(started)
+    drawn, ms = _draw(clip, job["frame"])
+    started = time.perf_counter()
+    exact = _exact(job, clip)
+    data = {
+        "model": program.model,
+        "objects": objects,
+        "rows": len(program),
+        "canvas": program.canvas,
+        "ms": {**ms, "compile": compiled, "exact": _since(started)},
+        **_figures_of(over_white(drawn), over_white(exact)),
+    }
+    return {"is": "done"}, _json({**job["message"], **data})
+
+
+def _figures_of(picture: np.ndarray, exact: np.ndarray) -> dict[str, float | None]:
+    """PSNR, SSIM and FLIP; None where the package that measures it is missing."""
+    found: dict[str, float | None] = {"psnr": round(psnr(picture, exact), 2)}
+    for name, measure in (("ssim", ssim), ("flip", flip)):
+        try:
+            found[name] = round(measure(picture, exact), 5)
+        except (ImportError, OSError):  # torch's libraries may not fit the memory
+            found[name] = None
+    return found
+
+
+def _draw(clip: Clip, frame: int, tell: Tell | None = None) -> tuple[Image, dict[str, float]]:
+    """The network's picture of a frame, and milliseconds by stage."""
+    started = time.perf_counter()
+    program = clip.program(_shot(clip, frame))
+    ms = {"compile": _since(started)}
+    started = time.perf_counter()
+    image = _by_network(program, tell)
+    return image, {**ms, "draw": _since(started)}
+
+
+def _by_network(program: Program, tell: Tell | None) -> Image:
+    _check_size(program.canvas)
+    if load_manifest(program.model).renderer in _BY_NUMPY:
+        return draw_small(program, kept=_KEPT, progress=tell).image
+    from scenelang.animation.painting import paint
+
+    return paint(program, "cpu", threads=1, split=1, kept=None, progress=tell)
+
+
+def _exact(job: Job, clip: Clip) -> Image:
+    """The exact picture; the last one is kept, for figures and differences of it."""
+    shot = _shot(clip, job["frame"])
+    _check_size(shot.scene.canvas)
+    key = f"{clip.model} {shot.scene.to_json()}"
+    if key not in _EXACT:
+        image = draw_exact(shot.scene, spans=shot.spans, model=clip.model)
+        _EXACT.clear()
+        _EXACT[key] = image
+    return _EXACT[key]
+
+
+def _picture(job: Job, image: Image, ms: dict[str, float], **facts: Any) -> Done:
+    started = time.perf_counter()
+    data = io.BytesIO()
+    image.to_pil().save(data, "PNG", compress_level=1)  # a third of the time for a tenth more bytes
+    png = base64.b64encode(data.getvalue()).decode()
+    size = [image.shape[1], image.shape[0]]
+    told = {**job["message"], "png": png, "size": size, "ms": {**ms, "encode": _since(started)}, **facts}
+    return {"is": "done"}, _json(told)
+
+
+# ---------------------------------------------------------------- files
+
+
+class _ByNumpy(Painter):
+    """Draws frames as single pictures are drawn here: without torch."""
+
+    def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
+        program = self.clip.program(shot)
+        if load_manifest(program.model).renderer not in _BY_NUMPY:
+            return super().prepare(shot, single=single)
+        return Drawable(shot.number, frame_key("play", program.digest()), shot, program, small=True)
+
+
+def _file(job: Job, tell: Tell) -> Done:
+    kind = job["as"]
+    clip = _clip(job)
+    if kind == "png":
+        image = _by_network(clip.program(_shot(clip, job["frame"])), tell)
+        return {"is": "done"}, image.encode()
+    if kind == "html":
+        found = Diagnostics()
+        view, program = _viewed(job, _evaluated(job, found), found)
+        return {"is": "done"}, page(view, still=still(program)).encode()
+    _check_size(clip.first.scene.canvas)
+
+    def said(progress: Progress) -> None:
+        share = progress.done / max(1.0, progress.total)
+        tell(0.9 * share if progress.stage == "drawing" else 0.9 + 0.1 * share)
+
+    with tempfile.TemporaryDirectory() as folder:
+        target = find_target(str(Path(folder, f"film.{kind}")), "film")
+        made = make(_ByNumpy(clip), target, range(clip.frames), jobs=1, progress=said)
+        return {"is": "done"}, made.files[0].read_bytes()
+
+
+# ---------------------------------------------------------------- what all need
+
+
+def _clip(job: Job) -> Clip:
+    return Clip(
+        SourceFile(job["name"], job["text"]),
+        path=Path(job["path"]),
+        defines=job["params"],
+        root=None if job["root"] is None else Path(job["root"]),
+        size=None if job["size"] is None else (job["size"][0], job["size"][1]),
+        texts=_texts(job),
+    )
+
+
+def _texts(job: Job) -> dict[Path, str]:
+    return {Path(path): text for path, text in job["texts"].items()}
+
+
+def _shot(clip: Clip, frame: int) -> Shot:
+    """A frame, or the last one where the animation has become shorter."""
+    return clip.first if frame == 0 else clip.shot(min(frame, clip.frames - 1))
+
+
+def _check_size(canvas: tuple[int, int]) -> None:
+    if canvas[0] * canvas[1] > MOST_PIXELS:
+        size = f"{canvas[0]} × {canvas[1]}"
+        raise Trouble(f"a canvas of {size}; pictures have at most {MOST_PIXELS:,} pixels here")
+
+
+def _json(data: dict[str, Any]) -> bytes:
+    return json.dumps(data, separators=(",", ":"), allow_nan=False).encode()
+
+
+def _since(started: float) -> float:
+    return round(1000 * (time.perf_counter() - started), 2)
+
+
+DO: Final[dict[str, Callable[[Job, Tell], Done]]] = {
+    "view": _view,
+    "network": _network,
+    "reference": _reference,
+    "difference": _difference,
+    "figures": _figures,
+    "file": _file,
+}

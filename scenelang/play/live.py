@@ -1,0 +1,350 @@
+"""One page that is open: what it says, and what it is told. `scenelang.play` has the messages."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from scenelang.files import read_json
+from scenelang.play.folder import Changed, Refused
+from scenelang.play.messages import Json, id_of, string_of, text_of, whole_of, wishes
+from scenelang.play.pool import Answer, JobFailed, Pool
+
+if TYPE_CHECKING:
+    from scenelang.play.app import Play
+
+log = logging.getLogger("scenelang.play")
+LIMITS_S: Final = {"view": 20.0, "network": 60.0, "reference": 300.0, "difference": 300.0, "figures": 300.0}
+FILES: Final = {
+    "png": "image/png",
+    "gif": "image/gif",
+    "webp": "image/webp",
+    "apng": "image/apng",
+    "html": "text/html",
+    "nsg": "text/plain",
+}
+FILE_S: Final = 3600.0
+KEEP_S: Final = 0.5  # between two keepings of an unsaved text
+MOST_WAITING: Final = 200  # messages for a page that does not read
+MOST_OPEN: Final = 100
+
+
+class Open:
+    """A file that the page shows."""
+
+    def __init__(self, path: Path, text: str, disk: str | None) -> None:
+        self.path = path
+        self.text, self.version = text, 0  # of the page
+        self.saved, self.disk = text, disk  # what the file held when the page was last told
+        self.wanted: frozenset[Path] = frozenset()  # files that it imports
+        self.keeping: asyncio.TimerHandle | None = None
+
+
+class Live:
+    """A page's connection."""
+
+    def __init__(self, play: Play, socket: WebSocket) -> None:
+        self._play, self._socket = play, socket
+        self.open: dict[str, Open] = {}
+        self._out: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
+        self._jobs: dict[tuple[str, str], tuple[asyncio.Task[None], Any, str]] = {}
+
+    async def run(self) -> None:
+        """Answer the page until it is gone."""
+        await self._socket.accept()
+        writes = asyncio.create_task(self._write())
+        reads = asyncio.create_task(self._read())
+        try:
+            self.tell(await self._play.files())
+            await asyncio.wait([reads, writes], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in (reads, writes, *(task for task, _, _ in self._jobs.values())):
+                task.cancel()
+            for name in list(self.open):
+                self._keep(name)
+            with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+                await self._socket.close()
+
+    def tell(self, message: Json | str) -> None:
+        """Send a message as soon as those before are sent; a page that does not read is given up."""
+        try:
+            self._out.put_nowait(message if isinstance(message, str) else json.dumps(message))
+        except asyncio.QueueFull:
+            for task, _, _ in self._jobs.values():
+                task.cancel()
+            while not self._out.empty():
+                self._out.get_nowait()
+            self._out.put_nowait("")
+
+    async def _write(self) -> None:
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            while text := await self._out.get():
+                await self._socket.send_text(text)
+
+    async def _read(self) -> None:
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError, KeyError):  # KeyError: bytes, not text
+            while True:
+                text = await self._socket.receive_text()
+                message: Json = {}
+                try:
+                    given = read_json(text.encode("utf-8"))
+                    message = given if isinstance(given, dict) else {}
+                    await self._answer(message)
+                except (Refused, OSError) as error:
+                    self._trouble(message, str(error))
+                except (ValueError, TypeError, KeyError, RecursionError) as error:
+                    self._trouble(message, f"not a message: {error}")
+
+    def _trouble(self, message: Json, why: str) -> None:
+        id, file = message.get("id"), message.get("file")
+        id = id if isinstance(id, int | str | None) else None
+        self.tell(
+            {"kind": "error", "id": id, "file": file if isinstance(file, str) else None, "message": why}
+        )
+
+    async def _answer(self, message: Json) -> None:
+        kind = string_of(message, "kind")
+        if kind not in _ANSWERS:
+            raise ValueError(f"unknown kind `{kind[:40]}`")
+        await _ANSWERS[kind](self, message)
+
+    # ------------------------------------------------------------ texts
+
+    async def _open(self, message: Json) -> None:
+        name = string_of(message, "file")
+        path = self._play.folder.place(name)
+        if name not in self.open and len(self.open) >= MOST_OPEN:
+            raise Refused(f"more than {MOST_OPEN} open files")
+        text, disk = await asyncio.to_thread(self._play.folder.read, name)
+        kept = await asyncio.to_thread(self._play.journal.find, path)
+        known = self.open.get(name)
+        if known is None:
+            known = self.open[name] = Open(path, text or "", disk)
+        unsaved = None
+        if kept is not None and kept.text != text:
+            unsaved = {"text": kept.text, "disk": kept.disk, "seconds": kept.seconds}
+        known.saved, known.disk = text or "", disk
+        if not known.version:
+            known.text = text or ""
+        said = {"file": name, "text": text, "version": known.version, "disk": disk}
+        self.tell({"kind": "text", **said, "origin": "open", "unsaved": unsaved})
+        self._view(name)
+
+    async def _edit(self, message: Json) -> None:
+        name, known = self._known(message)
+        known.text, known.version = text_of(message), whole_of(message, "version", 1, 1 << 53)
+        self._cancel(lambda slot, id, file: file == name and slot[0] != "file")
+        if known.keeping is None:
+            known.keeping = asyncio.get_running_loop().call_later(KEEP_S, self._keep_later, name)
+        for other in [name, *(k for k, o in self.open.items() if known.path in o.wanted)]:
+            self._view(other)
+
+    async def _save(self, message: Json) -> None:
+        name, known = self._known(message)
+        base = message.get("base")
+        if not isinstance(base, str | None):
+            raise ValueError("`base` is neither a text nor null")
+        text, version = text_of(message), whole_of(message, "version", 0, 1 << 53)
+        said = {"file": name, "version": version}
+        try:
+            # the page is not told of what it has written itself
+            disk = await self._play.write(name, text, base, self)
+        except Changed as change:
+            self.tell({"kind": "conflict", **said, "text": change.text, "disk": change.disk})
+            return
+        known.saved, known.disk = text, disk
+        self._keep(name)
+        self.tell({"kind": "saved", **said, "disk": disk})
+
+    async def _discard(self, message: Json) -> None:
+        name, known = self._known(message)
+        self._unkeep(known)
+        known.text = known.saved
+        await asyncio.to_thread(self._play.journal.drop, known.path)
+        self._view(name)
+
+    async def _close(self, message: Json) -> None:
+        name, _ = self._known(message)
+        self._keep(name)
+        self._cancel(lambda slot, id, file: file == name)
+        del self.open[name]
+
+    async def _rename(self, message: Json) -> None:
+        name, to = string_of(message, "file"), string_of(message, "to")
+        await asyncio.to_thread(self._play.folder.rename, name, to)
+        if (known := self.open.pop(name, None)) is not None:
+            self._unkeep(known)
+            self._play.journal.drop(known.path)
+            known.path = self._play.folder.place(to)
+            self.open[to] = known
+            self._keep(to)
+        await self._play.refresh()
+
+    def _known(self, message: Json) -> tuple[str, Open]:
+        name = string_of(message, "file")
+        if name not in self.open:
+            raise Refused(f"`{name[:80]}` is not open")
+        return name, self.open[name]
+
+    def _keep_later(self, name: str) -> None:
+        known = self.open.get(name)
+        if known is not None:
+            known.keeping = None
+            self._play.later(
+                asyncio.to_thread(self._play.keep, known.path, known.text, known.saved, known.disk)
+            )
+
+    def _keep(self, name: str) -> None:
+        """Keep what is not saved of a file, now."""
+        known = self.open[name]
+        self._unkeep(known)
+        if known.version:
+            self._play.keep(known.path, known.text, known.saved, known.disk)
+
+    def _unkeep(self, known: Open) -> None:
+        if known.keeping is not None:
+            known.keeping.cancel()
+            known.keeping = None
+
+    def changed(self, name: str, text: str | None, disk: str | None) -> None:
+        """Tell the page that a file of its is another one on the disk."""
+        known = self.open.get(name)
+        if known is None or known.disk == disk:
+            return
+        clean = known.text == known.saved
+        known.saved, known.disk = text or "", disk
+        said = {"file": name, "text": text, "version": known.version, "disk": disk}
+        self.tell({"kind": "text", **said, "origin": "disk", "unsaved": None})
+        if clean:
+            known.text = known.saved
+            self._view(name)
+
+    def imported(self, path: Path) -> None:
+        """Show again what imports a file that has changed."""
+        for name, known in self.open.items():
+            if path in known.wanted:
+                self._view(name)
+
+    # ------------------------------------------------------------ jobs
+
+    def _view(self, name: str) -> None:
+        version = self.open[name].version
+
+        def found(answer: Answer) -> None:
+            known = self.open.get(name)
+            if known is not None:
+                known.wanted = frozenset(map(Path, answer.head["wanted"]))
+
+        message = {"kind": "view", "file": name, "version": version}
+        self._start(("view", name), None, name, {"do": "view", "message": message}, self._play.quick, found)
+
+    async def _draw(self, message: Json) -> None:
+        name, known = self._known(message)
+        id, by = id_of(message), string_of(message, "by")
+        if by not in LIMITS_S or by == "view":
+            raise ValueError(f"`by` is `{by[:40]}`")
+        said = {"kind": "figures" if by == "figures" else "picture", "id": id, "file": name}
+        said |= {"version": known.version, "by": by}
+        job = {"do": by, "message": said, **wishes(message)}
+        self._start((by, ""), id, name, job, self._play.quick if by == "network" else self._play.slow)
+
+    async def _download(self, message: Json) -> None:
+        name, known = self._known(message)
+        id, kind = id_of(message), string_of(message, "as")
+        if kind not in FILES:
+            raise ValueError(f"`as` is `{kind[:40]}`")
+        stem = Path(name).name.removesuffix("nsg") + ("png" if kind == "apng" else kind)
+
+        def made(answer: Answer) -> None:
+            key = self._play.store.put(stem, FILES[kind], answer.data)
+            url = f"download?key={key}"
+            self.tell({"kind": "ready", "id": id, "url": url, "name": stem, "bytes": len(answer.data)})
+
+        if kind == "nsg":
+            made(Answer({}, known.text.encode()))
+            return
+        job = {"do": "file", "as": kind, "message": {}, **wishes(message)}
+        self._start(("file", str(id)), id, name, job, self._play.slow, made)
+
+    async def _stop(self, message: Json) -> None:
+        wanted = id_of(message)
+        self._cancel(lambda slot, id, file: id == wanted)
+
+    def _cancel(self, wanted: Callable[[tuple[str, str], Any, str], bool]) -> None:
+        for slot, (task, id, file) in list(self._jobs.items()):
+            if slot[0] != "view" and wanted(slot, id, file):
+                task.cancel()
+
+    def _start(
+        self,
+        slot: tuple[str, str],
+        id: Any,
+        name: str,
+        job: Json,
+        pool: Pool,
+        done: Callable[[Answer], None] | None = None,
+    ) -> None:
+        """Do a job; the one that has its slot is cancelled."""
+        if slot in self._jobs:
+            self._jobs[slot][0].cancel()
+        elif len(self._jobs) >= MOST_OPEN:
+            raise Refused("too many drawings at the same time")
+        known, folder = self.open[name], self._play.folder
+        job = {"params": {}, "frame": 0, "size": None, **job, "name": name, "text": known.text}
+        job["path"], job["root"] = str(known.path), None if folder.root is None else str(folder.root)
+        job["texts"] = {
+            str(o.path.resolve()): o.text for k, o in self.open.items() if k != name and o.version
+        }
+        task = asyncio.create_task(self._work(id, name, job, pool, done))
+        self._jobs[slot] = task, id, name
+
+        def ended(_: object) -> None:
+            if slot in self._jobs and self._jobs[slot][0] is task:
+                del self._jobs[slot]
+
+        task.add_done_callback(ended)
+
+    async def _work(
+        self, id: Any, name: str, job: Json, pool: Pool, done: Callable[[Answer], None] | None
+    ) -> None:
+        def said(share: float) -> None:
+            self.tell({"kind": "progress", "id": id, "done": round(share, 4)})
+
+        try:
+            limit = LIMITS_S.get(job["do"], FILE_S)
+            answer = await pool.run(job, limit, said if job["do"] == "file" else None)
+        except asyncio.CancelledError:
+            if id is not None:
+                self.tell({"kind": "cancelled", "id": id})
+            raise
+        except JobFailed as error:
+            if job["do"] == "view":
+                problem = {"code": "", "severity": "error", "message": str(error), "line": 1, "column": 1}
+                self.tell({**job["message"], "view": None, "problems": [problem], "ms": None})
+            else:
+                self.tell({"kind": "error", "id": id, "file": name, "message": str(error)})
+            return
+        if done is not None:
+            done(answer)
+        if job["do"] != "file":
+            self.tell(answer.data.decode())
+
+
+_ANSWERS: Final[dict[str, Callable[[Live, Json], Coroutine[Any, Any, None]]]] = {
+    "open": Live._open,
+    "edit": Live._edit,
+    "save": Live._save,
+    "discard": Live._discard,
+    "close": Live._close,
+    "rename": Live._rename,
+    "draw": Live._draw,
+    "download": Live._download,
+    "cancel": Live._stop,
+}
