@@ -6,9 +6,9 @@ import asyncio
 import contextlib
 import json
 import logging
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Collection, Coroutine
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -16,9 +16,7 @@ from scenelang.files import read_json
 from scenelang.play.folder import Changed, Refused
 from scenelang.play.messages import Json, id_of, string_of, text_of, whole_of, wishes
 from scenelang.play.pool import Answer, JobFailed, Pool
-
-if TYPE_CHECKING:
-    from scenelang.play.app import Play
+from scenelang.play.shared import Play
 
 log = logging.getLogger("scenelang.play")
 LIMITS_S: Final = {"view": 20.0, "network": 60.0, "reference": 300.0, "difference": 300.0, "figures": 300.0}
@@ -55,6 +53,11 @@ class Live:
         self.open: dict[str, Open] = {}
         self._out: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
         self._jobs: dict[tuple[str, str], tuple[asyncio.Task[None], Any, str]] = {}
+
+    @property
+    def names(self) -> Collection[str]:
+        """The files that the page shows."""
+        return self.open.keys()
 
     async def run(self) -> None:
         """Answer the page until it is gone."""

@@ -13,8 +13,9 @@ from typing import Final
 
 import uvicorn
 
-from scenelang.play.app import Play
-from scenelang.play.guard import LOCAL, is_loopback
+from scenelang.play.app import make_app
+from scenelang.play.guard import LOCAL, Guard, is_loopback
+from scenelang.play.shared import Play
 
 PORT: Final = 8766
 MOST_MESSAGE: Final = 1 << 25
@@ -65,7 +66,8 @@ def serve(
     with listen(host, port) as listener:
         number = listener.getsockname()[1]
         local = is_loopback(host)
-        guard = play.guarded(token, () if local else (host, socket.gethostname()), anywhere=not local)
+        hosts = () if local else (host, socket.gethostname())
+        guard = Guard(make_app(play), token, hosts, anywhere=not local)
         name = host if local or host not in ("0.0.0.0", "::", "") else LOCAL[1]
         name = f"[{name}]" if ":" in name else name
         config = uvicorn.Config(

@@ -5,14 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from watchfiles import Change, DefaultFilter, awatch
 
 from scenelang.play.folder import Refused
-
-if TYPE_CHECKING:
-    from scenelang.play.app import Play
+from scenelang.play.shared import Play
 
 log = logging.getLogger("scenelang.play")
 STEP_MS: Final = 30  # a change is told once nothing has changed for so long
@@ -52,7 +50,7 @@ async def watch(play: Play, stop: asyncio.Event) -> None:
 async def _tell(play: Play, paths: set[Path]) -> None:
     names = {name for path in paths if (name := play.folder.name_of(path)) is not None}
     for name in names:
-        if any(name in page.open for page in play.pages):
+        if any(name in page.names for page in play.pages):
             await _reread(play, name)
     for page in play.pages:
         for path in paths:

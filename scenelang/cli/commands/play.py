@@ -28,10 +28,10 @@ def command(path: Path, port: int | None, host: str, no_browser: bool, root: Pat
     machine alone, and its address holds a token. Ctrl-C ends it, with exit code 130.
     """
     try:
-        from scenelang.play.app import Play
         from scenelang.play.folder import Folder, fits
         from scenelang.play.guard import is_loopback
         from scenelang.play.serve import serve
+        from scenelang.play.shared import Play
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] not in _PARTS:
             raise
