@@ -15,11 +15,11 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from scenelang.files import read_json
 from scenelang.play.folder import Changed, Refused
 from scenelang.play.messages import Json, id_of, string_of, text_of, whole_of, wishes
-from scenelang.play.pool import Answer, JobFailed, Pool
+from scenelang.play.pool import Answer, Pool
 from scenelang.play.shared import Play
+from scenelang.play.slots import LIMITS_S, Jobs, Slot, Took
 
 log = logging.getLogger("scenelang.play")
-LIMITS_S: Final = {"view": 20.0, "network": 60.0, "reference": 300.0, "difference": 300.0, "figures": 300.0}
 FILES: Final = {
     "png": "image/png",
     "gif": "image/gif",
@@ -28,7 +28,6 @@ FILES: Final = {
     "html": "text/html",
     "nsg": "text/plain",
 }
-FILE_S: Final = 3600.0
 KEEP_S: Final = 0.5  # between two keepings of an unsaved text
 MOST_WAITING: Final = 200  # messages for a page that does not read
 MOST_OPEN: Final = 100
@@ -52,7 +51,7 @@ class Live:
         self._play, self._socket = play, socket
         self.open: dict[str, Open] = {}
         self._out: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
-        self._jobs: dict[tuple[str, str], tuple[asyncio.Task[None], Any, str]] = {}
+        self._jobs = Jobs(self.tell)
 
     @property
     def names(self) -> Collection[str]:
@@ -68,8 +67,9 @@ class Live:
             self.tell(await self._play.files())
             await asyncio.wait([reads, writes], return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for task in (reads, writes, *(task for task, _, _ in self._jobs.values())):
-                task.cancel()
+            reads.cancel()
+            writes.cancel()
+            self._jobs.close()
             for name in list(self.open):
                 self._keep(name)
             with contextlib.suppress(RuntimeError, WebSocketDisconnect):
@@ -80,8 +80,7 @@ class Live:
         try:
             self._out.put_nowait(message if isinstance(message, str) else json.dumps(message))
         except asyncio.QueueFull:
-            for task, _, _ in self._jobs.values():
-                task.cancel()
+            self._jobs.close()
             while not self._out.empty():
                 self._out.get_nowait()
             self._out.put_nowait("")
@@ -143,7 +142,7 @@ class Live:
     async def _edit(self, message: Json) -> None:
         name, known = self._known(message)
         known.text, known.version = text_of(message), whole_of(message, "version", 1, 1 << 53)
-        self._cancel(lambda slot, id, file: file == name and slot[0] != "file")
+        self._jobs.cancel(lambda slot, id, file: file == name and slot[0] not in ("file", "view"))
         if known.keeping is None:
             known.keeping = asyncio.get_running_loop().call_later(KEEP_S, self._keep_later, name)
         for other in [name, *(k for k, o in self.open.items() if known.path in o.wanted)]:
@@ -176,7 +175,7 @@ class Live:
     async def _close(self, message: Json) -> None:
         name, _ = self._known(message)
         self._keep(name)
-        self._cancel(lambda slot, id, file: file == name)
+        self._jobs.cancel(lambda slot, id, file: file == name)
         del self.open[name]
 
     async def _rename(self, message: Json) -> None:
@@ -278,66 +277,17 @@ class Live:
 
     async def _stop(self, message: Json) -> None:
         wanted = id_of(message)
-        self._cancel(lambda slot, id, file: id == wanted)
+        self._jobs.cancel(lambda slot, id, file: id == wanted and id is not None)
 
-    def _cancel(self, wanted: Callable[[tuple[str, str], Any, str], bool]) -> None:
-        for slot, (task, id, file) in list(self._jobs.items()):
-            if slot[0] != "view" and wanted(slot, id, file):
-                task.cancel()
-
-    def _start(
-        self,
-        slot: tuple[str, str],
-        id: Any,
-        name: str,
-        job: Json,
-        pool: Pool,
-        done: Callable[[Answer], None] | None = None,
-    ) -> None:
-        """Do a job; the one that has its slot is cancelled."""
-        if slot in self._jobs:
-            self._jobs[slot][0].cancel()
-        elif len(self._jobs) >= MOST_OPEN:
-            raise Refused("too many drawings at the same time")
-        known, folder = self.open[name], self._play.folder
+    def _start(self, slot: Slot, id: Any, name: str, job: Json, pool: Pool, done: Took | None = None) -> None:
+        """Do a job of a file as the page has it."""
+        known, root = self.open[name], self._play.folder.root
         job = {"params": {}, "frame": 0, "size": None, **job, "name": name, "text": known.text}
-        job["path"], job["root"] = str(known.path), None if folder.root is None else str(folder.root)
+        job["path"], job["root"] = str(known.path), None if root is None else str(root)
         job["texts"] = {
             str(o.path.resolve()): o.text for k, o in self.open.items() if k != name and o.version
         }
-        task = asyncio.create_task(self._work(id, name, job, pool, done))
-        self._jobs[slot] = task, id, name
-
-        def ended(_: object) -> None:
-            if slot in self._jobs and self._jobs[slot][0] is task:
-                del self._jobs[slot]
-
-        task.add_done_callback(ended)
-
-    async def _work(
-        self, id: Any, name: str, job: Json, pool: Pool, done: Callable[[Answer], None] | None
-    ) -> None:
-        def said(share: float) -> None:
-            self.tell({"kind": "progress", "id": id, "done": round(share, 4)})
-
-        try:
-            limit = LIMITS_S.get(job["do"], FILE_S)
-            answer = await pool.run(job, limit, said if job["do"] == "file" else None)
-        except asyncio.CancelledError:
-            if id is not None:
-                self.tell({"kind": "cancelled", "id": id})
-            raise
-        except JobFailed as error:
-            if job["do"] == "view":
-                problem = {"code": "", "severity": "error", "message": str(error), "line": 1, "column": 1}
-                self.tell({**job["message"], "view": None, "problems": [problem], "ms": None})
-            else:
-                self.tell({"kind": "error", "id": id, "file": name, "message": str(error)})
-            return
-        if done is not None:
-            done(answer)
-        if job["do"] != "file":
-            self.tell(answer.data.decode())
+        self._jobs.start(slot, id, name, job, pool, done)
 
 
 _ANSWERS: Final[dict[str, Callable[[Live, Json], Coroutine[Any, Any, None]]]] = {
