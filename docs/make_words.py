@@ -2,16 +2,19 @@
 
 - `grammar/scenelang.tmLanguage.json`, the grammar for VS Code and others;
 - the words of `editors/vim/syntax/nsg.vim`;
+- `scenelang/play/web/words.js`, for the editor of `scenelang play`;
 - the tables of `docs/language.md` between comments that name them.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from pathlib import Path
 
 from scenelang import words
-from scenelang.highlighting import textmate
+from scenelang.highlighting import lexer, textmate
+from scenelang.syntax.tables import tables
 
 ROOT = Path(__file__).parents[1]
 _OR = r"\|"
@@ -67,6 +70,20 @@ def _called(known: Iterable[str]) -> str:
     return rf"/\<\%({_OR.join(known)}\)\>\ze\s*(/"
 
 
+def script() -> str:
+    """The words and terminals as a module of JavaScript."""
+    known = [{"scope": scope, "words": [*texts], "after": after} for texts, after, _, scope in lexer.WORDS]
+    terminals = {name: tables().patterns[name] for name in ("NAME", "NUMBER", "COLOR", "STRING")}
+    signs = sorted(lexer.OPERATORS, key=len, reverse=True)
+    lines = "".join(f"  {json.dumps(entry)},\n" for entry in known)
+    return (
+        "// The words and terminals of the language, written by docs/make_words.py.\n"
+        f"export const WORDS = [\n{lines}];\n"
+        f"export const TERMINALS = {json.dumps(terminals, indent=2, ensure_ascii=False)};\n"
+        f"export const SIGNS = {json.dumps(signs)};\n"
+    )
+
+
 def _between(text: str, start: str, end: str, new: str) -> str:
     """A text with what stands between two lines replaced."""
     head, found, rest = text.partition(f"{start}\n")
@@ -84,7 +101,8 @@ def made() -> dict[Path, str]:
     coloured = _between(
         syntax.read_text("utf-8"), '" Words, written by docs/make_words.py.', '" End of words', vim()
     )
-    return {grammar: textmate.encode(), syntax: coloured, page: text}
+    web = ROOT / "scenelang/play/web/words.js"
+    return {grammar: textmate.encode(), syntax: coloured, web: script(), page: text}
 
 
 def main() -> None:
