@@ -1,18 +1,16 @@
 // What the page of `scenelang play` takes of CodeMirror.
 export {
-  EditorView, keymap, hoverTooltip, showTooltip, closeHoverTooltips, lineNumbers, highlightActiveLine,
-  highlightActiveLineGutter, highlightSpecialChars, drawSelection, dropCursor, rectangularSelection, crosshairCursor,
+  EditorView, keymap, hoverTooltip, showTooltip, lineNumbers, highlightActiveLine, highlightActiveLineGutter,
+  highlightSpecialChars, drawSelection, dropCursor, rectangularSelection, crosshairCursor,
 } from "@codemirror/view";
-export { EditorState, EditorSelection, StateEffect, StateField, Annotation, Transaction, Compartment, Text, Prec }
-  from "@codemirror/state";
+export { EditorState, StateEffect, StateField, Annotation, Text } from "@codemirror/state";
 export {
-  StreamLanguage, HighlightStyle, syntaxHighlighting, bracketMatching, indentOnInput, indentUnit, indentService,
-  foldGutter, foldKeymap, foldService,
+  StreamLanguage, HighlightStyle, syntaxHighlighting, bracketMatching, indentOnInput, indentUnit,
 } from "@codemirror/language";
-export { lintGutter, setDiagnostics, lintKeymap, forEachDiagnostic } from "@codemirror/lint";
+export { lintGutter, setDiagnostics, lintKeymap, nextDiagnostic } from "@codemirror/lint";
 export {
-  autocompletion, closeBrackets, closeBracketsKeymap, completionKeymap, snippet, startCompletion, acceptCompletion,
+  autocompletion, closeBrackets, closeBracketsKeymap, completionKeymap, snippet,
 } from "@codemirror/autocomplete";
-export { defaultKeymap, history, historyKeymap, indentWithTab, isolateHistory, undo, redo } from "@codemirror/commands";
+export { defaultKeymap, history, historyKeymap, indentWithTab, isolateHistory } from "@codemirror/commands";
 export { search, searchKeymap, highlightSelectionMatches } from "@codemirror/search";
 export { tags } from "@lezer/highlight";
