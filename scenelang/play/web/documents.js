@@ -23,6 +23,7 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
   let current = null;
   let folder = "";  // its address
   let wish = null;  // the file to show once it is here
+  let fresh = null;  // {file, text} of one to make
 
   const stateOf = (document) => (document === current ? editor.view.state : document.state);
   const isUnsaved = (document) => document.saved === null || !stateOf(document).doc.eq(document.saved);
@@ -100,6 +101,14 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
     documents.set(file, document);
     server.open(document.uri, state.doc);
     if (wish === file || current === null) show(document);
+    if (fresh?.file === file) {
+      if (text === null) {
+        replace(document, fresh.text);
+        save();
+      } else bars.ask(`back ${file}`, `There is a file ${file} already`, { OK() {} });
+      fresh = null;
+      return;
+    }
     const lost = unsaved ?? kept(document);
     if (!lost || lost.text === (text ?? "")) return;
     replace(document, lost.text);
@@ -112,6 +121,15 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
         keep(document);
       },
     });
+  }
+
+  /** Have the shown text written; whether that could be sent. */
+  function save() {
+    const document = current;
+    const text = editor.view.state.doc;
+    document.saving = { version: document.version, text };
+    const { file, version, disk } = document;
+    return send({ kind: "save", file, version, text: text.toString(), base: disk });
   }
 
   /** The file holds something else than what is edited here. */
@@ -161,6 +179,11 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
       if (documents.has(file)) show(documents.get(file));
       send({ kind: "open", file });
     },
+    /** Make a file of this text and show it; one that is there is shown as it is. */
+    make(file, text) {
+      if (!documents.has(file)) fresh = { file, text };
+      this.open(file);
+    },
     /** The connection is back: say again what is open. */
     again() {
       for (const file of documents.keys()) send({ kind: "open", file });
@@ -184,14 +207,7 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
       document.version = Math.max(document.version, message.version) + 1;
       sendNow(document);
     },
-    /** Write the shown text. */
-    save() {
-      const document = current;
-      const text = editor.view.state.doc;
-      document.saving = { version: document.version, text };
-      const { file, version, disk } = document;
-      return send({ kind: "save", file, version, text: text.toString(), base: disk });
-    },
+    save,
     onsaved({ file, version, disk }) {
       const document = documents.get(file);
       if (!document) return;
@@ -214,7 +230,6 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
       if (!document) return;
       documents.delete(file);
       server.close(document.uri);
-      send({ kind: "close", file });
       current = document === current ? null : current;
       this.open(to);
     },

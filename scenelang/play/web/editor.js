@@ -56,11 +56,12 @@ export function makeEditor(parent, { nonce, onchange, onsave, extensions }) {
     ]),
     EditorView.updateListener.of((update) => update.docChanged && onchange(update)),
   ];
-  const view = new EditorView({ parent });
+  const state = (text) => EditorState.create({ doc: text, extensions: setup });
+  const view = new EditorView({ parent, state: state("") });
   return {
     view,
     /** A state for a text. */
-    state: (text) => EditorState.create({ doc: text, extensions: setup }),
+    state,
     /** Change the shown text in one step of undo; `from` says where a change from elsewhere is from. */
     change(changes, from = null) {
       const annotations = [isolateHistory.of("full"), ...(from ? [elsewhere.of(from)] : [])];

@@ -25,9 +25,10 @@ export function makePicture(at, { send, oncamera }) {
   let by = "network";
   let count = 0;
   let wanted = {};  // by -> id of the last drawing that was asked for
-  let asked = {};  // id -> {size, at}
+  let asked = {};  // id -> {size, at, params}
   let cost = 0;  // ms that the last edit's picture took to come
   let next = null;  // the view to show: {file, version, message}
+  let expected = false;  // whether a drawing of the text whose view comes next was asked for
   let written = false;  // whether the camera stands in the text, whose view has not come
   let mostSide = 1024;
   let controls = null;
@@ -59,8 +60,10 @@ export function makePicture(at, { send, oncamera }) {
     if (file === null || what === "shader") return;
     const id = `${what}-${(count += 1)}`;
     wanted[what] = id;
-    asked = { ...Object.fromEntries(Object.entries(asked).slice(-8)), [id]: { size, at: performance.now() } };
-    send({ kind: "draw", id, file, params: moved(), frame: viewer?.frame ?? 0, size, by: what });
+    const params = moved();
+    const entry = { size, at: performance.now(), params: JSON.stringify(params) };
+    asked = { ...Object.fromEntries(Object.entries(asked).slice(-8)), [id]: entry };
+    send({ kind: "draw", id, file, params, frame: viewer?.frame ?? 0, size, by: what });
   }
 
   /** Nothing moves for the moment: have the server draw soon. */
@@ -68,6 +71,10 @@ export function makePicture(at, { send, oncamera }) {
     stop("sharp");
     if (isLive()) stop("rest");
     else later("rest", () => ask(by), ms);
+    figuresSoon();
+  }
+
+  function figuresSoon() {
     if (figuresOpen) later("figures", () => ask("figures"), 4 * REST_MS);
   }
 
@@ -89,7 +96,7 @@ export function makePicture(at, { send, oncamera }) {
     if (message.id !== wanted[message.by] || message.by !== by || isLive()) return;
     at.still.src = image.src;
     const [width, height] = message.size;
-    at.still.style.setProperty("--ratio", (message.by === "difference" ? 3 : 1) * (width / height));
+    at.still.style.setProperty("--ratio", image.naturalWidth / image.naturalHeight);
     at.still.dataset.version = message.version;
     show("still");
     note(null);
@@ -175,6 +182,7 @@ export function makePicture(at, { send, oncamera }) {
     at.canvas.setAttribute("aria-label", plainText(view.alt ?? view.title));
     at.still.alt = plainText(view.alt ?? view.title);
     arrange(view);
+    if (asked[wanted[by]]?.params !== JSON.stringify(moved())) rest(0);  // there are other params now
     if (Number(at.still.dataset.version ?? -1) < version || isLive() || at.still.hidden) showShader();
   }
 
@@ -211,6 +219,7 @@ export function makePicture(at, { send, oncamera }) {
       mostSide = most ?? mostSide;
       wanted = {};
       cost = 0;
+      expected = false;
       written = false;
       next = null;
       delete at.still.dataset.version;
@@ -228,7 +237,8 @@ export function makePicture(at, { send, oncamera }) {
       stop("sharp", "rest");
       if (by === "network" && !isLive()) ask(by);
       else rest(2 * REST_MS);
-      if (figuresOpen) later("figures", () => ask("figures"), 4 * REST_MS);
+      figuresSoon();
+      expected = true;
     },
     onview({ file: of, version, view, problems }) {
       if (of !== file) return;
@@ -238,6 +248,8 @@ export function makePicture(at, { send, oncamera }) {
         return;
       }
       note(null);
+      if (!expected) rest(0);
+      expected = false;
       next = { file: of, version, message: view };
       const waits = viewer && !isLive() && cost < START_MS && !written;
       later("apply", () => next && apply(next), waits ? START_MS : 0);

@@ -89,14 +89,8 @@ const answers = {
     showFiles();
   },
   text: (message) => documents.ontext(message),
-  saved(message) {
-    documents.onsaved(message);
-    if (!documents.has(message.file)) documents.open(message.file);
-  },
-  conflict(message) {
-    if (documents.has(message.file)) documents.onconflict(message);
-    else bars.ask("name", `There is a file ${message.file} already`, { OK() {} });
-  },
+  saved: (message) => documents.onsaved(message),
+  conflict: (message) => documents.onconflict(message),
   view: (message) => picture.onview(message),
   picture: (message) => picture.onpicture(message),
   figures: (message) => picture.onfigures(message),
@@ -154,7 +148,7 @@ async function makeNew() {
     const answer = await fetch(`static/examples/${encodeURIComponent(asked.example)}`);
     if (answer.ok) text = await answer.text();
   }
-  live.send({ kind: "save", file: asked.file, version: 1, text, base: null });
+  documents.make(asked.file, text);
 }
 
 async function rename() {
