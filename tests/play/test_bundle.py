@@ -29,3 +29,10 @@ def test_versions_are_exact() -> None:
     package = json.loads((SOURCE / "package.json").read_text("utf-8"))
     asked = package["dependencies"] | package["devDependencies"]
     assert all(re.fullmatch(r"\d+\.\d+\.\d+", number) for number in asked.values())
+
+
+def test_scenes_to_start_from_are_the_examples() -> None:
+    shipped = sorted((WEB / "examples").glob("*.nsg"))
+    assert shipped
+    for path in shipped:
+        assert path.read_bytes() == (ROOT / "examples" / path.name).read_bytes()

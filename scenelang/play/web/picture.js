@@ -29,6 +29,7 @@ export function makePicture(at, { send, oncamera }) {
   let cost = 0;  // ms that the last edit's picture took to come
   let next = null;  // the view to show: {file, version, message}
   let expected = false;  // whether a drawing of the text whose view comes next was asked for
+  let faulty = false;  // whether the text that was last heard of has mistakes
   let written = false;  // whether the camera stands in the text, whose view has not come
   let mostSide = 1024;
   let controls = null;
@@ -242,7 +243,8 @@ export function makePicture(at, { send, oncamera }) {
     },
     onview({ file: of, version, view, problems }) {
       if (of !== file) return;
-      if (view === null) {
+      faulty = view === null;
+      if (faulty) {
         const errors = problems.filter(({ severity }) => severity === "error").length;
         note(errors ? `The last picture without mistakes; the text has ${errors}` : "There is nothing to draw");
         return;
@@ -255,7 +257,7 @@ export function makePicture(at, { send, oncamera }) {
       later("apply", () => next && apply(next), waits ? START_MS : 0);
     },
     onerror(id, message) {
-      if (Object.values(wanted).includes(id)) note(message);
+      if (Object.values(wanted).includes(id)) later("note", () => !faulty && note(message), REST_MS);
     },
     /** Choose what draws: `shader`, `network`, `reference` or `difference`. */
     choose(what) {
