@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from scenelang.formatting.format import format_text as format_text
     from scenelang.image import Image as Image
     from scenelang.measure.metrics import compare as compare
+    from scenelang.notebook import set_notebook as set_notebook
     from scenelang.outputs import Outputs as Outputs
     from scenelang.outputs import Proof as Proof
     from scenelang.program.check import check as check
@@ -75,6 +76,7 @@ _HOME: Final = {
     "scenelang.backend.outputs": "render_outputs",
     "scenelang.backend.prove": "prove",
     "scenelang.backend.render": "render",
+    "scenelang.notebook": "set_notebook",
     "scenelang.outputs": "Outputs Proof",
     "scenelang.diagnostics.diagnostic": "Diagnostic Diagnostics",
     "scenelang.diagnostics.error": "SceneError",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -106,6 +107,19 @@ def test_notebooks_show_a_picture(value: Any) -> None:
         assert picture.size == SMALL
         assert np.array_equal(np.asarray(picture), nsg.render(value).to_uint8())
     assert "24 × 16 pixels" in shown["text/plain"]
+    (frame,) = re.findall(r'<iframe sandbox="([^"]*)" title="A picture of a star', shown["text/html"])
+    assert frame == "allow-scripts"
+    assert shown["text/html"].count("<") == 2  # the page is a text in an attribute
+
+
+def test_notebooks_show_pictures_alone_where_that_is_wished(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(notebook.SWITCH, "viewer")
+    nsg.set_notebook("picture")
+    assert set(STAR._repr_mimebundle_()) == {"image/png", "text/plain"}
+    nsg.set_notebook("viewer")
+    assert "text/html" in STAR._repr_mimebundle_()
+    with pytest.raises(ValueError, match="`film`"):
+        nsg.set_notebook("film")  # type: ignore[arg-type]
 
 
 def test_notebooks_show_mistakes_as_text(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,8 +6,9 @@ import io
 import os
 from collections.abc import Mapping
 from dataclasses import replace
+from html import escape
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from scenelang.backend.render import render
 from scenelang.diagnostics.diagnostic import Diagnostics
@@ -16,17 +17,23 @@ from scenelang.evaluate.evaluation import Evaluation
 from scenelang.evaluate.loader import Unreadable, read_source
 from scenelang.files import write_output
 from scenelang.program.compile import compile_scene
-from scenelang.program.program import Program
+from scenelang.program.program import Program, ProgramError
 from scenelang.program.reading import load_program
 from scenelang.scene import library
 from scenelang.scene.schema import Scene
 from scenelang.syntax import parse
-from scenelang.viewer.page import page
+from scenelang.viewer.page import control_rows, page, plain
 from scenelang.viewer.view import View, view_of
+
+if TYPE_CHECKING:
+    import PIL.Image
+
+    from scenelang.image import Image
 
 PROGRAM: Final = ".safetensors"
 STILL_SIDE: Final = 256
 _COLOURS: Final = 64
+_FRAME_PX: Final = (360, 640)  # width of a frame in a notebook, at least and at most
 _MOST_TEXT: Final = 20_000  # of a Scene, whose text nobody wrote
 
 
@@ -101,14 +108,48 @@ def scene_view(
 
 def still(program: Program) -> bytes:
     """A small picture of a Program as PNG, in few colours."""
+    return _few_colours(render(replace(program, canvas=_small(program.canvas))).to_pil())
+
+
+def frame(value: Scene | Program, picture: Image) -> str:
+    """The viewer of a Scene or a Program as HTML for a notebook, in a frame that may run scripts alone.
+
+    Args:
+        picture: of the value, for browsers that cannot draw it.
+
+    Returns:
+        Nothing where no page can draw its model.
+    """
+    program, scene = (value, None) if isinstance(value, Program) else (compile_scene(value), value)
+    try:
+        view = scene_view(program, scene, None)
+    except ProgramError:
+        return ""
     from PIL import Image as pillow
 
-    shrink = min(1.0, STILL_SIDE / max(program.canvas))
-    width, height = (max(1, round(side * shrink)) for side in program.canvas)
-    image = render(replace(program, canvas=(width, height))).to_pil()
-    method = pillow.Quantize.FASTOCTREE if image.mode == "RGBA" else pillow.Quantize.MEDIANCUT
+    small = picture.to_pil().resize(_small(program.canvas), pillow.Resampling.BOX)
+    text = escape(page(view, still=_few_colours(small), embedded=True))
+    width = max(_FRAME_PX[0], min(_FRAME_PX[1], program.canvas[0]))
+    height = round(width * program.canvas[1] / program.canvas[0]) + 16 * control_rows(view)
+    title = escape(plain(view.data["alt"]))
+    return (
+        f'<iframe sandbox="allow-scripts" title="{title}" srcdoc="{text}" '
+        f'width="{width}" height="{height}" style="border: 0; max-width: 100%"></iframe>'
+    )
+
+
+def _small(canvas: tuple[int, int]) -> tuple[int, int]:
+    shrink = min(1.0, STILL_SIDE / max(canvas))
+    width, height = (max(1, round(side * shrink)) for side in canvas)
+    return width, height
+
+
+def _few_colours(picture: PIL.Image.Image) -> bytes:
+    from PIL import Image as pillow
+
+    method = pillow.Quantize.FASTOCTREE if picture.mode == "RGBA" else pillow.Quantize.MEDIANCUT
     data = io.BytesIO()
-    image.quantize(_COLOURS, method, dither=pillow.Dither.NONE).save(data, "PNG", optimize=True)
+    picture.quantize(_COLOURS, method, dither=pillow.Dither.NONE).save(data, "PNG", optimize=True)
     return data.getvalue()
 
 

@@ -32,8 +32,7 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
     """
     data = view.data
     width, height = data["canvas"]
-    rows = 3 * len(data["params"]) + 3 * bool(data["animation"]) + 4 * (data["dimension"] == 3)
-    sizes = f":root{{--aspect:{width / height:.6f};--controls:{rows}rem}}\n"
+    sizes = f":root{{--aspect:{width / height:.6f};--controls:{control_rows(view)}rem}}\n"
     style = sizes + web("controls.css") + web("page.css")
     code = f"{script()}\nopenPage();\n"
     alt = escape(plain(data["alt"]))
@@ -56,6 +55,14 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
         "script": code,
     }
     return _SLOT.sub(lambda slot: parts[slot[1]], web("page.html"))
+
+
+def control_rows(view: View) -> int:
+    """About how high the controls of a view are, in rem."""
+    data = view.data
+    params, fixed = len(data["params"]), len(data["fixed"])
+    timeline, camera = bool(data["animation"]), bool(data["dimension"] == 3)
+    return 2 * params + 2 * fixed + 3 * (params > 0) + 3 * timeline + 6 * camera
 
 
 def plain(text: str) -> str:
