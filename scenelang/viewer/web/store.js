@@ -14,12 +14,24 @@ export function unpack(data, buffer) {
   return Object.fromEntries(Object.entries(data).map(([name, value]) => [name, unpack(value, buffer)]));
 }
 
+export const WITH_ARRAYS = ["shader", "network", "shapes", "materials", "paints"]; // parts of a view
+
 /** The view of a message: data whose `blob` is deflated and in base64. */
-export async function readView(message) {
-  const { blob, ...data } = message;
+export async function readView({ blob, ...view }) {
   const bytes = Uint8Array.from(atob(blob), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   const buffer = await new Response(stream).arrayBuffer();
-  const { form, source, ...rest } = data; // texts and trees name no arrays
-  return { ...unpack(rest, buffer), form, source };
+  for (const part of WITH_ARRAYS) view[part] = unpack(view[part], buffer); // values of params may look like names
+  return view;
+}
+
+/** Whether two pieces of data are equal; typed arrays too. */
+export function alike(a, b) {
+  if (a === b) return true;
+  if (typeof a !== "object" || typeof b !== "object" || a === null || b === null) return false;
+  if (ArrayBuffer.isView(a)) {
+    return a.constructor === b.constructor && a.length === b.length && a.every((value, at) => value === b[at]);
+  }
+  const keys = Object.keys(a);
+  return keys.length === Object.keys(b).length && keys.every((key) => alike(a[key], b[key]));
 }

@@ -3,8 +3,9 @@ import { evaluateForm } from "./evaluate.js";
 import { Pace } from "./pace.js";
 import { planeDrawer } from "./plane.js";
 import { solidDrawer } from "./solid.js";
+import { alike, WITH_ARRAYS } from "./store.js";
 
-const DRAWN_FROM = ["dimension", "shader", "network", "shapes", "materials", "paints"]; // what a drawer is made of
+const DRAWN_FROM = ["dimension", ...WITH_ARRAYS]; // what a drawer is made of
 
 /** A scene on a canvas. It draws when something has changed, and coarser while it cannot keep up. */
 export class Viewer {
@@ -17,6 +18,7 @@ export class Viewer {
   #refused = false; // whether the params give no picture
   #stale = true; // whether rows belong to other params or another frame
   #dirty = false; // whether what is shown is not what is to be shown
+  #drawnFor = null; // pixels of the screen that the canvas had
   #request = 0;
   #origin = 0; // when frame 0 would have been shown, in ms
   #pace;
@@ -47,7 +49,9 @@ export class Viewer {
     this.#drawer = this.#made(view);
     canvas.addEventListener("webglcontextlost", this);
     canvas.addEventListener("webglcontextrestored", this);
-    this.#observe(new ResizeObserver(() => this.#touch()));
+    this.#observe(new ResizeObserver(() => {
+      if (!alike(this.#full(), this.#drawnFor)) this.#touch();
+    }));
     this.#observe(new IntersectionObserver(([entry]) => {
       this.#shown = entry.isIntersecting;
       this.#ask(false);
@@ -266,10 +270,10 @@ export class Viewer {
 
   #next(now) {
     this.#request = 0;
-    if (this.#pace.busy || this.#gl.isContextLost()) return; // the end of the frame under way asks again
+    if (this.#gl.isContextLost()) return;
     if (this.playing) this.#advance(now);
-    if (this.#dirty) this.#paint(this.#pace.scale(this.playing));
-    else this.#ask(false);
+    if (this.#dirty && !this.#pace.busy) this.#paint(this.#pace.scale(this.playing));
+    if (this.playing) this.#ask(false); // otherwise the end of the frame under way does
   }
 
   #advance(now) {
@@ -308,7 +312,8 @@ export class Viewer {
     if (this.#gl.isContextLost()) return;
     const program = this.program;
     this.#dirty = false;
-    const [width, height] = this.#full().map((side) => Math.max(1, Math.round(side * scale)));
+    this.#drawnFor = this.#full();
+    const [width, height] = this.#drawnFor.map((side) => Math.max(1, Math.round(side * scale)));
     if (this.canvas.width !== width) this.canvas.width = width;
     if (this.canvas.height !== height) this.canvas.height = height;
     this.#pace.start(scale);
@@ -336,15 +341,4 @@ function pin(canvas, [width, height]) {
 
 function defaults(view) {
   return Object.fromEntries(view.params.map(({ name, value }) => [name, value]));
-}
-
-/** Whether two pieces of data are equal; typed arrays too. */
-function alike(a, b) {
-  if (a === b) return true;
-  if (typeof a !== "object" || typeof b !== "object" || a === null || b === null) return false;
-  const keys = Object.keys(a);
-  if (ArrayBuffer.isView(a)) {
-    return a.constructor === b.constructor && a.length === b.length && a.every((value, at) => value === b[at]);
-  }
-  return keys.length === Object.keys(b).length && keys.every((key) => alike(a[key], b[key]));
 }
