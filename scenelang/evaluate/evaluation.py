@@ -62,6 +62,7 @@ class Evaluation:
     Attributes:
         wanted: all files that it imports, also those that are not there.
         sources: the text of the file and of all that it imports.
+        context: its names, and the values they had in the last run.
     """
 
     def __init__(self, file: nodes.File, *, diagnostics: Diagnostics, **inputs: Unpack[Inputs]) -> None:
@@ -84,13 +85,13 @@ class Evaluation:
         folder = Path(root).resolve() if root is not None else path.parent if path is not None else None
         loader = Loader(folder, [path] if path is not None else [], texts=inputs.get("texts") or {})
         self.inputs = given = defines if isinstance(defines, Defines) else Defines(defines or {})
-        self._context = FileContext(file.span.source, session, loader, given, path)
+        self.context = FileContext(file.span.source, session, loader, given, path)
         self._body: Body | None = None
         if not self.animates:
             session.animated[:] = [0.0, 0.0, 0.0, 1.0]
         with deep_stack(), suppress(Halt):
-            self._body = prepare_file(self._context, file)
-            given.lost |= self._context.damage.words
+            self._body = prepare_file(self.context, file)
+            given.lost |= self.context.damage.words
             if given is not defines:
                 given.report_unused(diagnostics)
         self.wanted = tuple(loader.wanted)
@@ -133,7 +134,7 @@ class Evaluation:
             with deep_stack(), suppress(Halt):
                 session.tick(self._body.weight, self.file.span)
                 for act in self._body.actions:
-                    act(self._context.env, out)
+                    act(self.context.env, out)
         self._steps += session.steps
         self._objects += session.objects
         if self.animates and frame:

@@ -11,7 +11,11 @@ from functools import cache
 from importlib.resources import files
 from typing import Final
 
-MODULES: Final = ("store", "gl", "camera", "pace", "viewer", "dom", "steer", "controls", "page")
+MODULES: Final = (
+    *("store", "gl"),
+    *("values", "functions", "maps", "looks", "chain", "bounds", "graph", "stage", "expressions", "evaluate"),
+    *("camera", "pace", "viewer", "dom", "steer", "controls", "page"),
+)
 """Of ``web/``; each stands behind what it imports."""
 
 _IMPORT: Final = re.compile(r'^import \{[^}]*\} from "[^"]*";\n', re.MULTILINE)

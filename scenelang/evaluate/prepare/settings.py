@@ -226,7 +226,7 @@ _APPLY: Final[dict[str, Callable[..., None]]] = {
 }
 
 
-_BROUGHT = (nodes.Param, nodes.Let, nodes.Fn, nodes.Module, nodes.Import, nodes.Version)
+BROUGHT = (nodes.Param, nodes.Let, nodes.Fn, nodes.Module, nodes.Import, nodes.Version)
 
 
 def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
@@ -296,5 +296,5 @@ def prepare_file(context: FileContext, file: nodes.File, *, imported: bool = Fal
                 help = "it belongs to the scene: put it into the file that is drawn"
                 fact = f"`{stmt.name.text}` in an imported file"
                 report.error_once((fact, context.source), "E0330", fact, stmt.name.span, help=help)
-    statements = [s for s in file.statements if not imported or isinstance(s, _BROUGHT)]
+    statements = [s for s in file.statements if not imported or isinstance(s, BROUGHT)]
     return prepare_block(statements, Place(context, context.scope, "file"), file.span)

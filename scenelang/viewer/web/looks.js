@@ -1,0 +1,84 @@
+// Materials: operations on colours, folded to one colour where there is no texture.
+
+import { modulo, refuse } from "./values.js";
+import { hsvToRgb } from "./functions.js";
+import { IDENTITY, composedMap, flatMap, invertedMap, usableMap } from "./maps.js";
+
+const LUMA_SHARES = [0.2126, 0.7152, 0.0722];
+const MOST_OPERATIONS = 1000;
+
+/** The linear numbers of a colour as written (IEC 61966-2-1). */
+export function linearColour(srgb) {
+  return srgb.map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+}
+
+const shareOf = (v) => Math.min(Math.max(v, 0), 1);
+
+function rgbToHsv([r, g, b]) {
+  const [most, least] = [Math.max(r, g, b), Math.min(r, g, b)];
+  if (most === least) return [0, 0, most];
+  const [rc, gc, bc] = [r, g, b].map((v) => (most - v) / (most - least));
+  const h = r === most ? bc - gc : g === most ? 2 + rc - bc : 4 + gc - rc;
+  return [modulo(h / 6, 1), (most - least) / most, most];
+}
+
+function inkedColour(rgb, [kind, ...numbers]) {
+  if (kind === "color") return rgb.map((v, at) => shareOf(v * numbers[at]));
+  if (kind === "grayscale") {
+    const y = rgb[0] * LUMA_SHARES[0] + rgb[1] * LUMA_SHARES[1] + rgb[2] * LUMA_SHARES[2];
+    return rgb.map((v) => shareOf(v + numbers[0] * (y - v)));
+  }
+  const [h, s, v] = rgbToHsv(rgb);
+  return hsvToRgb(modulo(h + numbers[0], 1), s, v).map(shareOf);
+}
+
+function inksJoined([kind, ...a], [, ...b]) {
+  if (kind === "hue") return [kind, modulo(a[0] + b[0], 1)];
+  if (kind === "grayscale") return [kind, a[0] + b[0] - a[0] * b[0]];
+  return [kind, ...a.map((number, at) => number * b[at])];
+}
+
+const IDLE_NUMBERS = { color: 1, grayscale: 0, hue: 0 };
+
+/** The same operations, fewer: neighbours of a kind join where nothing is clamped between them. */
+function fewerInks(steps) {
+  const found = [];
+  for (let step of steps) {
+    const last = found.at(-1);
+    const [kind, ...numbers] = last ?? [];
+    if (kind === step[0] && (kind === "hue" || numbers.every((number) => number >= 0 && number <= 1))) {
+      step = inksJoined(found.pop(), step);
+    } else if (step[0] === "hue") {
+      step = inksJoined(["hue", 0], step);
+    }
+    if (!step.slice(1).every((number) => number === IDLE_NUMBERS[step[0]])) found.push(step);
+  }
+  return found;
+}
+
+/**
+ * What a row says of a material.
+ * @param {Wearing} worn - its `ops` are maps {rows} and colour steps
+ */
+export function lookOf(worn, form) {
+  let moved = IDENTITY;
+  const steps = [];
+  for (const op of worn.ops) {
+    if (Array.isArray(op)) {
+      steps.push(form.dimension === 3 && op[0] === "color" ? ["color", ...linearColour(op.slice(1))] : op);
+      continue;
+    }
+    if (worn.paint >= 0 && form.spatial[worn.paint]) refuse("colours of space do not move");
+    const rows = flatMap(op.rows);
+    if (rows === null && worn.paint >= 0) refuse("a move of a texture leaves its plane");
+    if (rows !== null && !usableMap(rows, 2)) refuse("a move of a texture is singular");
+    if (rows !== null) moved = composedMap(rows, moved);
+  }
+  if (!usableMap(moved, 2)) refuse("the moves of a texture compose to a singular one");
+  const look = { material: worn.lit, paint: worn.paint, colour: [1, 1, 1] };
+  if (worn.paint < 0) return { ...look, colour: steps.reduce(inkedColour, [1, 1, 1]) };
+  const paintSteps = fewerInks(steps);
+  if (paintSteps.length > MOST_OPERATIONS) refuse("too many operations on the colours of a texture");
+  const [a, b, , x, c, d, , y] = invertedMap(moved);
+  return { ...look, place: [a, b, x, c, d, y], paintSteps };
+}

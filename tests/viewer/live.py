@@ -1,0 +1,160 @@
+"""What a scene is by the compiler, for given params and frame, and whether a page's rows say the same."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import Evaluation
+from scenelang.graph import affine
+from scenelang.graph.nodes import Graph
+from scenelang.graph.steps import Affine, Displace, Step, Warp
+from scenelang.models.manifest import Manifest, load_manifest
+from scenelang.passes import OPTIONAL
+from scenelang.program.compile import compile_scene
+from scenelang.syntax import parse
+from scenelang.viewer.form import Form, form_of
+from scenelang.viewer.rows import stage_of
+from scenelang.words import TOKENS
+from tests.viewer.test_view import carried
+
+POINTS = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 50))
+
+
+class Compiled(NamedTuple):
+    """A scene by the compiler."""
+
+    evaluation: Evaluation
+    manifest: Manifest
+    graph: Graph
+    elements: tuple[Any, ...]
+
+    def form(self) -> Form:
+        """The same for a page."""
+        return form_of(self.evaluation, self.manifest, self.elements)
+
+
+def compiled(source: SourceFile, path: Path | None = None, **inputs: Any) -> Compiled:
+    """Compile a scene without passes that only save work; raises SceneError."""
+    found, graphs = Diagnostics(), {}
+    evaluation = Evaluation(parse(source, found), diagnostics=found, path=path, **inputs)
+    scene, _ = evaluation.run(inputs.get("frame", 0))
+    if scene is None:
+        raise SceneError(found)
+    model, after = inputs.get("model"), graphs.__setitem__
+    program = compile_scene(scene, diagnostics=found, model=model, without=OPTIONAL, after=after)
+    return Compiled(evaluation, load_manifest(program.model), graphs["check_trained"], program.elements)
+
+
+def moved(param: dict[str, Any]) -> list[Any]:
+    """Values over a param's range, or among its choices."""
+    if "low" in param:
+        low, high, step = param["low"], param["high"], param.get("step")
+        values = [low + (high - low) * share for share in (0.0, 0.25, 0.5, 0.77, 1.0)]
+        return values if step is None else [low + round((v - low) / step) * step for v in values]
+    return param.get(
+        "choices", {"color": [[0.2, 0.7, 0.4]], "bool": [not param["value"]]}.get(param["kind"], [])
+    )
+
+
+def defined(param: dict[str, Any], value: Any) -> Any:
+    """A page's value of a param as the compiler takes it."""
+    unit = {"angle": "rad", "time": "s"}.get(param["kind"])
+    return value if unit is None else f"{value!r}{unit}"
+
+
+def way_back(steps: tuple[Step, ...], p: np.ndarray) -> np.ndarray:
+    """World points (3, M) in a leaf's own space, by the definition of each step."""
+    for step in reversed(steps):
+        if isinstance(step, Displace):
+            continue
+        if isinstance(step, Affine):
+            rows = np.reshape(affine.inverted(step.rows), (3, 4))
+            p = rows[:, :3] @ p + rows[:, 3:]
+            continue
+        warps = isinstance(step, Warp)
+        j, k = (1, step.twirl) if isinstance(step, Warp) else (2, step.twist)
+        a = k * (np.linalg.norm(p, axis=0) if warps else p[1])
+        if isinstance(step, Warp):
+            a = a + step.bend[0] * p[0] + step.bend[1] * p[1]
+        p = p.copy()
+        p[0], p[j] = np.cos(a) * p[0] + np.sin(a) * p[j], np.cos(a) * p[j] - np.sin(a) * p[0]
+    return p
+
+
+def check_picture(picture: dict[str, Any], expected: Compiled, form: Form) -> None:
+    """Hold what a page's evaluator says against what the compiler says."""
+    graph, d = expected.graph, expected.manifest.dimension
+    links = graph.root.links
+    assert len(picture["rows"]) == len(links)
+    names = [*expected.manifest.geometries, *form.shapes]
+    for at, (row, link) in enumerate(zip(picture["rows"], links, strict=True)):
+        leaf, look = link.node, link.node.look
+        assert row["token"] == (TOKENS[link.op] if at else 0)
+        assert names[row["shape"]] == graph.elements.get(leaf.geometry, leaf.geometry)
+        assert expected.manifest.materials[row["material"]] == look.material
+        assert row["object"] == leaf.number
+        assert link.op != "smooth" or row["blend"] == link.k
+        np.testing.assert_allclose(row["colour"], look.rgb, atol=1e-9)
+        stretch = graph.space.stretches(affine.composed(leaf.steps))[0]
+        np.testing.assert_allclose(row["scale"], stretch, rtol=1e-9)
+        bump = next((s for s in leaf.steps if isinstance(s, Displace)), Displace(0.0, 0.0))
+        assert (row["amount"], row["frequency"]) == (bump.amount, bump.frequency)
+        _check_paint(row, look, form)
+        there, here = carried(row["steps"], POINTS[:d]), way_back(leaf.steps, POINTS * [[1], [1], [d > 2]])
+        np.testing.assert_allclose(there, here[:d], rtol=1e-6, atol=1e-6)
+    stage = None if graph.stage is None else stage_of(graph.stage)
+    assert _flat(picture["stage"]).keys() == _flat(stage).keys()
+    for name, number in _flat(stage).items():
+        np.testing.assert_allclose(_flat(picture["stage"])[name], number, atol=1e-9, err_msg=name)
+    assert picture["background"] == (None if graph.background is None else list(graph.background))
+
+
+def _check_paint(row: dict[str, Any], look: Any, form: Form) -> None:
+    if look.element is None:
+        assert row["paint"] == -1
+        return
+    assert form.paints[row["paint"]] == look.element
+    inverse = affine.inverted(look.moved)
+    np.testing.assert_allclose(row["place"], [inverse[at] for at in (0, 1, 3, 4, 5, 7)], atol=1e-9)
+    assert [step[0] for step in row["paintSteps"]] == [step[0] for step in look.colours]
+    for mine, theirs in zip(row["paintSteps"], look.colours, strict=True):
+        np.testing.assert_allclose(mine[1:], theirs[1:], atol=1e-9)
+
+
+def _flat(data: Any, name: str = "") -> dict[str, Any]:
+    """Numbers of nested data by their places; what is not a number is told by its place."""
+    if isinstance(data, dict):
+        return {k: v for key, value in data.items() for k, v in _flat(value, f"{name}.{key}").items()}
+    if isinstance(data, list | tuple):
+        return {k: v for at, value in enumerate(data) for k, v in _flat(value, f"{name}.{at}").items()}
+    return {f"{name} {data}": 0.0} if data is None or isinstance(data, bool) else {name: data}
+
+
+RUN = """(jobs) => jobs.map(([form, all]) => all.map((inputs) => {
+  try {
+    return evaluateForm(form, inputs);
+  } catch (error) {
+    if (error instanceof NotLive) return error.message;
+    throw error;
+  }
+}))"""
+
+
+def pictures(page: Any, jobs: list[tuple[Form, list[dict[str, Any]]]]) -> list[list[Any]]:
+    """What a page says of forms for inputs: a picture, or why there is none."""
+    found: list[list[Any]] = page.evaluate(RUN, [[form.data, inputs] for form, inputs in jobs])
+    return found
+
+
+def blocks(text: str) -> Iterator[str]:
+    """Scenes in a page of the documentation."""
+    for found in re.finditer(r"^```nsg\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        yield found[1]
