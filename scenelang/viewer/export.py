@@ -16,12 +16,14 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.evaluation import Evaluation
 from scenelang.evaluate.loader import Unreadable, read_source
 from scenelang.files import write_output
+from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program, ProgramError
 from scenelang.program.reading import load_program
 from scenelang.scene import library
 from scenelang.scene.schema import Scene
 from scenelang.syntax import parse
+from scenelang.viewer.form import form_of
 from scenelang.viewer.page import control_rows, page, plain
 from scenelang.viewer.view import View, view_of
 
@@ -97,13 +99,16 @@ def scene_view(
         title: of the page.
     """
     source: list[tuple[str, str]] = []
+    form = None
     if evaluation is not None:
+        form = form_of(evaluation, load_manifest(program.model), program.elements)
         first = evaluation.sources[0].name
         own = [text for text in evaluation.sources if not library.holds(text)]
         source = [(_shown(text.name, first), text.text) for text in own]
     elif scene is not None and len(text := scene.to_nsg()) <= _MOST_TEXT:
         source = [(f"{title or 'scene'}.nsg", text)]
-    return view_of(program, title=title, source=source)
+    animation = None if scene is None else scene.animation
+    return view_of(program, title=title, source=source, form=form, animation=animation)
 
 
 def still(program: Program) -> bytes:

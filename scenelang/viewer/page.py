@@ -6,6 +6,7 @@ import base64
 import hashlib
 import re
 import unicodedata
+import zlib
 from html import escape
 from importlib.metadata import version
 from typing import Any, Final
@@ -15,11 +16,11 @@ from scenelang.viewer.view import View
 
 MOST_TITLE: Final = 200
 _POLICY: Final = (
-    "default-src 'none'; script-src '{script}'; style-src '{style}'; img-src data: blob:; "
+    "default-src 'none'; script-src '{loader}' '{code}'; style-src '{style}'; img-src data: blob:; "
     "base-uri 'none'; form-action 'none'"
 )
 _SLOT: Final = re.compile(r"\[\[(\w+)\]\]")
-_INERT: Final = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
+_COMMENT: Final = re.compile(r"^ *(?:/\*\*.*?\*/|//[^\n]*)\n", re.MULTILINE | re.DOTALL)
 
 
 def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
@@ -34,14 +35,14 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
     width, height = data["canvas"]
     sizes = f":root{{--aspect:{width / height:.6f};--controls:{control_rows(view)}rem}}\n"
     style = sizes + web("controls.css") + web("page.css")
-    code = f"{script()}\nopenPage();\n"
+    code, loader = f"{_COMMENT.sub('', script())}\nopenPage();\n", web("loader.js")
     alt = escape(plain(data["alt"]))
     drawn = base64.b64encode(still).decode()
     image = '<i id="still"></i>'
     if still:
         image = f'<img id="still" src="data:image/png;base64,{drawn}" alt="{alt}">'
     parts = {
-        "policy": escape(_POLICY.format(script=_digest(code), style=_digest(style))),
+        "policy": escape(_POLICY.format(loader=_digest(loader), code=_digest(code), style=_digest(style))),
         "version": escape(version("scenelang")),
         "title": escape(plain(data["title"])[:MOST_TITLE] or "scene"),
         "style": style,
@@ -51,8 +52,9 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
         "height": str(height),
         "alt": alt,
         "model": told(data["model"]),
-        "view": view.message().translate(_INERT),
-        "script": code,
+        "view": _packed(view.message()),
+        "code": _packed(code),
+        "loader": loader,
     }
     return _SLOT.sub(lambda slot: parts[slot[1]], web("page.html"))
 
@@ -82,6 +84,11 @@ def told(model: dict[str, Any]) -> str:
             f"{figures['cap']:g}) and {figures['flip']:.4f} (mean FLIP) from the exact picture"
         )
     return f"{line}."
+
+
+def _packed(text: str) -> str:
+    """Deflated (zlib), in base64."""
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
 
 
 def _digest(text: str) -> str:

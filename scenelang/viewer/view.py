@@ -20,7 +20,9 @@ from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.network import FramedArrays
+from scenelang.scene.schema import Animation
 from scenelang.viewer.describe import alternative
+from scenelang.viewer.form import Form
 from scenelang.viewer.rows import rows_of, stage_of
 
 FORMAT: Final = 1
@@ -65,13 +67,22 @@ class View:
         return json.dumps({**self.data, "blob": packed}, separators=(",", ":"), allow_nan=False)
 
 
-def view_of(program: Program, *, title: str = "", source: Sequence[tuple[str, str]] = ()) -> View:
-    """The view of a Program, whose numbers never change.
+def view_of(
+    program: Program,
+    *,
+    title: str = "",
+    source: Sequence[tuple[str, str]] = (),
+    form: Form | None = None,
+    animation: Animation | None = None,
+) -> View:
+    """The view of a Program; without a form its numbers never change.
 
     Args:
         program: compiled for a shipped model.
         title: of the page.
         source: names and texts of the files that it was compiled from.
+        form: of the scene that it was compiled from.
+        animation: of that scene.
 
     Raises:
         ProgramError: it was compiled for other weights, or no page can draw its model.
@@ -83,6 +94,7 @@ def view_of(program: Program, *, title: str = "", source: Sequence[tuple[str, st
         raise ProgramError(f"model `{manifest.name}` has learned transformations, which no page draws")
     network, digest = load_arrays(program.model)
     program.check_weights(digest)
+    elements = (*form.shapes, *form.paints) if form else program.elements
     albedo = network.material_codes @ network.albedo[:-1] + network.albedo[-1]
     geometries = [{"name": name, "kind": "learned"} for name in manifest.geometries]
     data = {
@@ -109,15 +121,13 @@ def view_of(program: Program, *, title: str = "", source: Sequence[tuple[str, st
             "stage": program.stage and stage_of(program.stage),
             "background": program.background,
         },
-        "form": None,
-        "params": [],
-        "fixed": [],
-        "animation": None,
+        "form": form and form.data,
+        "params": form.params if form else [],
+        "fixed": form.fixed if form else [],
+        "animation": form and animation and {**animation.model_dump(), "frames": animation.frames},
         "source": [{"name": name, "text": text} for name, text in source],
         "licences": [
-            {"name": element.name, "text": credit}
-            for element in program.elements
-            if (credit := credit_of([element]))
+            {"name": element.name, "text": credit} for element in elements if (credit := credit_of([element]))
         ],
     }
     data["alt"] = alternative(data)

@@ -198,7 +198,7 @@ def test_cameras_have_the_axes_that_the_language_gives_them(viewer_page: Any) ->
     cameras = [Camera(tuple(e), tuple(t)) for e, t in random.normal(size=(20, 2, 3))]
     cameras.append(Camera((0.0, 3.0, 0.0), (0.0, 0.0, 0.0)))
     given = [{"eye": c.eye, "target": c.target} for c in cameras]
-    found = viewer_page.evaluate("(given) => given.map(cameraAxes)", given)
+    found = viewer_page.evaluate("(given) => given.map(({ eye, target }) => axesOf(eye, target))", given)
     np.testing.assert_allclose(found, [c.axes() for c in cameras], atol=1e-12)
 
 

@@ -1,3 +1,5 @@
+import { axesOf } from "./stage.js";
+
 // The camera of a 3D scene, moved by hand. Lengths are in world units, angles in radians, y is up.
 
 const NEAREST_POLE = 0.02; // an orbit stays this far from straight above and below the target
@@ -6,16 +8,6 @@ const FARTHEST_EYE = 1e4;
 
 const vecMinus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const vecPlus = (a, b, times = 1) => [a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2]];
-const vecCross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const vecUnit = (a) => vecPlus([0, 0, 0], a, 1 / Math.hypot(...a));
-
-/** Unit vectors forward, right and up of a camera; seen straight along y, up is -z. */
-export function cameraAxes({ eye, target }) {
-  const forward = vecUnit(vecMinus(target, eye));
-  const upright = Math.hypot(forward[0], forward[2]) > 1e-9;
-  const right = vecUnit(vecCross(forward, upright ? [0, 1, 0] : [0, 0, -1]));
-  return [forward, right, vecCross(right, forward)];
-}
 
 /** A camera that has gone round its target, by `turn` to the right and `rise` upward. */
 export function orbited(camera, turn, rise) {
@@ -40,7 +32,7 @@ export function zoomed(camera, factor) {
 
 /** A camera moved so that what it looks at goes by (right, up), in shares of the canvas's shorter side. */
 export function panned(camera, right, up) {
-  const [, side, above] = cameraAxes(camera);
+  const [, side, above] = axesOf(camera.eye, camera.target);
   const distance = Math.hypot(...vecMinus(camera.eye, camera.target));
   const span = 2 * distance * Math.tan(camera.fov / 2);
   const way = vecPlus(vecPlus([0, 0, 0], side, -right * span), above, -up * span);
@@ -49,7 +41,7 @@ export function panned(camera, right, up) {
 
 /** A stage as another camera sees it. */
 export function seenBy(stage, camera) {
-  return { ...stage, ...camera, axes: cameraAxes(camera) };
+  return { ...stage, ...camera, axes: axesOf(camera.eye, camera.target) };
 }
 
 /** The line of a scene that says where a camera is; its numbers are rounded to 1e-4, fov to 1e-3 degrees. */

@@ -1,16 +1,15 @@
 import { cameraControls, paramControls, timeline } from "./controls.js";
 import { copyButton, element, isolated, listing } from "./dom.js";
 import { steer } from "./steer.js";
-import { readView } from "./store.js";
+import { inflated, readView } from "./store.js";
 import { Viewer } from "./viewer.js";
 
 /** Draw the view that a page holds, and put the controls beside it; without WebGL2 the still picture stays. */
 export async function openPage() {
   const at = (id) => document.getElementById(id);
-  const message = JSON.parse(at("view").textContent);
+  const message = await inflated(at("view").textContent).json();
   showTexts(message, at("texts"));
   try {
-    if (!globalThis.DecompressionStream) throw new Error("this browser cannot unpack the page");
     return showView(await readView(message), at);
   } catch (error) {
     at("note").textContent = `A still picture: ${error.message}.`;
@@ -33,9 +32,6 @@ function showView(view, at) {
     note.hidden = text === null;
   };
   const viewer = new Viewer(canvas, view, {
-    onchange({ kind }) {
-      if (kind !== "drawn" || !canvas.hidden) return;
-    },
     onerror: (told) => refusals[told.kind](told),
   });
   const unwatch = viewer.watch(({ kind }) => {

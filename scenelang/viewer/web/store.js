@@ -18,11 +18,15 @@ export const WITH_ARRAYS = ["shader", "network", "shapes", "materials", "paints"
 
 /** The view of a message: data whose `blob` is deflated and in base64. */
 export async function readView({ blob, ...view }) {
-  const bytes = Uint8Array.from(atob(blob), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const buffer = await new Response(stream).arrayBuffer();
+  const buffer = await inflated(blob).arrayBuffer();
   for (const part of WITH_ARRAYS) view[part] = unpack(view[part], buffer); // values of params may look like names
   return view;
+}
+
+/** What is deflated and in base64, as a Response. */
+export function inflated(text) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate")));
 }
 
 /** Whether two pieces of data are equal; typed arrays too. */
