@@ -1,12 +1,15 @@
 import { plainNumber } from "./camera.js";
 import { copyButton, element, isolated, plainText } from "./dom.js";
 
-const UNITS = { number: [1, ""], angle: [180 / Math.PI, "°"], time: [1, "s"] }; // shown per base unit, its sign
+const SHOWN_UNITS = { // how many are one of the base unit, and the sign
+  deg: [180 / Math.PI, "°"], rad: [1, "rad"], turn: [0.5 / Math.PI, "turn"], s: [1, "s"], ms: [1000, "ms"],
+};
 
 /** A control for each of a viewer's params, those that stay fixed with the reason, and a button to reset all. */
 export function paramControls(viewer) {
   const { params, fixed } = viewer.view;
-  const rows = params.map((param) => paramRow(viewer, param));
+  const still = new Set(fixed.map(({ name }) => name));
+  const rows = params.filter(({ name }) => !still.has(name)).map((param) => paramRow(viewer, param));
   const unwatch = viewer.watch(({ kind }) => {
     if (kind === "param" || kind === "view") for (const row of rows) row.refresh();
   });
@@ -28,12 +31,12 @@ function paramRow(viewer, param) {
   const id = `param-${param.name}`;
   const note = element("output", { class: "why", htmlFor: id });
   const change = (value) => viewer.set(param.name, value);
-  const { inputs, refresh } = makerOf(param)(param, change);
+  const { inputs, sign = "", refresh } = makerOf(param)(param, change);
   inputs[0].id = id;
-  for (const input of inputs) input.setAttribute("aria-label", plainText(param.label ?? param.name));
+  for (const input of inputs.slice(1)) input.ariaLabel = plainText(param.name);
   const label = element("label", { for: id }, isolated(param.name));
-  if (param.label) label.title = plainText(param.label);
-  const box = element("div", { class: "param" }, label, element("span", { class: "inputs" }, ...inputs), note);
+  const box = element("div", { class: "param" }, label, element("span", { class: "inputs" }, ...inputs, sign), note);
+  if (param.label) note.before(element("small", { class: "hint", dir: "auto" }, plainText(param.label)));
   refresh(viewer.params[param.name]);
   return {
     name: param.name,
@@ -45,12 +48,13 @@ function paramRow(viewer, param) {
 
 function makerOf(param) {
   if (param.choices) return choiceInput;
-  if (param.kind in UNITS) return numberInput;
+  if (["number", "angle", "time"].includes(param.kind)) return numberInput;
   return { bool: switchInput, color: colourInput, string: textInput }[param.kind] ?? listInput;
 }
 
-function numberInput({ kind, low, high, step, exclusive }, change) {
-  const [factor, sign] = UNITS[kind];
+function numberInput({ unit, low, high, step, exclusive }, change) {
+  const [factor, sign] = SHOWN_UNITS[unit] ?? [1, ""];
+  step = step && Math.abs(step);
   const told = (value) => plainNumber(value * factor, 6);
   const ranged = low !== undefined && high !== undefined;
   const limits = ranged ? { min: told(low), max: told(high) } : {};
@@ -70,8 +74,7 @@ function numberInput({ kind, low, high, step, exclusive }, change) {
   const box = element("input", { type: "number", ...limits, step: "any" });
   slider.addEventListener("input", take(slider));
   box.addEventListener("change", take(box));
-  const inputs = [...(ranged ? [slider] : []), box, ...(sign ? [element("span", {}, sign)] : [])];
-  return { inputs, refresh: (value) => (slider.value = box.value = told(value)) };
+  return { inputs: ranged ? [slider, box] : [box], sign, refresh: (value) => (slider.value = box.value = told(value)) };
 }
 
 function switchInput(_, change) {
@@ -127,8 +130,9 @@ export function timeline(viewer) {
   const time = element("output", { class: "seconds" });
   button.addEventListener("click", () => (viewer.playing ? viewer.pause() : viewer.play()));
   place.addEventListener("input", () => {
+    const frame = place.valueAsNumber; // a pause shows the one before
     viewer.pause();
-    viewer.seek(place.valueAsNumber);
+    viewer.seek(frame);
   });
   const refresh = () => {
     const { fps = 1, seconds = 0 } = viewer.view.animation ?? {};
