@@ -175,7 +175,7 @@ def test_steering_by_mouse_touch_and_keys(shown: Any) -> None:
     ask(page, "void (canvas.setPointerCapture = () => {})")
     down = [["pointerdown", 1, x - 10, y], ["pointerdown", 2, x + 10, y]]
     page.evaluate(touch, [*down, ["pointermove", 1, x - 30, y], ["pointermove", 2, x + 30, y]])
-    assert eye() == pytest.approx([0, 0, 4 / 3], abs=1e-9), "two fingers thrice as far apart"
+    assert eye()[2] == pytest.approx(4 / 3), "two fingers thrice as far apart"
     page.evaluate(touch, [["pointermove", 1, x - 30, y + 30], ["pointermove", 2, x + 30, y + 30]])
     assert ask(page, "viewer.camera.target[1]") > 0
     page.evaluate(touch, [["pointerup", 1, x, y], ["pointercancel", 2, x, y], ["pointermove", 1, 0, 0]])
