@@ -12,7 +12,7 @@ from importlib.resources import files
 from typing import Final
 
 MODULES: Final = (
-    *("store", "gl"),
+    *("store", "gl", "grids", "ways", "plane"),
     *("values", "functions", "maps", "looks", "chain", "bounds", "graph", "stage", "expressions", "evaluate"),
     *("camera", "pace", "viewer", "dom", "steer", "controls", "page"),
 )

@@ -1,8 +1,4 @@
-"""The view: everything a page needs to draw a scene, as JSON data and one piece of arrays.
-
-Arrays are named in the data as ``[kind, offset, count]``, with a kind of `KINDS`, an offset in bytes into the
-blob, a multiple of 4, and a count of numbers.
-"""
+"""The view: everything a page needs to draw a scene, as JSON data and one piece of arrays."""
 
 from __future__ import annotations
 
@@ -21,32 +17,14 @@ from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.network import FramedArrays
 from scenelang.scene.schema import Animation
+from scenelang.viewer import plane
 from scenelang.viewer.describe import alternative
 from scenelang.viewer.form import Form
+from scenelang.viewer.grids import paints_of, shapes_of
 from scenelang.viewer.rows import rows_of, stage_of
+from scenelang.viewer.store import Store
 
 FORMAT: Final = 1
-KINDS: Final = {"float32": "f32", "uint8": "u8", "int16": "i16", "uint16": "u16", "int32": "i32"}
-
-
-class Store:
-    """Arrays one after the other, as they lie in the blob."""
-
-    def __init__(self) -> None:
-        self._parts: list[bytes] = []
-        self._size = 0
-
-    def add(self, array: np.ndarray) -> list[Any]:
-        """Take in an array of a dtype of `KINDS` and return what names it in the data."""
-        data = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).tobytes()
-        name = [KINDS[array.dtype.name], self._size, array.size]
-        self._parts.append(data + bytes(-len(data) % 4))
-        self._size += len(self._parts[-1])
-        return name
-
-    def bytes(self) -> bytes:
-        """The blob."""
-        return b"".join(self._parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +75,7 @@ def view_of(
     elements = (*form.shapes, *form.paints) if form else program.elements
     albedo = network.material_codes @ network.albedo[:-1] + network.albedo[-1]
     geometries = [{"name": name, "kind": "learned"} for name in manifest.geometries]
-    data = {
+    data: dict[str, Any] = {
         "format": FORMAT,
         "title": title,
         "canvas": program.canvas,
@@ -130,8 +108,11 @@ def view_of(
             {"name": element.name, "text": credit} for element in elements if (credit := credit_of([element]))
         ],
     }
+    if isinstance(network, FramedArrays):
+        data |= plane.shader(network, store)
+        data["paints"] = paints_of(elements, store)
+    data["shapes"] += shapes_of(elements, store)
     data["alt"] = alternative(data)
-    assert isinstance(network, FramedArrays) == (manifest.dimension == 2)
     return View(data, store.bytes())
 
 

@@ -1,7 +1,7 @@
 // What Python packed: JSON data and the arrays that it names.
 
 const KINDS = {
-  f32: Float32Array, u8: Uint8Array, i16: Int16Array, u16: Uint16Array, i32: Int32Array,
+  f32: Float32Array, i8: Int8Array, u8: Uint8Array, i16: Int16Array, u16: Uint16Array, i32: Int32Array,
 };
 
 /** Data with typed arrays in place of their names `[kind, offset, count]`, which lie in an ArrayBuffer. */

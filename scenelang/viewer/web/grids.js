@@ -1,0 +1,56 @@
+// Distances of elements: pyramids of grids, unfolded as elements/pyramid.py does.
+
+/** Shares of four neighbours, of which the second and third lie around a place. */
+const [BEGIN, MIDDLE, END] = [[5, 15, -5, 1], [-1, 9, 9, -1], [1, -5, 15, 5]];
+
+/** Values between nodes along one of the axes, by the cubic through four: (outer, n, inner) to 2 n - 1. */
+function betweenAlong(grid, n, inner) {
+  const outer = grid.length / (n * inner);
+  const found = new Float32Array(outer * (2 * n - 1) * inner);
+  for (let o = 0; o < outer; o++) {
+    const [from, to] = [o * n * inner, o * (2 * n - 1) * inner];
+    for (let k = 0; k < n; k++) {
+      found.set(grid.subarray(from + k * inner, from + (k + 1) * inner), to + 2 * k * inner);
+    }
+    for (let k = 0; k < n - 1; k++) {
+      const [p, q, r, s] = n < 4 ? [0, 8, 8, 0] : k === 0 ? BEGIN : k === n - 2 ? END : MIDDLE;
+      const a = from + (n < 4 ? k - 1 : Math.min(Math.max(k - 1, 0), n - 4)) * inner;
+      const [b, c, d] = n < 4 ? [a + inner, a + 2 * inner, a + inner] : [1, 2, 3].map((i) => a + i * inner);
+      const at = to + (2 * k + 1) * inner;
+      const first = n < 4 ? b : a; // so that nothing outside is read
+      for (let i = 0; i < inner; i++) {
+        found[at + i] = (p * grid[first + i] + q * grid[b + i] + r * grid[c + i] + s * grid[d + i]) / 16;
+      }
+    }
+  }
+  return found;
+}
+
+function between(grid, n, dimension) {
+  let found = grid;
+  for (let axis = dimension - 1; axis >= 0; axis--) {
+    found = betweenAlong(found, n, (2 * n - 1) ** (dimension - 1 - axis));
+  }
+  return found;
+}
+
+/**
+ * The finest grid of a shape of kind "grid": distances at `finest` nodes along each axis of [-1, 1]^d, the
+ * last axis first to change, a Float32Array.
+ */
+export function distances({ dimension, sides, finest, steps, codec }) {
+  let [grid, from] = [null, 0];
+  for (const side of sides) {
+    const count = side ** dimension;
+    grid = grid ? between(grid, (side + 1) / 2, dimension) : new Float32Array(count);
+    const near = Math.fround(2 / (side - 1) / codec.fine);
+    const far = Math.fround(codec.far + codec.first / side);
+    for (let at = 0; at < count; at++) {
+      const found = grid[at] + steps[from + at] * Math.max(near, Math.abs(grid[at]) / far);
+      grid[at] = Math.min(Math.max(found, -codec.farthest), codec.farthest);
+    }
+    from += count;
+  }
+  const last = sides[sides.length - 1];
+  return finest > last ? between(grid, last, dimension) : grid;
+}

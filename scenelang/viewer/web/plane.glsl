@@ -1,0 +1,244 @@
+// The framed network at points of the plane: what renderers/device/kernel.py computes, and which pixels take
+// four samples as renderers/coverage.py says. In front stand sizes and angles.glsl, behind it the decoders.
+
+uniform sampler2D rows; // of each object: four texels, its steps, the place and the steps of its picture
+uniform sampler2D lists; // of each tile: where its list begins, and how many objects; the lists: texels of rows
+uniform sampler2D nodes; // distances of elements
+uniform sampler2D texels; // of pictures
+uniform vec4 cell[4 * (LINES + 2)]; // of each token: lines in distance, state and 1; then candidate, bump
+uniform vec4 background; // premultiplied
+uniform vec2 size; // of the frame, pixels
+uniform float px; // side of a pixel, world units; 0: single points
+uniform float empty; // the state before the first object
+uniform float widest; // of the blends, world units
+uniform int across; // tiles in a row
+#ifdef POINTS
+uniform sampler2D points;
+#endif
+#ifdef OPERATIONS
+#define SPEND(n) spent += float(n)
+float spent = 0.0; // multiply-adds
+#else
+#define SPEND(n)
+#endif
+out vec4 shown;
+
+const float FAR = 1e15; // leaf units: float32 holds its square
+const float CORNER = 0.36; // pixels from the centre to a sample, a little rounded up
+const float NEAR = 0.85; // pixels: farther from an outline a pixel has one colour
+const float NARROW = 1.0 / 16.0; // of a pixel by a blend's width: above it colours change much across the pixel
+const float LEAST = 1e-4; // of a colour, that counts as part of what a point shows
+const vec2 OFFSETS[5] =
+    vec2[](vec2(0), vec2(-0.25, -0.25), vec2(0.25, -0.25), vec2(-0.25, 0.25), vec2(0.25, 0.25));
+
+float learned(int shape, vec2 q);
+
+vec4 texel(sampler2D data, int at) {
+  return texelFetch(data, ivec2(at & 1023, at >> 10), 0);
+}
+
+// ------------------------------------------------------------ the way to the leaf
+
+vec2 local(vec2 p, int at, int steps) {
+  for (int i = 0; i < steps; i++) {
+    vec4 a = texel(rows, at++);
+    if (a.w == 0.0) {
+      vec4 b = texel(rows, at++);
+      p = vec2(dot(a.xy, p) + a.z, dot(b.xy, p) + b.z);
+      SPEND(4);
+    } else {
+      vec2 turn = direction(a.x * length(p) + dot(a.yz, p));
+      p = vec2(dot(p, turn), dot(p, vec2(-turn.y, turn.x)));
+      SPEND(24);
+    }
+    p = clamp(p, -FAR, FAR);
+  }
+  return p;
+}
+
+// ------------------------------------------------------------ elements
+
+#ifdef GRIDS
+float node(int at) {
+  return texelFetch(nodes, ivec2(at & 2047, at >> 11), 0).r;
+}
+
+float edge(int at, float share) {
+  return mix(node(at), node(at + 1), share);
+}
+
+/** A distance by a grid over [-1, 1]^2, and beyond it the least that it can be. */
+float lattice(vec2 q, int first, int side) {
+  vec2 inside = clamp(q, -1.0, 1.0), off = q - inside;
+  vec2 at = (inside + 1.0) * (0.5 * float(side - 1));
+  ivec2 corner = min(ivec2(at), side - 2);
+  vec2 share = at - vec2(corner);
+  first += corner.x * side + corner.y;
+  float found = mix(edge(first, share.y), edge(first + side, share.y), share.x);
+  SPEND(12);
+  return off == vec2(0) ? found : sqrt(found * found + dot(off, off));
+}
+#endif
+
+#ifdef PICTURES
+vec3 dot_of_picture(int first, ivec2 at, ivec2 sides) {
+  at -= sides * ivec2(floor(vec2(at) / vec2(sides)));
+  first += at.y * sides.x + at.x;
+  return texelFetch(texels, ivec2(first & 2047, first >> 11), 0).rgb;
+}
+
+vec3 turned(vec3 rgb, float turns) {
+  float value = max(max(rgb.r, rgb.g), rgb.b), chroma = value - min(min(rgb.r, rgb.g), rgb.b);
+  vec3 gaps = (rgb.gbr - rgb.brg) / max(chroma, 1e-12);
+  float hue = value == rgb.r ? gaps.r : value == rgb.g ? gaps.g + 2.0 : gaps.b + 4.0;
+  hue = fract(hue / 6.0 + turns) * 6.0;
+  vec3 shares = vec3(abs(hue - 3.0) - 1.0, 2.0 - abs(hue - 2.0), 2.0 - abs(hue - 4.0));
+  return value - chroma + chroma * clamp(shares, 0.0, 1.0);
+}
+
+/** The colour of a picture, which repeats, at leaf coordinates. */
+vec3 painted(vec2 q, int at) {
+  vec4 a = texel(rows, at), b = texel(rows, at + 1), about = texel(rows, at + 2);
+  vec2 spot = fract(vec2(dot(a.xy, q) + a.z, dot(b.xy, q) + b.z)) * about.xy - 0.5;
+  ivec2 corner = ivec2(floor(spot)), sides = ivec2(about.xy);
+  vec2 share = spot - vec2(corner);
+  int first = int(about.z);
+  vec3 above = mix(dot_of_picture(first, corner, sides),
+                   dot_of_picture(first, corner + ivec2(1, 0), sides), share.x);
+  vec3 below = mix(dot_of_picture(first, corner + ivec2(0, 1), sides),
+                   dot_of_picture(first, corner + ivec2(1, 1), sides), share.x);
+  vec3 rgb = mix(above, below, share.y);
+  SPEND(20);
+  for (int i = 0; i < int(about.w); i++) {
+    vec4 op = texel(rows, at + 3 + i);
+    if (op.x == COLOR) rgb *= op.yzw;
+    else if (op.x == GRAYSCALE) rgb += op.y * (dot(LUMA, rgb) - rgb);
+    else rgb = turned(rgb, op.y);
+    rgb = clamp(rgb, 0.0, 1.0);
+    SPEND(6);
+  }
+  return rgb;
+}
+#endif
+
+// ------------------------------------------------------------ the cell
+
+float level(vec4 line, float narrow, float distance, float state) {
+  return narrow * (line.x * distance + line.y * state) + line.z;
+}
+
+/** Whether no gate opens, however much farther away than a distance an object is. */
+bool idle(int gate, float narrow, float distance, float state) {
+  for (int k = 0; k <= LINES; k++) {
+    vec4 line = cell[gate + k];
+    if (line.x > 0.0 || level(line, narrow, distance, state) > 0.0) return false;
+  }
+  return true;
+}
+
+/**
+ * Colour and state of a point that has met its objects.
+ * @param gap how near to an outline a pixel around the point has more than one colour, world units;
+ *     0 where the point itself is asked for
+ * @param near whether the pixel has, in which case the answer is of no use
+ */
+vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
+  float state = empty;
+  vec3 rgb = vec3(0.0);
+  bool tied = false, doubtful = false;
+  near = false;
+  for (int i = 0; i < span.y; i++) {
+    int at = int(texel(lists, span.x + (i >> 2))[i & 3]);
+    vec4 a = texel(rows, at), b = texel(rows, at + 1), c = texel(rows, at + 2), own = texel(rows, at + 3);
+    float scale = a.x, stretch = a.y, narrow = a.w;
+    int token = int(a.z), gate = token * (LINES + 2), steps = int(c.z);
+    vec2 q = local(p, at + 4, steps);
+
+    // no decoder where the leaf is proved so far away that nothing changes
+    float radius = length(q), room = gap * stretch;
+    float least = own.a * scale * max(max(abs(q.x) - b.x, abs(q.y) - b.y), radius - b.z) - room;
+    SPEND(8 + 3 * (LINES + 1));
+    if (least > 0.0 && idle(gate, narrow, least, state)) continue;
+#ifndef POINTS
+    if (radius > b.w + room / scale) continue;
+    bool cut = token == INTERSECT && least > FARTHEST * widest;
+#else
+    const bool cut = false;
+#endif
+    float distance = least;
+    if (!cut) {
+#ifdef GRIDS
+      distance = c.y > 0.0 ? lattice(q, int(c.x), int(c.y)) : learned(int(c.x), q);
+#else
+      distance = learned(int(c.x), q);
+#endif
+      distance *= scale;
+    }
+    if (abs(distance) < room) {
+      near = true;
+      return vec4(0.0);
+    }
+
+    float take = clamp(level(cell[gate], narrow, distance, state), 0.0, 1.0), paint = 0.0;
+    for (int k = 1; k <= LINES; k++) paint = max(paint, level(cell[gate + k], narrow, distance, state));
+    paint = min(paint, 1.0);
+    if (gap > 0.0) {
+      float margin = abs(state / UNIT - distance);
+      if (token == SMOOTH) {
+        doubtful = doubtful || (tied && paint > LEAST && paint < 1.0 - LEAST);
+#ifdef PICTURES
+        float width = BLEND / narrow;
+        doubtful = doubtful || (px > NARROW * width && margin < width + CORNER * px * (1.0 + stretch));
+#endif
+      }
+      tied = tied || (token == UNION && margin < 2.0 * CORNER * px);
+    }
+    vec2 ends = cell[gate + LINES + 1].xy;
+    state += take * (ends.x * distance - state) - take * (1.0 - take) * ends.y / narrow;
+    SPEND(3 * (LINES + 1) + 8);
+#ifdef PICTURES
+    if (c.w > 0.0 && paint > LEAST) {
+      // over a pixel, colours of pictures are a mean as they are of four samples
+      vec3 sum = painted(q, at + int(c.w));
+      if (gap > 0.0) {
+        sum = vec3(0.0);
+        for (int k = 1; k < 5; k++) sum += painted(local(p + px * OFFSETS[k], at + 4, steps), at + int(c.w));
+        sum *= 0.25;
+      }
+      own.rgb = sum;
+    }
+#endif
+    rgb += paint * (own.rgb - rgb);
+    SPEND(3);
+  }
+  near = abs(state) < gap * UNIT || (doubtful && state * SLOPE < 0.5);
+  return vec4(rgb, state);
+}
+
+void main() {
+  bool near;
+#ifdef POINTS
+  int number = int(gl_FragCoord.x) + 1024 * int(gl_FragCoord.y);
+  vec4 found = met(texel(points, number).xy, ivec2(texel(lists, 0).xy), 0.0, near);
+  shown = vec4(found.a / UNIT, found.rgb);
+#else
+  ivec2 tile = ivec2(gl_FragCoord.xy) / TILE, span = ivec2(texel(lists, tile.y * across + tile.x).xy);
+  vec2 middle = (gl_FragCoord.xy - 0.5 * size) * px;
+  vec4 sum = vec4(0.0);
+  for (int k = 0; k < 5; k++) {
+    vec4 found = met(middle + px * OFFSETS[k], span, k == 0 ? NEAR * px : 0.0, near);
+    float alpha = clamp(0.5 - found.a * SLOPE, 0.0, 1.0);
+    vec4 picture = vec4(found.rgb * alpha, alpha);
+    if (k > 0) {
+      sum += 0.25 * picture;
+    } else if (!near) {
+      sum = picture;
+      break;
+    }
+  }
+  shown = sum + (1.0 - sum.a) * background;
+#endif
+#ifdef OPERATIONS
+  shown = vec4(spent);
+#endif
+}

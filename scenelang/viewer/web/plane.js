@@ -1,0 +1,234 @@
+// The drawer of the plane: rows become textures of numbers, and one triangle asks the network at all pixels.
+
+import { floats, linked, target, triangle } from "./gl.js";
+import { distances } from "./grids.js";
+import { discInWorld, reaches, tileLists } from "./ways.js";
+
+const WIDE = 1024; // texels of a row of numbers; as in plane.glsl
+
+/** GLSL of a decoder: weights as numbers in the text, which is several times as fast as fetching them. */
+function decoderText(name, { units: [n, m], weights, far }) {
+  let at = 0;
+  const next = (count) => Array.from(weights.subarray(at, (at += count)));
+  const sum = (numbers, names) => numbers.map((w, i) => `${literal(w)} * ${names[i]}`).join(" + ");
+  const lines = [`float ${name}(vec2 q) {`, "  float r = length(q), grown = max(r - RIM, 0.0);"];
+  lines.push("  q *= RIM / max(r, RIM);");
+  const hidden = Array.from({ length: n }, (_, i) => `h${i}`);
+  const last = Array.from({ length: m }, (_, i) => `g${i}`);
+  for (const h of hidden) {
+    const [x, y, bias] = next(3);
+    lines.push(`  float ${h} = max(${sum([x, y], ["q.x", "q.y"])} + ${literal(bias)}, 0.0);`);
+  }
+  for (const g of last) {
+    const [bias, ...factors] = next(1 + n);
+    lines.push(`  float ${g} = max(${literal(bias)} + ${sum(factors, hidden)}, 0.0);`);
+  }
+  const factors = next(m);
+  const [bias] = next(1);
+  lines.push(`  SPEND(${3 * n + m * (n + 1) + m + 8});`);
+  lines.push(`  return ${literal(bias)} + ${sum(factors, last)} + grown * ${literal(far)};`, "}");
+  return lines.join("\n");
+}
+
+/** A number in GLSL, exact of a float32. */
+function literal(x) {
+  const text = Math.fround(x).toPrecision(9).replace(/(\.\d*?)0+(e|$)/, "$1$2");
+  const whole = /[.e]/.test(text) ? text : `${text}.0`;
+  return x < 0 ? `(${whole})` : whole;
+}
+
+/** The fragment shader for shapes in use, with names defined. */
+function fragmentText(view, shapes, defines) {
+  const head = ["#version 300 es", ...defines.map((name) => `#define ${name}`), view.shader.fragment];
+  const used = shapes.filter((shape) => shape < view.network.decoders.length);
+  for (const shape of used) head.push(decoderText(`decoder${shape}`, view.network.decoders[shape]));
+  head.push("float learned(int shape, vec2 q) {", "  switch (shape) {");
+  for (const shape of used) head.push(`    case ${shape}: return decoder${shape}(q);`);
+  head.push("    default: return FAR;", "  }", "}");
+  return head.join("\n");
+}
+
+/** A texture of one kind of numbers, as wide as every GPU allows. */
+function sheet(gl, data, [inner, format, type], channels) {
+  const wide = 2048;
+  const high = Math.max(1, Math.ceil(data.length / (channels * wide)));
+  const padded = new data.constructor(channels * wide * high);
+  padded.set(data);
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+  gl.texImage2D(gl.TEXTURE_2D, 0, inner, wide, high, 0, format, type, padded);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+  return texture;
+}
+
+/** Numbers of all rows, and the texel at which each begins; see `rows` of plane.glsl. */
+function packed({ network, materials }, leaves, pictures, { rows }, reach) {
+  const [numbers, begins] = [[], []];
+  rows.forEach((row, i) => {
+    const { steps, scale } = row;
+    const paint = network.draws[row.token] ? row.paint : -1; // the others leave colours as they are
+    begins.push(numbers.length / 4);
+    const { bounds, far, first, side } = leaves[row.shape];
+    const narrow = row.token === network.tokens.smooth ? network.blend / row.blend : 1;
+    const moves = steps.reduce((total, [kind]) => total + (kind === "map" ? 2 : 1), 0);
+    const albedo = materials[row.material].albedo;
+    const colour = row.colour.map((share, k) => Math.min(Math.max(share * albedo[k], 0), 1));
+    numbers.push(scale, discInWorld(steps, 1).stretch, row.token, narrow);
+    numbers.push(...bounds, Math.min(reach[i], 1e30));
+    numbers.push(side ? first : row.shape, side);
+    numbers.push(steps.length, paint < 0 ? 0 : 4 + moves, ...colour, Math.min(far, 1));
+    for (const [kind, a, b, c, ...rest] of steps) {
+      numbers.push(a, b, c, kind === "map" ? 0 : 1);
+      if (kind === "map") numbers.push(...rest, 0);
+    }
+    if (paint < 0) return;
+    const [a, b, u, c, d, v] = row.place; // to shares of the picture's sides, from its upper left corner
+    numbers.push(a / 2, b / 2, (u + 1) / 2 - Math.floor((u + 1) / 2), 0);
+    numbers.push(-c / 2, -d / 2, (1 - v) / 2 - Math.floor((1 - v) / 2), 0);
+    const picture = pictures[paint];
+    numbers.push(picture.wide, picture.high, picture.first, row.paintSteps.length);
+    for (const [name, ...amounts] of row.paintSteps) {
+      numbers.push(network.paintSteps.indexOf(name), ...amounts, ...Array(3 - amounts.length).fill(0));
+    }
+  });
+  return { numbers, begins };
+}
+
+/** Tiles' lists as texels: where each begins and how long it is, then texels of rows, four to one. */
+function listed({ starts, objects }, begins) {
+  const tiles = starts.length - 1;
+  let end = tiles;
+  for (let at = 0; at < tiles; at++) end += Math.ceil((starts[at + 1] - starts[at]) / 4);
+  const numbers = new Float32Array(4 * end);
+  end = tiles;
+  for (let at = 0; at < tiles; at++) {
+    const count = starts[at + 1] - starts[at];
+    numbers.set([end, count], 4 * at);
+    for (let k = 0; k < count; k++) numbers[4 * end + k] = begins[objects[starts[at] + k]];
+    end += Math.ceil(count / 4);
+  }
+  return numbers;
+}
+
+/**
+ * Draws the plane.
+ * @param view - as `unpack` gives it
+ * @returns `draw(program, {width, height})` into the bound framebuffer, premultiplied;
+ *   `points(program, p)`: distance, red, green and blue at points (M * 2) of the world, a Float32Array (M * 4);
+ *   `operations(program, {width, height})`: multiply-adds a pixel; `dispose()`
+ */
+export function planeDrawer(gl, view) {
+  const { network } = view;
+  const programs = new Map(); // by what they were compiled for
+  const shapes = new Set(); // seen so far
+  const textures = ["rows", "lists", "nodes", "texels", "points"];
+  const held = { rows: floats(gl, new Float32Array(4)), lists: floats(gl, new Float32Array(4)) };
+  const kinds = [];
+  const grids = view.shapes.slice(network.decoders.length);
+  const [nodes, ofGrid] = joined(grids.map(distances), Float32Array);
+  const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels), Uint8Array);
+  const leaves = [
+    ...network.decoders.map((decoder) => ({ ...decoder, side: 0 })),
+    ...grids.map(({ bounds, finest }, i) => ({ bounds, far: 1, side: finest, first: ofGrid[i] })),
+  ];
+  const pictures = view.paints.map((paint, i) => ({ ...paint, first: ofPicture[i] / 3 }));
+  if (grids.length) {
+    kinds.push("GRIDS");
+    held.nodes = sheet(gl, nodes, [gl.R32F, gl.RED, gl.FLOAT], 1);
+  }
+  if (pictures.length) {
+    kinds.push("PICTURES");
+    held.texels = sheet(gl, texels, [gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE], 3);
+  }
+
+  function compiled(program, define) {
+    for (const { shape } of program.rows) shapes.add(shape);
+    const used = [...shapes].sort((a, b) => a - b);
+    const key = [define, ...used].join();
+    if (!programs.has(key)) {
+      const found = linked(gl, fragmentText(view, used, [...kinds, ...(define ? [define] : [])]));
+      const place = (name) => gl.getUniformLocation(found, name);
+      gl.useProgram(found);
+      textures.forEach((name, unit) => gl.uniform1i(place(name), unit));
+      gl.uniform4fv(place("cell"), network.cell);
+      programs.set(key, { found, place });
+    }
+    return programs.get(key);
+  }
+
+  function run(program, { width, height }, define = "") {
+    const { found, place } = compiled(program, define);
+    const px = 2 / Math.min(width, height);
+    const { reach, widest } = reaches(program.rows, network);
+    const { numbers, begins } = packed(view, leaves, pictures, program, reach);
+    const { tile } = network;
+    const lists = define === "POINTS"
+      ? { starts: [0, begins.length], objects: begins.map((_, i) => i) }
+      : tileLists(program.rows, reach, { width, height, tile, px }, network.draws);
+    floats(gl, new Float32Array(numbers), WIDE, held.rows);
+    floats(gl, listed(lists, begins), WIDE, held.lists);
+    textures.forEach((name, unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, held[name] ?? null);
+    });
+    gl.useProgram(found);
+    const { background } = program;
+    gl.uniform4fv(place("background"), background ? [...background, 1] : [0, 0, 0, 0]);
+    gl.uniform2f(place("size"), width, height);
+    gl.uniform1f(place("px"), define === "POINTS" ? 0 : px);
+    gl.uniform1f(place("empty"), (network.empty * widest) / network.blend);
+    gl.uniform1f(place("widest"), widest);
+    gl.uniform1i(place("across"), Math.ceil(width / tile));
+    gl.viewport(0, 0, width, height);
+    gl.disable(gl.BLEND);
+    triangle(gl);
+  }
+
+  /** Numbers (width * height * 4) that a variant of the shader answers. */
+  function answers(program, size, define) {
+    const before = gl.getParameter(gl.FRAMEBUFFER_BINDING);
+    const { framebuffer, texture } = target(gl, size.width, size.height);
+    const found = new Float32Array(4 * size.width * size.height);
+    run(program, size, define);
+    gl.readPixels(0, 0, size.width, size.height, gl.RGBA, gl.FLOAT, found);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, before);
+    gl.deleteFramebuffer(framebuffer);
+    gl.deleteTexture(texture);
+    return found;
+  }
+
+  compiled(view.program, ""); // throws where it cannot be
+  return {
+    draw: (program, size) => run(program, size),
+    points(program, p) {
+      const count = p.length / 2;
+      const spread = new Float32Array(4 * count);
+      for (let i = 0; i < count; i++) spread.set([p[2 * i], p[2 * i + 1]], 4 * i);
+      held.points = floats(gl, spread, WIDE);
+      const found = answers(program, { width: WIDE, height: Math.ceil(count / WIDE) }, "POINTS");
+      gl.deleteTexture(held.points);
+      delete held.points;
+      return found.subarray(0, 4 * count);
+    },
+    operations(program, size) {
+      const found = answers(program, size, "OPERATIONS");
+      return found.reduce((total, n) => total + n, 0) / found.length;
+    },
+    dispose() {
+      for (const texture of Object.values(held)) gl.deleteTexture(texture);
+      for (const { found } of programs.values()) gl.deleteProgram(found);
+      programs.clear();
+    },
+  };
+}
+
+/** Arrays of a kind one after the other, and where each begins. */
+function joined(arrays, Kind) {
+  const begins = [0];
+  for (const { length } of arrays) begins.push(begins[begins.length - 1] + length);
+  const all = new Kind(begins.pop());
+  arrays.forEach((array, i) => all.set(array, begins[i]));
+  return [all, begins];
+}
