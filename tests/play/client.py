@@ -94,9 +94,9 @@ class Page:
 
 def children(pid: int) -> set[int]:
     """Processes that a process has started and that are there."""
-    found = subprocess.run(["ps", "-eo", "pid=,ppid="], capture_output=True, text=True, check=True).stdout
-    pairs = [tuple(map(int, line.split())) for line in found.splitlines()]
-    return {child for child, parent in pairs if parent == pid}
+    found = subprocess.run(["ps", "-eo", "pid=,ppid=,comm="], capture_output=True, text=True, check=True)
+    rows = [line.split(None, 2) for line in found.stdout.splitlines()]
+    return {int(child) for child, parent, name in rows if int(parent) == pid and name != "ps"}
 
 
 def is_there(pid: int) -> bool:
