@@ -60,7 +60,7 @@ def test_a_mistake_is_shown_while_the_last_picture_stays(page: Page) -> None:
     before = page.picture()
     page.knows()
     page.click_text("background")
-    page.page.keyboard.type("\nsquar;")
+    page.page.keyboard.insert_text("\nsquar;")
     page.page.locator(".cm-lintRange-error", has_text="squar").wait_for()
     page.page.locator("#note", has_text="last picture without mistakes").wait_for()
     assert page.picture() == before
