@@ -4,6 +4,8 @@
   changelog and the contributors' guide as pages.
 - What each command's ``--help`` says, as a page.
 - The scenes of ``examples/`` as files to download.
+- Pictures of scenes, of ``examples/`` and of blocks of ``nsg``, lead to the scenes themselves, drawn live
+  (``viewers/NAME.html``); ``site.js`` opens them in the picture's place.
 - Links of pages lead to files of the repository, as code hosts show them; here they lead to the same thing
   inside the site, and where the site has no such thing they become plain text.
 - Nothing is fetched from elsewhere, also where the site is opened as files.
@@ -12,6 +14,7 @@
 from __future__ import annotations
 
 import re
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -22,6 +25,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 from scenelang.cli.main import Commands, cli
+from scenelang.viewer.export import page_of
 
 ROOT = Path(__file__).parents[1]
 CODE_PAGES = "scenelang/diagnostics/pages"
@@ -30,6 +34,13 @@ COMMANDS_PAGE = "commands.md"
 _LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 _SHIM = re.compile(r"<script src=\"?https://unpkg\.com/iframe-worker/shim\"?></script>")
 _CODES = re.compile(r"^(```nsg)(?: [EW]\d{4})+", re.MULTILINE)  # the codes that a test expects of a scene
+_PICTURE = re.compile(r"(\[)?(!\[[^\]]*\]\((?:\.\./)*pictures/([\w/-]+)\.(?:png|webp)\))(?(1)\]\([^)]*\))")
+_SCENE = re.compile(
+    r"^```nsg(?: title=[^\n]*)?\n((?:(?!```)[^\n]*\n)*)```\n\n"
+    r"!\[[^\]]*\]\(pictures/([\w/-]+)\.(?:png|webp)\)",
+    re.MULTILINE,
+)
+_SHOWN = re.compile(r"^// Shown( \w+)?:", re.MULTILINE)
 _FENCE = re.compile(r"(^```.*?^```$)", re.MULTILINE | re.DOTALL)
 
 
@@ -60,8 +71,31 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             made[path.relative_to(ROOT).as_posix()] = path
     for target, path in made.items():
         files.append(File.generated(config, target, content=path.read_bytes()))
+    for name, scene in live_scenes().items():
+        files.append(File.generated(config, f"viewers/{name}.html", content=viewer(scene)))
     files.append(File.generated(config, COMMANDS_PAGE, content=commands_page()))
     return files
+
+
+def live_scenes() -> dict[str, str | Path]:
+    """The texts or files of scenes, by the pictures that show them."""
+    found: dict[str, str | Path] = {path.stem: path for path in (ROOT / "examples").glob("*.nsg")}
+    for path in (ROOT / "examples/reference").glob("*.nsg"):
+        shown = _SHOWN.findall(path.read_text("utf-8"))
+        found |= {f"language/{name.strip() or path.stem}": path for name in shown}
+    for page in (ROOT / "docs").glob("*.md"):
+        found |= {name: text for text, name in _SCENE.findall(page.read_text("utf-8"))}
+    return found
+
+
+def viewer(scene: str | Path) -> str:
+    """The page that draws a scene live, to be framed."""
+    if isinstance(scene, Path):
+        return page_of(scene, root=ROOT / "examples", embedded=True)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "scene.nsg")
+        path.write_text(scene, "utf-8")
+        return page_of(path, embedded=True)
 
 
 def commands_page() -> str:
@@ -98,6 +132,13 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
         up = "../" * page.file.src_uri.count("/")
         return f"[{text}]({up}{inside}{hash_sign}{anchor})"
 
+    def alive(match: re.Match[str]) -> str:
+        up = "../" * page.file.src_uri.count("/")
+        if files.get_file_from_path(goal := f"viewers/{match[3]}.html") is None:
+            return match[0]
+        return f"[{match[2]}]({up}{goal}){{.live}}"
+
+    markdown = _PICTURE.sub(alive, markdown)
     parts = _FENCE.split(_CODES.sub(r"\1", markdown))
     return "".join(part if part.startswith("```") else _LINK.sub(link, part) for part in parts)
 
