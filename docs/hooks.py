@@ -25,7 +25,10 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 from scenelang.cli.main import Commands, cli
-from scenelang.viewer.export import page_of
+from scenelang.viewer.export import viewed
+from scenelang.viewer.page import control_rows
+from scenelang.viewer.page import page as page_of
+from scenelang.viewer.view import View
 
 ROOT = Path(__file__).parents[1]
 CODE_PAGES = "scenelang/diagnostics/pages"
@@ -41,6 +44,9 @@ _SCENE = re.compile(
     re.MULTILINE,
 )
 _SHOWN = re.compile(r"^// Shown( \w+)?:", re.MULTILINE)
+LIVE: dict[str, str] = {}
+"""Attributes of links to the pages that draw scenes, by the names of their pictures: lines of controls, 16 px
+each, and the height of the picture by its width."""
 _FENCE = re.compile(r"(^```.*?^```$)", re.MULTILINE | re.DOTALL)
 
 
@@ -72,7 +78,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for target, path in made.items():
         files.append(File.generated(config, target, content=path.read_bytes()))
     for name, scene in live_scenes().items():
-        files.append(File.generated(config, f"viewers/{name}.html", content=viewer(scene)))
+        view = view_of_scene(scene)
+        width, height = view.data["canvas"]
+        LIVE[name] = f"data-rows={control_rows(view)} data-aspect={height / width:.4f}"
+        files.append(File.generated(config, f"viewers/{name}.html", content=page_of(view, embedded=True)))
     files.append(File.generated(config, COMMANDS_PAGE, content=commands_page()))
     return files
 
@@ -88,14 +97,14 @@ def live_scenes() -> dict[str, str | Path]:
     return found
 
 
-def viewer(scene: str | Path) -> str:
-    """The page that draws a scene live, to be framed."""
+def view_of_scene(scene: str | Path) -> View:
+    """What a page draws of a text or a file."""
     if isinstance(scene, Path):
-        return page_of(scene, root=ROOT / "examples", embedded=True)
+        return viewed(scene, root=ROOT / "examples")[0]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "scene.nsg")
         path.write_text(scene, "utf-8")
-        return page_of(path, embedded=True)
+        return viewed(path)[0]
 
 
 def commands_page() -> str:
@@ -134,9 +143,9 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
 
     def alive(match: re.Match[str]) -> str:
         up = "../" * page.file.src_uri.count("/")
-        if files.get_file_from_path(goal := f"viewers/{match[3]}.html") is None:
+        if (sizes := LIVE.get(match[3])) is None:
             return match[0]
-        return f"[{match[2]}]({up}{goal}){{.live}}"
+        return f"[{match[2]}]({up}viewers/{match[3]}.html){{.live {sizes}}}"
 
     markdown = _PICTURE.sub(alive, markdown)
     parts = _FENCE.split(_CODES.sub(r"\1", markdown))

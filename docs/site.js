@@ -12,8 +12,9 @@ function bringToLife(link) {
   frame.title = picture.alt;
   frame.sandbox = "allow-scripts";
   frame.className = "live";
-  frame.style.width = `${Math.max(picture.clientWidth, 260)}px`;
-  frame.style.height = `${Math.max(picture.clientWidth, 260) * (picture.naturalHeight / picture.naturalWidth)}px`;
+  const width = Math.max(picture.clientWidth, 260);
+  frame.style.width = `${width}px`;
+  frame.style.height = `${Math.round(width * link.dataset.aspect) + 16 * link.dataset.rows}px`;
   link.replaceWith(frame);
 }
 
@@ -22,11 +23,4 @@ document.addEventListener("click", (event) => {
   if (!link || event.ctrlKey || event.metaKey || event.shiftKey || event.button !== 0 || !hasWebGL2()) return;
   event.preventDefault();
   bringToLife(link);
-});
-
-// a frame tells how high its page is
-window.addEventListener("message", (event) => {
-  const frame = [...document.querySelectorAll("iframe.live")].find((one) => one.contentWindow === event.source);
-  const height = Number(event.data?.scenelangHeight);
-  if (frame && height > 0 && height < 4000) frame.style.height = `${height}px`;
 });

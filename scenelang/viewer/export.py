@@ -55,6 +55,28 @@ def export(
         source: a scene's file, whose params the page can change and whose animation it plays; or a compiled
             Program's (.safetensors), a Scene or a Program, which are as they are.
         out: the page.
+        params, size, model, root, title: as of `viewed`.
+
+    Raises:
+        As `viewed`, and OSError where the page cannot be written.
+    """
+    view, program = viewed(source, params=params, size=size, model=model, root=root, title=title)
+    write_output(out, page(view, still=still(program)).encode())
+
+
+def viewed(
+    source: str | os.PathLike[str] | Scene | Program,
+    *,
+    params: Mapping[str, Any] | None = None,
+    size: tuple[int, int] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    title: str | None = None,
+) -> tuple[View, Program]:
+    """The view of what `export` takes, and the Program that it shows first.
+
+    Args:
+        source: as of `export`.
         params: values for a file's params that the page starts from; as for `scenelang.load`.
         size: canvas in pixels instead of the scene's; the picture keeps its aspect.
         model: draw with this model instead of the one that the scene names.
@@ -67,7 +89,7 @@ def export(
         RenderError: the model has no weights here.
         ValueError: an argument says something of a file where there is none, or of a scene where there is a
             Program.
-        OSError: a file cannot be read or written.
+        OSError: a file cannot be read.
     """
     scene = source if isinstance(source, Scene) else None
     evaluation = None
@@ -83,8 +105,7 @@ def export(
     else:
         program = source if isinstance(source, Program) else load_program(Path(path or ""))
     name = "" if path is None else path.stem
-    view = scene_view(program, scene, evaluation, title=name if title is None else title)
-    write_output(out, page(view, still=still(program)).encode())
+    return scene_view(program, scene, evaluation, title=name if title is None else title), program
 
 
 def scene_view(
