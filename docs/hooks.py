@@ -14,6 +14,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -102,6 +103,7 @@ def view_of_scene(scene: str | Path) -> View:
     if isinstance(scene, Path):
         return viewed(scene, root=ROOT / "examples")[0]
     with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(ROOT / "examples", folder, dirs_exist_ok=True)  # some import from there
         path = Path(folder, "scene.nsg")
         path.write_text(scene, "utf-8")
         return viewed(path)[0]

@@ -12,7 +12,7 @@ function bringToLife(link) {
   frame.title = picture.alt;
   frame.sandbox = "allow-scripts";
   frame.className = "live";
-  const width = Math.max(picture.clientWidth, 260);
+  const width = Math.min(Math.max(picture.clientWidth, 300), 420); // pixels; strips are wider
   frame.style.width = `${width}px`;
   frame.style.height = `${Math.round(width * link.dataset.aspect) + 16 * link.dataset.rows}px`;
   link.replaceWith(frame);
