@@ -1,6 +1,6 @@
-"""What users brought as a page has it: steps of a geometry's pyramid, and the texels of a picture.
+"""What users brought as a page has it: steps of pyramids of distances and of colours, and texels of pictures.
 
-The page unfolds a pyramid itself (``web/grids.js``): its steps are a fifth of the grid, deflated.
+The page unfolds pyramids itself (``web/grids.js``): its steps are a fifth of the grid, deflated.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from scenelang.elements.element import Element
 from scenelang.elements.picture import texels
@@ -29,22 +30,19 @@ def shapes_of(elements: Iterable[Element], store: Store) -> list[dict[str, Any]]
 
 
 def paints_of(elements: Iterable[Element], store: Store) -> list[dict[str, Any]]:
-    """Entries of a view's ``paints`` for the pictures among elements; raises as `shapes_of`."""
-    return [_picture(element, store) for element in elements if element.form == "picture"]
+    """Entries of a view's ``paints`` for the materials among elements; raises as `shapes_of`."""
+    worn = [element for element in elements if element.material]
+    return [(_picture if element.form == "picture" else _colours)(element, store) for element in worn]
 
 
 def _shape(element: Element, store: Store) -> dict[str, Any]:
-    try:
-        steps = np.frombuffer(element.inflated(), np.int8)
-    except TensorError as error:
-        raise ProgramError(str(error)) from None
     return {
         "name": element.name,
         "kind": "grid",
         "dimension": element.dimension,
         "sides": element.sides,
         "finest": len(unpacked(element)),
-        "steps": store.add(steps),
+        "steps": store.add(_steps(element)),
         "codec": {"fine": FINE, "far": FAR, "first": FIRST, "farthest": FARTHEST},
         "bounds": bounds_of(element) if element.dimension == 2 else None,
     }
@@ -76,3 +74,20 @@ def _picture(element: Element, store: Store) -> dict[str, Any]:
         "high": high,
         "texels": store.add(np.rint(colours * 255).astype(np.uint8).reshape(-1)),
     }
+
+
+def _colours(element: Element, store: Store) -> dict[str, Any]:
+    return {
+        "name": element.name,
+        "kind": "colours",
+        "sides": element.sides,
+        "steps": store.add(_steps(element)),
+        "fineness": element.sizes[1],
+    }
+
+
+def _steps(element: Element) -> npt.NDArray[np.int8]:
+    try:
+        return np.frombuffer(element.inflated(), np.int8)
+    except TensorError as error:
+        raise ProgramError(str(error)) from None

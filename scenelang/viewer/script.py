@@ -14,6 +14,7 @@ from typing import Final
 MODULES: Final = (
     *("store", "gl", "grids", "ways", "plane"),
     *("values", "functions", "maps", "looks", "chain", "bounds", "graph", "stage", "expressions", "evaluate"),
+    *("elements", "balls", "solid"),
     *("camera", "pace", "viewer", "dom", "steer", "controls", "page"),
 )
 """Of ``web/``; each stands behind what it imports."""

@@ -16,8 +16,9 @@ from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.network import FramedArrays
+from scenelang.renderers.solid.network import SolidArrays
 from scenelang.scene.schema import Animation
-from scenelang.viewer import plane
+from scenelang.viewer import plane, solid
 from scenelang.viewer.describe import alternative
 from scenelang.viewer.form import Form
 from scenelang.viewer.grids import paints_of, shapes_of
@@ -110,7 +111,9 @@ def view_of(
     }
     if isinstance(network, FramedArrays):
         data |= plane.shader(network, store)
-        data["paints"] = paints_of(elements, store)
+    elif isinstance(network, SolidArrays):
+        data |= solid.shader(network, store)
+    data["paints"] = paints_of(elements, store)
     data["shapes"] += shapes_of(elements, store)
     data["alt"] = alternative(data)
     return View(data, store.bytes())

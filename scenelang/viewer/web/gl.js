@@ -18,9 +18,8 @@ export function linked(gl, fragment, vertex = CORNERS) {
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
     const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
-    const log = [...logs, gl.getProgramInfoLog(program)].join("\n").trim();
     gl.deleteProgram(program);
-    throw new Error(`the shader does not compile: ${log}`);
+    throw new Error(`the shader does not compile: ${[...logs, gl.getProgramInfoLog(program)].join("\n").trim()}`);
   }
   return program;
 }
@@ -36,10 +35,13 @@ export function floats(gl, data, width = 1024, texture = gl.createTexture()) {
   padded.set(data);
   gl.bindTexture(gl.TEXTURE_2D, texture);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, width, height, 0, gl.RGBA, gl.FLOAT, padded);
-  for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
-    gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
-  }
+  unfiltered(gl, gl.TEXTURE_2D);
   return texture;
+}
+
+/** Have the bound texture's texels as they are. */
+export function unfiltered(gl, target) {
+  for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(target, side, gl.NEAREST);
 }
 
 /** Draw the triangle with a program in use. */

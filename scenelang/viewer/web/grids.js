@@ -54,3 +54,37 @@ export function distances({ dimension, sides, finest, steps, codec }) {
   const last = sides[sides.length - 1];
   return finest > last ? between(grid, last, dimension) : grid;
 }
+
+/** Values linearly between nodes along one of the axes: (outer, n, inner) to 2 n - 1. */
+function halfway(grid, n, inner) {
+  const wide = 2 * n - 1, found = new Float32Array((grid.length / n) * wide);
+  for (let at = 0; at < found.length; at++) {
+    const o = Math.floor(at / inner / wide), k = Math.floor(at / inner) % wide, from = (o * n + (k >> 1)) * inner + (at % inner);
+    found[at] = k & 1 ? (grid[from] + grid[from + inner]) / 2 : grid[from];
+  }
+  return found;
+}
+
+/**
+ * The colours of a paint of kind "colours", as elements/colours.py has them: linear, whole numbers up to `unit`,
+ * at n^3 nodes, z first to change, a Uint16Array of three a node.
+ */
+export function spaceColours({ sides, steps, fineness }, unit) {
+  let [grid, from] = [null, 0];
+  for (const side of sides) {
+    const count = side ** 3;
+    if (grid) for (let axis = 2; axis >= 0; axis--) grid = halfway(grid, (side + 1) / 2, side ** (2 - axis));
+    grid ??= new Float32Array(3 * count);
+    for (let at = 0; at < 3 * count; at++) grid[at] += steps[from + at] * (Math.fround(at < count ? 1 : 2) / fineness);
+    from += 3 * count;
+  }
+  const count = grid.length / 3, found = new Uint16Array(grid.length);
+  const linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+  for (let at = 0; at < count; at++) { // from YCoCg
+    const y = grid[at], orange = grid[count + at], green = grid[2 * count + at], rest = y - green / 2;
+    [rest + orange / 2, y + green / 2, rest - orange / 2].forEach((v, i) => {
+      found[3 * at + i] = Math.round(unit * linear(Math.min(1, Math.max(0, v))));
+    });
+  }
+  return found;
+}

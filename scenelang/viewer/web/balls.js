@@ -1,0 +1,136 @@
+// Where solids may be met: a ball around each row, and of directions from a point which balls lie there.
+
+import { IDENTITY, invertedMap, stretchesOf } from "./maps.js";
+
+const SMALL_SIDE = 1.7; // of a leaf's box that is worth the asking
+const SMOOTH_TOKEN = 1;
+const SUBTRACT_TOKEN = 2;
+const INTERSECT_TOKEN = 3;
+
+/** How much longer a map makes a step at most. */
+const longest = (map) => stretchesOf(map, 3)[1];
+
+/** How much longer a turn makes a small step at most, in the ball of a radius about the origin. */
+function stretched([kind, ...strengths], radius) {
+  const m = radius * strengths.reduce((sum, strength) => sum + Math.abs(strength), 0);
+  const c = kind === "turn" ? radius * Math.abs(strengths[1]) : 0;
+  return (m + Math.sqrt(m * m + 4 + 4 * c)) / 2;
+}
+
+/**
+ * Of each row where rays may meet it: `outer`, the map into the space in which it lies in a ball about the
+ * origin, `rest`, the steps behind that, its `radius` in leaf units and the `ball`'s there, the `rate` at which its world distance changes at
+ * most per step of 1 there, a ball (`centre`, `extent`) of the world around it, and a `box` [low, high] or null.
+ * @param {object[]} rows
+ * @param {{slack: number}} network - of a view
+ * @param {(row: object) => number[][]} boxOf - the box of a row's leaf
+ */
+export function solidBalls(rows, network, boxOf) {
+  const deepest = rows.reduce((most, row) => Math.max(most, row.scale * (1 + Math.abs(row.amount))), 0);
+  let smooths = 0, widest = 0; // of the blends from a row on
+  return rows.slice().reverse().map((row) => {
+    if (row.token === SMOOTH_TOKEN) {
+      smooths += 1;
+      widest = Math.max(widest, row.blend);
+    }
+    const blends = widest * (1 + smooths / 4) + (smooths && row.token === SUBTRACT_TOKEN ? deepest : 0);
+    const radius = 1 + network.slack + Math.abs(row.amount) + blends / row.scale;
+    const mapped = row.steps.length > 0 && row.steps[0][0] === "map";
+    const outer = mapped ? row.steps[0].slice(1) : IDENTITY, rest = row.steps.slice(mapped ? 1 : 0);
+    let ball = radius, growth = 1 + Math.abs(row.amount * row.frequency);
+    for (const step of rest.slice().reverse()) {
+      if (step[0] === "map") {
+        const map = step.slice(1), back = invertedMap(map);
+        growth *= longest(map);
+        ball = longest(back) * ball + Math.hypot(back[3], back[7], back[11]);
+      } else growth *= stretched(step, ball);
+    }
+    const back = invertedMap(outer), centre = [back[3], back[7], back[11]], extent = longest(back) * ball;
+    const [low, high] = boxOf(row), slim = high.some((side, i) => side - low[i] <= SMALL_SIDE);
+    const box = slim && !rest.length ? [low.map((v) => v - radius + 1), high.map((v) => v + radius - 1)] : null;
+    return { outer, rest, radius, ball, rate: row.scale * growth, centre, extent, box };
+  }).reverse();
+}
+
+/** Between which values of across / ahead directions to a ball lie, of those ahead; null where none does. */
+function bearings(across, ahead, radius) {
+  const far = Math.hypot(across, ahead);
+  if (far <= radius) return [-Infinity, Infinity];
+  const middle = Math.atan2(across, ahead), half = Math.asin(radius / far) + 1e-6;
+  const [low, high] = [middle - half, middle + half], side = Math.PI / 2 - 1e-6;
+  if (low >= side || high <= -side) return null;
+  return [low <= -side ? -Infinity : Math.tan(low), high >= side ? Infinity : Math.tan(high)];
+}
+
+const inner = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+/**
+ * Cells of directions from a point, as a picture sees them.
+ * @param {number[]} from - the point
+ * @param {number[][]} axes - unit vectors forward, right and up
+ * @param {number[]} scale, middle - a direction's cell is right / forward * scale + middle, and likewise up
+ * @param {number[]} counts - cells across and up
+ */
+export function cellsOf(from, axes, scale, middle, counts) {
+  return {
+    count: counts[0] * counts[1],
+    /** Calls of the numbers of all cells where a ball may be seen. */
+    of(centre, extent, call) {
+      const to = centre.map((v, i) => v - from[i]), ahead = inner(to, axes[0]), ranges = [];
+      for (const i of [0, 1]) {
+        const range = bearings(inner(to, axes[1 + i]), ahead, extent * (1 + 1e-5));
+        if (!range) return;
+        const [low, high] = range.map((v) => Math.floor(v * scale[i] + middle[i]));
+        ranges.push([Math.max(low, 0), Math.min(high, counts[i] - 1)]);
+      }
+      const [[left, right], [down, up]] = ranges;
+      for (let y = down; y <= up; y++) for (let x = left; x <= right; x++) call(y * counts[0] + x);
+    },
+  };
+}
+
+/** The six sides of a cube around a point, each of side x side cells; a side is that of an axis and a sign. */
+export function cubeOf(from, side) {
+  const unit = (i) => [0, 1, 2].map((j) => Number(i % 3 === j));
+  return [0, 1, 2, 3, 4, 5].map((face) => {
+    const axis = face >> 1, forward = unit(axis).map((v) => (face & 1 ? -v : v));
+    const half = side / 2;
+    return cellsOf(from, [forward, unit(axis + 1), unit(axis + 2)], [half, half], [half, half], [side, side]);
+  });
+}
+
+/**
+ * Lists of the rows whose balls may be met in each cell, the last row first: of each cell where its list begins
+ * and how long it is, then the lists. The first cell has all rows.
+ * @param {object[]} rows
+ * @param {object[]} balls - of `solidBalls`
+ * @param {object[]} groups - of cells
+ * @returns {{data: Int32Array, longest: number}} and how long the longest list but the first is
+ */
+export function listsOf(rows, balls, groups) {
+  const count = 1 + groups.reduce((sum, group) => sum + group.count, 0);
+  const lists = Array.from({ length: count }, () => []), closed = new Uint8Array(count);
+  for (let i = rows.length - 1; i >= 0; i--) {
+    const held = rows[i].token === INTERSECT_TOKEN ? new Uint8Array(count) : null;
+    lists[0].push(i);
+    let first = 1;
+    for (const group of groups) {
+      group.of(balls[i].centre, balls[i].extent, (at) => {
+        if (!closed[first + at]) lists[first + at].push(i);
+        if (held) held[first + at] = 1;
+      });
+      first += group.count;
+    }
+    // outside its ball an intersection leaves nothing of what came before
+    if (held) for (let at = 1; at < count; at++) if (!held[at]) closed[at] = 1;
+  }
+  const data = new Int32Array(2 * count + lists.reduce((sum, list) => sum + list.length, 0));
+  let begin = 2 * count, longestList = 0;
+  lists.forEach((list, at) => {
+    data.set([begin, list.length], 2 * at);
+    data.set(list, begin);
+    begin += list.length;
+    if (at) longestList = Math.max(longestList, list.length);
+  });
+  return { data, longest: longestList };
+}

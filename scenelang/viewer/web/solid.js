@@ -1,0 +1,264 @@
+// Draws solids: rows and light to pictures, by the shader of `solid.glsl` and `light.glsl`.
+
+import { floats, linked, triangle, unfiltered } from "./gl.js";
+import { solidElements } from "./elements.js";
+import { cellsOf, cubeOf, listsOf, solidBalls } from "./balls.js";
+
+const ROW_TEXELS = 12; // as the shader has it
+const LIST_WIDTH = 1024;
+const TILE_SIDE = 16; // pixels that share a list of balls, along each axis
+const CUBE_SIDE = 12; // cells along a side of the cube around the light
+const BAND = 1 << 16; // pixels drawn at a time
+const COLOUR_STEPS = { color: 0, grayscale: 1, hue: 2 };
+
+/** Whether a row wears a medium. */
+const isMedium = (view, row) => view.materials[row.material].medium > 0.5;
+
+/** A row's colour, as far as no texture changes it. */
+function plainColour(view, row) {
+  return view.materials[row.material].albedo.map((v, i) => Math.min(1, Math.max(0, v * row.colour[i])));
+}
+
+/** The rows' numbers for the shader: ROW_TEXELS texels a row, then steps of space and of colours. */
+function tableOf(view, rows, balls, elements) {
+  const blocks = [], blank = () => new Float32Array(4 * ROW_TEXELS);
+  for (let i = 0; i < rows.length; i++) blocks.push(blank());
+  const more = (texels) => { // as many rows as hold some texels; the number of the first
+    const first = blocks.length, flat = texels.flat();
+    for (let at = 0; at < flat.length; at += 4 * ROW_TEXELS) {
+      blocks.push(blank());
+      blocks.at(-1).set(flat.slice(at, at + 4 * ROW_TEXELS));
+    }
+    return first;
+  };
+  rows.forEach((row, i) => {
+    const { outer, rest, ball, rate, box } = balls[i], material = view.materials[row.material];
+    const steps = rest.map(([kind, ...n]) => (kind === "map" ? [0, 0, 0, 0, ...n]
+      : [...(kind === "turn" ? [1, n[0], n[1], 0] : [2, n[0], 0, 0]), ...new Array(12).fill(0)]));
+    const paint = row.paint < 0 ? null : elements.paints[row.paint];
+    const ops = (paint ? row.paintSteps : []).map(([kind, a, b = 0, c = 0]) => [COLOUR_STEPS[kind], a, b, c]);
+    const [a, b, u, c, d, v] = row.place ?? [0, 0, 0, 0, 0, 0], grid = elements.grids[row.shape];
+    const usual = row.token === 1 ? view.network.blend / row.blend : 1;
+    const turn = (x) => x - Math.floor(x);
+    blocks[i].set([
+      ...outer,
+      row.token, row.shape, row.scale, usual,
+      ball * ball, rate, steps.length ? more(steps) : 0, steps.length,
+      ...plainColour(view, row), material.medium,
+      ...(box ? [...box[0], 1, ...box[1]] : [0, 0, 0, -1, 0, 0, 0]), row.amount,
+      row.frequency, paint ? paint.kind : 0, ops.length ? more(ops) : 0, ops.length,
+      // to shares of the picture's sides, from its upper left corner
+      a / 2, b / 2, turn((u + 1) / 2), paint ? paint.first : 0,
+      -c / 2, -d / 2, turn((1 - v) / 2), 0,
+      grid ? grid.side : 0, grid ? grid.first : 0, ...(paint ? paint.sides : [0, 0]),
+    ]);
+  });
+  const data = new Float32Array(blocks.length * 4 * ROW_TEXELS);
+  blocks.forEach((block, i) => data.set(block, i * 4 * ROW_TEXELS));
+  return data;
+}
+
+/** What the shader has to know of, for some rows and their balls, as names of defines. */
+function featuresOf(view, rows, balls) {
+  const media = rows.filter((row) => isMedium(view, row)), has = (holds) => rows.some(holds);
+  const colours = new Set(media.map((row) => (row.paint < 0 ? plainColour(view, row).join() : row.object)));
+  return Object.entries({
+    MEDIA: media.length > 0,
+    MIXED: media.length > 0 && media.length < rows.length,
+    COLOURED: colours.size > 1,
+    TEXTURES: has((row) => row.paint >= 0),
+    GRIDS: has((row) => row.shape >= view.network.geometries),
+    TURNS: balls.some((ball) => ball.rest.length > 0),
+    FAR: balls.some((ball) => ball.radius > view.network.far),
+    BUMPS: has((row) => row.amount !== 0),
+    OTHERS: has((row) => row.token > 1),
+  }).filter(([, holds]) => holds).map(([name]) => name);
+}
+
+/** A texture of whole numbers to fetch. */
+function wholes(gl, data, texture) {
+  const height = Math.max(1, Math.ceil(data.length / LIST_WIDTH)), padded = new Int32Array(LIST_WIDTH * height);
+  padded.set(data);
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32I, LIST_WIDTH, height, 0, gl.RED_INTEGER, gl.INT, padded);
+  unfiltered(gl, gl.TEXTURE_2D);
+}
+
+/** A framebuffer with textures of a format. */
+function screens(gl, width, height, formats) {
+  const framebuffer = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+  const textures = formats.map((format, i) => {
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
+    unfiltered(gl, gl.TEXTURE_2D);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, texture, 0);
+    return texture;
+  });
+  gl.drawBuffers(formats.map((_, i) => gl.COLOR_ATTACHMENT0 + i));
+  return { framebuffer, textures, width, height };
+}
+
+function dropScreens(gl, { framebuffer, textures }) {
+  gl.deleteFramebuffer(framebuffer);
+  for (const texture of textures) gl.deleteTexture(texture);
+}
+
+/** Draws a view of solids; docs/architecture.md has what drawers do. */
+export function solidDrawer(gl, view) {
+  const { network } = view, shaders = new Map(), table = gl.createTexture(), lists = gl.createTexture();
+  const elements = solidElements(gl, view);
+  const block = gl.createBuffer();
+  gl.bindBuffer(gl.UNIFORM_BUFFER, block);
+  gl.bufferData(gl.UNIFORM_BUFFER, network.uniforms, gl.STATIC_DRAW);
+  let first = null, ready = {};
+
+  const boxOf = (row) => {
+    if (row.shape >= network.geometries) return elements.grids[row.shape].box;
+    const at = 6 * row.shape, numbers = [...network.boxes.subarray(at, at + 6)];
+    return [numbers.slice(0, 3), numbers.slice(3)];
+  };
+
+  /** The shader with some defines, compiled once. */
+  const shaderOf = (names) => {
+    const key = names.join();
+    if (!shaders.has(key)) {
+      const defines = names.map((name) => `#define ${name}\n`.replace("=", " ")).join("");
+      const program = linked(gl, `#version 300 es\n${defines}${view.shader.source}`);
+      gl.uniformBlockBinding(program, gl.getUniformBlockIndex(program, "Network"), 0);
+      const places = new Map();
+      shaders.set(key, { program, at(name) {
+        if (!places.has(name)) places.set(name, gl.getUniformLocation(program, name));
+        return places.get(name);
+      } });
+    }
+    return shaders.get(key);
+  };
+
+  /** Take rows in, and cells for a picture of a size. */
+  const prepare = (program, width, height) => {
+    if (ready.program === program && ready.width === width && ready.height === height) return;
+    const { rows, stage } = program, balls = solidBalls(rows, network, boxOf);
+    const pixel = 2 / Math.min(width, height), near = 1 / Math.tan(stage.fov / 2);
+    const tiles = [width, height].map((side) => Math.ceil(side / TILE_SIDE)), scale = near / pixel / TILE_SIDE;
+    const seen = cellsOf(stage.eye, stage.axes, [scale, scale],
+      [width / 2 / TILE_SIDE, height / 2 / TILE_SIDE], tiles);
+    const { data, longest: most } = listsOf(rows, balls, [seen, ...cubeOf(stage.light, CUBE_SIDE)]);
+    floats(gl, tableOf(view, rows, balls, elements), 1024, table);
+    wholes(gl, data, lists);
+    const slots = `SLOTS=${Math.min(48, Math.max(8, 8 * Math.ceil(most / 8)))}`;
+    ready = {
+      program, width, height, features: [...featuresOf(view, rows, balls), slots],
+      cells: [TILE_SIDE, tiles[0], 1 + seen.count, CUBE_SIDE], pixel, near,
+    };
+  };
+
+  /** Begin to draw by a shader. */
+  const use = (names, textures = {}) => {
+    const { stage } = ready.program, { program, at } = shaderOf([...ready.features, ...names]);
+    gl.useProgram(program);
+    gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, block);
+    Object.entries({ table, lists, ...elements.textures, ...textures }).forEach(([name, texture], unit) => {
+      const space = name === "grids" || name === "colours";
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(space ? gl.TEXTURE_3D : gl.TEXTURE_2D, texture);
+      gl.uniform1i(at(name), unit);
+    });
+    gl.uniform1i(at("zero"), 0);
+    const vectors = {
+      eye: stage.eye, forward: stage.axes[0].map((v) => v * ready.near), right: stage.axes[1], up: stage.axes[2],
+      lamp: stage.light, power: stage.lightRgb.map((v) => v * stage.power),
+      horizon: stage.horizon, zenith: stage.zenith, canvas: [ready.width, ready.height, ready.pixel],
+    };
+    for (const [name, value] of Object.entries(vectors)) gl.uniform3fv(at(name), value);
+    gl.uniform4fv(at("ground"), stage.ground ? [...stage.ground.rgb, stage.ground.y] : [0, 0, 0, 0]);
+    gl.uniform1i(at("grounded"), Number(stage.ground !== null));
+    gl.uniform1i(at("transparent"), Number(stage.transparent));
+    gl.uniform4iv(at("cells"), ready.cells);
+  };
+
+  /** Draw a picture in bands, so that no call takes long. */
+  const bands = () => {
+    const { width, height } = ready, rows = Math.max(1, Math.floor(BAND / width));
+    gl.viewport(0, 0, width, height);
+    gl.disable(gl.BLEND);
+    gl.enable(gl.SCISSOR_TEST);
+    for (let bottom = 0; bottom < height; bottom += rows) {
+      gl.scissor(0, bottom, width, rows);
+      triangle(gl);
+      gl.flush();
+    }
+    gl.disable(gl.SCISSOR_TEST);
+  };
+
+  /** One sample of each pixel, then four where these differ. */
+  const render = (into, format, names) => {
+    const { width, height } = ready;
+    if (!first || first.width !== width || first.height !== height || first.format !== format) {
+      if (first) dropScreens(gl, first);
+      first = { ...screens(gl, width, height, [format, gl.RGBA8]), format };
+    }
+    gl.bindFramebuffer(gl.FRAMEBUFFER, first.framebuffer);
+    use(names);
+    bands();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, into);
+    use([...names, "FOUR"], { once: first.textures[0], shown: first.textures[1] });
+    bands();
+  };
+
+  return {
+    /** Draw into the bound framebuffer. */
+    draw(program, { width, height }) {
+      const into = gl.getParameter(gl.FRAMEBUFFER_BINDING);
+      prepare(program, width, height);
+      render(into, gl.RGBA8, []);
+    },
+
+    /** What the field has at points (M * 3): distance, linear colour and medium (M * 5). */
+    points(program, p) {
+      const count = p.length / 3, width = 1024, height = Math.ceil(count / width);
+      const into = gl.getParameter(gl.FRAMEBUFFER_BINDING), found = new Float32Array(5 * count);
+      if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("no framebuffers of floats here");
+      prepare(program, 16, 16);
+      const four = new Float32Array(4 * count);
+      for (let i = 0; i < count; i++) four.set(p.subarray(3 * i, 3 * i + 3), 4 * i);
+      const places = floats(gl, four, width), screen = screens(gl, width, height, [gl.RGBA32F, gl.RGBA32F]);
+      use(["POINTS"], { places });
+      gl.viewport(0, 0, width, height);
+      triangle(gl);
+      const numbers = new Float32Array(4 * width * height);
+      [4, 1].forEach((parts, i) => {
+        gl.readBuffer(gl.COLOR_ATTACHMENT0 + i);
+        gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, numbers);
+        for (let at = 0; at < count; at++) found.set(numbers.subarray(4 * at, 4 * at + parts), 5 * at + 4 * i);
+      });
+      dropScreens(gl, screen);
+      gl.deleteTexture(places);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, into);
+      return found;
+    },
+
+    /** Multiply-adds of the network for a pixel, on average, in a picture of a size. */
+    operations(program, { width, height }) {
+      const into = gl.getParameter(gl.FRAMEBUFFER_BINDING), numbers = new Float32Array(4 * width * height);
+      if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("no framebuffers of floats here");
+      prepare(program, width, height);
+      const screen = screens(gl, width, height, [gl.RGBA32F]);
+      render(screen.framebuffer, gl.RGBA32F, ["COUNT"]);
+      gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, numbers);
+      dropScreens(gl, screen);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, into);
+      let met = 0;
+      for (let i = 0; i < numbers.length; i += 4) met += numbers[i];
+      return (met / (width * height)) * network.products;
+    },
+
+    dispose() {
+      for (const { program } of shaders.values()) gl.deleteProgram(program);
+      for (const texture of [table, lists, ...Object.values(elements.textures)]) gl.deleteTexture(texture);
+      if (first) dropScreens(gl, first);
+      gl.deleteBuffer(block);
+    },
+  };
+}

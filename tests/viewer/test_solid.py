@@ -1,0 +1,134 @@
+"""Solids in a browser: the shader's field and pictures are the network's, as numpy has them."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+from scenelang.models.framed import load_arrays
+from scenelang.program.program import Program
+from scenelang.renderers.draw import draw_objects
+from scenelang.renderers.solid.field import SolidField
+from scenelang.renderers.solid.network import SolidArrays, Wanted
+from scenelang.viewer.script import script
+from scenelang.viewer.view import view_of
+from tests.browser import watched
+
+pytestmark = pytest.mark.browser
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SOLID = re.compile(r"\b(sphere|torus|diffuse|volumetric)\b")
+SCENES = [path.stem for path in sorted(EXAMPLES.glob("*.nsg")) if SOLID.search(path.read_text("utf-8"))]
+SETUP = """
+globalThis.opened = async (message, width, height) => {
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [width, height];
+  const gl = canvas.getContext("webgl2", { antialias: false });
+  const view = await readView(message), drawer = solidDrawer(gl, view);
+  const close = (array) => {
+    drawer.dispose();
+    gl.getExtension("WEBGL_lose_context").loseContext();
+    let text = "";
+    for (const byte of new Uint8Array(array.buffer)) text += String.fromCharCode(byte);
+    return btoa(text);
+  };
+  return { gl, view, drawer, close };
+};
+globalThis.pictured = async (message, width, height) => {
+  const { gl, view, drawer, close } = await opened(message, width, height);
+  const pixels = new Uint8Array(4 * width * height);
+  drawer.draw(view.program, { width, height, scale: 1 });
+  gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  if (gl.getError()) throw new Error("an error of GL");
+  return close(pixels);
+};
+globalThis.answered = async (message, points) => {
+  const { view, drawer, close } = await opened(message, 1, 1);
+  return close(drawer.points(view.program, new Float32Array(points)));
+};
+"""
+
+
+@pytest.fixture(scope="module")
+def page(chromium: Any) -> Iterator[Any]:
+    with watched(chromium) as page:
+        page.add_script_tag(content=script() + SETUP)
+        yield page
+
+
+def network() -> SolidArrays:
+    found = load_arrays("solids3d")[0]
+    assert isinstance(found, SolidArrays)
+    return found
+
+
+def called(page: Any, name: str, program: Program, *arguments: Any) -> bytes:
+    message = json.loads(view_of(program).message())
+    return base64.b64decode(page.evaluate(f"(given) => {name}(...given)", [message, *arguments]))
+
+
+def pictured(page: Any, program: Program) -> np.ndarray:
+    """The shader's picture (H, W, 4), premultiplied."""
+    w, h = program.canvas
+    found = np.frombuffer(called(page, "pictured", program, w, h), np.uint8).reshape(h, w, 4)
+    return found[::-1] / 255.0
+
+
+def network_picture(program: Program) -> np.ndarray:
+    """The network's picture, likewise."""
+    image = np.asarray(draw_objects(network(), program, threads=1, split=1).image, np.float64)
+    alpha = image[..., 3:] if image.shape[2] == 4 else np.ones_like(image[..., :1])
+    return np.concatenate([image[..., :3] * alpha, alpha], 2)
+
+
+def psnr(a: np.ndarray, b: np.ndarray) -> float:
+    return float(-10 * np.log10(max(1e-10, np.mean((a - b) ** 2))))
+
+
+def field_at(program: Program, points: np.ndarray) -> np.ndarray:
+    """Distance, colour and medium (M, 5) at points (M, 3), as numpy has them."""
+    solids = SolidField(network(), program.vectors, program.tokens, program.brought(), program.paints())
+    eye = np.array([0.3, 9.1, 7.7], np.float32)  # rays to the points come from anywhere
+    way = (points - eye).T
+    t = np.sqrt((way**2).sum(0))
+    way = (way / t).astype(np.float32)
+    found = np.tile(np.array([100.0, 0, 0, 0, 0]), (len(points), 1))
+    some, passes = solids.passes(eye, way, t + 1, tight=False)
+    meeting = solids.meet(
+        passes, t[some].astype(np.float32), Wanted.ALL, p=np.ascontiguousarray(points.T[:, some])
+    )
+    found[some, 0] = meeting.distance
+    found[some, 1:4], found[some, 4] = meeting.register[:3].T, meeting.register[-1]
+    return found
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_pictures_are_the_networks(page: Any, name: str) -> None:
+    program = nsg.compile(nsg.load(EXAMPLES / f"{name}.nsg"))
+    by = 128 / min(program.canvas)
+    w, h = program.canvas
+    program = dataclasses.replace(program, canvas=(round(w * by), round(h * by)))
+    assert psnr(pictured(page, program), network_picture(program)) > 40
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_points_are_the_fields(page: Any, name: str) -> None:
+    program = nsg.compile(nsg.load(EXAMPLES / f"{name}.nsg"))
+    rng = np.random.default_rng(0)
+    balls = program.bounds[rng.integers(0, len(program), 10_000)]
+    points = (balls[:, :3] + balls[:, 3:].clip(0, 3) * rng.uniform(-0.6, 0.6, (10_000, 3))).astype(np.float32)
+    data = called(page, "answered", program, points.reshape(-1).tolist())
+    found, known = np.frombuffer(data, np.float32).reshape(-1, 5), field_at(program, points)
+    assert (known[:, 0] < 0).sum() > 500
+    np.testing.assert_allclose(found[:, 0], known[:, 0], atol=1e-4)
+    # a colour gives way to another within 0.001 of distance, and so follows its last bits
+    assert (abs(found - known).max(1) > 1e-4).mean() < 1e-3
