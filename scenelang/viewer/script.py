@@ -13,7 +13,8 @@ from typing import Final
 
 MODULES: Final = (
     *("store", "gl", "grids", "ways", "plane"),
-    *("values", "functions", "maps", "looks", "chain", "bounds", "graph", "stage", "expressions", "evaluate"),
+    *("values", "functions", "maps", "looks", "chain", "bounds", "graph", "stage"),
+    *("eye", "expressions", "evaluate"),
     *("elements", "balls", "solid"),
     *("camera", "pace", "viewer", "dom", "steer", "controls", "page"),
 )

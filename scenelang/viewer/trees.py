@@ -212,6 +212,8 @@ class Writer(Names):
     def _setting(self, stmt: nodes.Call, scope: Scope) -> Json:
         name, word = stmt.name.text, SETTINGS[stmt.name.text]
         args = self.given(bind(word.params, stmt.args), scope)
+        if refusal := self.manifest.refusal(name):
+            return ["no", refusal[1]]
         return None if name == "canvas" else [name, *args]
 
     def _move(self, stmt: nodes.Call, scope: Scope, inks: bool) -> Json:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +19,7 @@ from scenelang.graph.nodes import Graph
 from scenelang.graph.steps import Affine, Displace, Step, Warp
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.passes import OPTIONAL
-from scenelang.program.compile import compile_scene
+from scenelang.program.compile import compile_scene, find_model
 from scenelang.syntax import parse
 from scenelang.viewer.form import Form, form_of
 from scenelang.viewer.rows import stage_of
@@ -154,7 +155,63 @@ def pictures(page: Any, jobs: list[tuple[Form, list[dict[str, Any]]]]) -> list[l
     return found
 
 
-def blocks(text: str) -> Iterator[str]:
-    """Scenes in a page of the documentation."""
-    for found in re.finditer(r"^```nsg\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
-        yield found[1]
+def drawable(source: SourceFile, **inputs: Any) -> tuple[Form, Compiled | None] | None:
+    """A scene's form, and what the compiler makes of it, if it does; nothing where no page draws it."""
+    found = Diagnostics()
+    evaluation = Evaluation(parse(source, found), diagnostics=found, **inputs)
+    scene, _ = evaluation.run(0)
+    if scene is None or found.errors:
+        return None
+    if (manifest := find_model(scene, found)) is None or manifest.lifting != "exact":
+        return None
+    try:
+        expected = compiled(source, **inputs)
+    except SceneError:
+        return form_of(evaluation, manifest), None
+    return expected.form(), expected
+
+
+def solid_text(pick: random.Random, depth: int = 3) -> str:
+    """A random scene of solids."""
+
+    def numbers(count: int, low: float, high: float) -> str:
+        return ", ".join(f"{pick.uniform(low, high):.3f}" for _ in range(count))
+
+    def moves() -> str:
+        axis = pick.choice(["X", "Y", "Z", f"[{numbers(3, -1, 1)}]"])
+        some = [
+            *(
+                f"translate({numbers(3, -2, 2)});",
+                f"scale({numbers(1, 0.3, 1.5)});",
+                f"scale({numbers(3, 0.3, 2)});",
+            ),
+            *(
+                f"rotate({numbers(1, -180, 180)}deg, {axis});",
+                f"shear(xz = {numbers(1, -1, 1)});",
+                "scale(-1, 1, 1);",
+            ),
+            *(f"twirl({numbers(1, -1, 1)});", f"bend({numbers(1, -1, 1)});", f"twist({numbers(1, -1, 1)});"),
+        ]
+        return " ".join(pick.choice(some) for _ in range(pick.choice([0, 1, 1, 2, 4])))
+
+    def node(depth: int) -> str:
+        if depth == 0 or pick.random() < 0.3:
+            bumps = f"displace({numbers(2, 0, 0.2)});" if pick.random() < 0.2 else ""
+            inks = f"color([{numbers(3, 0, 1)}]); hue({numbers(1, 0, 1)}turn); grayscale({numbers(1, 0, 1)});"
+            look = f"material {pick.choice(['diffuse', 'volumetric'])} {{ {inks} }}" * pick.randint(0, 1)
+            return f"{pick.choice(['sphere', 'torus'])} {{ {bumps} {moves()} {look} }}"
+        words = ["group", "union", "subtract", "intersect", f"smooth(k = {numbers(1, 0.05, 0.4)})"]
+        children = " ".join(node(depth - 1) for _ in range(pick.choice([0, 1, 2, 2, 3])))
+        return f"{pick.choice(words)} {{ {children} {moves()} }}"
+
+    camera = f"camera([{numbers(2, -9, 9)}, 20], fov = {numbers(1, 10, 90)}deg);"
+    return f'nsg 1; model "solids3d"; {camera} {node(depth)} {node(depth)}'
+
+
+def sources(root: Path) -> Iterator[SourceFile]:
+    """Scenes of the documentation and the conformance suite."""
+    for page in sorted([*root.glob("docs/*.md"), *root.glob("scenelang/diagnostics/pages/*.md")]):
+        texts = re.findall(r"^```nsg[^\n]*\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+        yield from (SourceFile(f"{page.stem}-{at}", text) for at, text in enumerate(texts))
+    for path in sorted(root.glob("tests/conformance/cases/*.nsg")):
+        yield SourceFile(path.stem, path.read_text())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ import pytest
 
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from tests.viewer.live import check_picture, compiled, defined, moved, pictures
+from tests.passes.random_scenes import blob_scene, full_scene, random_scene
+from tests.viewer.live import check_picture, compiled, defined, drawable, moved, pictures, solid_text, sources
 
 pytestmark = pytest.mark.browser
 ROOT = Path(__file__).parents[2]
@@ -39,3 +41,74 @@ def test_every_param_and_frame_of_the_examples(path: Path, viewer_page: Any) -> 
             continue
         assert isinstance(picture, dict), (picture, values, frame)
         check_picture(picture, expected, form)
+
+
+def agree(page: Any, scenes: Iterable[SourceFile], **inputs: Any) -> tuple[int, int]:
+    """Hold a page's pictures of scenes against the compiler's; how many it has, and how many it refuses."""
+    listed = [(source, found) for source in scenes if (found := drawable(source, **inputs)) is not None]
+    shown = pictures(page, [(form, [{}]) for _, (form, _) in listed])
+    for (source, (form, expected)), (picture,) in zip(listed, shown, strict=True):
+        assert isinstance(picture, str if expected is None else dict), (source.name, source.text, picture)
+        if expected is not None:
+            check_picture(picture, expected, form)
+    good = sum(expected is not None for _, (_, expected) in listed)
+    return good, len(listed) - good
+
+
+def test_scenes_of_documentation_and_conformance_suite(viewer_page: Any) -> None:
+    good, refused = agree(viewer_page, sources(ROOT), root=ROOT / "examples")
+    assert good > 150
+    assert refused >= 5  # by passes, not by the evaluator
+
+
+def test_random_trees_of_the_plane(viewer_page: Any) -> None:
+    makers = (random_scene, full_scene, blob_scene)
+    scenes = [(f"{make.__name__}({n})", make(n).to_nsg()) for make in makers for n in range(60)]
+    good, refused = agree(viewer_page, (SourceFile(*scene) for scene in scenes), model="shapes2d")
+    assert min(good, refused) > 30
+
+
+def test_random_trees_of_space(viewer_page: Any) -> None:
+    scenes = (SourceFile(f"solid {n}", solid_text(random.Random(n))) for n in range(200))
+    good, refused = agree(viewer_page, scenes, model="solids3d")
+    assert min(good, refused) > 30
+
+
+MISTAKES = [
+    ("for (i in 1..n) { square; }", 1e9, "20000 objects"),
+    ("for (i in 1..n) { for (j in 1..n) { let v = i * j; } }", 1e9, "takes too long"),
+    ("fn f(n) = n < 1 ? 0 : 1 + f(n - 1); square { scale(1 + f(n)); }", 1000, "calls nested deeper"),
+    ("fn f(v, n) = n < 1 ? len(v) : f([v, v, v, v], n - 1); square { scale(f([1], n)); }", 15, "1,000,000"),
+    ("module m(n) { group { if (n > 0) { m(n - 1); m(n - 1); } square; } } m(n);", 150, "20000 objects"),
+    ("square { scale(n - 3); }", 3, "scale by 0"),
+    ("square { scale(1 / (n - 3)); }", 3, "not a finite number"),
+    ("intersect { square; group { square; if (n > 1) { star; } } }", 2, "one operand of `intersect`"),
+    ("square { if (n > 1) { material flat; } material flat; }", 2, "a second material"),
+    ("group { square; if (n > 1) { scale(2); } star; }", 2, "a child after a transform"),
+    ("chain { if (n < 2) { square; } subtract star; }", 2, "nothing before it"),
+    ('square { rotate(n > 1 ? "no" : 0); }', 2, "expected an angle, found a string"),
+    ("param k = 1 in 0..n; square { scale(k); }", 0.5, "outside its range"),
+    ("square { twirl(1); for (i in 1..n) { scale(1, 2); bend(1); } }", 4, "deformations"),
+]
+
+
+@pytest.mark.parametrize(("text", "bad", "why"), MISTAKES)
+def test_what_would_be_a_mistake_is_refused_in_words(
+    text: str, bad: float, why: str, viewer_page: Any
+) -> None:
+    form = compiled(SourceFile("", f"param n = 1; {text}")).form()
+    before, answer, after = pictures(viewer_page, [(form, [{}, {"params": {"n": bad}}, {}])])[0]
+    assert why in str(answer)
+    assert isinstance(before, dict)
+    assert before == after  # a run that ends early leaves nothing behind
+
+
+def test_what_the_canvas_and_the_length_hang_on_is_fixed() -> None:
+    text = """param w = 200; param speed = 2; param k = 0.5 in 0..1;  // how far
+        param unused = 1; fn wide(n) = n * w; let side = wide(1); canvas(side, 100);
+        animate(4 / speed, 10); square { scale(k + t); }"""
+    form = compiled(SourceFile("", text)).form()
+    assert {one["name"]: one["reason"].split()[1] for one in form.fixed} == {"w": "canvas", "speed": "length"}
+    assert [param["name"] for param in form.params] == ["w", "speed", "k"]
+    assert form.params[2]["label"] == "how far"
+    assert "wide" not in str(form.data)

@@ -95,7 +95,7 @@ function solidBox({ steps }, reach) {
 
 /** A box around all points whose world distance to a leaf is below a level. */
 function leafBox(leaf, level) {
-  const { dimension } = leaf;
+  const { dimension } = leaf.form;
   const stretch = level > 0 ? stretchesOf(mapOfChain(leaf.steps), dimension)[0] : 1;
   if (stretch === 0) return EVERYWHERE;
   return (dimension === 2 ? flatBox : solidBox)(leaf, level / stretch);

@@ -8,6 +8,7 @@ import { MAPS } from "./maps.js";
 import { USUAL_BLEND } from "./bounds.js";
 import { MOST_OBJECTS, rowsOf } from "./graph.js";
 import { stageFrom } from "./stage.js";
+import { checkEye } from "./eye.js";
 
 const MOST_WORK = 2e6; // passes of loops, calls, objects, transforms and numbers of vectors
 const MOST_CALLS = 200; // within each other
@@ -50,7 +51,9 @@ class SceneRun {
     const out = new Block();
     for (const act of this.body) act(undefined, out);
     const rows = rowsOf(out.links, this.form);
-    return { rows, ...stageFrom(this.settings, this.form.dimension) };
+    const made = { rows, ...stageFrom(this.settings, this.form.dimension) };
+    if (made.stage !== null) checkEye(made, this.form);
+    return made;
   }
 
   /** A fn or module by its place, prepared when it is first asked for. */

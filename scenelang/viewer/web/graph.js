@@ -4,7 +4,7 @@
 // leaf first. See `scenelang/graph/lower.py`, `passes/drop.py`, `leaves.py` and `linearise.py`.
 
 import { Wearing, refuse } from "./values.js";
-import { invertedMap, usableMap } from "./maps.js";
+import { flatMap, invertedMap, usableMap } from "./maps.js";
 import { checkChain, mergedChain, normalChain, scaleOfChain } from "./chain.js";
 import { lookOf } from "./looks.js";
 import { Stream, USUAL_BLEND } from "./bounds.js";
@@ -24,8 +24,7 @@ export function rowsOf(links, form) {
 
 /** A node with all its steps in the world, and looks; null where it is empty. */
 function lowered(node, outward, around, state) {
-  checkSteps(node, state.form);
-  const steps = mergedChain([...node.steps, ...outward]);
+  const steps = mergedChain([...ownSteps(node, state.form), ...outward]);
   const worn = node.worn ?? around;
   if (!node.links) return loweredLeaf(node, steps, worn, state);
   const links = [];
@@ -44,19 +43,21 @@ function lowered(node, outward, around, state) {
   return links.length === 1 ? links[0].node : { links };
 }
 
-function checkSteps(node, { dimension }) {
-  node.steps.forEach((step, at) => {
-    if (step.rows && !usableMap(step.rows, dimension)) refuse("a transform flattens what it moves");
+/** The steps of a node's own transforms, maps as its space has them. */
+function ownSteps(node, { dimension }) {
+  return node.steps.map((step, at) => {
     if (step.amount !== undefined && (at > 0 || node.links)) refuse("`displace` does not stand first in its block");
+    if (!step.rows) return step;
+    const rows = dimension === 2 ? flatMap(step.rows) : step.rows;
+    if (rows === null) refuse("a transform leaves the plane");
+    return usableMap(rows, dimension) ? { rows } : refuse("a transform flattens what it moves");
   });
 }
 
-function loweredLeaf(node, merged, worn, state) {
+function loweredLeaf(node, steps, worn, state) {
   const { form, looks } = state;
   state.objects += 1;
   if (state.objects > MOST_OBJECTS) refuse(`more than ${MOST_OBJECTS} objects`);
-  const steps = normalChain(merged, form.dimension);
-  checkChain(steps, form);
   const wears = worn ?? state.plain;
   if (!looks.has(wears)) looks.set(wears, lookOf(wears, form));
   return {
@@ -65,9 +66,16 @@ function loweredLeaf(node, merged, worn, state) {
     steps,
     look: looks.get(wears),
     number: state.objects,
-    dimension: form.dimension,
+    form,
     corners: form.corners[node.shape],
   };
+}
+
+/** A leaf that no empty node has swallowed, with its steps in the normal form. */
+function finishedLeaf(leaf) {
+  const steps = normalChain(leaf.steps, leaf.form.dimension);
+  checkChain(steps, leaf.form);
+  return { ...leaf, steps };
 }
 
 // ---------------------------------------------------------------- the boolean rule
@@ -84,7 +92,7 @@ function takeLinks(links, stream) {
     const { op, k, node } = todo.pop();
     if (op === "smooth") smooths -= 1;
     if (node.leaf) {
-      stream.push(op, node, k);
+      stream.push(op, finishedLeaf(node), k);
     } else if (stream.rows.length === 0) {
       put(node.links);
     } else {
