@@ -46,6 +46,8 @@ class Jobs:
         self._tasks[slot] = task, id, file
 
         def ended(_: object) -> None:
+            if task.cancelled() and id is not None:  # perhaps before it began
+                self._tell({"kind": "cancelled", "id": id})
             if slot in self._tasks and self._tasks[slot][0] is task:
                 del self._tasks[slot]
 
@@ -68,10 +70,6 @@ class Jobs:
         try:
             limit = LIMITS_S.get(job["do"], FILE_S)
             answer = await pool.run(job, limit, said if job["do"] == "file" else None)
-        except asyncio.CancelledError:
-            if id is not None:
-                self._tell({"kind": "cancelled", "id": id})
-            raise
         except JobFailed as error:
             if job["do"] == "view":
                 problem = {"code": "", "severity": "error", "message": str(error), "line": 1, "column": 1}

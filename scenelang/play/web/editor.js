@@ -44,6 +44,8 @@ const theme = EditorView.theme({
 export function makeEditor(parent, { nonce, onchange, onsave, extensions }) {
   const setup = [
     EditorView.cspNonce.of(nonce),
+    // before all that asks about a text: the server has to have it
+    EditorView.updateListener.of((update) => update.docChanged && onchange(update)),
     lineNumbers(), highlightActiveLineGutter(), highlightSpecialChars({ addSpecialChars: BIDI }), history(),
     drawSelection(), dropCursor(), EditorState.allowMultipleSelections.of(true), indentOnInput(), indentUnit.of("  "),
     bracketMatching(), closeBrackets(), rectangularSelection(), crosshairCursor(), highlightActiveLine(),
@@ -54,7 +56,6 @@ export function makeEditor(parent, { nonce, onchange, onsave, extensions }) {
       ...closeBracketsKeymap, ...defaultKeymap, ...searchKeymap, ...historyKeymap, ...completionKeymap, ...lintKeymap,
       indentWithTab,
     ]),
-    EditorView.updateListener.of((update) => update.docChanged && onchange(update)),
   ];
   const state = (text) => EditorState.create({ doc: text, extensions: setup });
   const view = new EditorView({ parent, state: state("") });

@@ -165,6 +165,9 @@ export function makePicture(at, { send, oncamera }) {
     const view = await readView(JSON.parse(message));
     if (next?.version !== version || next.file !== of || of !== file) return;
     next = null;
+    const mark = JSON.stringify([view.params, view.fixed, view.animation, view.dimension]);
+    const isOther = controls?.mark !== mark;
+    if (isOther) for (const part of controls?.parts ?? []) part.dispose();
     if (viewer === null) {
       viewer = viewerOf(view);
       viewer.watch(touched);
@@ -182,16 +185,13 @@ export function makePicture(at, { send, oncamera }) {
     at.canvas.style.touchAction = view.dimension === 3 ? "none" : "auto";
     at.canvas.setAttribute("aria-label", plainText(view.alt ?? view.title));
     at.still.alt = plainText(view.alt ?? view.title);
-    arrange(view);
+    if (isOther) arrange(view, mark);
     if (asked[wanted[by]]?.params !== JSON.stringify(moved())) rest(0);  // there are other params now
     if (Number(at.still.dataset.version ?? -1) < version || isLive() || at.still.hidden) showShader();
   }
 
-  /** Controls of a view, made anew where other params than before are in it. */
-  function arrange(view) {
-    const mark = JSON.stringify([view.params, view.fixed, view.animation, view.dimension]);
-    if (controls?.mark === mark) return;
-    for (const part of controls?.parts ?? []) part.dispose();
+  /** Make the controls of a view; `mark` tells those of others. */
+  function arrange(view, mark) {
     const params = paramControls(viewer);
     const parts = [params];
     if (view.animation) parts.unshift(timeline(viewer));
@@ -246,7 +246,9 @@ export function makePicture(at, { send, oncamera }) {
       faulty = view === null;
       if (faulty) {
         const errors = problems.filter(({ severity }) => severity === "error").length;
-        note(errors ? `The last picture without mistakes; the text has ${errors}` : "There is nothing to draw");
+        const count = `${errors} ${errors === 1 ? "mistake" : "mistakes"}`;
+        const isOf = viewer && (at.still.dataset.version || isLive()) ? "The last picture without mistakes" : "No picture";
+        note(`${isOf}: the text has ${count}`);
         return;
       }
       note(null);

@@ -18,8 +18,9 @@ export function linked(gl, fragment, vertex = CORNERS) {
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
     const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
+    const log = [...logs, gl.getProgramInfoLog(program)].join("\n").trim();
     gl.deleteProgram(program);
-    throw new Error(`the shader does not compile: ${[...logs, gl.getProgramInfoLog(program)].join("\n").trim()}`);
+    throw new Error(`the shader does not compile: ${log}`);
   }
   return program;
 }

@@ -3,7 +3,7 @@ const EASY_MS = 20; // one that would take less is drawn finer again
 const REST_MS = 200; // how long nothing moves before it is drawn in full
 const MOST_MS = 4000; // nothing that would take longer is begun: browsers end what hangs the screen
 const POLL_MS = 4;
-const SCALES = [1, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125, 0.0625];
+const SCALES = [1, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125];
 
 /** How fine to draw, from how long it takes. One frame is under way at a time, and a fence tells its end. */
 export class Pace {

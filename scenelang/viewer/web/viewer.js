@@ -317,7 +317,12 @@ export class Viewer {
     if (this.canvas.width !== width) this.canvas.width = width;
     if (this.canvas.height !== height) this.canvas.height = height;
     this.#pace.start(scale);
-    this.#drawer.draw(program, { width, height, scale });
+    try {
+      this.#drawer.draw(program, { width, height, scale });
+    } catch (error) { // shaders are made for what a scene shows
+      this.onerror({ kind: "shader", message: error.message });
+      return;
+    }
     this.#pace.end();
     this.#tell("drawn");
   }

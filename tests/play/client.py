@@ -1,0 +1,106 @@
+"""A server in a process of its own, and a page without a browser."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+WAIT_S = 60
+
+
+class Server:
+    """``scenelang play`` of a folder; ``state`` is where it keeps what was not saved."""
+
+    def __init__(self, path: Path, state: Path, *arguments: str) -> None:
+        command = [sys.executable, "-m", "scenelang", "play", str(path), "--no-browser", *arguments]
+        environment = {**os.environ, "SCENELANG_STATE": str(state), "PYTHONUNBUFFERED": "1"}
+        pipe = subprocess.PIPE
+        self.process = subprocess.Popen(command, env=environment, stdout=pipe, stderr=pipe, text=True)
+        assert self.process.stdout is not None
+        self.process.stdout.readline()
+        self.url = self.process.stdout.readline().strip()
+        assert self.url, self.process.stderr and self.process.stderr.read()
+
+    @property
+    def origin(self) -> str:
+        """Scheme, host and port."""
+        found = re.match(r"http://[^/]+", self.url)
+        assert found is not None
+        return found[0]
+
+    def connect(self, name: str, **options: Any) -> ClientConnection:
+        """A websocket."""
+        options = {"origin": self.origin, "max_size": None, "proxy": None, **options}
+        return connect(f"{self.url.replace('http', 'ws', 1)}{name}", **options)
+
+    @contextlib.contextmanager
+    def page(self) -> Iterator[Page]:
+        """A page that is open."""
+        with self.connect("live") as socket:
+            yield Page(socket)
+
+    def end(self, how: int = signal.SIGINT) -> int:
+        """End it; the exit code."""
+        self.process.send_signal(how)
+        self.process.communicate(timeout=WAIT_S)
+        return self.process.returncode
+
+
+class Page:
+    """What says messages and is told some."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.told: list[dict[str, Any]] = []
+        self.files = self.until("files")
+
+    def say(self, kind: str, **message: Any) -> None:
+        """Send a message."""
+        self.socket.send(json.dumps({"kind": kind, **message}))
+
+    def hear(self) -> dict[str, Any]:
+        """The next message."""
+        self.told.append(json.loads(self.socket.recv(WAIT_S)))
+        return self.told[-1]
+
+    def until(self, kind: str, **like: Any) -> dict[str, Any]:
+        """The next message of a kind that has such parts."""
+        while True:
+            message = self.hear()
+            if message["kind"] == kind and all(message[key] == value for key, value in like.items()):
+                return message
+
+    def open(self, file: str) -> dict[str, Any]:
+        """Open a file; its text, when its view is there too."""
+        self.say("open", file=file)
+        text = self.until("text", file=file)
+        self.until("view", file=file)
+        return text
+
+    def draw(self, id: int | str, file: str, by: str = "network", **wishes: Any) -> None:
+        """Ask for a picture."""
+        self.say("draw", id=id, file=file, by=by, **{"params": {}, "frame": 0, "size": [64, 48], **wishes})
+
+
+def children(pid: int) -> set[int]:
+    """Processes that a process has started and that are there."""
+    found = subprocess.run(["ps", "-eo", "pid=,ppid=,comm="], capture_output=True, text=True, check=True)
+    rows = [line.split(None, 2) for line in found.stdout.splitlines()]
+    return {int(child) for child, parent, name in rows if int(parent) == pid and name != "ps"}
+
+
+def is_there(pid: int) -> bool:
+    """Whether a process runs."""
+    with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False

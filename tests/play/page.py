@@ -1,0 +1,103 @@
+"""A server of its own for a test, and the page in Chromium."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tests.browser import watched
+
+PATIENCE_MS = 20_000
+"""How long anything is waited for; most takes milliseconds."""
+
+
+class Served:
+    """A server that runs."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        assert process.stdout is not None
+        self.process = process
+        self.address = next(line.strip() for line in process.stdout if line.startswith("http://"))
+        self.origin = self.address.rsplit("/", 2)[0]
+
+
+@contextmanager
+def served(path: Path, state: Path) -> Iterator[Served]:
+    """A server of a scene or folder; what is not saved it keeps in ``state``."""
+    command = [sys.executable, "-m", "scenelang", "play", str(path), "--no-browser"]
+    environment = {**os.environ, "SCENELANG_STATE": str(state), "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            yield Served(process)
+        finally:
+            process.terminate()
+
+
+class Page:
+    """The page of a server, as its user has it.
+
+    Args:
+        page: of Playwright.
+    """
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        page.set_default_timeout(PATIENCE_MS)
+
+    def until(self, script: str, *given: Any) -> Any:
+        """Wait until an expression of JavaScript holds; ``given`` is its argument `g`.
+
+        Playwright's own way evaluates text in the page, which its content policy forbids.
+        """
+        stop = time.monotonic() + PATIENCE_MS / 1000
+        while not (found := self.page.evaluate(f"(g) => {script}", list(given))):
+            assert time.monotonic() < stop, script
+            self.page.wait_for_timeout(30)
+        return found
+
+    def text(self) -> str:
+        """What is in the editor, where it is short."""
+        return "\n".join(self.page.locator(".cm-line").all_inner_texts()).replace("\n\n", "\n")
+
+    def has(self, piece: str) -> None:
+        """Wait until a line of the editor has a piece of text."""
+        self.until(
+            "[...document.querySelectorAll('.cm-line')].some((l) => l.textContent.includes(g[0]))", piece
+        )
+
+    def click_text(self, piece: str, where: str = "End") -> None:
+        """Put the cursor to the end of a line, or elsewhere by a key."""
+        self.page.locator(".cm-line", has_text=piece).first.click()
+        self.page.keyboard.press(where)
+
+    def picture(self) -> str:
+        """Wait for the server's picture of what is shown; its data."""
+        self.until("document.getElementById('stage').dataset.shows === 'still'")
+        return str(self.page.locator("#still").get_attribute("src"))
+
+    def other_picture(self, than: str) -> str:
+        """Wait for another picture of the server than one."""
+        self.until(
+            "document.getElementById('stage').dataset.shows === 'still'"
+            " && document.getElementById('still').src !== g[0]",
+            than,
+        )
+        return self.picture()
+
+    def knows(self) -> None:
+        """Wait for the language server."""
+        self.page.locator("#problems:enabled", has_text="mistake").wait_for()
+
+
+@contextmanager
+def opened(browser: Any, server: Served, **options: Any) -> Iterator[Page]:
+    """The page; fails where it wrote to the console or asked another host."""
+    with watched(browser, (server.origin,), **options) as page:
+        page.goto(server.address)
+        yield Page(page)

@@ -1,0 +1,141 @@
+"""Files of the folder and no others, written whole, with nothing lost."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path, PureWindowsPath
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenelang.play.folder import Changed, Folder, Refused, fits
+
+ESCAPES = [
+    *("../out.nsg", "a/../../out.nsg", "..", ".", "", "/etc/passwd", "/tmp/out.nsg", "a//b.nsg", "/", "a/"),
+    *("..\\out.nsg", "a\\b.nsg", "C:\\out.nsg", "C:out.nsg", "\\\\host\\share\\out.nsg", "//host/out.nsg"),
+    *("a.nsg\0.txt", "a\0.nsg", "a.txt", "a.nsg/", "a.nsg:stream.nsg", "a.NSG", "~/.nsg", ".hidden.nsg"),
+    *("CON.nsg", "aux.nsg", "com1.b.nsg", "LPT9 .nsg", "a/nul.nsg", "nul/a.nsg", "com¹.nsg", "CONIN$.nsg"),
+    *(" a.nsg", "a /b.nsg", "a./b.nsg", "a\n.nsg", "a\u202egsn.nsg", "a\ud800.nsg", "%2e%2e/a.nsg/../b"),
+    *("a/" * 9 + "b.nsg", "ä" * 120 + ".nsg", "….nsg/../../x", "a|b.nsg", "a*.nsg", 'a"b.nsg', "a?.nsg"),
+]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Folder:
+    inside = tmp_path / "in"
+    inside.mkdir()
+    (tmp_path / "out.nsg").write_text("outside")
+    (inside / "a.nsg").write_text("square;")
+    return Folder(inside)
+
+
+@pytest.mark.parametrize("name", ESCAPES)
+def test_names_that_lead_elsewhere(folder: Folder, name: str) -> None:
+    for ask in (
+        lambda: folder.read(name),
+        lambda: folder.write(name, "x", None),
+        lambda: folder.rename("a.nsg", name),
+        lambda: folder.rename(name, "b.nsg"),
+    ):
+        with pytest.raises(Refused):
+            ask()
+    assert (folder.path.parent / "out.nsg").read_text() == "outside"
+    assert [path.name for path in folder.path.iterdir()] == ["a.nsg"]
+
+
+@given(
+    st.text(st.characters(), max_size=12) | st.lists(st.sampled_from("./\\:ab\0 ~"), max_size=12).map("".join)
+)
+def test_what_fits_stays_inside_on_any_system(name: str) -> None:
+    name += ".nsg"
+    if fits(name):
+        assert Path(os.path.normpath(f"/in/{name}")) == Path(f"/in/{name}")
+        windows = PureWindowsPath("C:/in") / name
+        assert windows.parts[:2] == ("C:\\", "in")
+        assert ".." not in windows.parts
+        assert not windows.is_reserved()
+
+
+@pytest.mark.parametrize("kind", ["file", "folder", "dangling", "inside"])
+def test_links_are_not_written_through(folder: Folder, kind: str) -> None:
+    outside, link = folder.path.parent, folder.path / "link"
+    name = "link/out.nsg" if kind == "folder" else "link.nsg"
+    target = {"file": "out.nsg", "folder": "", "dangling": "new.nsg", "inside": "in/a.nsg"}[kind]
+    (link if kind == "folder" else folder.path / "link.nsg").symlink_to(outside / target)
+    if kind == "inside":
+        assert folder.read(name)[0] == "square;"
+    else:
+        with pytest.raises(Refused):
+            folder.read(name)
+    for base in (None, folder.read("a.nsg")[1]):
+        with pytest.raises(Refused):
+            folder.write(name, "x", base)
+    with pytest.raises(Refused):
+        folder.rename("a.nsg", name)
+    assert (outside / "out.nsg").read_text() == "outside"
+    assert not (outside / "new.nsg").exists()
+    assert (folder.path / "a.nsg").read_text() == "square;"
+
+
+def test_a_file_that_has_changed_is_not_overwritten(folder: Folder) -> None:
+    text, disk = folder.read("a.nsg")
+    (folder.path / "a.nsg").write_text("disc;")
+    with pytest.raises(Changed) as change:
+        folder.write("a.nsg", f"{text} // mine", disk)
+    assert change.value.text == "disc;"
+    assert (folder.path / "a.nsg").read_text() == "disc;"
+    again = folder.write("a.nsg", "mine", change.value.disk)
+    assert folder.read("a.nsg") == ("mine", again)
+    with pytest.raises(Changed):
+        folder.write("a.nsg", "new", None)
+    assert folder.write("deep/b.nsg", "new", None) == folder.read("deep/b.nsg")[1]
+    assert folder.names() == ["a.nsg", "deep/b.nsg"]
+    assert not list(folder.path.rglob("*.part"))
+
+
+def test_line_ends_stay(folder: Folder) -> None:
+    (folder.path / "a.nsg").write_bytes("\ufeffsquare;\r\ntriangle;\r\n".encode())
+    text, disk = folder.read("a.nsg")
+    assert text == "square;\ntriangle;\n"
+    folder.write("a.nsg", f"{text}star;\n", disk)
+    assert (folder.path / "a.nsg").read_bytes() == b"square;\r\ntriangle;\r\nstar;\r\n"
+
+
+@pytest.mark.parametrize("data", [b"\xff", b"x" * 10_000_001])
+def test_what_is_not_a_scene_is_not_read(folder: Folder, data: bytes) -> None:
+    (folder.path / "b.nsg").write_bytes(data)
+    with pytest.raises(Refused):
+        folder.read("b.nsg")
+
+
+def test_nothing_waits_for_a_pipe(folder: Folder) -> None:
+    os.mkfifo(folder.path / "pipe.nsg")
+    with pytest.raises(Refused):
+        folder.read("pipe.nsg")
+
+
+def test_what_is_too_large_is_not_written(folder: Folder) -> None:
+    with pytest.raises(Refused):
+        folder.write("big.nsg", "x" * 10_000_001, None)
+    assert folder.names() == ["a.nsg"]
+
+
+def test_renaming_takes_no_other_name(folder: Folder) -> None:
+    folder.write("b.nsg", "b", None)
+    with pytest.raises(Refused):
+        folder.rename("a.nsg", "b.nsg")
+    with pytest.raises(Refused):
+        folder.rename("none.nsg", "c.nsg")
+    folder.rename("a.nsg", "deep/c.nsg")
+    assert folder.names() == ["b.nsg", "deep/c.nsg"]
+    assert folder.read("deep/c.nsg")[0] == "square;"
+
+
+def test_hidden_folders_and_links_are_not_listed(folder: Folder) -> None:
+    for name in (".git/x.nsg", "node_modules/y.nsg", "deep/z.nsg", "other.txt"):
+        path = folder.path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("square;")
+    (folder.path / "loop").symlink_to(folder.path)
+    assert folder.names() == ["a.nsg", "deep/z.nsg"]

@@ -1,0 +1,80 @@
+"""What is not saved is kept, for its owner alone, and found again."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from scenelang.play.journal import MOST_DAYS, MOST_KEPT, Journal, state_folder
+
+SCENE = Path("/scenes/a.nsg")
+
+
+def test_a_text_is_found_again(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "deep/play")
+    assert journal.find(SCENE) is None
+    journal.keep(SCENE, "square; // \u202e", "abc")
+    journal.keep(Path("/scenes/b.nsg"), "other", None)
+    found = Journal(tmp_path / "deep/play").find(SCENE)
+    assert found is not None
+    assert (found.text, found.disk) == ("square; // \u202e", "abc")
+    assert 0 <= found.seconds < 60
+    (entry,) = [path for path in journal.folder.iterdir() if "square" in path.read_text()]
+    assert entry.stat().st_mode & 0o777 == 0o600
+    assert journal.folder.stat().st_mode & 0o777 == 0o700
+    journal.drop(SCENE)
+    assert journal.find(SCENE) is None
+    journal.drop(SCENE)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"\xff",
+        b'{"file": "/scenes/a.nsg"}',
+        json.dumps({"file": "/other.nsg", "text": "x", "disk": None, "time": 0}).encode(),
+        json.dumps({"file": str(SCENE), "text": 1, "disk": None, "time": 0}).encode(),
+        json.dumps({"file": str(SCENE), "text": "x", "disk": None, "time": "now"}).encode(),
+        b"[" * 100_000,
+    ],
+)
+def test_damaged_entries_are_none(tmp_path: Path, data: bytes) -> None:
+    journal = Journal(tmp_path)
+    journal.keep(SCENE, "x", None)
+    (entry,) = tmp_path.iterdir()
+    entry.write_bytes(data)
+    assert journal.find(SCENE) is None
+
+
+def test_old_ones_go(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    for number in range(MOST_KEPT + 5):
+        journal.keep(Path(f"/scenes/{number}.nsg"), "x", None)
+        at = time.time() - (MOST_KEPT + 5 - number)
+        os.utime(journal._place(Path(f"/scenes/{number}.nsg")), (at, at))
+    old = time.time() - (MOST_DAYS + 1) * 86400
+    os.utime(journal._place(Path("/scenes/50.nsg")), (old, old))
+    journal.tidy()
+    kept = [n for n in range(MOST_KEPT + 5) if journal.find(Path(f"/scenes/{n}.nsg"))]
+    assert kept == [n for n in range(4, MOST_KEPT + 5) if n != 50]
+
+
+@pytest.mark.parametrize(
+    ("environment", "platform", "expected"),
+    [
+        ({"SCENELANG_STATE": "/own", "XDG_STATE_HOME": "/x"}, "linux", Path("/own")),
+        ({"XDG_STATE_HOME": "/x"}, "linux", Path("/x/scenelang")),
+        ({"XDG_STATE_HOME": "x"}, "linux", Path.home() / ".local/state/scenelang"),
+        ({}, "darwin", Path.home() / "Library/Application Support/scenelang"),
+        ({"LOCALAPPDATA": "/local"}, "win32", Path("/local/scenelang")),
+    ],
+)
+def test_where_it_lies(environment: dict[str, str], platform: str, expected: Path) -> None:
+    assert state_folder(environment, platform) == expected

@@ -1,0 +1,333 @@
+"""What a page says and is told, with a server in a process of its own."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import io
+import json
+import signal
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from websockets.exceptions import ConnectionClosed
+
+import scenelang as nsg
+from tests.play.client import Page, Server
+from tests.play.conftest import SQUARE
+
+# Loops that end at a limit of the language after seconds, and what has no end but limits.
+BOMBS = {
+    "loop": "for (i in 0..1000000000) { square; }",
+    "calls": "fn f(x) = f(x) + f(x); square { scale(f(1)); }",
+    "modules": "module m() { m(); m(); } m();",
+    "objects": "for (i in 0..99999) { for (j in 0..99999) { square; } }",
+    "canvas": "canvas(100000, 100000); square;",
+}
+
+
+def pixels(message: dict[str, Any]) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(message["png"]))).convert("RGB")).astype(int)
+
+
+def picture_of(text: str, **options: Any) -> np.ndarray:
+    return nsg.render(nsg.loads(text, **options.pop("load", {})), **options).to_uint8().astype(int)
+
+
+def test_an_edit_is_drawn_as_the_command_line_draws_it(page: Page) -> None:
+    assert page.files["files"] == ["a.nsg", "b.nsg"]
+    text = page.open("a.nsg")
+    assert (text["text"], text["version"], text["unsaved"]) == (SQUARE, 0, None)
+    edited = "param k = 0.2 in 0..1; param tilt = 0deg;\n" + SQUARE.replace(
+        "scale(0.5)", "scale(k); rotate(tilt)"
+    )
+    page.say("edit", file="a.nsg", version=1, text=edited)
+    page.draw(7, "a.nsg", params={"k": 0.9, "tilt": "30deg"}, size=[80, 60])
+    told = [page.hear() for _ in range(2)]
+    view = next(message for message in told if message["kind"] == "view")
+    assert (view["version"], view["problems"]) == (1, [])
+    assert json.loads(view["view"])["dimension"] == 2
+    drawn = next(message for message in told if message["kind"] == "picture")
+    assert (drawn["id"], drawn["version"], drawn["size"]) == (7, 1, [80, 60])
+    defines = {"k": 0.9, "tilt": "30deg"}
+    expected = picture_of(edited, load={"params": defines}, size=(80, 60))
+    assert np.abs(pixels(drawn) - expected).max() <= 1
+    page.say("discard", file="a.nsg")
+
+
+def test_reference_difference_and_figures(page: Page) -> None:
+    page.open("a.nsg")
+    page.draw("r", "a.nsg", by="reference")
+    exact = pixels(page.until("picture", id="r"))
+    assert np.abs(exact - picture_of(SQUARE, backend="reference")).max() <= 1
+    page.draw("d", "a.nsg", by="difference")
+    difference = page.until("picture", id="d")
+    assert difference["size"] == [3 * 64 + 8, 48 + 14]
+    assert np.array_equal(pixels(difference)[14:, 68:132], exact)
+    page.draw("f", "a.nsg", by="figures")
+    figures = page.until("figures", id="f")
+    assert (figures["objects"], figures["rows"], figures["canvas"]) == (1, 1, [64, 48])
+    assert figures["psnr"] == difference["psnr"] > 40
+
+
+def test_mistakes_are_told_and_the_picture_fails(page: Page) -> None:
+    page.open("b.nsg")
+    page.say("edit", file="b.nsg", version=5, text="\n square { scale(); ")
+    view = page.until("view", version=5)
+    assert view["view"] is None
+    assert {problem["line"] for problem in view["problems"]} == {2}
+    page.draw(1, "b.nsg")
+    assert page.until("error")["id"] == 1
+    page.say("discard", file="b.nsg")
+
+
+# ---------------------------------------------------------------- files
+
+
+def test_saving_and_what_changes_on_the_disk(server: Server, folder: Path) -> None:
+    file = folder / "both.nsg"
+    file.write_text("square;\n")
+    with server.page() as page, server.page() as other:
+        for one in (page, other):
+            base = one.open("both.nsg")["disk"]
+        page.say("edit", file="both.nsg", version=1, text="star;\n")
+        page.until("view", version=1)
+        page.say("save", file="both.nsg", version=1, text="star;\n", base=base)
+        saved = page.until("saved")
+        assert file.read_text() == "star;\n"
+        assert other.until("text")["text"] == "star;\n"
+        # another program
+        replaced = folder / "new.tmp"
+        replaced.write_text("disc;\n")
+        replaced.rename(file)
+        changed = page.until("text", origin="disk")
+        assert changed["text"] == "disc;\n"
+        page.until("view")
+        # saved by the page at the same time: nothing is lost
+        page.say("save", file="both.nsg", version=2, text="mine;\n", base=saved["disk"])
+        conflict = page.until("conflict")
+        assert (conflict["text"], file.read_text()) == ("disc;\n", "disc;\n")
+        page.say("save", file="both.nsg", version=2, text="mine;\n", base=conflict["disk"])
+        page.until("saved")
+        assert file.read_text() == "mine;\n"
+        # the page's own saves were not told back
+        assert [m["text"] for m in page.told if m["kind"] == "text"] == ["square;\n", "disc;\n"]
+        file.unlink()
+        assert page.until("text")["text"] is None
+        assert "both.nsg" not in page.until("files")["files"]
+
+
+def test_a_file_that_is_imported_is_shown_with_its_unsaved_text(page: Page, folder: Path) -> None:
+    (folder / "lib.nsg").write_text("module thing() { square; }\n")
+    (folder / "use.nsg").write_text('canvas(64, 48);\nimport "lib.nsg" as lib;\nlib.thing();\n')
+    page.open("use.nsg")
+    page.open("lib.nsg")
+    page.say("edit", file="lib.nsg", version=1, text="module thing() { star; }\n")
+    assert page.until("view", file="use.nsg")["problems"] == []
+    page.draw(1, "use.nsg")
+    assert np.abs(pixels(page.until("picture")) - picture_of("canvas(64, 48); star;")).max() <= 1
+    page.say("discard", file="lib.nsg")
+    page.until("view", file="lib.nsg")
+    (folder / "lib.nsg").write_text("module thing() { nothing_like_it; }\n")
+    assert page.until("view", file="use.nsg", view=None)["problems"]
+
+
+def test_files_are_made_listed_and_renamed(page: Page, folder: Path) -> None:
+    assert page.open("deep/new.nsg")["text"] is None
+    page.say("save", file="deep/new.nsg", version=1, text="star;\n", base=None)
+    assert "deep/new.nsg" in page.until("files")["files"]
+    page.say("rename", file="deep/new.nsg", to="renamed.nsg")
+    files = page.until("files")["files"]
+    assert "renamed.nsg" in files
+    assert "deep/new.nsg" not in files
+    page.draw(1, "renamed.nsg")
+    page.until("picture", id=1)
+    for file in ("../x.nsg", "/etc/passwd", "a\0.nsg", "con.nsg"):
+        page.say("open", file=file)
+        page.until("error", file=file)
+        page.say("rename", file="renamed.nsg", to=file)
+        page.until("error", file="renamed.nsg")
+    (folder / "renamed.nsg").unlink()
+
+
+@pytest.mark.parametrize("how", ["page", "server"])
+def test_unsaved_text_outlives_a_crash(tmp_path: Path, how: str) -> None:
+    scenes, state = tmp_path / "scenes", tmp_path / "state"
+    scenes.mkdir()
+    (scenes / "a.nsg").write_text(SQUARE)
+    server = Server(scenes / "a.nsg", state)
+    with server.page() as page:
+        assert page.files["open"] == "a.nsg"
+        base = page.open("a.nsg")["disk"]
+        page.say("edit", file="a.nsg", version=1, text="star; // not saved")
+        page.until("view", version=1)
+        if how == "server":
+            while not list(state.rglob("*.json")):  # kept within a second
+                page.draw(1, "a.nsg")
+                page.until("picture")
+            server.end(signal.SIGKILL)
+    if how == "server":
+        server = Server(scenes, state)
+    with server.page() as page:
+        text = page.open("a.nsg")
+        assert text["text"] == SQUARE
+        assert (text["unsaved"]["text"], text["unsaved"]["disk"]) == ("star; // not saved", base)
+        page.say("edit", file="a.nsg", version=1, text="star; // not saved")
+        page.say("save", file="a.nsg", version=1, text="star; // not saved", base=base)
+        page.until("saved")
+        assert page.open("a.nsg")["unsaved"] is None
+    assert server.end() == 130
+    assert not list(state.rglob("*.json"))
+    assert [path.name for path in scenes.iterdir()] == ["a.nsg"]
+
+
+# ---------------------------------------------------------------- downloads
+
+
+@pytest.mark.parametrize("kind", ["png", "gif", "webp", "html", "nsg"])
+def test_downloads(server: Server, page: Page, folder: Path, kind: str) -> None:
+    text = f"animate(seconds = 1, fps = 4);\n{SQUARE.replace('0.5', '0.2 + 0.2 * u')}"
+    (folder / "film.nsg").write_text(text)
+    page.open("film.nsg")
+    page.say("download", id="d", file="film.nsg", **{"as": kind}, frame=2, size=[80, 60], params={})
+    ready = page.until("ready")
+    assert ready["name"] == f"film.{kind}"
+    address = f"{server.url}{ready['url']}"
+    with urllib.request.urlopen(address) as answer:
+        data = answer.read()
+        assert answer.headers["content-disposition"].startswith("attachment")
+    assert len(data) == ready["bytes"]
+    with pytest.raises(urllib.error.HTTPError):  # once
+        urllib.request.urlopen(address)
+    if kind == "nsg":
+        assert data.decode() == text
+    elif kind == "html":
+        assert b"<html" in data[:200].lower()
+    else:
+        picture = Image.open(io.BytesIO(data))
+        assert picture.size == (80, 60)
+        assert getattr(picture, "n_frames", 1) == (1 if kind == "png" else 4)
+        assert kind == "png" or page.told[-2]["kind"] == "progress"
+
+
+# ---------------------------------------------------------------- what nobody should send
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "null",
+        "[]",
+        "7",
+        '"x"',
+        "[" * 100_000,
+        '{"kind": 7}',
+        '{"kind": "nothing"}',
+        '{"kind": "__class__"}',
+        '{"kind": "open"}',
+        '{"kind": "open", "file": {"a": 1}}',
+        '{"kind": "open", "kind": "edit"}',
+        '{"kind": "edit", "file": "a.nsg", "version": 1, "text": "x"}',  # not open
+        '{"kind": "draw", "file": "a.nsg", "id": 1, "by": "network", "params": {}}',
+        '{"kind": "cancel", "id": {"a": []}}',
+        '{"kind": "cancel", "id": NaN}',
+        '{"kind": "open", "file": "\\ud800.nsg"}',
+    ],
+)
+def test_malformed_messages_are_answered(page: Page, text: str) -> None:
+    page.socket.send(text)
+    assert page.until("error")["message"]
+    page.open("b.nsg")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"size": [0, 10]},
+        {"size": [9000, 10]},
+        {"size": [10.5, 10]},
+        {"size": "64x64"},
+        {"size": [8192, 8192]},
+        {"frame": -1},
+        {"frame": 1e9},
+        {"frame": True},
+        {"by": "view"},
+        {"by": "../network"},
+        {"id": None},
+        {"id": 1.5},
+        {"params": [1]},
+        {"params": {"nobody": 1}},
+        {"params": {"nobody": {"__class__": 1}}},
+    ],
+)
+def test_wrong_wishes_are_answered(page: Page, wrong: dict[str, Any]) -> None:
+    page.open("b.nsg")
+    page.draw(**{"id": 3, "file": "b.nsg", **wrong})
+    page.until("error")
+    page.draw(4, "b.nsg")
+    page.until("picture", id=4)
+
+
+def test_halves_of_characters_and_large_texts_are_refused(page: Page) -> None:
+    page.open("b.nsg")
+    for text in ("\ud800", "x" * 10_000_001):
+        page.say("edit", file="b.nsg", version=1, text=text)
+        page.until("error", file="b.nsg")
+
+
+def test_an_oversized_message_ends_its_page_alone(server: Server, page: Page) -> None:
+    with server.page() as other:
+        with contextlib.suppress(ConnectionClosed):
+            other.socket.send("x" * (40 << 20))
+        with pytest.raises(ConnectionClosed):
+            other.hear()
+        page.open("b.nsg")
+
+
+@pytest.mark.parametrize("bomb", BOMBS)
+def test_a_bomb_keeps_nobody_waiting(server: Server, page: Page, bomb: str) -> None:
+    with server.page() as other:
+        for one in (page, other):
+            one.open("b.nsg")
+        page.say("edit", file="b.nsg", version=1, text=BOMBS[bomb])
+        page.draw(1, "b.nsg", size=None)
+        page.draw(2, "b.nsg", by="reference", size=None)
+        other.draw(3, "b.nsg")
+        other.until("picture", id=3)
+        # a newer text takes the place of the bomb's, whatever that was doing
+        page.say("edit", file="b.nsg", version=2, text=SQUARE)
+        page.draw(4, "b.nsg")
+        page.until("picture", id=4, version=2)
+        page.say("edit", file="b.nsg", version=3, text=BOMBS[bomb])
+        assert page.until("view", version=3)["view"] is None
+        page.say("discard", file="b.nsg")
+
+
+def test_a_flood_of_drawings(page: Page) -> None:
+    """Each is answered once; the last is drawn."""
+    page.open("b.nsg")
+    count = 300
+    for number in range(count):
+        page.draw(number, "b.nsg", size=[400 + number % 7, 300])
+    answers: dict[int, str] = {}
+    while len(answers) < count:
+        message = page.hear()
+        assert message["id"] not in answers
+        answers[message["id"]] = message["kind"]
+    assert set(answers.values()) <= {"picture", "cancelled"}
+    assert answers[count - 1] == "picture"
+
+
+def test_cancelling(page: Page) -> None:
+    page.open("b.nsg")
+    page.draw("slow", "b.nsg", by="reference", size=[2000, 2000])
+    page.say("cancel", id="slow")
+    page.until("cancelled", id="slow")
+    page.draw("next", "b.nsg", by="reference")
+    page.until("picture", id="next")

@@ -1,0 +1,103 @@
+"""From the command line: ports, addresses, Ctrl-C, and nothing that stays."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from scenelang.cli.main import cli
+from scenelang.play.serve import PORT, listen
+from tests.play.client import Server, children, is_there
+from tests.play.conftest import SQUARE
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_it_ends_with_all_its_processes(tmp_path: Path, how: signal.Signals) -> None:
+    (tmp_path / "a.nsg").write_text(SQUARE)
+    server = Server(tmp_path, tmp_path / ".state")
+    with server.page() as page, server.connect("lsp"):
+        page.open("a.nsg")
+        page.say("edit", file="a.nsg", version=1, text="for (i in 0..3000) { for (j in 0..3000) { } }")
+        page.draw(1, "a.nsg", by="reference")
+        processes = children(server.process.pid)
+        assert len(processes) >= 3
+        code = server.end(how)
+    assert code == {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}[how]
+    while any(map(is_there, processes)):
+        pass
+    assert [path.name for path in tmp_path.iterdir() if path.name != ".state"] == ["a.nsg"]
+
+
+def test_a_port_in_use() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        found = CliRunner().invoke(cli, ["play", "--no-browser", "--port", str(port)])
+        assert found.exit_code == 2
+        assert f"port {port} of 127.0.0.1 is in use" in found.output
+    with listen("127.0.0.1", None) as first, listen("127.0.0.1", None) as second:
+        assert second.getsockname()[1] not in (PORT, first.getsockname()[1])
+        assert second.getsockname()[0] == "127.0.0.1"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["none.nsg"], "there is neither a scene nor a folder"),
+        (["--host", "192.0.2.1"], "cannot listen on `192.0.2.1`"),
+        (["--host", "no.such.host.invalid"], "cannot listen on `no.such.host.invalid`"),
+        (["--port", "0"], "not in the range"),
+    ],
+)
+def test_what_cannot_be_served(tmp_path: Path, arguments: list[str], message: str) -> None:
+    if arguments[0].startswith("-"):
+        arguments = [str(tmp_path), *arguments]
+    found = CliRunner().invoke(cli, ["play", "--no-browser", *arguments])
+    assert found.exit_code == 2
+    assert message in found.output
+
+
+def test_others_are_warned_of(tmp_path: Path) -> None:
+    found = CliRunner().invoke(cli, ["play", str(tmp_path), "--no-browser", "--host", "192.0.2.1"])
+    assert "other machines reach 192.0.2.1" in found.output
+
+
+@pytest.mark.parametrize("missing", ["starlette", "uvicorn", "watchfiles", "pygls"])
+def test_what_is_missing_is_told(missing: str) -> None:
+    code = f"import sys; sys.modules['{missing}'] = None\nfrom scenelang.cli.main import main\nmain(['play'])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "pip install 'scenelang[play]'" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_files_of_the_package_and_no_others(server: Server) -> None:
+    """Static files: the page's and the viewer's, whatever else a path says."""
+
+    def get(path: str) -> int:
+        try:
+            with urllib.request.urlopen(f"{server.url}{path}") as answer:
+                return int(answer.status)
+        except urllib.error.HTTPError as error:
+            with error:
+                return error.code
+
+    assert get("static/viewer/gl.js") == get("static/codemirror.js") == 200
+    for path in (
+        *(
+            "static/../app.py",
+            "static/%2e%2e/app.py",
+            "static/viewer/../view.py",
+            "static/viewer/%2e%2e%2fview.py",
+        ),
+        *("static//etc/passwd", "static/..%5capp.py", "static/web", "static/", "static/.", "static/viewer"),
+        *("static/play.js%00.py", "static/viewer/gl.js/x", "app.py", "download", "download?key=", "live"),
+    ):
+        assert get(path) in (403, 404, 405), path
