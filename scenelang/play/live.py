@@ -29,7 +29,7 @@ FILES: Final = {
     "nsg": "text/plain",
 }
 KEEP_S: Final = 0.5  # between two keepings of an unsaved text
-MOST_WAITING: Final = 200  # messages for a page that does not read
+MOST_WAITING: Final = 1000  # messages for a page that does not read
 MOST_OPEN: Final = 100
 
 
@@ -94,6 +94,7 @@ class Live:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, KeyError):  # KeyError: bytes, not text
             while True:
                 text = await self._socket.receive_text()
+                await asyncio.sleep(0)  # whatever is to be sent goes first, though there may be more to read
                 message: Json = {}
                 try:
                     given = read_json(text.encode("utf-8"))
