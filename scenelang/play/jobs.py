@@ -83,20 +83,24 @@ def _view(job: Job, tell: Tell) -> Done:
     started = time.perf_counter()
     found = Diagnostics()
     shown: View | None = None
+    lacking: list[dict[str, Any]] = []
     evaluation = _evaluated(job, found)
     try:
         shown = _viewed(job, evaluation, found)[0]
     except SceneError:
         pass  # its diagnostics are `found`
     except (ProgramError, FileNotFoundError) as error:
-        found.add("E0508", str(error), None)
+        lacking.append({"code": "", "severity": "error", "message": str(error), "line": 1, "column": 1})
     data = {
         **job["message"],
         "view": shown and shown.message(),
-        "problems": [_problem(d) for d in found.items[:MOST_TOLD]],
+        "problems": [*map(_problem, found.items[:MOST_TOLD]), *lacking],
         "ms": _since(started),
     }
-    return {"is": "done", "wanted": [str(path) for path in evaluation.wanted]}, _json(data)
+    head = {"is": "done", "wanted": [str(path) for path in evaluation.wanted]}
+    if shown is not None:
+        head["angles"] = [param["name"] for param in shown.data["params"] if param["kind"] == "angle"]
+    return head, _json(data)
 
 
 def _evaluated(job: Job, found: Diagnostics) -> Evaluation:

@@ -14,7 +14,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from scenelang.files import read_json
 from scenelang.play.folder import Changed, Refused
-from scenelang.play.messages import Json, id_of, string_of, text_of, whole_of, wishes
+from scenelang.play.messages import Json, id_of, in_unit, string_of, text_of, whole_of, wishes
 from scenelang.play.pool import Answer, Pool
 from scenelang.play.shared import Play
 from scenelang.play.slots import LIMITS_S, Jobs, Slot, Took
@@ -41,6 +41,7 @@ class Open:
         self.text, self.version = text, 0  # of the page
         self.saved, self.disk = text, disk  # what the file held when the page was last told
         self.wanted: frozenset[Path] = frozenset()  # files that it imports
+        self.angles: frozenset[str] = frozenset()  # params in radians
         self.keeping: asyncio.TimerHandle | None = None
 
 
@@ -244,6 +245,7 @@ class Live:
             known = self.open.get(name)
             if known is not None:
                 known.wanted = frozenset(map(Path, answer.head["wanted"]))
+                known.angles = frozenset(answer.head.get("angles", known.angles))
 
         message = {"kind": "view", "file": name, "version": version}
         self._start(("view", name), None, name, {"do": "view", "message": message}, self._play.quick, found)
@@ -284,6 +286,7 @@ class Live:
         """Do a job of a file as the page has it."""
         known, root = self.open[name], self._play.folder.root
         job = {"params": {}, "frame": 0, "size": None, **job, "name": name, "text": known.text}
+        job["params"] = {k: in_unit(v) if k in known.angles else v for k, v in job["params"].items()}
         job["path"], job["root"] = str(known.path), None if root is None else str(root)
         job["texts"] = {
             str(o.path.resolve()): o.text for k, o in self.open.items() if k != name and o.version

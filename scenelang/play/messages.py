@@ -55,3 +55,8 @@ def wishes(message: Json) -> Json:
         size = [whole_of({"size": side}, "size", 1, MOST_SIDE) for side in size]
     frame = whole_of({"frame": 0, **message}, "frame", 0, 1 << 31)
     return {"params": params, "frame": frame, "size": size}
+
+
+def in_unit(value: Any) -> Any:
+    """A number of radians as a literal of the language; anything else as it is."""
+    return f"{value!r}rad" if isinstance(value, int | float) and not isinstance(value, bool) else value

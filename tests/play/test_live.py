@@ -6,6 +6,7 @@ import base64
 import contextlib
 import io
 import json
+import math
 import signal
 import urllib.request
 from pathlib import Path
@@ -34,6 +35,10 @@ def pixels(message: dict[str, Any]) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(base64.b64decode(message["png"]))).convert("RGB")).astype(int)
 
 
+def by_kind(told: list[dict[str, Any]], kind: str) -> dict[str, Any]:
+    return next(message for message in told if message["kind"] == kind)
+
+
 def picture_of(text: str, **options: Any) -> np.ndarray:
     return nsg.render(nsg.loads(text, **options.pop("load", {})), **options).to_uint8().astype(int)
 
@@ -48,10 +53,12 @@ def test_an_edit_is_drawn_as_the_command_line_draws_it(page: Page) -> None:
     page.say("edit", file="a.nsg", version=1, text=edited)
     page.draw(7, "a.nsg", params={"k": 0.9, "tilt": "30deg"}, size=[80, 60])
     told = [page.hear() for _ in range(2)]
-    view = next(message for message in told if message["kind"] == "view")
+    page.draw(8, "a.nsg", params={"k": 0.9, "tilt": math.radians(30)}, size=[80, 60])
+    assert np.array_equal(pixels(page.until("picture", id=8)), pixels(by_kind(told, "picture")))
+    view = by_kind(told, "view")
     assert (view["version"], view["problems"]) == (1, [])
     assert json.loads(view["view"])["dimension"] == 2
-    drawn = next(message for message in told if message["kind"] == "picture")
+    drawn = by_kind(told, "picture")
     assert (drawn["id"], drawn["version"], drawn["size"]) == (7, 1, [80, 60])
     defines = {"k": 0.9, "tilt": "30deg"}
     expected = picture_of(edited, load={"params": defines}, size=(80, 60))
