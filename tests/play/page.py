@@ -96,8 +96,9 @@ class Page:
 
 
 @contextmanager
-def opened(browser: Any, server: Served, **options: Any) -> Iterator[Page]:
-    """The page; fails where it wrote to the console or asked another host."""
+def opened(browser: Any, server: Served, first: str = "", **options: Any) -> Iterator[Page]:
+    """The page; fails where it wrote to the console or asked another host. ``first`` runs before all else."""
     with watched(browser, (server.origin,), **options) as page:
+        page.add_init_script(first)
         page.goto(server.address)
         yield Page(page)

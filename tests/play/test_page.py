@@ -89,11 +89,18 @@ def test_completion_hover_and_arguments_know_the_language(page: Page) -> None:
 
 def test_a_slider_is_drawn_by_the_shader_and_then_by_the_network(page: Page) -> None:
     before = page.picture()
-    slider = page.page.locator("#controls input[type=range]")
-    slider.evaluate("(s) => { s.value = 0.9; s.dispatchEvent(new Event('input')); }")
+    page.page.locator("#controls input[type=range]").fill("0.9")
     page.until("document.getElementById('told').textContent.startsWith('shader')")
     assert page.other_picture(before) != before
     assert "0.5" in page.text(), "the text stays"
+
+
+def test_without_webgl_the_server_draws_all(chromium: Any, server: Served) -> None:
+    with opened(chromium, server, "HTMLCanvasElement.prototype.getContext = () => null;") as page:
+        before = page.picture()
+        page.page.locator("#note", has_text="WebGL2").wait_for()
+        page.page.locator("#controls input[type=range]").fill("0.9")
+        page.other_picture(before)
 
 
 def test_the_camera_is_written_into_the_text(page: Page, scene: Path) -> None:
@@ -150,7 +157,19 @@ def test_what_was_not_saved_is_back_after_a_crash(chromium: Any, scene: Path, tm
                 page.page.wait_for_timeout(1500)  # the server keeps it within half a second
                 server.process.kill()
                 page.page.locator("#line", has_text="does not answer").wait_for()
-                page.page.evaluate("window.onerror = null")
+
+
+def test_a_definition_in_another_file_is_gone_to(page: Page, scene: Path) -> None:
+    library = "nsg 1;\n\nmodule dot(r) {\n  square { scale(r); }\n}\n"
+    scene.with_name("lib.nsg").write_text(library, "utf-8")
+    page.picture()
+    page.knows()
+    page.click_text("square")
+    page.page.keyboard.insert_text('\nimport "lib.nsg" as lib;\nlib.dot(0.1);')
+    page.page.locator(".cm-line", has_text="lib.dot").get_by_text("dot", exact=False).last.click()
+    page.page.keyboard.press("F12")
+    page.page.locator("#files option:checked", has_text="lib.nsg").wait_for(state="attached")
+    page.page.locator(".cm-activeLine", has_text="module dot(r)").wait_for()
 
 
 def test_a_new_scene_begins_with_an_example(page: Page, scene: Path) -> None:

@@ -168,8 +168,8 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
   return {
     current: () => current,
     isUnsaved: (file) => documents.has(file) && isUnsaved(documents.get(file)),
-    anyUnsaved: () => [...documents.values()].some(isUnsaved),
-    at: (uri) => [...documents.values()].find((document) => document.uri === uri),
+    /** The page goes away: keep what is not saved, in this browser. */
+    keepAll: () => documents.forEach(keep),
     has: (file) => documents.has(file),
     folder: () => folder,
     setFolder: (uri) => (folder = uri),

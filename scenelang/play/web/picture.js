@@ -266,13 +266,18 @@ export function makePicture(at, { send, oncamera }) {
       by = what;
       stop("rest", "sharp");
       if (by === "shader") showShader();
-      else ask(by);
+      else {
+        at.told.textContent = "drawing …";
+        ask(by);
+      }
     },
     /** Show or hide the figures. */
     toggleFigures(open) {
       figuresOpen = open;
       at.figures.hidden = !open;
-      if (open) ask("figures");
+      if (!open) return;
+      at.figures.replaceChildren(element("dt", {}, "measuring …"));
+      ask("figures");
     },
     /** What a download takes along. */
     inputs: () => ({ params: moved(), frame: viewer?.frame ?? 0 }),

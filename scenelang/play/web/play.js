@@ -18,6 +18,7 @@ const SHORT = "nsg 1;\n\nsquare { scale(0.6); material flat { color(#2a6f97); } 
 let known = { files: [], examples: [], most: {} };
 let download = null;  // {id, done} of the one that is being made
 let renaming = null;  // [file, to]
+let goal = null;  // {uri, position} to go to once it is shown
 
 const bars = makeBars(at("bars"));
 const server = languageServer(address("lsp"), {
@@ -58,6 +59,7 @@ const documents = makeDocuments({
     picture.open(file, known.most.side);
     showFiles();
     editor.view.focus();
+    reach();
   },
   onsent: () => picture.onedit(),
   onstate: showState,
@@ -104,6 +106,7 @@ const answers = {
     element("a", { href: url, download: name }).click();
   },
   error({ id, message }) {
+    if (id === null) renaming = null;
     if (id === null || id === download) bars.ask("error", message, { OK() {} });
     else picture.onerror(id, message);
     if (id === download) {
@@ -163,11 +166,18 @@ async function rename() {
   live.send({ kind: "rename", file: shown.file, to: asked.file });
 }
 
+/** Show a place of a file, which may have to be opened. */
 function go(uri, position) {
-  const target = documents.at(uri);
-  if (target && target !== documents.current()) documents.open(target.file);
-  if (documents.current()?.uri === uri) editor.go(toOffset(editor.view.state.doc, position));
-  else if (uri.startsWith(documents.folder())) documents.open(decodeURIComponent(uri.slice(documents.folder().length)));
+  goal = { uri, position };
+  const inside = uri.startsWith(documents.folder());
+  if (documents.current().uri === uri) reach();
+  else if (inside) documents.open(decodeURIComponent(uri.slice(documents.folder().length)));
+}
+
+function reach() {
+  if (goal === null || documents.current().uri !== goal.uri) return;
+  editor.go(toOffset(editor.view.state.doc, goal.position));
+  goal = null;
 }
 
 // ---------------------------------------------------------------- downloads
@@ -209,6 +219,4 @@ addEventListener("keydown", (event) => {
   event.preventDefault();
   save();
 });
-addEventListener("beforeunload", (event) => {
-  if (documents.anyUnsaved()) event.preventDefault();
-});
+addEventListener("pagehide", () => documents.keepAll());

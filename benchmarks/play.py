@@ -1,0 +1,72 @@
+"""From key press to changed picture in `scenelang play`: ``python benchmarks/play.py [SCENE] [KEYS]``.
+
+A server and Chromium with software GL run on this machine. A digit of the scene's first number behind a
+bracket is typed and taken back, one key each 0.8 s. Measured in the page, from the time that the browser
+gives the key press to the frame after the network's picture of that text has been put in, at the scene's own
+size; beside it what the server says that compiling and drawing took.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from playwright.sync_api import sync_playwright
+
+from tests.browser import ARGUMENTS, _path
+from tests.play.page import Page, served
+
+WATCH = """() => {
+  const still = document.getElementById("still");
+  globalThis.took = [];
+  let pressed = null;
+  addEventListener("keydown", (event) => (pressed = event.timeStamp), true);
+  new MutationObserver(() => requestAnimationFrame(() => {
+    const since = pressed;
+    pressed = null;
+    if (since !== null) requestAnimationFrame((now) => took.push([now - since, told.textContent]));
+  })).observe(still, { attributeFilter: ["data-version"] });
+}"""
+
+
+def main(scene: Path, keys: int) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(shutil.copy(scene, folder))
+        load = os.getloadavg()[0]
+        with served(copy, Path(folder, "state")) as server, sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=_path(), args=list(ARGUMENTS))
+            page = Page(browser.new_page(viewport={"width": 1280, "height": 800}))
+            page.page.goto(server.address)
+            page.picture()
+            page.knows()
+            page.page.evaluate(WATCH)
+            number = re.search(r"\((0?\.\d+)", scene.read_text("utf-8"))
+            assert number is not None, "no number behind a bracket"
+            page.page.get_by_text(number[1], exact=True).first.click()
+            page.page.wait_for_timeout(1000)
+            for key in range(keys):
+                page.page.keyboard.press("Backspace" if key % 2 else "5")
+                page.page.wait_for_timeout(800)
+            took = page.page.evaluate("took")
+            browser.close()
+    times = sorted(ms for ms, _ in took)
+    print(
+        f"{scene.name}: {len(times)} of {keys} keys; load before {load:.1f}, after {os.getloadavg()[0]:.1f}"
+    )
+    print(f"median {statistics.median(times):.0f} ms, from {times[0]:.0f} to {times[-1]:.0f} ms")
+    drawn = [int(found[1]) for _, told in took if (found := re.search(r"(\d+) ms", told))]
+    print(f"of which the server compiles and draws {statistics.median(drawn):.0f} ms; {took[-1][1]}")
+
+
+if __name__ == "__main__":
+    main(
+        Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1] / "examples/chain.nsg",
+        int(sys.argv[2]) if len(sys.argv) > 2 else 20,
+    )
