@@ -42,8 +42,9 @@ export function makePicture(at, { send, oncamera }) {
   };
   const stop = (...names) => names.forEach((name) => clearTimeout(timers[name]));
   const note = (text) => {
-    at.note.textContent = text ?? "";
-    at.note.hidden = !text;
+    const shown = text ?? (drawn && `The server alone draws: ${drawn}`);
+    at.note.textContent = shown ?? "";
+    at.note.hidden = !shown;
   };
   const isByHand = () => Boolean(viewer?.moved && !written);
   const isLive = () => !drawn && viewer !== null && (by === "shader" || viewer.playing || isByHand());
@@ -155,7 +156,7 @@ export function makePicture(at, { send, oncamera }) {
     } catch (error) {
       drawn = error.message;
       at.canvas.hidden = true;
-      note(`The server alone draws: ${drawn}`);
+      note(null);
       return new Numbers(view);
     }
   }
@@ -199,12 +200,14 @@ export function makePicture(at, { send, oncamera }) {
       const camera = cameraControls(viewer);
       const write = element("button", { type: "button", class: "write" }, "Write camera");
       write.addEventListener("click", () => {
-        if (!viewer.moved) return;
         written = true;
         oncamera(viewer.cameraLine());
       });
-      camera.box.append(write);
-      parts.push(camera);
+      const refresh = () => (write.disabled = !viewer.moved);
+      const unwatch = viewer.watch(refresh);
+      refresh();
+      camera.box.prepend(write);
+      parts.push(camera, { box: "", dispose: unwatch });
     }
     controls = { mark, parts, params };
     at.controls.replaceChildren(...parts.map(({ box }) => box));
