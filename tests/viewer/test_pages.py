@@ -10,7 +10,6 @@ import pytest
 import scenelang as nsg
 from scenelang.viewer.export import export
 from scenelang.viewer.page import plain
-from scenelang.viewer.script import MODULES
 from tests.browser import watched
 from tests.viewer.conftest import ask
 
@@ -37,9 +36,9 @@ def loaded(page: Any, path: Path) -> Any:
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples(chromium: Any, tmp_path: Path, path: Path) -> None:
     out = tmp_path / "page.html"
-    if "solid" not in MODULES and nsg.compile(nsg.load(path)).stage:
-        pytest.skip("no shader of solids yet")
     export(path, out)
+    if not nsg.load(path).elements:
+        assert out.stat().st_size < 150_000
     with watched(chromium, viewport={"width": 260, "height": 320}, reduced_motion="reduce") as page:
         asked = loaded(page, out)
         assert page.locator("#note").is_hidden(), page.locator("#note").text_content()
@@ -93,6 +92,38 @@ def test_a_still_picture_where_it_cannot_draw(chromium: Any, tmp_path: Path, bro
         assert ask(page, "still.naturalWidth") == 256
 
 
+def test_values_without_a_picture_are_told_beside_their_control(chromium: Any, tmp_path: Path) -> None:
+    scene = tmp_path / "a.nsg"
+    scene.write_text("param k = 0.5 in 0..1; background(#fff); star { scale(k); material flat { color(#00f); } }")
+    export(scene, tmp_path / "a.html")
+    with watched(chromium, viewport={"width": 200, "height": 200}) as page:
+        loaded(page, tmp_path / "a.html")
+        before, slider = page.locator("canvas").screenshot(), page.locator("[type=range]")
+        slider.press("Home")
+        page.locator(".why:not(:empty)").wait_for()
+        assert slider.input_value() == "0"
+        assert page.locator("canvas").screenshot() == before, "the last picture stays"
+        slider.press("End")
+        page.locator(".why:not(:empty)").wait_for(state="detached")
+        assert page.locator("canvas").screenshot() != before
+
+
+def test_a_lost_context_comes_back(chromium: Any, tmp_path: Path) -> None:
+    export(EXAMPLES[0].with_stem("hello"), tmp_path / "a.html")
+    with watched(chromium, viewport={"width": 300, "height": 200}) as page:
+        loaded(page, tmp_path / "a.html")
+        before = page.locator("canvas").screenshot()
+        lost = "canvas.getContext('webgl2').getExtension('WEBGL_lose_context')"
+        ask(page, f"void (globalThis.extension = {lost}, extension.loseContext())")
+        page.locator("#note").wait_for()
+        ask(page, "void extension.restoreContext()")
+        page.locator("#note").wait_for(state="hidden")
+        page.wait_for_function(
+            "() => new Promise((done) => requestAnimationFrame(() => setTimeout(done, 100, true)))"
+        )
+        assert page.locator("canvas").screenshot() == before
+
+
 def test_a_still_picture_without_scripts(chromium: Any, tmp_path: Path) -> None:
     export(nsg.loads("star;"), tmp_path / "a.html")
     with watched(chromium, java_script_enabled=False) as page:
@@ -102,13 +133,15 @@ def test_a_still_picture_without_scripts(chromium: Any, tmp_path: Path) -> None:
 
 
 def test_a_frame_in_a_notebook(chromium: Any, tmp_path: Path) -> None:
-    shown = nsg.loads("canvas(300, 200); star;")._repr_mimebundle_()
+    shown = nsg.loads("canvas(300, 200); sphere;")._repr_mimebundle_()
     (tmp_path / "notebook.html").write_text(f"<!doctype html><title>a</title>{shown['text/html']}", "utf-8")
     with watched(chromium) as page:
         page.goto((tmp_path / "notebook.html").as_uri())
         frame = page.frame_locator("iframe")
         frame.locator("canvas.drawn").wait_for()
         assert frame.locator("h1").is_hidden()
+        frame.get_by_text("Copy camera line").click()
+        frame.get_by_text("Copied").wait_for()
         sizes = page.frames[1].evaluate("[document.documentElement.scrollHeight, innerHeight]")
         assert sizes[0] <= sizes[1], "nothing has to be scrolled to"
 
