@@ -94,7 +94,9 @@ def test_a_still_picture_where_it_cannot_draw(chromium: Any, tmp_path: Path, bro
 
 def test_values_without_a_picture_are_told_beside_their_control(chromium: Any, tmp_path: Path) -> None:
     scene = tmp_path / "a.nsg"
-    scene.write_text("param k = 0.5 in 0..1; background(#fff); star { scale(k); material flat { color(#00f); } }")
+    scene.write_text(
+        "param k = 0.5 in 0..1; background(#fff); star { scale(k); material flat { color(#00f); } }"
+    )
     export(scene, tmp_path / "a.html")
     with watched(chromium, viewport={"width": 200, "height": 200}) as page:
         loaded(page, tmp_path / "a.html")

@@ -49,16 +49,12 @@ export function copyButton(label, text) {
   return button;
 }
 
+/** Copy as a selection is, which a frame of its own may do too; elsewhere the clipboard is asked. */
 async function copied(text) {
-  try {
-    await navigator.clipboard.writeText(text);
-    return true;
-  } catch { // in a frame of its own it may be refused, where this is not
-    const field = element("textarea", { value: text, class: "aside" });
-    document.body.append(field);
-    field.select();
-    const done = document.execCommand("copy");
-    field.remove();
-    return done;
-  }
+  const field = element("textarea", { value: text, class: "aside" });
+  document.body.append(field);
+  field.select();
+  const done = document.execCommand("copy");
+  field.remove();
+  return done || navigator.clipboard.writeText(text).then(() => true, () => false);
 }
