@@ -53,6 +53,7 @@ GALLERY = (
 )
 GALLERY_FRAMES = {"vortex": 8, "lava": 30, "stones": 48}
 COMPARED = "chain"
+RECORDED = "play.webp"  # by make_play.py
 CHARTED = ("compare", "table1")  # experiments whose chart the documentation shows
 STRIPPED = ("overfit", "compare", "table1", "table3")  # and whose pictures
 GAP_PX = 8
@@ -321,7 +322,9 @@ def main() -> None:
                 flush=True,
             )
     stale = [
-        path for path in sorted(PICTURES.rglob("*.*")) if path.relative_to(PICTURES).as_posix() not in made
+        path
+        for path in sorted(PICTURES.rglob("*.*"))
+        if path.relative_to(PICTURES).as_posix() not in (*made, RECORDED)
     ]
     for path in stale:
         print(f"no longer made: {path.relative_to(PICTURES)}")

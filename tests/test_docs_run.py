@@ -21,11 +21,22 @@ import pytest
 from scenelang.cli.main import main
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("index", "tutorial", "cookbook", "embedding", "language", "formatting", "data", "elements", "proof")
+PAGES = (
+    "index",
+    "tutorial",
+    "cookbook",
+    "embedding",
+    "language",
+    "formatting",
+    "data",
+    "elements",
+    "proof",
+    "viewer",
+)
 SLOW = ("animation",)
 _BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```\n(?:\n```text\n(.*?)^```$)?", re.MULTILINE | re.DOTALL)
 VENV = ".venv/bin/"
-_LONG = {"watch", "train", "lab", "lsp"}  # commands that do not end, or not soon
+_LONG = {"watch", "train", "lab", "lsp", "play"}  # commands that do not end, or not soon
 _OTHERS = {"python3", "python", "pip", "git", "mkdocs"}  # parsed by test_docs.py, not run here
 
 
