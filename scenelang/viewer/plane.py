@@ -22,7 +22,6 @@ from scenelang.viewer.script import web
 from scenelang.viewer.store import Store
 from scenelang.words import TOKENS
 
-TILE: Final = 16  # pixels along a side of the squares that have a list of objects each
 NODES: Final = 129  # along a side of the grid that bounds are looked for on
 QUARTERED: Final = 7  # times that a square may be, in a proof that a unit is never above zero
 UNKNOWN: Final = 1e9  # leaf units: a bound that rules nothing out
@@ -67,9 +66,9 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
     sizes = {
         **{name.upper(): token for name, token in TOKENS.items()},
         "LINES": config.paint_lines,
-        "TILE": TILE,
         "RIM": RADIUS,
         "BLEND": field.BLEND,
+        "FARTHER": field.FARTHER,
         "FARTHEST": field.FARTHEST,
         "UNIT": unit,
         "SLOPE": float(np.exp(network.read_slope)) / 4,
@@ -82,7 +81,6 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
         "shader": {"fragment": text + defines + web("angles.glsl") + web("plane.glsl")},
         "network": {
             "cell": store.add(table.reshape(-1)),
-            "tile": TILE,
             "empty": EMPTY,
             "blend": field.BLEND,
             "slack": field.SLACK,

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from benchmarks import floor
+from benchmarks.viewer import SMALL, timed
 from scenelang.backend.small import draw_small
 from scenelang.elements.pyramid import unpacked
 from scenelang.models.framed import load_arrays
@@ -32,7 +32,7 @@ from tests.browser import watched
 from tests.elements.shapes import ball, element, square
 from tests.pictures import premultiplied, psnr_db
 from tests.renderers.test_pruned import of_sets, rng_of, wild
-from tests.test_examples import EXAMPLES, SCENES, sized
+from tests.test_examples import SCENES, sized
 
 LEAST_DB = 45.0
 MODELS = "shapes2d", "shapes2d-w16", "shapes2d-w8", "textures2d"
@@ -54,22 +54,22 @@ DRAW = """async ([message, width, height]) => {
   drawer.draw(view.program, { width, height });
   const pixels = new Uint8Array(4 * width * height);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-  const operations = drawer.operations(view.program, { width, height });
   drawer.dispose();
   gl.getExtension("WEBGL_lose_context").loseContext();
   let text = "";
   for (let at = 0; at < pixels.length; at += 4096) {
     text += String.fromCharCode(...pixels.subarray(at, at + 4096));
   }
-  return [btoa(text), operations];
+  return btoa(text);
 }"""
 
 
-def drawn(page: Any, view: View, size: tuple[int, int]) -> tuple[np.ndarray, float]:
-    """Premultiplied pixels (H, W, 4) in [0, 1], and multiply-adds a pixel."""
-    data, operations = page.evaluate(DRAW, [view.message(), *size])
+def drawn(page: Any, view: View, size: tuple[int, int]) -> np.ndarray:
+    """Premultiplied pixels (H, W, 4) in [0, 1]."""
+    data = page.evaluate(DRAW, [view.message(), *size])
     pixels = np.frombuffer(base64.b64decode(data), np.uint8).reshape(size[1], size[0], 4)
-    return pixels[::-1] / 255.0, operations
+    found: np.ndarray = pixels[::-1] / 255.0
+    return found
 
 
 def asked(program: Program, p: np.ndarray) -> np.ndarray:
@@ -171,7 +171,7 @@ def test_random_pictures_are_the_networks(page: Any) -> None:
 def compared(page: Any, program: Program) -> float:
     """PSNR of the shader's picture, dB."""
     network = premultiplied(draw_small(program).image)
-    picture, _ = drawn(page, view_of(program), program.canvas)
+    picture = drawn(page, view_of(program), program.canvas)
     if network.shape[2] == 3:
         assert (picture[..., 3] == 1).all()
     return psnr_db(picture[..., : network.shape[2]], network)
@@ -179,11 +179,9 @@ def compared(page: Any, program: Program) -> float:
 
 @pytest.mark.browser
 def test_many_small_objects_cost_as_much_as_a_few(page: Any) -> None:
-    chain = nsg.compile(sized(nsg.load(EXAMPLES / "chain.nsg"), 256))
-    few = drawn(page, view_of(chain), (256, 256))[1]
-    assert 500 < few < 1185 * 5 * len(chain)
-    stars = view_of(nsg.compile(floor.stars(0, 200, 0.05, 256)))
-    assert 10 < drawn(page, stars, (256, 256))[1] < 10 * few
+    chain, small = (timed(page, name, 256, 1)["operations"] for name in ("chain", SMALL))
+    assert 500 < chain < 1185 * 5 * 4
+    assert 10 < small < 10 * chain
 
 
 @pytest.mark.browser

@@ -2,7 +2,7 @@
 // four samples as renderers/coverage.py says. In front stand sizes and angles.glsl, behind it the decoders.
 
 uniform sampler2D rows; // of each object: four texels, its steps, the place and the steps of its picture
-uniform sampler2D lists; // of each tile: where its list begins, and how many objects; the lists: texels of rows
+uniform sampler2D lists; // of tiles, where each one's begins and its length; then texels of rows, four in one
 uniform sampler2D nodes; // distances of elements
 uniform sampler2D texels; // of pictures
 uniform vec4 cell[4 * (LINES + 2)]; // of each token: lines in distance, state and 1; then candidate, bump
@@ -11,6 +11,7 @@ uniform vec2 size; // of the frame, pixels
 uniform float px; // side of a pixel, world units; 0: single points
 uniform float empty; // the state before the first object
 uniform float widest; // of the blends, world units
+uniform int tile; // side of a tile, pixels
 uniform int across; // tiles in a row
 #ifdef POINTS
 uniform sampler2D points;
@@ -26,7 +27,7 @@ out vec4 shown;
 const float FAR = 1e15; // leaf units: float32 holds its square
 const float CORNER = 0.36; // pixels from the centre to a sample, a little rounded up
 const float NEAR = 0.85; // pixels: farther from an outline a pixel has one colour
-const float NARROW = 1.0 / 16.0; // of a pixel by a blend's width: above it colours change much across the pixel
+const float NARROW = 1.0 / 16.0; // of a pixel by a blend's width: above it colours change across the pixel
 const float LEAST = 1e-4; // of a colour, that counts as part of what a point shows
 const vec2 OFFSETS[5] =
     vec2[](vec2(0), vec2(-0.25, -0.25), vec2(0.25, -0.25), vec2(-0.25, 0.25), vec2(0.25, 0.25));
@@ -136,82 +137,102 @@ bool idle(int gate, float narrow, float distance, float state) {
   return true;
 }
 
+// Of the first objects of a tile what a pixel's middle said: a distance that its samples can do with, too.
+#define KNOWN 16
+const float SKIPPED = 3e38; // it changes nothing
+const float OPEN = 2e38; // its outline is near, or a blend needs it exactly
+float known[KNOWN];
+int first = 0; // the last object that hides all before it
+
 /**
  * Colour and state of a point that has met its objects.
  * @param gap how near to an outline a pixel around the point has more than one colour, world units;
- *     0 where the point itself is asked for
+ *     0 for one of its samples
  * @param near whether the pixel has, in which case the answer is of no use
  */
 vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
   float state = empty;
   vec3 rgb = vec3(0.0);
-  bool tied = false, doubtful = false;
+  bool tied = false, doubtful = false, middle = gap > 0.0;
   near = false;
-  for (int i = 0; i < span.y; i++) {
+  for (int i = first; i < span.y; i++) {
+    float distance = OPEN;
+    if (!middle && px > 0.0 && i < KNOWN) distance = known[i];
+    if (distance == SKIPPED) continue;
     int at = int(texel(lists, span.x + (i >> 2))[i & 3]);
-    vec4 a = texel(rows, at), b = texel(rows, at + 1), c = texel(rows, at + 2), own = texel(rows, at + 3);
-    float scale = a.x, stretch = a.y, narrow = a.w;
-    int token = int(a.z), gate = token * (LINES + 2), steps = int(c.z);
-    vec2 q = local(p, at + 4, steps);
+    vec4 a = texel(rows, at);
+    float stretch = a.y, narrow = a.w, room = gap * stretch;
+    int kind = int(a.z), token = kind & 3, steps = kind >> 3, gate = token * (LINES + 2);
+    bool blends = (kind & 4) > 0;
+    vec4 c = texel(rows, at + 2), own = texel(rows, at + 3);
+    vec2 q;
 
-    // no decoder where the leaf is proved so far away that nothing changes
-    float radius = length(q), room = gap * stretch;
-    float least = own.a * scale * max(max(abs(q.x) - b.x, abs(q.y) - b.y), radius - b.z) - room;
-    SPEND(8 + 3 * (LINES + 1));
-    if (least > 0.0 && idle(gate, narrow, least, state)) continue;
+    if (distance == OPEN) {
+      // no decoder where the leaf is proved so far away that nothing changes
+      vec4 b = texel(rows, at + 1);
+      q = local(p, at + 4, steps);
+      float radius = length(q);
+      float least = a.x * max(max(abs(q.x) - b.x, abs(q.y) - b.y), radius - b.z) - room;
+      SPEND(8 + 3 * (LINES + 1));
+      bool skipped = least > 0.0 && idle(gate, narrow, least, state);
 #ifndef POINTS
-    if (radius > b.w + room / scale) continue;
-    bool cut = token == INTERSECT && least > FARTHEST * widest;
-#else
-    const bool cut = false;
+      skipped = skipped || a.x * (radius - b.w) > room;
+      if (middle && i < KNOWN) known[i] = SKIPPED;
 #endif
-    float distance = least;
-    if (!cut) {
+      if (skipped) continue;
+      distance = least;
+#ifndef POINTS
+      if (token != INTERSECT || least < FARTHEST * widest)
+#endif
+      {
 #ifdef GRIDS
-      distance = c.y > 0.0 ? lattice(q, int(c.x), int(c.y)) : learned(int(c.x), q);
+        distance = c.y > 0.0 ? lattice(q, int(c.x), int(c.y)) : learned(int(c.x), q);
 #else
-      distance = learned(int(c.x), q);
+        distance = learned(int(c.x), q);
 #endif
-      distance *= scale;
-    }
-    if (abs(distance) < room) {
-      near = true;
-      return vec4(0.0);
+        distance *= own.a;
+      }
     }
 
     float take = clamp(level(cell[gate], narrow, distance, state), 0.0, 1.0), paint = 0.0;
     for (int k = 1; k <= LINES; k++) paint = max(paint, level(cell[gate + k], narrow, distance, state));
     paint = min(paint, 1.0);
-    if (gap > 0.0) {
-      float margin = abs(state / UNIT - distance);
+    if (middle) {
+      float margin = abs(state / UNIT - distance), off = abs(distance);
+      if (i < KNOWN) known[i] = off < room + (blends ? FARTHER * widest : 0.0) ? OPEN : distance;
+      near = near || off < room;
       if (token == SMOOTH) {
         doubtful = doubtful || (tied && paint > LEAST && paint < 1.0 - LEAST);
 #ifdef PICTURES
         float width = BLEND / narrow;
         doubtful = doubtful || (px > NARROW * width && margin < width + CORNER * px * (1.0 + stretch));
 #endif
+      } else if (token == UNION) {
+        tied = tied || margin < 2.0 * CORNER * px;
+        if (!blends && distance < -room) {
+          first = i;
+          near = tied = doubtful = false;
+        }
       }
-      tied = tied || (token == UNION && margin < 2.0 * CORNER * px);
     }
     vec2 ends = cell[gate + LINES + 1].xy;
     state += take * (ends.x * distance - state) - take * (1.0 - take) * ends.y / narrow;
     SPEND(3 * (LINES + 1) + 8);
 #ifdef PICTURES
-    if (c.w > 0.0 && paint > LEAST) {
+    if (c.z > 0.0 && paint > LEAST) {
       // over a pixel, colours of pictures are a mean as they are of four samples
-      vec3 sum = painted(q, at + int(c.w));
-      if (gap > 0.0) {
-        sum = vec3(0.0);
-        for (int k = 1; k < 5; k++) sum += painted(local(p + px * OFFSETS[k], at + 4, steps), at + int(c.w));
-        sum *= 0.25;
+      own.rgb = vec3(0.0);
+      int count = middle ? 4 : 1;
+      for (int k = 0; k < count; k++) {
+        vec2 spot = middle ? p + px * OFFSETS[k + 1] : p;
+        own.rgb += painted(local(spot, at + 4, steps), at + int(c.z)) / float(count);
       }
-      own.rgb = sum;
     }
 #endif
     rgb += paint * (own.rgb - rgb);
     SPEND(3);
   }
-  near = abs(state) < gap * UNIT || (doubtful && state * SLOPE < 0.5);
+  near = near || abs(state) < gap * UNIT || (doubtful && state * SLOPE < 0.5);
   return vec4(rgb, state);
 }
 
@@ -222,7 +243,7 @@ void main() {
   vec4 found = met(texel(points, number).xy, ivec2(texel(lists, 0).xy), 0.0, near);
   shown = vec4(found.a / UNIT, found.rgb);
 #else
-  ivec2 tile = ivec2(gl_FragCoord.xy) / TILE, span = ivec2(texel(lists, tile.y * across + tile.x).xy);
+  ivec2 at = ivec2(gl_FragCoord.xy) / tile, span = ivec2(texel(lists, at.y * across + at.x).xy);
   vec2 middle = (gl_FragCoord.xy - 0.5 * size) * px;
   vec4 sum = vec4(0.0);
   for (int k = 0; k < 5; k++) {

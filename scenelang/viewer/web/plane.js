@@ -66,6 +66,7 @@ function sheet(gl, data, [inner, format, type], channels) {
 /** Numbers of all rows, and the texel at which each begins; see `rows` of plane.glsl. */
 function packed({ network, materials }, leaves, pictures, { rows }, reach) {
   const [numbers, begins] = [[], []];
+  const lastBlend = rows.reduce((last, { token }, i) => (token === network.tokens.smooth ? i : last), -1);
   rows.forEach((row, i) => {
     const { steps, scale } = row;
     const paint = network.draws[row.token] ? row.paint : -1; // the others leave colours as they are
@@ -75,10 +76,10 @@ function packed({ network, materials }, leaves, pictures, { rows }, reach) {
     const moves = steps.reduce((total, [kind]) => total + (kind === "map" ? 2 : 1), 0);
     const albedo = materials[row.material].albedo;
     const colour = row.colour.map((share, k) => Math.min(Math.max(share * albedo[k], 0), 1));
-    numbers.push(scale, discInWorld(steps, 1).stretch, row.token, narrow);
+    const kind = row.token + 4 * (i <= lastBlend) + 8 * steps.length;
+    numbers.push(Math.min(far, 1) * scale, discInWorld(steps, 1).stretch, kind, narrow);
     numbers.push(...bounds, Math.min(reach[i], 1e30));
-    numbers.push(side ? first : row.shape, side);
-    numbers.push(steps.length, paint < 0 ? 0 : 4 + moves, ...colour, Math.min(far, 1));
+    numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : 4 + moves, 0, ...colour, scale);
     for (const [kind, a, b, c, ...rest] of steps) {
       numbers.push(a, b, c, kind === "map" ? 0 : 1);
       if (kind === "map") numbers.push(...rest, 0);
@@ -115,8 +116,8 @@ function listed({ starts, objects }, begins) {
 /**
  * Draws the plane.
  * @param view - as `unpack` gives it
- * @returns `draw(program, {width, height})` into the bound framebuffer, premultiplied;
- *   `points(program, p)`: distance, red, green and blue at points (M * 2) of the world, a Float32Array (M * 4);
+ * @returns `draw(program, {width, height})` into the bound framebuffer, premultiplied; `points(program, p)`:
+ *   distance, red, green and blue (M * 4, Float32Array) at points (M * 2) of the world;
  *   `operations(program, {width, height})`: multiply-adds a pixel; `dispose()`
  */
 export function planeDrawer(gl, view) {
@@ -163,7 +164,7 @@ export function planeDrawer(gl, view) {
     const px = 2 / Math.min(width, height);
     const { reach, widest } = reaches(program.rows, network);
     const { numbers, begins } = packed(view, leaves, pictures, program, reach);
-    const { tile } = network;
+    const tile = 8 * Math.ceil(Math.min(width, height) / 256); // as many at any size, for JavaScript's time
     const lists = define === "POINTS"
       ? { starts: [0, begins.length], objects: begins.map((_, i) => i) }
       : tileLists(program.rows, reach, { width, height, tile, px }, network.draws);
@@ -180,6 +181,7 @@ export function planeDrawer(gl, view) {
     gl.uniform1f(place("px"), define === "POINTS" ? 0 : px);
     gl.uniform1f(place("empty"), (network.empty * widest) / network.blend);
     gl.uniform1f(place("widest"), widest);
+    gl.uniform1i(place("tile"), tile);
     gl.uniform1i(place("across"), Math.ceil(width / tile));
     gl.viewport(0, 0, width, height);
     gl.disable(gl.BLEND);

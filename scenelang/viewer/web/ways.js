@@ -37,21 +37,39 @@ export function discInWorld(steps, radius) {
   return { centre: [u, v], half: [Math.hypot(a, b), Math.hypot(c, d)], stretch };
 }
 
-/** Leaf coordinates of the centre of a disc in the world, and the radius of one in which those of it lie. */
-export function discInLeaf(steps, x, y, radius) {
-  for (const step of steps) {
-    if (step[0] === "map") {
-      const [, a, b, u, c, d, v] = step;
-      [x, y, radius] = [a * x + b * y + u, c * x + d * y + v, radius * steepest(a, b, c, d)];
+/** Steps as numbers, eight each: of a map six, 0 and its steepness; of a turn three, at the end 1 and its rate. */
+function flattened(steps) {
+  const numbers = new Float64Array(8 * steps.length);
+  steps.forEach((step, i) => {
+    numbers.set(step.slice(1), 8 * i);
+    const turns = step[0] !== "map";
+    numbers[8 * i + 6] = turns ? 1 : 0;
+    numbers[8 * i + 7] = turns ? rateOf(step) : steepest(step[1], step[2], step[4], step[5]);
+  });
+  return numbers;
+}
+
+/** How near to a leaf's origin a point of a disc in the world is at least, in leaf units. */
+function nearest(way, x, y, radius) {
+  for (let i = 0; i < way.length; i += 8) {
+    const [a, b, c] = [way[i], way[i + 1], way[i + 2]];
+    if (way[i + 6] === 0) {
+      const moved = a * x + b * y + c;
+      y = way[i + 3] * x + way[i + 4] * y + way[i + 5];
+      x = moved;
+      radius *= way[i + 7];
     } else {
-      const length = Math.hypot(x, y);
-      const angle = step[1] * length + step[2] * x + step[3] * y;
-      const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
-      radius *= 1 + (length + radius) * rateOf(step);
-      [x, y] = [x * cos + y * sin, y * cos - x * sin];
+      const length = Math.sqrt(x * x + y * y);
+      const angle = a * length + b * x + c * y;
+      const cos = Math.cos(angle);
+      const sin = Math.sin(angle);
+      radius *= 1 + (length + radius) * way[i + 7];
+      const moved = x * cos + y * sin;
+      y = y * cos - x * sin;
+      x = moved;
     }
   }
-  return { x, y, radius };
+  return Math.sqrt(x * x + y * y) - radius;
 }
 
 /**
@@ -83,6 +101,7 @@ export function tileLists(rows, reach, { width, height, tile, px }, draws) {
   const [left, low] = [-0.5 * width * px, -0.5 * height * px];
   const drawn = new Uint8Array(across * down);
   const [tiles, objects] = [[], []];
+  const most = 2 ** Math.ceil(Math.log2(Math.max(across, down, 1)));
   rows.forEach(({ steps, token }, object) => {
     let [x0, x1, y0, y1] = [0, across - 1, 0, down - 1];
     if (reach[object] < Infinity) {
@@ -93,17 +112,26 @@ export function tileLists(rows, reach, { width, height, tile, px }, draws) {
       [x0, y0] = [x0 > 0 ? x0 : 0, y0 > 0 ? y0 : 0];
       [x1, y1] = [x1 < across ? x1 : across - 1, y1 < down ? y1 : down - 1];
     }
-    for (let j = y0; j <= y1; j++) {
-      for (let i = x0; i <= x1; i++) {
-        const at = j * across + i;
-        if (!draws[token] && !drawn[at]) continue;
-        const q = discInLeaf(steps, left + (i + 0.5) * side, low + (j + 0.5) * side, around);
-        if (Math.hypot(q.x, q.y) - q.radius > reach[object]) continue;
-        drawn[at] = 1;
-        tiles.push(at);
-        objects.push(object);
+    const way = flattened(steps);
+    /** Squares of tiles that may be in reach are looked at in quarters. */
+    const look = (i, j, size) => {
+      if (i > x1 || j > y1 || i + size <= x0 || j + size <= y0) return;
+      const half = 0.5 * size;
+      if (reach[object] < Infinity) {
+        const middle = [left + (i + half) * side, low + (j + half) * side];
+        if (nearest(way, ...middle, size * around) > reach[object]) return;
       }
-    }
+      if (size > 1) {
+        for (let k = 0; k < 4; k++) look(i + half * (k & 1), j + half * (k >> 1), half);
+        return;
+      }
+      const at = j * across + i;
+      if (!draws[token] && !drawn[at]) return;
+      drawn[at] = 1;
+      tiles.push(at);
+      objects.push(object);
+    };
+    look(0, 0, most);
   });
   const starts = new Int32Array(across * down + 1);
   for (const at of tiles) starts[at + 1]++;
