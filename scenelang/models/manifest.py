@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from scenelang.elements.element import Element
 from scenelang.elements.zoo import load_zoo
-from scenelang.files import read_json, read_regular
+from scenelang.files import note_input, read_json, read_regular
 from scenelang.words import STAGE
 
 ROOT = Path(__file__).parent
@@ -249,9 +250,15 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
 """What each field may hold."""
 
 
+_FILE: Final = "manifest.json"
+_READ: Final[dict[Path, tuple[tuple[int, int, int], Manifest]]] = {}
+"""Manifests that were read, and their files' times, sizes and identities then."""
+
+
 def available() -> list[str]:
     """Names of the shipped models, sorted."""
-    return sorted(p.parent.name for p in ROOT.glob("*/manifest.json"))
+    # a page asks with each key: a glob takes a millisecond, this a fiftieth of one
+    return sorted(name for name in os.listdir(ROOT) if os.path.exists(os.path.join(ROOT, name, _FILE)))
 
 
 def load_manifest(name: str) -> Manifest:
@@ -263,10 +270,17 @@ def load_manifest(name: str) -> Manifest:
     """
     if name not in available():
         raise KeyError(name)
-    found = Manifest.from_json(read_regular(ROOT / name / "manifest.json", _MOST_BYTES))
-    if found.name != name:
-        raise ValueError(f"the manifest of `{name}` calls itself `{found.name[:40]}`")
-    return found
+    path = ROOT / name / _FILE
+    stat = path.stat()
+    stamp = stat.st_mtime_ns, stat.st_size, stat.st_ino
+    known = _READ.get(path)
+    if known is None or known[0] != stamp:
+        found = Manifest.from_json(read_regular(path, _MOST_BYTES))
+        if found.name != name:
+            raise ValueError(f"the manifest of `{name}` calls itself `{found.name[:40]}`")
+        known = _READ[path] = stamp, found
+    note_input(os.fspath(path))
+    return known[1]
 
 
 def load_textures(manifest: Manifest) -> dict[str, Element]:
