@@ -20,7 +20,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from scenelang.play.guard import policy
-from scenelang.play.language import bridge
+from scenelang.play.language import Languages
 from scenelang.play.live import Live
 from scenelang.play.shared import Play
 from scenelang.play.watch import watch
@@ -33,6 +33,8 @@ _FROM: Final = {None: "play/web", "viewer": "viewer/web", "examples": "play/web/
 
 def make_app(play: Play) -> Starlette:
     """The server, without a guard; while it runs processes wait for jobs and the folder is watched."""
+
+    languages = Languages(play.folder)
 
     async def page(request: Request) -> Response:
         nonce = secrets.token_urlsafe(16)
@@ -56,19 +58,18 @@ def make_app(play: Play) -> Starlette:
         finally:
             play.pages.discard(connection)
 
-    async def language(socket: WebSocket) -> None:
-        await bridge(socket, play.folder)
-
     @contextlib.asynccontextmanager
     async def running(_: Starlette) -> AsyncIterator[None]:
         stop = asyncio.Event()
         play.quick.start()
+        languages.start()
         play.later(asyncio.to_thread(play.journal.tidy))
         play.later(watch(play, stop))
         try:
             yield
         finally:
             stop.set()
+            await languages.close()
             await play.close()
 
     routes = [
@@ -76,7 +77,7 @@ def make_app(play: Play) -> Starlette:
         Route("/static/{name:path}", _static),
         Route("/download", download),
         WebSocketRoute("/live", _few(live)),
-        WebSocketRoute("/lsp", _few(language)),
+        WebSocketRoute("/lsp", _few(languages.serve)),
     ]
     return Starlette(routes=routes, lifespan=running)
 

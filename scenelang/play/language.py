@@ -29,13 +29,53 @@ class Elsewhere(ValueError):
     """A message names a file outside the folder."""
 
 
-async def bridge(socket: WebSocket, folder: Folder) -> None:
-    """Pass messages on, both ways, until one side ends."""
+class Languages:
+    """Language servers, one a page; one more waits for the next page, so that it need not."""
+
+    def __init__(self, folder: Folder) -> None:
+        self._folder, self._closed = folder, False
+        self._spare: asyncio.Task[asyncio.subprocess.Process] | None = None
+
+    def start(self) -> None:
+        """Have one wait."""
+        if self._spare is None and not self._closed:
+            self._spare = asyncio.create_task(_start())
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Pass messages on, both ways, until one side ends."""
+        await socket.accept()
+        self.start()
+        if self._spare is None:
+            return
+        spare, self._spare = self._spare, None
+        process = await spare
+        try:
+            await _bridge(socket, process, self._folder)
+        finally:
+            await _end(process)
+            self.start()
+
+    async def close(self) -> None:
+        """End the one that waits."""
+        self._closed = True
+        if self._spare is not None:
+            await _end(await self._spare)
+            self._spare = None
+
+
+async def _start() -> asyncio.subprocess.Process:
     pipe = asyncio.subprocess.PIPE
-    await socket.accept()
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "scenelang.play.language"), stdin=pipe, stdout=pipe, start_new_session=True
-    )
+    command = (sys.executable, "-m", "scenelang.play.language")
+    return await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe, start_new_session=True)
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        process.kill()
+    await process.wait()
+
+
+async def _bridge(socket: WebSocket, process: asyncio.subprocess.Process, folder: Folder) -> None:
     assert process.stdin is not None
     assert process.stdout is not None
     ways = [
@@ -45,12 +85,9 @@ async def bridge(socket: WebSocket, folder: Folder) -> None:
     try:
         await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
     finally:
-        with contextlib.suppress(ProcessLookupError):
-            process.kill()
         for way in ways:
             way.cancel()
         await asyncio.gather(*ways, return_exceptions=True)
-        await process.wait()
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):
             await socket.close()
 
