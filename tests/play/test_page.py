@@ -107,10 +107,9 @@ def test_the_camera_is_written_into_the_text(page: Page, scene: Path) -> None:
     page.picture()
     scene.write_text(SOLID, "utf-8")
     page.has("sphere")
-    page.page.locator("#canvas").focus()
     page.page.get_by_role("button", name="Write camera").wait_for()
     for _ in range(3):
-        page.page.locator("#canvas").press("ArrowRight")
+        page.page.locator("#stage").press("ArrowRight")
     before = page.page.locator("#still").get_attribute("src")
     page.page.get_by_role("button", name="Write camera").click()
     page.has("camera(eye = [")

@@ -31,15 +31,17 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
 
   // ---------------------------------------------------------------- to the server and to the store of this browser
 
+  /** Tell the server a text: at once, unless it was told one a moment ago. */
   function sendSoon(document) {
     if (document.timer) return;
-    document.timer = setTimeout(() => {
-      document.timer = null;
-      sendNow(document);
-    }, performance.now() - (document.sentAt ?? 0) > SEND_MS ? 0 : SEND_MS);
+    const wait = SEND_MS - (performance.now() - (document.sentAt ?? -SEND_MS));
+    if (wait <= 0) sendNow(document);
+    else document.timer = setTimeout(() => sendNow(document), wait);
   }
 
   function sendNow(document) {
+    clearTimeout(document.timer);
+    document.timer = null;
     document.sentAt = performance.now();
     const text = stateOf(document).doc.toString();
     send({ kind: "edit", file: document.file, version: document.version, text });
@@ -191,8 +193,8 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
     /** The editor's text has changed. */
     onchange(update) {
       current.version += 1;
-      server.change(current.uri, update.startState.doc, update.changes, update.state.doc);
       sendSoon(current);
+      server.change(current.uri, update.startState.doc, update.changes, update.state.doc);
       keepSoon(current);
       onstate(update.transactions.some((transaction) => transaction.annotation(elsewhere)));
     },

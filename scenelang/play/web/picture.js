@@ -7,7 +7,8 @@ import { readView } from "./viewer/store.js";
 import { Viewer } from "./viewer/viewer.js";
 
 const REST_MS = 150;  // how long nothing moves before the server draws
-const START_MS = 120;  // what the server may take for an edit before the shader shows it
+const START_MS = 120;  // what the server may take for an edit at least before the shader shows it …
+const SLOW_MS = 400;  // … unless the last one took this long
 const SHARP_MS = 300;  // how long a picture stands before it is drawn as large as it is shown
 const MOST_SHARP_MS = 700;  // what that may take
 const NAMES = { network: "network", reference: "exact", difference: "network, exact, difference" };
@@ -27,12 +28,13 @@ export function makePicture(at, { send, oncamera }) {
   let wanted = {};  // by -> id of the last drawing that was asked for
   let asked = {};  // id -> {size, at, params}
   let cost = 0;  // ms that the last edit's picture took to come
-  let next = null;  // the view to show: {file, version, message}
+  let latest = null;  // what stands for the view that came last
   let expected = false;  // whether a drawing of the text whose view comes next was asked for
   let faulty = false;  // whether the text that was last heard of has mistakes
   let written = false;  // whether the camera stands in the text, whose view has not come
   let mostSide = 1024;
   let controls = null;
+  let shows = "none";
   let figuresOpen = false;
   let timers = {};
 
@@ -126,9 +128,14 @@ export function makePicture(at, { send, oncamera }) {
 
   // ---------------------------------------------------------------- the shader's
 
+  /** Show the server's picture (`still`), the shader's once it is drawn (`live`), or none; one unseen costs nothing. */
   function show(which) {
-    at.still.hidden = which !== "still";
-    at.stage.dataset.shows = which;
+    shows = which;
+    at.canvas.hidden = which === "still" || drawn !== null;
+    if (which !== "live") {
+      at.still.hidden = which === "none";
+      at.stage.dataset.shows = which;
+    }
   }
 
   function showShader() {
@@ -138,6 +145,10 @@ export function makePicture(at, { send, oncamera }) {
   }
 
   function touched({ kind }) {
+    if (kind === "drawn" && shows === "live") {
+      at.still.hidden = true;
+      at.stage.dataset.shows = "live";
+    }
     if (!["param", "frame", "camera", "play"].includes(kind)) return;
     showShader();
     rest();
@@ -151,21 +162,28 @@ export function makePicture(at, { send, oncamera }) {
   function viewerOf(view) {
     try {
       const made = new Viewer(at.canvas, view, { onerror: wrong });
-      steer(made);
+      steer({  // from the stage, as a hidden canvas hears nothing
+        canvas: at.stage,
+        orbit: (...way) => made.orbit(...way),
+        pan: (...way) => made.pan(...way),
+        zoom: (factor) => made.zoom(factor),
+        set camera(camera) {
+          made.camera = camera;
+        },
+      });
       return made;
     } catch (error) {
       drawn = error.message;
-      at.canvas.hidden = true;
       note(null);
       return new Numbers(view);
     }
   }
 
-  /** Take over a view; the shader shows it where the server has not. */
-  async function apply({ file: of, version, message }) {
+  /** Take over a view; the shader shows it where the server has not in a while. */
+  async function apply(version, message) {
+    const mine = (latest = {});
     const view = await readView(JSON.parse(message));
-    if (next?.version !== version || next.file !== of || of !== file) return;
-    next = null;
+    if (mine !== latest) return;
     const mark = JSON.stringify([view.params, view.fixed, view.animation, view.dimension]);
     const isOther = controls?.mark !== mark;
     if (isOther) for (const part of controls?.parts ?? []) part.dispose();
@@ -180,15 +198,17 @@ export function makePicture(at, { send, oncamera }) {
         return;
       }
     }
+    const waits = at.still.dataset.version && !isLive() && cost < SLOW_MS;
     if (written) viewer.camera = null;
     written = false;
     at.canvas.style.setProperty("--ratio", view.canvas[0] / view.canvas[1]);
-    at.canvas.style.touchAction = view.dimension === 3 ? "none" : "auto";
+    at.stage.style.touchAction = view.dimension === 3 ? "none" : "auto";
     at.canvas.setAttribute("aria-label", plainText(view.alt ?? view.title));
     at.still.alt = plainText(view.alt ?? view.title);
     if (isOther) arrange(view, mark);
     if (asked[wanted[by]]?.params !== JSON.stringify(moved())) rest(0);  // there are other params now
-    if (Number(at.still.dataset.version ?? -1) < version || isLive() || at.still.hidden) showShader();
+    const isBehind = () => Number(at.still.dataset.version ?? -1) < version || isLive();
+    later("shader", () => mine === latest && isBehind() && showShader(), waits ? Math.max(START_MS, 1.5 * cost) : 0);
   }
 
   /** Make the controls of a view; `mark` tells those of others. */
@@ -225,16 +245,16 @@ export function makePicture(at, { send, oncamera }) {
       cost = 0;
       expected = false;
       written = false;
-      next = null;
+      latest = null;
       delete at.still.dataset.version;
-      show("live");
+      show("none");
       if (viewer) {
         viewer.pause();
         viewer.camera = null;
         viewer.reset();
         viewer.frame = 0;
       }
-      stop("rest", "sharp", "figures");
+      stop("rest", "sharp", "figures", "shader");
     },
     /** The text has changed, and the server has it. */
     onedit() {
@@ -257,9 +277,7 @@ export function makePicture(at, { send, oncamera }) {
       note(null);
       if (!expected) rest(0);
       expected = false;
-      next = { file: of, version, message: view };
-      const waits = viewer && !isLive() && cost < START_MS && !written;
-      later("apply", () => next && apply(next), waits ? START_MS : 0);
+      apply(version, view);
     },
     onerror(id, message) {
       if (Object.values(wanted).includes(id)) later("note", () => !faulty && note(message), REST_MS);
