@@ -20,12 +20,15 @@ from scenelang.graph.steps import Affine, Displace, Step, Warp
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.passes import OPTIONAL
 from scenelang.program.compile import compile_scene, find_model
+from scenelang.program.program import Program
 from scenelang.syntax import parse
 from scenelang.viewer.form import Form, form_of
 from scenelang.viewer.rows import stage_of
+from scenelang.viewer.view import view_of
 from scenelang.words import TOKENS
 from tests.viewer.test_view import carried
 
+WORDS = ("token", "shape", "material", "paint", "object")
 POINTS = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 50))
 
 
@@ -35,11 +38,11 @@ class Compiled(NamedTuple):
     evaluation: Evaluation
     manifest: Manifest
     graph: Graph
-    elements: tuple[Any, ...]
+    program: Program
 
     def form(self) -> Form:
         """The same for a page."""
-        return form_of(self.evaluation, self.manifest, self.elements)
+        return form_of(self.evaluation, self.manifest, self.program.elements)
 
 
 def compiled(source: SourceFile, path: Path | None = None, **inputs: Any) -> Compiled:
@@ -51,7 +54,7 @@ def compiled(source: SourceFile, path: Path | None = None, **inputs: Any) -> Com
         raise SceneError(found)
     model, after = inputs.get("model"), graphs.__setitem__
     program = compile_scene(scene, diagnostics=found, model=model, without=OPTIONAL, after=after)
-    return Compiled(evaluation, load_manifest(program.model), graphs["check_trained"], program.elements)
+    return Compiled(evaluation, load_manifest(program.model), graphs["check_trained"], program)
 
 
 def moved(param: dict[str, Any]) -> list[Any]:
@@ -60,9 +63,10 @@ def moved(param: dict[str, Any]) -> list[Any]:
         low, high, step = param["low"], param["high"], param.get("step")
         values = [low + (high - low) * share for share in (0.0, 0.25, 0.5, 0.77, 1.0)]
         return values if step is None else [low + round((v - low) / step) * step for v in values]
-    return param.get(
-        "choices", {"color": [[0.2, 0.7, 0.4]], "bool": [not param["value"]]}.get(param["kind"], [])
-    )
+    if "choices" in param:
+        return list(param["choices"])
+    others = {"color": [[0.2, 0.7, 0.4]], "bool": [not param["value"]], "string": [], "vector": []}
+    return others[param["kind"]] if param["kind"] in others else [0.9 * param["value"]]
 
 
 def defined(param: dict[str, Any], value: Any) -> Any:
@@ -116,6 +120,23 @@ def check_picture(picture: dict[str, Any], expected: Compiled, form: Form) -> No
     for name, number in _flat(stage).items():
         np.testing.assert_allclose(_flat(picture["stage"])[name], number, atol=1e-9, err_msg=name)
     assert picture["background"] == (None if graph.background is None else list(graph.background))
+
+
+def check_rows(rows: list[dict[str, Any]], program: Program) -> None:
+    """Hold a page's rows against those of the Program, which names shapes and paints by their places too."""
+    kept = view_of(program).data["program"]["rows"]
+    assert len(rows) == len(kept)
+    for row, own in zip(rows, kept, strict=True):
+        assert [row[key] for key in WORDS] == [own[key] for key in WORDS]
+        for key in (
+            "colour",
+            "scale",
+            "blend",
+            "amount",
+            "frequency",
+            *(("place",) if row["paint"] >= 0 else ()),
+        ):
+            np.testing.assert_allclose(row[key], own[key], rtol=1e-6, atol=1e-6)
 
 
 def _check_paint(row: dict[str, Any], look: Any, form: Form) -> None:

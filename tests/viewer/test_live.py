@@ -12,7 +12,17 @@ import pytest
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from tests.passes.random_scenes import blob_scene, full_scene, random_scene
-from tests.viewer.live import check_picture, compiled, defined, drawable, moved, pictures, solid_text, sources
+from tests.viewer.live import (
+    check_picture,
+    check_rows,
+    compiled,
+    defined,
+    drawable,
+    moved,
+    pictures,
+    solid_text,
+    sources,
+)
 
 pytestmark = pytest.mark.browser
 ROOT = Path(__file__).parents[2]
@@ -41,6 +51,8 @@ def test_every_param_and_frame_of_the_examples(path: Path, viewer_page: Any) -> 
             continue
         assert isinstance(picture, dict), (picture, values, frame)
         check_picture(picture, expected, form)
+        if not values and not frame:
+            check_rows(picture["rows"], expected.program)
 
 
 def agree(page: Any, scenes: Iterable[SourceFile], **inputs: Any) -> tuple[int, int]:
@@ -101,6 +113,14 @@ def test_what_would_be_a_mistake_is_refused_in_words(
     assert why in str(answer)
     assert isinstance(before, dict)
     assert before == after  # a run that ends early leaves nothing behind
+
+
+def test_names_of_params_mean_nothing_to_the_page(viewer_page: Any) -> None:
+    names = ("constructor", "toString", "hasOwnProperty", "eval", "window", "g", "sin_")
+    text = "".join(f"param {name} = {at}; " for at, name in enumerate(names, 1))
+    form = compiled(SourceFile("", text + f"square {{ scale({' + '.join(names)}); }}")).form()
+    answers = pictures(viewer_page, [(form, [{}, {"params": {"toString": 3}}])])[0]
+    assert [answer["rows"][0]["scale"] for answer in answers] == [28, 29]
 
 
 def test_what_the_canvas_and_the_length_hang_on_is_fixed() -> None:

@@ -10,7 +10,7 @@ import { MOST_OBJECTS, rowsOf } from "./graph.js";
 import { stageFrom } from "./stage.js";
 import { checkEye } from "./eye.js";
 
-const MOST_WORK = 2e6; // passes of loops, calls, objects, transforms and numbers of vectors
+const MOST_WORK = 5e6; // passes of loops, calls, objects, transforms and numbers of vectors
 const MOST_CALLS = 200; // within each other
 const MOST_FRAMES = 1e6;
 
@@ -218,7 +218,7 @@ const STATEMENTS_OF_FORMS = {
     const [get, bounds] = [prepared(expr, run), optionalValue(range, run)];
     return () => {
       const like = get();
-      const given = run.params[name];
+      const given = Object.hasOwn(run.params, name) ? run.params[name] : undefined;
       const value = given === undefined ? like : fromOutside(given, like);
       const allowed = bounds();
       if (allowed !== undefined && !allowedBy(value, allowed)) refuse(`${name} = ${given} is outside its range`);

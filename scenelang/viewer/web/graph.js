@@ -73,9 +73,9 @@ function loweredLeaf(node, steps, worn, state) {
 
 /** A leaf that no empty node has swallowed, with its steps in the normal form. */
 function finishedLeaf(leaf) {
-  const steps = normalChain(leaf.steps, leaf.form.dimension);
-  checkChain(steps, leaf.form);
-  return { ...leaf, steps };
+  leaf.steps = normalChain(leaf.steps, leaf.form.dimension);
+  checkChain(leaf.steps, leaf.form);
+  return leaf;
 }
 
 // ---------------------------------------------------------------- the boolean rule
@@ -131,11 +131,15 @@ function rowData({ op, leaf, k }, at, { dimension }) {
   const steps = wayBack(leaf.steps, dimension);
   if (steps.length > MOST_ROW_STEPS) refuse(`more than ${MOST_ROW_STEPS} steps between the world and an object`);
   return {
-    ...look,
     token: at === 0 ? 0 : TOKENS.indexOf(op),
     shape,
+    material: look.material,
     steps,
     scale: scaleOfChain(leaf.steps, dimension),
+    colour: look.colour,
+    paint: look.paint,
+    place: look.place,
+    paintSteps: look.paintSteps,
     amount: bump?.amount ?? 0,
     frequency: bump?.frequency ?? 0,
     blend: op === "smooth" ? k : USUAL_BLEND,
