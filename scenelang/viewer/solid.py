@@ -14,15 +14,13 @@ from typing import Any, Final
 import numpy as np
 
 from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST
-from scenelang.program.program import ProgramError
+from scenelang.renderers.arrays import Smooth
 from scenelang.renderers.network import TOKENS
 from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, SolidArrays
 from scenelang.renderers.solid.passes import SLACK
 from scenelang.viewer.script import web
 from scenelang.viewer.store import Store
 
-MOST: Final = 1024
-"""Numbers of a block of uniforms that every browser takes, in fours."""
 _CONSTANTS: Final = {
     "EMPTY": EMPTY,
     "RADIUS": RADIUS,
@@ -36,32 +34,25 @@ _CONSTANTS: Final = {
 
 
 def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
-    """The parts ``shader`` and ``network`` of a view.
-
-    Raises:
-        ProgramError: the network is too large for a page.
-    """
-    quads, geometries = _quads(network), len(network.codes)
-    paint, kind = network.config.paint_lines, network.config.kind_lines
-    decoders = [network.decoder(code) for code in network.codes]
-    parts = [_numbers(layers, quads) for layers in decoders]
-    uniforms = np.concatenate([*parts, *(_cell_numbers(network, token) for token in range(TOKENS))])
-    if len(uniforms) > MOST:
-        raise ProgramError("a network with more weights than a page's shader holds")
-    sizes = {"DECODER": len(parts[0]), "CELLS": geometries * len(parts[0]), "CELL": 2 + paint + kind}
-    lines = [f"const float {name} = {value!r};" for name, value in _CONSTANTS.items()]
-    lines += [f"const int {name} = {value};" for name, value in {**sizes, "GEOMETRIES": geometries}.items()]
-    lines += [f"layout(std140) uniform Network {{ vec4 network[{len(uniforms)}]; }};"]
-    text = "\n".join([*lines, _decoder(quads), _cell(paint, kind)])
-    width = network.config.width
+    """The parts ``shader`` and ``network`` of a view."""
+    config, decoders = network.config, [network.decoder(code) for code in network.codes]
+    paint, kind, width = config.paint_lines, config.kind_lines, config.width
+    cells = np.concatenate([_cell(network, token) for token in range(TOKENS)])
+    sizes = {"CELL": 2 + paint + kind, "GEOMETRIES": len(decoders)}
+    parts = [f"const float {name} = {value!r};" for name, value in _CONSTANTS.items()]
+    parts += [f"const int {name} = {value};" for name, value in sizes.items()]
+    parts += [
+        f"uniform vec4 cells[{len(cells)}]; // of each token what is made of a distance, a bump; then lines"
+    ]
+    parts += [_decoders(decoders, sloped=False), _decoders(decoders, sloped=True), _gates(paint, kind)]
     return {
-        "shader": {"source": web("solid.glsl").replace("//network//", text) + web("light.glsl")},
+        "shader": {"source": web("solid.glsl").replace("//network//", "\n".join(parts)) + web("light.glsl")},
         "network": {
-            "uniforms": store.add(uniforms.astype(np.float32).reshape(-1)),
+            "cells": store.add(cells.astype(np.float32).reshape(-1)),
             "boxes": store.add(
                 np.array([network.box(layers) for layers in decoders], np.float32).reshape(-1)
             ),
-            "geometries": geometries,
+            "geometries": len(decoders),
             "blend": BLEND,
             "slack": SLACK,
             "far": RADIUS,
@@ -70,88 +61,83 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     }
 
 
-def _quads(network: SolidArrays) -> int:
-    return -(-network.config.width // 4)
-
-
-def _numbers(layers: Sequence[tuple[np.ndarray, np.ndarray]], quads: int) -> np.ndarray:
-    """Weights of a decoder by columns (K, 4), each layer's biases behind them, filled with zeros."""
-    columns = []
-    for (w, b), inputs in zip(layers[:-1], (3, 4 * quads), strict=True):
-        full = np.zeros((inputs + 1, 4 * quads))
-        full[: w.shape[1], : len(w)], full[-1, : len(b)] = w.T, b
-        columns.append(full.reshape(-1, 4))
-    (w, b), last = layers[-1], np.zeros((quads + 1) * 4)
-    last[: w.shape[1]], last[4 * quads] = w[0], b[0]
-    return np.concatenate([*columns, last.reshape(-1, 4)])
-
-
-def _cell_numbers(network: SolidArrays, token: int) -> np.ndarray:
+def _cell(network: SolidArrays, token: int) -> np.ndarray:
     """A token's cell (K, 4): what is made of a distance and the bump; then each line's own, past and bias."""
     cell = network.cell(token, BLEND)[-1]
     lines = np.concatenate([cell.own, cell.past, cell.bias, 0 * cell.bias], 1)
     return np.concatenate([[[cell.candidate.item(), cell.bump.item(), 0.0, 0.0]], lines])
 
 
-def _sum(start: str, factors: Sequence[str], first: int, stride: int) -> str:
-    """A sum of columns times factors, in GLSL; the columns begin at ``at``."""
-    return " + ".join([start, *(f"{f} * network[at + {first + i * stride}]" for i, f in enumerate(factors))])
+def _gates(paint: int, kind: int) -> str:
+    """GLSL of the cell's gates, of lines behind the place ``at``; distances in widths of the usual blend."""
 
+    def largest(first: int, count: int) -> str:
+        gates = [f"dot(cells[at + {first + i}].xyz, vec3(d, before, 1.0))" for i in range(count)]
+        found = gates[0]
+        for gate in gates[1:]:
+            found = f"max({found}, {gate})"
+        return f"return clamp({found}, 0.0, 1.0);"
 
-def _decoder(quads: int) -> str:
-    """GLSL of the decoder, with its derivative: of weights that begin at ``at``."""
-    every, axes = range(quads), "xyzw"
-    second = 4 * quads
-    third = second + (4 * quads + 1) * quads
-    first = [_sum(f"network[at + {3 * quads + k}]", ["q.x", "q.y", "q.z"], k, quads) for k in every]
-    units = [f"h{k}.{axis}" for k in every for axis in axes]
-    hidden = [_sum(f"network[at + {third - quads + k}]", units, second + k, quads) for k in every]
-    last = " + ".join(
-        [f"network[at + {third + quads}].x", *(f"dot(i{k}, network[at + {third + k}])" for k in every)]
-    )
-    plain, sloped = [], []
-    for layer, name in ((first, "h"), (hidden, "i")):
-        for k, line in enumerate(layer):
-            plain += [f"vec4 {name}{k} = {line};", f"{name}{k} /= 1.0 + exp(-{name}{k});"]
-            a, s = f"{name}{k}a", f"{name}{k}s"
-            sloped += [f"vec4 {a} = {line}, {s} = 1.0 / (1.0 + exp(-{a})), {name}{k} = {a} * {s};"]
-            sloped += [f"{s} *= 1.0 + {a} - {name}{k};"]
-    sloped += [f"i{k}s *= network[at + {third + k}];" for k in every]
-    for k in every:
-        dots = [
-            " + ".join(f"dot(network[at + {second + (4 * k + j) * quads + m}], i{m}s)" for m in every)
-            for j in range(4)
-        ]
-        sloped.append(f"h{k}s *= vec4({', '.join(dots)});")
-    dots = [" + ".join(f"dot(network[at + {j * quads + k}], h{k}s)" for k in every) for j in range(3)]
-    sloped.append(f"g = vec3({', '.join(dots)});")
-    return _function("float decoder(int at, vec3 q)", [*plain, f"return {last};"]) + _function(
-        "float decoder(int at, vec3 q, out vec3 g)", [*sloped, f"return {last};"]
-    )
-
-
-def _cell(paint: int, kind: int) -> str:
-    """GLSL of the cell's gates, of weights that begin at ``at``; distances in widths of the usual blend."""
-
-    def gate(line: int) -> str:
-        row = f"network[at + {line + 1}]"
-        return f"clamp(dot({row}.xyz, vec3(d, before, 1.0)), 0.0, 1.0)"
-
-    def largest(lines: range) -> str:
-        found = gate(lines[0])
-        for line in lines[1:]:
-            found = f"max({found}, {gate(line)})"
-        return found
-
+    parts = {"taking": (1, 1), "painting": (2, paint), "kind": (2 + paint, kind)}
     head = "(int at, float d, float before)"
-    return "".join(
-        _function(f"float {name}{head}", [f"return {text};"])
-        for name, text in (
-            ("taking", gate(0)),
-            ("painting", largest(range(1, 1 + paint))),
-            ("kind", largest(range(1 + paint, 1 + paint + kind))),
-        )
-    )
+    return "".join(_function(f"float {name}{head}", [largest(*lines)]) for name, lines in parts.items())
+
+
+def _decoders(decoders: Sequence[Smooth], sloped: bool) -> str:
+    """GLSL of the decoders, those of shapes that a scene shows; if sloped with their gradients.
+
+    Weights are literals: compilers make three times as much of these as of uniforms.
+    """
+    lines = []
+    for shape, layers in enumerate(decoders):
+        body = [f"    {line}" for line in _decoder(layers, sloped)]
+        lines += [f"#ifdef SHAPE_{shape}", f"  if (shape == {shape}) {{", *body, "  }", "#endif"]
+    head = f"float decoder(int shape, vec3 q{', out vec3 g' if sloped else ''}) {{"
+    return "\n".join([head, *(["  g = vec3(0.0);"] if sloped else []), *lines, "  return EMPTY;", "}"])
+
+
+def _decoder(layers: Smooth, sloped: bool) -> list[str]:
+    """Statements that return a decoder's answer, its units four by four."""
+    lines, inputs = [], ["q.x", "q.y", "q.z"]
+    quads = -(-len(layers[0][1]) // 4)
+    padded = [_padded(w, b, 4 * quads) for w, b in layers]
+    for (w, b), name in zip(padded[:-1], "ab", strict=True):
+        for k in range(quads):
+            four = slice(4 * k, 4 * k + 4)
+            terms = [f"{x} * {_four(w[four, i])}" for i, x in enumerate(inputs)]
+            x, s = f"{name}{k}", f"{name}{k}s"
+            lines.append(f"vec4 {x} = {' + '.join([_four(b[four]), *terms])};")
+            lines.append(f"vec4 {s} = 1.0 / (1.0 + exp(-{x}));")
+            if sloped:  # the derivative of x s
+                lines.append(f"vec4 {x}d = {s} * (1.0 + {x} * (1.0 - {s}));")
+            lines.append(f"{x} *= {s};")
+        inputs = [f"{name}{k}.{axis}" for k in range(quads) for axis in "xyzw"]
+    (w1, _), (w2, _), (w3, b3) = padded
+    if sloped:
+        lines += [f"b{k}d *= {_four(w3[0, 4 * k : 4 * k + 4])};" for k in range(quads)]
+        back = [", ".join(_back(w2[:, 4 * k + j], "b") for j in range(4)) for k in range(quads)]
+        lines += [f"a{k}d *= vec4({four});" for k, four in enumerate(back)]
+        lines.append(f"g = vec3({', '.join(_back(w1[:, j], 'a') for j in range(3))});")
+    last = [f"dot(b{k}, {_four(w3[0, 4 * k : 4 * k + 4])})" for k in range(quads)]
+    return [*lines, f"return {' + '.join([repr(float(b3[0])), *last])};"]
+
+
+def _padded(w: np.ndarray, b: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Weights (width, inputs or width) and biases (width,) with zeros for units that a layer lacks."""
+    inputs = 3 if w.shape[1] == 3 else width
+    full, bias = np.zeros((width, inputs)), np.zeros(width)
+    full[: len(w), : w.shape[1]], bias[: len(b)] = w, b
+    return full, bias
+
+
+def _back(column: np.ndarray, name: str) -> str:
+    """What a layer's gradients give to an input, by its weights there."""
+    fours = column.reshape(-1, 4)
+    return " + ".join(f"dot({_four(four)}, {name}{k}d)" for k, four in enumerate(fours))
+
+
+def _four(numbers: np.ndarray) -> str:
+    return f"vec4({', '.join(f'{number:.9g}' for number in numbers)})"
 
 
 def _function(head: str, lines: Sequence[str]) -> str:

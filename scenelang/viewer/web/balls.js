@@ -3,6 +3,7 @@
 import { IDENTITY, invertedMap, stretchesOf } from "./maps.js";
 
 const SMALL_SIDE = 1.7; // of a leaf's box that is worth the asking
+const FREE_BOX = [[-1e30, -1e30, -1e30], [1e30, 1e30, 1e30]];
 const SMOOTH_TOKEN = 1;
 const SUBTRACT_TOKEN = 2;
 const INTERSECT_TOKEN = 3;
@@ -20,7 +21,7 @@ function stretched([kind, ...strengths], radius) {
 /**
  * Of each row where rays may meet it: `outer`, the map into the space in which it lies in a ball about the
  * origin, `rest`, the steps behind that, its `radius` in leaf units and the `ball`'s there, the `rate` at which its world distance changes at
- * most per step of 1 there, a ball (`centre`, `extent`) of the world around it, and a `box` [low, high] or null.
+ * most per step of 1 there, a ball (`centre`, `extent`) of the world around it, and a `box` [low, high] behind `outer`.
  * @param {object[]} rows
  * @param {{slack: number}} network - of a view
  * @param {(row: object) => number[][]} boxOf - the box of a row's leaf
@@ -47,7 +48,7 @@ export function solidBalls(rows, network, boxOf) {
     }
     const back = invertedMap(outer), centre = [back[3], back[7], back[11]], extent = longest(back) * ball;
     const [low, high] = boxOf(row), slim = high.some((side, i) => side - low[i] <= SMALL_SIDE);
-    const box = slim && !rest.length ? [low.map((v) => v - radius + 1), high.map((v) => v + radius - 1)] : null;
+    const box = slim && !rest.length ? [low.map((v) => v - radius + 1), high.map((v) => v + radius - 1)]  : FREE_BOX;
     return { outer, rest, radius, ball, rate: row.scale * growth, centre, extent, box };
   }).reverse();
 }

@@ -9,7 +9,7 @@ uniform vec3 lamp, power, horizon, zenith;
 uniform vec4 ground; // colour, height
 uniform bool grounded, transparent;
 uniform vec3 canvas; // width, height, world units of a pixel at the focus
-uniform ivec4 cells; // pixels along a side, cells in a row; first of the light's, these along a side of a cube
+uniform ivec4 grid; // pixels along a side, cells in a row; first of the light's, these along a side of a cube
 #ifdef TEXTURES
 uniform sampler2D pictures;
 uniform usampler3D colours;
@@ -37,7 +37,7 @@ vec3 texel(ivec3 at) {
 vec3 textured(int row, vec4 paint, vec3 q) {
   vec4 u = part(row, PLACE), v = part(row, PLACE + 1), size = part(row, GRID);
   vec3 rgb;
-  if (paint.y < 1.5) {
+  if (paint.x < 1.5) {
     vec2 sides = size.zw, place = vec2(dot(u.xyz, vec3(q.xy, 1.0)), dot(v.xyz, vec3(q.xy, 1.0)));
     place = fract(place) * sides - 0.5;
     vec2 cell = floor(place), share = place - cell;
@@ -56,8 +56,8 @@ vec3 textured(int row, vec4 paint, vec3 q) {
       rgb += part_.x * part_.y * part_.z * texel(at + off);
     }
   }
-  for (int i = zero; i < int(paint.w); i++) {
-    vec4 op = part(int(paint.z), i);
+  for (int i = zero; i < int(paint.z); i++) {
+    vec4 op = part(int(paint.y), i);
     if (op.x < 0.5) rgb *= op.yzw;
     else if (op.x < 1.5) rgb = mix(rgb, vec3(dot(rgb, vec3(0.2126, 0.7152, 0.0722))), op.y);
     else rgb = hued(rgb, op.y);
@@ -76,10 +76,10 @@ void look(ivec2 list, vec3 p) {
   seen = even = slope = vec3(0.0);
   for (int i = list.y - 1; i >= zero; i--) {
     int row = listed(list.x + i);
-    vec4 head = part(row, HEAD), ball = part(row, BALL);
+    vec4 head = part(row, HEAD);
     vec3 q = mapped(row, 0, p), g;
     int token = int(head.x);
-    if (dot(q, q) > ball.x) {
+    if (dot(q, q) > part(row, LOW).w) {
 #ifdef OTHERS
       if (token == INTERSECT) { // nothing is left of what came before
         touched = worn = false;
@@ -96,14 +96,14 @@ void look(ivec2 list, vec3 p) {
     touched = true;
     mat3 way = transpose(mat3(part(row, 0).xyz, part(row, 1).xyz, part(row, 2).xyz));
 #ifdef TURNS
-    q = turned(ball, q, way);
+    q = turned(part(row, MORE), q, way);
 #endif
     float d = leaf(row, head, q, g) * head.z, before = state;
     g = g * way * head.z;
-    int at = CELLS + token * CELL;
+    int at = token * CELL;
     float own = d * head.w, past = before * head.w;
     float take = taking(at, own, past), keep = 1.0 - take;
-    vec4 made = network[at], line = network[at + 1] * head.w;
+    vec4 made = cells[at], line = cells[at + 1] * head.w;
     float bump = made.y / head.w;
     state = take * (d * made.x - keep * bump) + keep * before;
     float rate = take > 0.0 && take < 1.0 ? d * made.x - before - (1.0 - 2.0 * take) * bump : 0.0;
@@ -114,7 +114,7 @@ void look(ivec2 list, vec3 p) {
 #ifdef TEXTURES
     vec4 paint = part(row, PAINT);
     vec3 plain = own_.rgb;
-    if (paint.y > 0.5) {
+    if (paint.x > 0.5) {
       worn = true;
       plain = 0.4 + 0.6 * fract(vec3(0.618034, 0.754878, 0.569840) * float(row + 1));
       own_.rgb = textured(row, paint, q);
@@ -140,9 +140,9 @@ float lit(vec3 p, bool edge) {
   a = abs(way);
   int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
   vec3 turned_ = axis == 0 ? way : axis == 1 ? way.yzx : way.zxy;
-  ivec2 at = ivec2(clamp((turned_.yz / abs(turned_.x) * 0.5 + 0.5) * float(cells.w), 0.0, float(cells.w) - 1.0));
+  ivec2 at = ivec2(clamp((turned_.yz / abs(turned_.x) * 0.5 + 0.5) * float(grid.w), 0.0, float(grid.w) - 1.0));
   int face = 2 * axis + (turned_.x > 0.0 ? 0 : 1);
-  march(cell(cells.z + (face * cells.w + at.y) * cells.w + at.x), lamp, way, r - (edge ? 0.0 : CLEAR));
+  march(cell(grid.z + (face * grid.w + at.y) * grid.w + at.x), lamp, way, r - (edge ? 0.0 : CLEAR));
   return hit < NEVER ? 0.0 : exp(-EXTINCTION * fog);
 }
 
@@ -316,7 +316,7 @@ vec4 encoded(vec4 light) {
 void main() {
   met = 0.0;
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  ivec2 list = cell(1 + pixel.y / cells.x * cells.y + pixel.x / cells.x);
+  ivec2 list = cell(1 + pixel.y / grid.x * grid.y + pixel.x / grid.x);
   vec4 light = vec4(0.0), one, plain;
 #ifdef FOUR
   picture = texelFetch(once, pixel, 0);

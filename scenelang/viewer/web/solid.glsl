@@ -5,12 +5,12 @@ precision highp isampler2D;
 precision highp sampler3D;
 precision highp usampler3D;
 
-// The network, made for its sizes: decoder(at, q), decoder(at, q, g), taking, painting, kind.
+// The network, made for its sizes: decoder(shape, q), decoder(shape, q, g), taking, painting, kind.
 //network//
 
 // The field of solids, and the way of a ray through it. Of what a scene lacks nothing is compiled:
-// MEDIA, MIXED (with solids), COLOURED (media of several colours), TEXTURES, GRIDS, TURNS, BUMPS, OTHERS (than
-// objects that draw), FAR (points from leaves), SLOTS (balls that a ray keeps).
+// SHAPE_i (a geometry), MEDIA, MIXED (with solids), COLOURED (media of several colours), TEXTURES, GRIDS, TURNS, BUMPS, OTHERS (than
+// objects that draw), FAR (points from leaves). SLOTS: balls that a ray keeps.
 
 const float NEVER = 1e30;
 const float TOUCH = 1e-5; // world units: so near counts as met
@@ -19,16 +19,16 @@ const int STEPS = 800; // of a ray
 const int WINDOWS = 16; // of a ray that passes more balls than it keeps
 const int HALVINGS = 16; // of the way on which a medium gives way to a solid
 const int SUBTRACT = 2, INTERSECT = 3;
-const int ROW = 12; // texels of a row
-// parts of a row
+const int ROW = 13; // numbers of a row, in fours, the first three its map
 const int HEAD = 3; // token, shape, scale, usual width of a blend in widths of its own
-const int BALL = 4; // its radius squared, rate, first step, steps
-const int LOOK = 5; // colour, medium
-const int LOW = 6; // of its box, -1 where there is none
-const int HIGH = 7; // of its box, amount of displacement
-const int PAINT = 8; // frequency of displacement, paint, first colour step, colour steps
-const int PLACE = 9; // to a picture: two texels; tag
-const int GRID = 11; // side, first slice
+const int MORE = 4; // amount and frequency of its displacement, where its steps begin, how many
+const int AROUND = 5; // centre and squared radius of a ball of the world around it
+const int LOW = 6; // of its box behind the map; squared radius of its ball there
+const int HIGH = 7; // of its box; rate
+const int LOOK = 8; // colour, medium
+const int PAINT = 9; // kind of texture, where its colour steps begin, how many
+const int PLACE = 10; // two: from the leaf to its picture; where that begins
+const int GRID = 12; // side and first slice of a grid, sides of a texture
 
 uniform int zero; // keeps compilers from unrolling
 uniform sampler2D table; // rows and steps
@@ -63,12 +63,12 @@ vec2 circle(float a) {
 }
 
 // A point behind a row's map, taken through its turns and further maps to the leaf.
-vec3 turned(vec4 ball, vec3 p) {
-  for (int i = zero; i < int(ball.w); i++) {
+vec3 turned(vec4 more, vec3 p) {
+  for (int i = zero; i < int(more.w); i++) {
     int at = 4 * i;
-    vec4 step_ = part(int(ball.z), at);
+    vec4 step_ = part(int(more.z), at);
     if (step_.x < 0.5) {
-      p = mapped(int(ball.z), at + 1, p);
+      p = mapped(int(more.z), at + 1, p);
     } else if (step_.x < 1.5) {
       vec2 a = circle(step_.y * length(p) + step_.z * p.x);
       p.xy = vec2(a.x * p.x + a.y * p.y, a.x * p.y - a.y * p.x);
@@ -81,14 +81,14 @@ vec3 turned(vec4 ball, vec3 p) {
 }
 
 // The same with the derivative of what comes out.
-vec3 turned(vec4 ball, vec3 p, inout mat3 change) {
-  for (int i = zero; i < int(ball.w); i++) {
+vec3 turned(vec4 more, vec3 p, inout mat3 change) {
+  for (int i = zero; i < int(more.w); i++) {
     int at = 4 * i;
-    vec4 step_ = part(int(ball.z), at);
+    vec4 step_ = part(int(more.z), at);
     mat3 own;
     if (step_.x < 0.5) {
-      own = transpose(mat3(part(int(ball.z), at + 1).xyz, part(int(ball.z), at + 2).xyz, part(int(ball.z), at + 3).xyz));
-      p = mapped(int(ball.z), at + 1, p);
+      own = transpose(mat3(part(int(more.z), at + 1).xyz, part(int(more.z), at + 2).xyz, part(int(more.z), at + 3).xyz));
+      p = mapped(int(more.z), at + 1, p);
     } else {
       bool twist = step_.x > 1.5;
       float r = length(p);
@@ -140,13 +140,14 @@ float leaf(int row, vec4 head, vec3 q) {
 #ifdef GRIDS
   if (int(head.y) >= GEOMETRIES) d = gridded(part(row, GRID), place); else
 #endif
-  d = decoder(int(head.y) * DECODER, place);
+  d = decoder(int(head.y), place);
 #ifdef FAR
   d += max(r - RADIUS, 0.0);
 #endif
 #ifdef BUMPS
-  vec3 s = sin(part(row, PAINT).x * q);
-  d += part(row, HIGH).w * s.x * s.y * s.z;
+  vec4 more = part(row, MORE);
+  vec3 s = sin(more.y * q);
+  d += more.x * s.x * s.y * s.z;
 #endif
   return d;
 }
@@ -171,7 +172,7 @@ float leaf(int row, vec4 head, vec3 q, out vec3 g) {
     }
   } else
 #endif
-  d = decoder(int(head.y) * DECODER, place, g);
+  d = decoder(int(head.y), place, g);
 #ifdef FAR
   if (r > RADIUS) {
     vec3 n = q / r;
@@ -180,7 +181,8 @@ float leaf(int row, vec4 head, vec3 q, out vec3 g) {
   }
 #endif
 #ifdef BUMPS
-  float f = part(row, PAINT).x, amount = part(row, HIGH).w;
+  vec4 more = part(row, MORE);
+  float f = more.y, amount = more.x;
   vec3 s = sin(f * q), c = cos(f * q);
   d += amount * s.x * s.y * s.z;
   g += amount * f * vec3(c.x * s.y * s.z, s.x * c.y * s.z, s.x * s.y * c.z);
@@ -218,12 +220,12 @@ void meet(float t) {
     vec4 head = part(row, HEAD);
     vec3 q = mapped(row, 0, p);
 #ifdef TURNS
-    q = turned(part(row, BALL), q);
+    q = turned(part(row, MORE), q);
 #endif
     float d = leaf(row, head, q) * head.z, before = state;
-    int at = CELLS + int(head.x) * CELL;
+    int at = int(head.x) * CELL;
     float take = taking(at, d * head.w, before * head.w), keep = 1.0 - take;
-    vec4 made = network[at];
+    vec4 made = cells[at];
     state = take * (d * made.x - keep * made.y / head.w) + keep * before;
 #ifdef MIXED
     float medium = part(row, LOOK).w, gap = abs(d);
@@ -241,21 +243,26 @@ float gather(ivec2 list, float low, float high) {
   slotCount = 0;
   for (int i = zero; i < list.y; i++) {
     int row = listed(list.x + i);
-    vec4 ball = part(row, BALL);
-    vec4 x = part(row, 0), y = part(row, 1), z = part(row, 2), p = vec4(rayFrom, 1.0);
-    vec3 from = vec3(dot(x, p), dot(y, p), dot(z, p));
-    vec3 way = vec3(dot(x.xyz, rayWay), dot(y.xyz, rayWay), dot(z.xyz, rayWay));
-    float square = dot(way, way), middle = -dot(from, way) / square;
-    vec3 closest = from + middle * way;
-    float left = ball.x - dot(closest, closest), wide = sqrt(max(left, 0.0) / square);
-    float begin = max(middle - wide, low), end = min(middle + wide, high);
-    vec4 least = part(row, LOW);
-    if (least.w > 0.0) {
-      vec3 a = (least.xyz - from) / way, b = (part(row, HIGH).xyz - from) / way, first = min(a, b), last = max(a, b);
-      begin = max(begin, max(first.x, max(first.y, first.z)));
-      end = min(end, min(last.x, min(last.y, last.z)));
+    vec4 around = part(row, AROUND);
+    vec3 to = around.xyz - rayFrom, aside = to - dot(to, rayWay) * rayWay;
+    float begin = NEVER, end = -NEVER, rate = 0.0;
+    if (dot(aside, aside) <= around.w) {
+      vec4 x = part(row, 0), y = part(row, 1), z = part(row, 2), p = vec4(rayFrom, 1.0);
+      vec3 from = vec3(dot(x, p), dot(y, p), dot(z, p));
+      vec3 way = vec3(dot(x.xyz, rayWay), dot(y.xyz, rayWay), dot(z.xyz, rayWay));
+      vec4 least = part(row, LOW), most = part(row, HIGH);
+      float square = dot(way, way), middle = -dot(from, way) / square;
+      vec3 closest = from + middle * way;
+      float left = least.w - dot(closest, closest);
+      if (left > 0.0) {
+        float wide = sqrt(left / square);
+        vec3 a = (least.xyz - from) / way, b = (most.xyz - from) / way, first = min(a, b), last = max(a, b);
+        begin = max(max(middle - wide, low), max(first.x, max(first.y, first.z)));
+        end = min(min(middle + wide, high), min(last.x, min(last.y, last.z)));
+        rate = most.w * sqrt(square);
+      }
     }
-    bool some = left > 0.0 && begin <= end;
+    bool some = begin <= end;
 #ifdef OTHERS
     int token = int(part(row, HEAD).x);
     if (token == INTERSECT) { // outside its ball nothing is left of what came before
@@ -275,7 +282,7 @@ float gather(ivec2 list, float low, float high) {
       for (int j = far; j < SLOTS - 1; j++) slots[j] = slots[j + 1];
       slotCount--;
     }
-    slots[slotCount++] = vec4(name, begin, end, ball.y * sqrt(square));
+    slots[slotCount++] = vec4(name, begin, end, rate);
   }
   return sure;
 }

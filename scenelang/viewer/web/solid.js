@@ -4,11 +4,11 @@ import { floats, linked, triangle, unfiltered } from "./gl.js";
 import { solidElements } from "./elements.js";
 import { cellsOf, cubeOf, listsOf, solidBalls } from "./balls.js";
 
-const ROW_TEXELS = 12; // as the shader has it
+const ROW_TEXELS = 13; // as the shader has it
 const LIST_WIDTH = 1024;
 const TILE_SIDE = 16; // pixels that share a list of balls, along each axis
 const CUBE_SIDE = 12; // cells along a side of the cube around the light
-const BAND = 1 << 16; // pixels drawn at a time
+const BAND = 1 << 14; // pixels drawn at a time
 const COLOUR_STEPS = { color: 0, grayscale: 1, hue: 2 };
 
 /** Whether a row wears a medium. */
@@ -32,7 +32,7 @@ function tableOf(view, rows, balls, elements) {
     return first;
   };
   rows.forEach((row, i) => {
-    const { outer, rest, ball, rate, box } = balls[i], material = view.materials[row.material];
+    const { outer, rest, ball, rate, centre, extent, box } = balls[i], material = view.materials[row.material];
     const steps = rest.map(([kind, ...n]) => (kind === "map" ? [0, 0, 0, 0, ...n]
       : [...(kind === "turn" ? [1, n[0], n[1], 0] : [2, n[0], 0, 0]), ...new Array(12).fill(0)]));
     const paint = row.paint < 0 ? null : elements.paints[row.paint];
@@ -43,10 +43,12 @@ function tableOf(view, rows, balls, elements) {
     blocks[i].set([
       ...outer,
       row.token, row.shape, row.scale, usual,
-      ball * ball, rate, steps.length ? more(steps) : 0, steps.length,
+      row.amount, row.frequency, steps.length ? more(steps) : 0, steps.length,
+      ...centre, extent * extent * (1 + 1e-5) + 1e-9,
+      ...box[0], ball * ball,
+      ...box[1], rate,
       ...plainColour(view, row), material.medium,
-      ...(box ? [...box[0], 1, ...box[1]] : [0, 0, 0, -1, 0, 0, 0]), row.amount,
-      row.frequency, paint ? paint.kind : 0, ops.length ? more(ops) : 0, ops.length,
+      paint ? paint.kind : 0, ops.length ? more(ops) : 0, ops.length, 0,
       // to shares of the picture's sides, from its upper left corner
       a / 2, b / 2, turn((u + 1) / 2), paint ? paint.first : 0,
       -c / 2, -d / 2, turn((1 - v) / 2), 0,
@@ -62,17 +64,20 @@ function tableOf(view, rows, balls, elements) {
 function featuresOf(view, rows, balls) {
   const media = rows.filter((row) => isMedium(view, row)), has = (holds) => rows.some(holds);
   const colours = new Set(media.map((row) => (row.paint < 0 ? plainColour(view, row).join() : row.object)));
-  return Object.entries({
+  const shown = [...new Set(rows.map((row) => row.shape))].sort((a, b) => a - b);
+  const learned = shown.filter((shape) => shape < view.network.geometries).map((shape) => `SHAPE_${shape}`);
+  const others = Object.entries({
     MEDIA: media.length > 0,
     MIXED: media.length > 0 && media.length < rows.length,
     COLOURED: colours.size > 1,
     TEXTURES: has((row) => row.paint >= 0),
-    GRIDS: has((row) => row.shape >= view.network.geometries),
+    GRIDS: learned.length < shown.length,
     TURNS: balls.some((ball) => ball.rest.length > 0),
     FAR: balls.some((ball) => ball.radius > view.network.far),
     BUMPS: has((row) => row.amount !== 0),
     OTHERS: has((row) => row.token > 1),
   }).filter(([, holds]) => holds).map(([name]) => name);
+  return [...learned, ...others];
 }
 
 /** A texture of whole numbers to fetch. */
@@ -109,9 +114,6 @@ function dropScreens(gl, { framebuffer, textures }) {
 export function solidDrawer(gl, view) {
   const { network } = view, shaders = new Map(), table = gl.createTexture(), lists = gl.createTexture();
   const elements = solidElements(gl, view);
-  const block = gl.createBuffer();
-  gl.bindBuffer(gl.UNIFORM_BUFFER, block);
-  gl.bufferData(gl.UNIFORM_BUFFER, network.uniforms, gl.STATIC_DRAW);
   let first = null, ready = {};
 
   const boxOf = (row) => {
@@ -126,7 +128,6 @@ export function solidDrawer(gl, view) {
     if (!shaders.has(key)) {
       const defines = names.map((name) => `#define ${name}\n`.replace("=", " ")).join("");
       const program = linked(gl, `#version 300 es\n${defines}${view.shader.source}`);
-      gl.uniformBlockBinding(program, gl.getUniformBlockIndex(program, "Network"), 0);
       const places = new Map();
       shaders.set(key, { program, at(name) {
         if (!places.has(name)) places.set(name, gl.getUniformLocation(program, name));
@@ -144,10 +145,10 @@ export function solidDrawer(gl, view) {
     const tiles = [width, height].map((side) => Math.ceil(side / TILE_SIDE)), scale = near / pixel / TILE_SIDE;
     const seen = cellsOf(stage.eye, stage.axes, [scale, scale],
       [width / 2 / TILE_SIDE, height / 2 / TILE_SIDE], tiles);
-    const { data, longest: most } = listsOf(rows, balls, [seen, ...cubeOf(stage.light, CUBE_SIDE)]);
-    floats(gl, tableOf(view, rows, balls, elements), 1024, table);
+    const { data, longest } = listsOf(rows, balls, [seen, ...cubeOf(stage.light, CUBE_SIDE)]);
     wholes(gl, data, lists);
-    const slots = `SLOTS=${Math.min(48, Math.max(8, 8 * Math.ceil(most / 8)))}`;
+    floats(gl, tableOf(view, rows, balls, elements), 1024, table);
+    const slots = `SLOTS=${Math.min(48, Math.max(8, 8 * Math.ceil(longest / 8)))}`;
     ready = {
       program, width, height, features: [...featuresOf(view, rows, balls), slots],
       cells: [TILE_SIDE, tiles[0], 1 + seen.count, CUBE_SIDE], pixel, near,
@@ -158,7 +159,6 @@ export function solidDrawer(gl, view) {
   const use = (names, textures = {}) => {
     const { stage } = ready.program, { program, at } = shaderOf([...ready.features, ...names]);
     gl.useProgram(program);
-    gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, block);
     Object.entries({ table, lists, ...elements.textures, ...textures }).forEach(([name, texture], unit) => {
       const space = name === "grids" || name === "colours";
       gl.activeTexture(gl.TEXTURE0 + unit);
@@ -175,7 +175,8 @@ export function solidDrawer(gl, view) {
     gl.uniform4fv(at("ground"), stage.ground ? [...stage.ground.rgb, stage.ground.y] : [0, 0, 0, 0]);
     gl.uniform1i(at("grounded"), Number(stage.ground !== null));
     gl.uniform1i(at("transparent"), Number(stage.transparent));
-    gl.uniform4iv(at("cells"), ready.cells);
+    gl.uniform4iv(at("grid"), ready.cells);
+    gl.uniform4fv(at("cells"), network.cells);
   };
 
   /** Draw a picture in bands, so that no call takes long. */
@@ -258,7 +259,6 @@ export function solidDrawer(gl, view) {
       for (const { program } of shaders.values()) gl.deleteProgram(program);
       for (const texture of [table, lists, ...Object.values(elements.textures)]) gl.deleteTexture(texture);
       if (first) dropScreens(gl, first);
-      gl.deleteBuffer(block);
     },
   };
 }
