@@ -96,7 +96,7 @@ def record(page: Any, film: Film) -> None:
     film.take(LONG_MS, 1500)
     page.locator("#files").select_option(f"{SCENES[1]}.nsg")
     film.take(LONG_MS, 8000)
-    box = page.locator("#canvas").bounding_box()
+    box = page.locator("#stage").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
     page.mouse.down()

@@ -184,6 +184,41 @@ def test_a_new_scene_begins_with_an_example(page: Page, scene: Path) -> None:
     assert made == (Path(__file__).parents[2] / "examples/hello.nsg").read_text("utf-8")
 
 
+def test_a_file_is_renamed(page: Page, scene: Path) -> None:
+    page.picture()
+    page.page.get_by_role("button", name="Rename…").click()
+    page.page.get_by_label("Name").fill("b")
+    page.page.get_by_role("button", name="OK").click()
+    page.page.locator("#files option:checked", has_text="b.nsg").wait_for(state="attached")
+    assert (scene.exists(), scene.with_name("b.nsg").read_text("utf-8")) == (False, SCENE)
+    page.click_text("background")
+    page.page.keyboard.type("  // mine")
+    page.page.keyboard.press("Control+s")
+    page.page.locator("#unsaved").wait_for(state="hidden")
+    assert "// mine" in scene.with_name("b.nsg").read_text("utf-8")
+    assert page.page.locator(".asks").count() == 0
+
+
+def test_a_stranger_s_text_stays_text(page: Page, scene: Path) -> None:
+    evil = "</script><img src=x onerror=document.title=1> \u202e"
+    page.picture()
+    page.knows()
+    lines = [
+        "nsg 1;",
+        f"// {evil}",
+        f'param name = "{evil}";',
+        'square { scale(name == "a" ? 0.4 : 0.5); }',
+        "",
+    ]
+    scene.write_text("\n".join(lines), "utf-8")
+    page.page.locator(".cm-specialChar").first.wait_for()
+    page.page.locator("#controls input[type=text]").wait_for()
+    page.page.locator(".cm-line", has_text="param").get_by_text("name").hover()
+    page.page.locator(".cm-tooltip-hover .markdown", has_text="</script><img src=x").wait_for()
+    assert page.page.locator("img:not(.cm-widgetBuffer)").count() == 1, "the picture alone"
+    assert page.page.title() == "a.nsg – scenelang"
+
+
 def test_the_picture_is_downloaded(page: Page) -> None:
     page.picture()
     page.page.get_by_role("button", name="Download…").click()

@@ -45,8 +45,7 @@ export async function askName(dialog, title, name, examples) {
   example.replaceChildren(...options);
   example.onchange = () => (file.value ||= example.value);
   file.value = name;
-  file.required = false;  // Cancel, too, is a button of the form
-  if (!(await answered(dialog)) || !file.value.trim()) return null;
+  if (!(await answered(dialog))) return null;
   const typed = file.value.trim();
   return { file: typed.endsWith(".nsg") ? typed : `${typed}.nsg`, example: example.value };
 }

@@ -170,6 +170,7 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
   return {
     current: () => current,
     isUnsaved: (file) => documents.has(file) && isUnsaved(documents.get(file)),
+    at: (uri) => [...documents.values()].find((document) => document.uri === uri),
     /** The page goes away: keep what is not saved, in this browser. */
     keepAll: () => documents.forEach(keep),
     has: (file) => documents.has(file),

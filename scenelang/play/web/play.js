@@ -23,13 +23,10 @@ let goal = null;  // {uri, position} to go to once it is shown
 const bars = makeBars(at("bars"));
 const server = languageServer(address("lsp"), {
   ondiagnostics(uri, version, found) {
-    const shown = documents.current();
-    if (shown?.uri !== uri || version !== server.version(uri)) return;
-    showMistakes(server, shown, editor.view, found);
-    const errors = found.filter(({ severity }) => severity === 1).length;
-    const told = [[errors, "mistake"], [found.length - errors, "warning"]].filter(([count]) => count);
-    at("problems").textContent = told.map(([n, what]) => `${n} ${what}${n > 1 ? "s" : ""}`).join(", ") || "No mistakes";
-    at("problems").classList.toggle("wrong", errors > 0);
+    const document = documents.at(uri);
+    if (!document || version !== server.version(uri)) return;
+    document.found = { version, found };
+    if (document === documents.current()) showFound();
   },
   onstate: (up) => (at("problems").disabled = !up),
 });
@@ -58,6 +55,7 @@ const documents = makeDocuments({
   onshow({ file }) {
     picture.open(file, known.most.side);
     showFiles();
+    showFound();
     editor.view.focus();
     reach();
   },
@@ -115,6 +113,20 @@ const answers = {
     }
   },
 };
+
+/** Show what the language server has found in the text, if that is what it has. */
+function showFound() {
+  const shown = documents.current();
+  const { version, found } = shown.found ?? {};
+  const isOf = version !== undefined && version === server.version(shown.uri);
+  const errors = isOf ? found.filter(({ severity }) => severity === 1).length : 0;
+  at("problems").classList.toggle("wrong", errors > 0);
+  at("problems").textContent = "…";
+  if (!isOf) return;
+  showMistakes(server, shown, editor.view, found);
+  const told = [[errors, "mistake"], [found.length - errors, "warning"]].filter(([count]) => count);
+  at("problems").textContent = told.map(([n, what]) => `${n} ${what}${n > 1 ? "s" : ""}`).join(", ") || "No mistakes";
+}
 
 // ---------------------------------------------------------------- files
 
