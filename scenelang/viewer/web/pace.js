@@ -1,7 +1,7 @@
 const SLOW_MS = 33; // a frame that takes longer is drawn coarser while something moves
 const EASY_MS = 20; // one that would take less is drawn finer again
 const REST_MS = 200; // how long nothing moves before it is drawn in full
-const MOST_MS = 4000; // nothing that would take longer is begun: browsers end what hangs the screen
+const MOST_MS = 2000; // nothing that would take longer is begun: browsers end what hangs the screen
 const POLL_MS = 4;
 const SCALES = [1, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125];
 
