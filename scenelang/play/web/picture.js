@@ -105,7 +105,7 @@ export function makePicture(at, { send, oncamera }) {
     show("still");
     note(null);
     const figures = ["psnr", "ssim", "flip"].filter((name) => typeof message[name] === "number");
-    const told = figures.map((name) => `, ${name.toUpperCase()} ${message[name].toFixed(name === "psnr" ? 1 : 3)}`);
+    const told = figures.map((name) => `, ${name.toUpperCase()} ${message[name].toFixed(name === "psnr" ? 1 : 4)}`);
     at.told.textContent = `${NAMES[by]}, ${width} × ${height}, ${Math.round(total(message.ms))} ms${told.join("")}`;
     if (known && !known.size) {
       cost = performance.now() - known.at;
@@ -202,6 +202,7 @@ export function makePicture(at, { send, oncamera }) {
     if (written) viewer.camera = null;
     written = false;
     at.canvas.style.setProperty("--ratio", view.canvas[0] / view.canvas[1]);
+    at.stage.tabIndex = view.dimension === 3 ? 0 : -1;
     at.stage.style.touchAction = view.dimension === 3 ? "none" : "auto";
     at.canvas.setAttribute("aria-label", plainText(view.alt ?? view.title));
     at.still.alt = plainText(view.alt ?? view.title);
