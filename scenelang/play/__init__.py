@@ -45,7 +45,8 @@ The server says:
 - ``{kind: "conflict", file, version, text, disk}``: nothing was written, as the file holds ``text``; the same
   save with ``base: disk`` overwrites it.
 - ``{kind: "view", file, version, view, problems: [{code, severity, message, line, column}], ms}``: ``view``
-  is a text (`View.message`), null where the scene has errors.
+  is a text (`View.message`), null where the scene has errors, or where the last problem, a warning, says why
+  no page draws it, as the network still does.
 - ``{kind: "picture", id, file, version, by, png, size, ms, …}``: ``png`` in base64; ``ms`` by stage. A
   difference is three pictures in a row, with ``psnr``, ``ssim`` and ``flip``.
 - ``{kind: "figures", id, file, version, model, objects, rows, canvas, ms, psnr, ssim, flip}``: null where the

@@ -43,6 +43,8 @@ from scenelang.viewer.page import page
 from scenelang.viewer.view import View
 
 MOST_PIXELS: Final = 1 << 24
+MOST_ROWS: Final = 5000
+"""Objects of a scene that a page is given: so many take 1 MB and most of a second."""
 MOST_TOLD: Final = 100  # problems of a scene
 _BY_NUMPY: Final = ("framed", "solid")  # renderers
 _KEPT: Final = Kept()
@@ -83,18 +85,18 @@ def _view(job: Job, tell: Tell) -> Done:
     started = time.perf_counter()
     found = Diagnostics()
     shown: View | None = None
-    lacking: list[dict[str, Any]] = []
+    lacking: list[str] = []
     evaluation = _evaluated(job, found)
     try:
         shown = _viewed(job, evaluation, found)[0]
     except SceneError:
         pass  # its diagnostics are `found`
     except (ProgramError, FileNotFoundError) as error:
-        lacking.append({"code": "", "severity": "error", "message": str(error), "line": 1, "column": 1})
+        lacking.append(str(error))
     data = {
         **job["message"],
         "view": shown and shown.message(),
-        "problems": [*map(_problem, found.items[:MOST_TOLD]), *lacking],
+        "problems": [*map(_problem, found.items[:MOST_TOLD]), *map(_warning, lacking)],
         "ms": _since(started),
     }
     head = {"is": "done", "wanted": [str(path) for path in evaluation.wanted]}
@@ -121,7 +123,13 @@ def _viewed(job: Job, evaluation: Evaluation, found: Diagnostics) -> tuple[View,
     if job["size"] is not None:
         scene = scene.sized((job["size"][0], job["size"][1]))
     program = compile_scene(scene, spans=spans, diagnostics=found)
+    if len(program) > MOST_ROWS:
+        raise ProgramError(f"more than {MOST_ROWS:,} objects, which no page draws by itself")
     return scene_view(program, scene, evaluation, title=Path(job["name"]).stem), program
+
+
+def _warning(message: str) -> dict[str, Any]:
+    return {"code": "", "severity": "warning", "message": message, "line": 1, "column": 1}
 
 
 def _problem(found: Diagnostic) -> dict[str, Any]:

@@ -40,6 +40,7 @@ class Open:
         self.path = path
         self.text, self.version = text, 0  # of the page
         self.saved, self.disk = text, disk  # what the file held when the page was last told
+        self.base = disk  # digest of what the text is an edit of
         self.wanted: frozenset[Path] = frozenset()  # files that it imports
         self.angles: frozenset[str] = frozenset()  # params in radians
         self.keeping: asyncio.TimerHandle | None = None
@@ -136,7 +137,7 @@ class Live:
             unsaved = {"text": kept.text, "disk": kept.disk, "seconds": kept.seconds}
         known.saved, known.disk = text or "", disk
         if not known.version:
-            known.text = text or ""
+            known.text, known.base = text or "", disk
         said = {"file": name, "text": text, "version": known.version, "disk": disk}
         self.tell({"kind": "text", **said, "origin": "open", "unsaved": unsaved})
         self._view(name)
@@ -163,14 +164,16 @@ class Live:
         except Changed as change:
             self.tell({"kind": "conflict", **said, "text": change.text, "disk": change.disk})
             return
-        known.saved, known.disk = text, disk
+        known.saved, known.disk, known.base = text, disk, disk
+        if version >= known.version:
+            known.text = text
         self._keep(name)
         self.tell({"kind": "saved", **said, "disk": disk})
 
     async def _discard(self, message: Json) -> None:
         name, known = self._known(message)
         self._unkeep(known)
-        known.text = known.saved
+        known.text, known.base = known.saved, known.disk
         await asyncio.to_thread(self._play.journal.drop, known.path)
         self._view(name)
 
@@ -202,7 +205,7 @@ class Live:
         if known is not None:
             known.keeping = None
             self._play.later(
-                asyncio.to_thread(self._play.keep, known.path, known.text, known.saved, known.disk)
+                asyncio.to_thread(self._play.keep, known.path, known.text, known.saved, known.base)
             )
 
     def _keep(self, name: str) -> None:
@@ -210,7 +213,7 @@ class Live:
         known = self.open[name]
         self._unkeep(known)
         if known.version:
-            self._play.keep(known.path, known.text, known.saved, known.disk)
+            self._play.keep(known.path, known.text, known.saved, known.base)
 
     def _unkeep(self, known: Open) -> None:
         if known.keeping is not None:
@@ -227,7 +230,7 @@ class Live:
         said = {"file": name, "text": text, "version": known.version, "disk": disk}
         self.tell({"kind": "text", **said, "origin": "disk", "unsaved": None})
         if clean:
-            known.text = known.saved
+            known.text, known.base = known.saved, disk
             self._view(name)
 
     def imported(self, path: Path) -> None:

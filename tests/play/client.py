@@ -49,6 +49,13 @@ class Server:
         with self.connect("live") as socket:
             yield Page(socket)
 
+    def __enter__(self) -> Server:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.process.poll() is None:
+            self.end(signal.SIGTERM)
+
     def end(self, how: int = signal.SIGINT) -> int:
         """End it; the exit code."""
         self.process.send_signal(how)

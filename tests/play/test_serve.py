@@ -22,8 +22,11 @@ from tests.play.conftest import SQUARE
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_it_ends_with_all_its_processes(tmp_path: Path, how: signal.Signals) -> None:
     (tmp_path / "a.nsg").write_text(SQUARE)
-    server = Server(tmp_path, tmp_path / ".state")
-    with server.page() as page, server.connect("lsp"):
+    with (
+        Server(tmp_path, tmp_path / ".state") as server,
+        server.page() as page,
+        server.connect("lsp"),
+    ):
         page.open("a.nsg")
         page.say("edit", file="a.nsg", version=1, text="for (i in 0..3000) { for (j in 0..3000) { } }")
         page.draw(1, "a.nsg", by="reference")

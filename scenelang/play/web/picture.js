@@ -267,9 +267,15 @@ export function makePicture(at, { send, oncamera }) {
     },
     onview({ file: of, version, view, problems }) {
       if (of !== file) return;
-      faulty = view === null;
+      const errors = problems.filter(({ severity }) => severity === "error").length;
+      faulty = view === null && errors > 0;
+      if (view === null && !faulty) {  // too much for a shader: the server draws
+        note(problems.at(-1)?.message);
+        if (!expected) rest(0);
+        expected = false;
+        return;
+      }
       if (faulty) {
-        const errors = problems.filter(({ severity }) => severity === "error").length;
         const count = `${errors} ${errors === 1 ? "mistake" : "mistakes"}`;
         const isOf = viewer && (at.still.dataset.version || isLive()) ? "The last picture without mistakes" : "No picture";
         note(`${isOf}: the text has ${count}`);
