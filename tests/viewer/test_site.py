@@ -15,7 +15,7 @@ from PIL import Image
 
 from tests.browser import watched
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def seen(data: bytes) -> np.ndarray:
