@@ -103,6 +103,18 @@ def test_without_webgl_the_server_draws_all(chromium: Any, server: Served) -> No
         page.other_picture(before)
 
 
+def test_what_no_page_draws_the_server_does(page: Page, scene: Path) -> None:
+    before = page.picture()
+    page.page.locator("#controls input").first.wait_for()
+    scene.write_text("for (i in 0..5000) { square { scale(0.01); translate(i / 5000, 0); } }\n", "utf-8")
+    page.page.locator("#note", has_text="server alone draws").wait_for()
+    page.other_picture(before)
+    assert page.page.locator("#controls input").count() == 0
+    scene.write_text(SCENE, "utf-8")
+    page.page.locator("#controls input").first.wait_for()
+    page.page.locator("#note").wait_for(state="hidden")
+
+
 def test_the_camera_is_written_into_the_text(page: Page, scene: Path) -> None:
     page.picture()
     scene.write_text(SOLID, "utf-8")

@@ -22,7 +22,8 @@ const total = (ms) => (typeof ms === "number" ? ms : Object.values(ms).reduce((s
 export function makePicture(at, { send, oncamera }) {
   let file = null;
   let viewer = null;
-  let drawn = null;  // why the shader cannot draw, else null
+  let drawn = null;  // why the shader cannot draw at all, else null
+  let unable = null;  // why it cannot draw this scene, else null
   let by = "network";
   let count = 0;
   let wanted = {};  // by -> id of the last drawing that was asked for
@@ -44,12 +45,13 @@ export function makePicture(at, { send, oncamera }) {
   };
   const stop = (...names) => names.forEach((name) => clearTimeout(timers[name]));
   const note = (text) => {
-    const shown = text ?? (drawn && `The server alone draws: ${drawn}`);
+    const reason = drawn ?? unable;
+    const shown = text ?? (reason && `The server alone draws: ${reason}`);
     at.note.textContent = shown ?? "";
     at.note.hidden = !shown;
   };
   const isByHand = () => Boolean(viewer?.moved && !written);
-  const isLive = () => !drawn && viewer !== null && (by === "shader" || viewer.playing || isByHand());
+  const isLive = () => !drawn && !unable && viewer !== null && (by === "shader" || viewer.playing || isByHand());
 
   // ---------------------------------------------------------------- the server's pictures
 
@@ -139,7 +141,7 @@ export function makePicture(at, { send, oncamera }) {
   }
 
   function showShader() {
-    if (drawn || !viewer) return;
+    if (drawn || unable || !viewer) return;
     show("live");
     at.told.textContent = `shader${isByHand() ? ", camera moved by hand" : ""}`;
   }
@@ -183,10 +185,10 @@ export function makePicture(at, { send, oncamera }) {
   async function apply(version, message) {
     const mine = (latest = {});
     const view = await readView(JSON.parse(message));
-    if (mine !== latest) return;
+    if (mine !== latest || unable) return;
     const mark = JSON.stringify([view.params, view.fixed, view.animation, view.dimension]);
     const isOther = controls?.mark !== mark;
-    if (isOther) for (const part of controls?.parts ?? []) part.dispose();
+    if (isOther) forget();
     if (viewer === null) {
       viewer = viewerOf(view);
       viewer.watch(touched);
@@ -210,6 +212,13 @@ export function makePicture(at, { send, oncamera }) {
     if (asked[wanted[by]]?.params !== JSON.stringify(moved())) rest(0);  // there are other params now
     const isBehind = () => Number(at.still.dataset.version ?? -1) < version || isLive();
     later("shader", () => mine === latest && isBehind() && showShader(), waits ? Math.max(START_MS, 1.5 * cost) : 0);
+  }
+
+  /** Take the controls away. */
+  function forget() {
+    for (const part of controls?.parts ?? []) part.dispose();
+    controls = null;
+    at.controls.replaceChildren();
   }
 
   /** Make the controls of a view; `mark` tells those of others. */
@@ -246,7 +255,7 @@ export function makePicture(at, { send, oncamera }) {
       cost = 0;
       expected = false;
       written = false;
-      latest = null;
+      latest = unable = null;
       delete at.still.dataset.version;
       show("none");
       if (viewer) {
@@ -269,22 +278,18 @@ export function makePicture(at, { send, oncamera }) {
       if (of !== file) return;
       const errors = problems.filter(({ severity }) => severity === "error").length;
       faulty = view === null && errors > 0;
-      if (view === null && !faulty) {  // too much for a shader: the server draws
-        note(problems.at(-1)?.message);
-        if (!expected) rest(0);
-        expected = false;
-        return;
-      }
       if (faulty) {
         const count = `${errors} ${errors === 1 ? "mistake" : "mistakes"}`;
-        const isOf = viewer && (at.still.dataset.version || isLive()) ? "The last picture without mistakes" : "No picture";
+        const isOf = at.still.dataset.version || isLive() ? "The last picture without mistakes" : "No picture";
         note(`${isOf}: the text has ${count}`);
         return;
       }
+      unable = view === null ? (problems.at(-1)?.message ?? "no page draws it") : null;
       note(null);
       if (!expected) rest(0);
       expected = false;
-      apply(version, view);
+      if (unable) forget();
+      else apply(version, view);
     },
     onerror(id, message) {
       if (Object.values(wanted).includes(id)) later("note", () => !faulty && note(message), REST_MS);
