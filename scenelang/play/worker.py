@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import _thread
 import contextlib
+import gc
 import json
 import os
 import signal
 import sys
 import threading
 import time
+import traceback
 from queue import SimpleQueue
 from types import FrameType
 from typing import Any, BinaryIO, Final
@@ -65,6 +67,7 @@ class Desk:
 
         head: dict[str, Any]
         data = b""
+        gc.enable()  # a job that was interrupted may have left it off
         try:
             self._missed, self._works = False, True
             try:
@@ -78,7 +81,8 @@ class Desk:
         except MemoryError:
             head = {"is": "failed", "message": f"it needs more than {MOST_MEMORY >> 30} GB of memory"}
         except Exception as error:
-            head = {"is": "failed", "message": f"internal error: {error!r}"}
+            traceback.print_exc()
+            head = {"is": "failed", "message": f"internal error: {error!r}"[:500]}
         self._write(head, data)
 
     def tell(self, done: float) -> None:

@@ -143,14 +143,15 @@ def test_saving_and_what_changes_on_the_disk(server: Server, folder: Path) -> No
 
 
 def test_a_file_that_is_imported_is_shown_with_its_unsaved_text(page: Page, folder: Path) -> None:
-    (folder / "lib.nsg").write_text("module thing() { square; }\n")
+    (folder / "lib.nsg").write_text("module thing() { square { material flat { color(#f00); } } }\n")
     (folder / "use.nsg").write_text('canvas(64, 48);\nimport "lib.nsg" as lib;\nlib.thing();\n')
     page.open("use.nsg")
     page.open("lib.nsg")
-    page.say("edit", file="lib.nsg", version=1, text="module thing() { star; }\n")
+    star = "star { material flat { color(#070); } }"
+    page.say("edit", file="lib.nsg", version=1, text=f"module thing() {{ {star} }}\n")
     assert page.until("view", file="use.nsg")["problems"] == []
     page.draw(1, "use.nsg")
-    assert np.abs(pixels(page.until("picture")) - picture_of("canvas(64, 48); star;")).max() <= 1
+    assert np.abs(pixels(page.until("picture")) - picture_of(f"canvas(64, 48); {star}")).max() <= 1
     page.say("discard", file="lib.nsg")
     page.until("view", file="lib.nsg")
     (folder / "lib.nsg").write_text("module thing() { nothing_like_it; }\n")
