@@ -67,8 +67,8 @@ vec3 textured(int row, vec4 paint, vec3 q) {
 }
 #endif
 
-// Let a point meet the objects of a list.
-void look(ivec2 list, vec3 p) {
+// Let a point a little off another one, p, meet the objects of a list in whose balls that is.
+void look(ivec2 list, vec3 p, vec3 off) {
   bool touched = false;
   worn = false;
   state = EMPTY;
@@ -95,6 +95,7 @@ void look(ivec2 list, vec3 p) {
 #endif
     touched = true;
     mat3 way = transpose(mat3(part(row, 0).xyz, part(row, 1).xyz, part(row, 2).xyz));
+    q += way * off;
 #ifdef TURNS
     q = turned(part(row, MORE), q, way);
 #endif
@@ -126,6 +127,10 @@ void look(ivec2 list, vec3 p) {
 #ifndef TEXTURES
   even = seen;
 #endif
+}
+
+void look(ivec2 list, vec3 p) {
+  look(list, p, vec3(0.0));
 }
 
 ivec2 cell(int at) {
@@ -235,7 +240,7 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
         for (int i = zero; i < 4; i++) {
           vec3 off = wide * (right * (float(i & 1) * 0.5 - 0.25) + up * (float(i >> 1) * 0.5 - 0.25));
           float ratio = clamp(dot(n, off) / towards_, -0.5, 0.5);
-          look(list, base + (off - ray * ratio) / (1.0 + ratio));
+          look(list, base, (off - ray * ratio) / (1.0 + ratio));
           colour += 0.25 * seen;
         }
       }
