@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from scenelang.elements.zoo import zoo_bytes
 from scenelang.models.framed import load_arrays
 from scenelang.program.program import Program
 from scenelang.renderers.draw import draw_objects
@@ -22,12 +23,50 @@ from scenelang.renderers.solid.network import SolidArrays, Wanted
 from scenelang.viewer.script import script
 from scenelang.viewer.view import view_of
 from tests.browser import watched
+from tests.elements.shapes import element, noise, torus
 
 pytestmark = pytest.mark.browser
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SOLID = re.compile(r"\b(sphere|torus|diffuse|volumetric)\b")
 SCENES = [path.stem for path in sorted(EXAMPLES.glob("*.nsg")) if SOLID.search(path.read_text("utf-8"))]
+CORNERS = {
+    "colours": """
+        model "solids3d"; import "zoo.safetensors" as zoo; canvas(64, 64); background(none);
+        zoo.ring { rotate(60deg, axis = X); translate(0, 0.2, 0);
+            material diffuse zoo.space { color(#ffc); grayscale(0.3); hue(40deg); } }
+        sphere { scale(0.5); translate(-0.7, -0.4, 0.6); material diffuse zoo.bark { scale(0.7); hue(90deg); } }
+        """,
+    "mists": """
+        import "zoo.safetensors" as zoo; canvas(64, 48); camera(eye = [0, 0.6, 3.2]);
+        light(position = [0.4, 1.1, 0.9], power = 6);
+        sphere { scale(0.9); material volumetric { color(#fa6); } }
+        sphere { scale(0.6); translate(0.5, 0.2, 0.3); material volumetric { color(#59f); } }
+        sphere { scale(0.25); translate(0.4, 0.2, 0.3); material diffuse { color(#4d4); } }
+        sphere { scale(0.5); translate(-0.9, -0.5, 0.5); material volumetric zoo.bark; }
+        """,
+    "inside": """
+        canvas(48, 48); camera(eye = [0.1, 0.2, 0.6], target = [0, 0, -1], fov = 70deg);
+        light(position = [0.3, 0.5, 0.2], power = 2);
+        sphere { scale(1.2); material volumetric { color(#acf); } }
+        torus { scale(0.4); rotate(50deg, axis = X); translate(0, 0, -0.6); }
+        """,
+    "crowd": """
+        canvas(48, 48);
+        smooth(0.1) {
+            for (i in 0..70) { sphere { scale(0.5); translate(0.5 * sin(i * 1rad), 0.3 * cos(i * 2.3rad), 0); } }
+        }
+        """,
+    "deep": """
+        canvas(64, 48);
+        chain {
+            sphere { displace(0.06, 9); twist(1.2); bend(0.5); scale(0.8, 1.1, 0.8); rotate(20deg, axis = Z); }
+            smooth(0.3) sphere { scale(0.5); translate(0.7, 0.3, 0); }
+            subtract torus { twirl(1.3); scale(0.7); translate(0.1, 0.2, 0.5); }
+            intersect sphere { scale(1.1); translate(0.1, 0, 0); }
+        }
+        """,
+}
 SETUP = """
 globalThis.opened = async (message, width, height) => {
   const canvas = document.createElement("canvas");
@@ -111,6 +150,12 @@ def field_at(program: Program, points: np.ndarray) -> np.ndarray:
     return found
 
 
+def corner(name: str, folder: Path) -> Program:
+    brought = [element(torus, "ring"), noise(9, 9, 9, name="space"), noise(24, 16)]
+    (folder / "zoo.safetensors").write_bytes(zoo_bytes(brought))
+    return nsg.compile(nsg.loads(CORNERS[name], root=folder))
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_pictures_are_the_networks(page: Any, name: str) -> None:
     program = nsg.compile(nsg.load(EXAMPLES / f"{name}.nsg"))
@@ -120,9 +165,20 @@ def test_pictures_are_the_networks(page: Any, name: str) -> None:
     assert psnr(pictured(page, program), network_picture(program)) > 40
 
 
+@pytest.mark.parametrize("name", CORNERS)
+def test_corners_are_the_networks(page: Any, tmp_path: Path, name: str) -> None:
+    program = corner(name, tmp_path)
+    check_points(page, program)
+    assert psnr(pictured(page, program), network_picture(program)) > 40
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_points_are_the_fields(page: Any, name: str) -> None:
-    program = nsg.compile(nsg.load(EXAMPLES / f"{name}.nsg"))
+    check_points(page, nsg.compile(nsg.load(EXAMPLES / f"{name}.nsg")))
+
+
+def check_points(page: Any, program: Program) -> None:
+    """Ten thousand points around objects have the field's distance, colour and medium."""
     rng = np.random.default_rng(0)
     balls = program.bounds[rng.integers(0, len(program), 10_000)]
     points = (balls[:, :3] + balls[:, 3:].clip(0, 3) * rng.uniform(-0.6, 0.6, (10_000, 3))).astype(np.float32)

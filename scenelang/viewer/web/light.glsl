@@ -167,11 +167,12 @@ vec3 glow, evenGlow; // light that media send towards the eye
 void scatter(ivec2 list, vec3 way, float begin, float end, float before) {
   vec3 total = vec3(0.0), evenTotal = vec3(0.0);
   float share = 0.0, first = 0.0, last = 0.0, free = 0.0;
+  bool woven = false;
   for (int i = zero; i < 3 + 3 * PARTS; i++) {
     int node = i % 3;
     if (i == 3) {
       bool edge = free > 0.5 && free < 2.5;
-      if (share <= LEAST || !(edge || last > STEEP * first || end - begin > LONG)) break;
+      if (share <= LEAST || !(edge || woven || last > STEEP * first || end - begin > LONG)) break;
       total = evenTotal = vec3(0.0);
     }
     float size = end - begin, from = begin;
@@ -185,6 +186,7 @@ void scatter(ivec2 list, vec3 way, float begin, float end, float before) {
     vec3 p = eye + t * way;
     look(list, p);
     vec3 own = seen, plain = even;
+    woven = woven || worn;
     float r = max(length(lamp - p), NEAREST), clear = lit(p, false);
     vec3 light = weight * (AMBIENT_EVEN + power * (clear / (4.0 * r * r)));
     total += own * light;
@@ -197,6 +199,33 @@ void scatter(ivec2 list, vec3 way, float begin, float end, float before) {
   glow += total;
   evenGlow += evenTotal;
 }
+
+#ifdef COLOURED
+const float JUMP = 0.03; // of colours that differ
+
+// Up to where a piece of a ray, from a place on, keeps its colour or changes it slowly.
+float lasting(ivec2 list, vec3 way, float from, vec2 piece) {
+  float size = (piece.y - piece.x) / 8.0, low = from + 0.02 * size, high = NEVER;
+  vec3 first, last;
+  look(list, eye + low * way);
+  first = even;
+  for (int i = zero; i < 16; i++) {
+    bool halving = high < NEVER;
+    float t = halving ? 0.5 * (low + high) : min(low + size, piece.y - 0.02 * size);
+    if (t <= low) return halving ? low : piece.y;
+    look(list, eye + t * way);
+    if (halving ? dot(abs(even - first), vec3(1.0)) < dot(abs(even - last), vec3(1.0))
+      : dot(abs(even - first), vec3(1.0)) <= JUMP) {
+      low = t;
+      first = halving ? first : even;
+    } else {
+      high = t;
+      last = halving ? last : even;
+    }
+  }
+  return high < NEVER ? low : piece.y;
+}
+#endif
 #endif
 
 // What a ray from the eye sees, premultiplied, and the same with plain colours.
@@ -267,16 +296,24 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
     float before = 0.0, middle = dot(lamp - eye, way), aside = max(length(lamp - eye - middle * way), NEAREST);
     for (int i = zero; i < pieceCount; i++) {
       vec2 piece = pieces[i];
-      vec3 a = lamp - eye - piece.x * way, b = lamp - eye - piece.y * way;
-      bool narrow = dot(a, b) > NARROW * length(a) * length(b);
-      for (int j = zero; j < 9; j++) { // by the angle at the light, where that is wide
-        vec2 part_ = piece;
-        if (!narrow) {
-          float low = j == 0 ? -NEVER : CUTS[j - 1], high = j == 8 ? NEVER : CUTS[j];
-          part_ = vec2(max(piece.x, middle + low * aside), min(piece.y, middle + high * aside));
+      float from = piece.x;
+      for (int j = zero; j < 9 && from < piece.y; j++) { // by colours
+        float to = piece.y;
+#ifdef COLOURED
+        if (j < 8) to = lasting(list, way, from, piece);
+#endif
+        vec3 a = lamp - eye - from * way, b = lamp - eye - to * way;
+        bool narrow = dot(a, b) > NARROW * length(a) * length(b);
+        for (int k = zero; k < 9; k++) { // by the angle at the light, where that is wide
+          float low = from, high = to;
+          if (!narrow) {
+            if (k > 0) low = max(low, middle + CUTS[k - 1] * aside);
+            if (k < 8) high = min(high, middle + CUTS[k] * aside);
+          }
+          if (low < high) scatter(list, way, low, high, before + low - piece.x);
+          if (narrow) break;
         }
-        if (part_.x < part_.y) scatter(list, way, part_.x, part_.y, before + part_.x - piece.x);
-        if (narrow) break;
+        from = to;
       }
       before += piece.y - piece.x;
     }

@@ -9,6 +9,7 @@ const LIST_WIDTH = 1024;
 const TILE_SIDE = 16; // pixels that share a list of balls, along each axis
 const CUBE_SIDE = 12; // cells along a side of the cube around the light
 const BAND = 1 << 14; // pixels drawn at a time
+const MOST_SLOTS = 256; // balls that a ray keeps
 const COLOUR_STEPS = { color: 0, grayscale: 1, hue: 2 };
 
 /** Whether a row wears a medium. */
@@ -148,7 +149,7 @@ export function solidDrawer(gl, view) {
     const { data, longest } = listsOf(rows, balls, [seen, ...cubeOf(stage.light, CUBE_SIDE)]);
     wholes(gl, data, lists);
     floats(gl, tableOf(view, rows, balls, elements), 1024, table);
-    const slots = `SLOTS=${Math.min(48, Math.max(8, 8 * Math.ceil(longest / 8)))}`;
+    const slots = `SLOTS=${Math.min(MOST_SLOTS, Math.max(8, 8 * Math.ceil(longest / 8)))}`;
     ready = {
       program, width, height, features: [...featuresOf(view, rows, balls), slots],
       cells: [TILE_SIDE, tiles[0], 1 + seen.count, CUBE_SIDE], pixel, near,
