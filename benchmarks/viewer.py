@@ -26,6 +26,7 @@ from tests.browser import ARGUMENTS, NAMES
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SMALL = "200 small objects"
 PLANE = ("chain", "tangram", "flower", "night", SMALL)
+SOLID = ("chess", "lotus", "clouds")
 
 TIMED = """async ([message, side, frames]) => {
   const view = await readView(JSON.parse(message));
@@ -84,7 +85,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--side", type=int, default=256, help="pixels along a side")
     parser.add_argument("--frames", type=int, default=5, help="frames after the first")
-    parser.add_argument("names", nargs="*", default=PLANE, help="of examples")
+    parser.add_argument("names", nargs="*", default=PLANE + SOLID, help="of examples")
     given = parser.parse_args()
 
     def work(page: Any) -> None:

@@ -35,7 +35,8 @@ CORNERS = {
         model "solids3d"; import "zoo.safetensors" as zoo; canvas(64, 64); background(none);
         zoo.ring { rotate(60deg, axis = X); translate(0, 0.2, 0);
             material diffuse zoo.space { color(#ffc); grayscale(0.3); hue(40deg); } }
-        sphere { scale(0.5); translate(-0.7, -0.4, 0.6); material diffuse zoo.bark { scale(0.7); hue(90deg); } }
+        sphere { scale(0.5); translate(-0.7, -0.4, 0.6);
+            material diffuse zoo.bark { scale(0.7); hue(90deg); } }
         """,
     "mists": """
         import "zoo.safetensors" as zoo; canvas(64, 48); camera(eye = [0, 0.6, 3.2]);
@@ -54,13 +55,15 @@ CORNERS = {
     "crowd": """
         canvas(48, 48);
         smooth(0.1) {
-            for (i in 0..70) { sphere { scale(0.5); translate(0.5 * sin(i * 1rad), 0.3 * cos(i * 2.3rad), 0); } }
+            for (i in 0..70) {
+                sphere { scale(0.5); translate(0.5 * sin(i * 1rad), 0.3 * cos(i * 2.3rad), 0); }
+            }
         }
         """,
     "deep": """
         canvas(64, 48);
         chain {
-            sphere { displace(0.06, 9); twist(1.2); bend(0.5); scale(0.8, 1.1, 0.8); rotate(20deg, axis = Z); }
+            sphere { displace(0.06, 9); twist(1.2); bend(0.5); scale(0.8, 1.1, 0.8); rotate(20deg); }
             smooth(0.3) sphere { scale(0.5); translate(0.7, 0.3, 0); }
             subtract torus { twirl(1.3); scale(0.7); translate(0.1, 0.2, 0.5); }
             intersect sphere { scale(1.1); translate(0.1, 0, 0); }
