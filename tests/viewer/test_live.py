@@ -99,7 +99,7 @@ MISTAKES = [
     ("group { square; if (n > 1) { scale(2); } star; }", 2, "a child after a transform"),
     ("chain { if (n < 2) { square; } subtract star; }", 2, "nothing before it"),
     ('square { rotate(n > 1 ? "no" : 0); }', 2, "expected an angle, found a string"),
-    ("param k = 1 in 0..n; square { scale(k); }", 0.5, "outside its range"),
+    ("param k = 1 in 0..n; square { scale(k); }", 0.5, "`k` is outside its range"),
     ("square { twirl(1); for (i in 1..n) { scale(1, 2); bend(1); } }", 4, "deformations"),
 ]
 

@@ -1,5 +1,5 @@
-// Conservative boxes around leaves, and streams of rows with what boxes prove of them: `scenelang/graph/bounds.py`,
-// `spaces.py` and `stream.py` have the proofs. A box is [xmin, xmax, ymin, ymax, zmin, zmax].
+// Conservative boxes around leaves, and streams of rows with what boxes prove of them: `spaces.py`, `solid.py`
+// and `stream.py` of `scenelang/graph` have the proofs. A box is [xmin, xmax, ymin, ymax, zmin, zmax].
 
 import { IDENTITY, composedMap, mappedPoint, stretchesOf } from "./maps.js";
 import { mapOfChain } from "./chain.js";
@@ -118,18 +118,21 @@ class Boxes {
 
   /** Keep only what lies within a box. */
   clip(box) {
-    const shared = this.bounds.map((side, at) => (at % 2 ? Math.min(side, box[at]) : Math.max(side, box[at])));
+    const inner = (side, at) => (at % 2 ? Math.min(side, box[at]) : Math.max(side, box[at]));
+    const shared = this.bounds.map(inner);
     const meets = this.list.length > 0 && overlap(this.bounds, box);
     this.list = meets ? [shared] : [];
     this.bounds = shared;
   }
 
   touches(box) {
-    return this.list.length > 0 && overlap(this.bounds, box) && this.list.some((other) => overlap(other, box));
+    if (this.list.length === 0 || !overlap(this.bounds, box)) return false;
+    return this.list.some((other) => overlap(other, box));
   }
 
   meets(other) {
-    if (this.list.length === 0 || other.list.length === 0 || !overlap(this.bounds, other.bounds)) return false;
+    if (this.list.length === 0 || other.list.length === 0) return false;
+    if (!overlap(this.bounds, other.bounds)) return false;
     const [few, many] = this.list.length <= other.list.length ? [this, other] : [other, this];
     return few.list.some((box) => many.touches(box));
   }

@@ -1,6 +1,6 @@
-// Chains of steps from a leaf into the world, nearest the leaf first, and their normal form: deformations as near
-// to the leaf, and as few steps, as may be. A step is {rows} of a map, {twirl, x, y} of a turn about z by
-// twirl |p| + x p.x + y p.y, {twist} of one about y by twist p.y, or {amount, frequency} of a displacement.
+// Chains of steps from a leaf into the world, nearest the leaf first, and their normal form: deformations as
+// near to the leaf, and as few steps, as may be. A step is {rows} of a map, {twirl, x, y} of a turn about z
+// by twirl |p| + x p.x + y p.y, {twist} of one about y by twist p.y, or {amount, frequency} of a displacement.
 
 import { refuse } from "./values.js";
 import { IDENTITY, composedMap, idleMap, invertedMap, mild, stretchesOf, usableMap } from "./maps.js";
@@ -43,10 +43,9 @@ function solidBefore(rows, turn) {
   const scale = Math.sqrt(Math.abs(a * d - b * c));
   const near = ALIKE * scale;
   const sign = a * d > b * c ? 1 : -1;
-  const apart = [
-    a - sign * d, b + sign * c, rows[3], rows[4 * j + 3], rows[k], rows[4 * k], rows[4 * j + k], rows[4 * k + j],
-  ];
-  if (apart.some((number) => Math.abs(number) > near)) return null;
+  const alike = [a - sign * d, b + sign * c];
+  const apart = [rows[3], rows[4 * j + 3], rows[k], rows[4 * k], rows[4 * j + k], rows[4 * k + j]];
+  if ([...alike, ...apart].some((number) => Math.abs(number) > near)) return null;
   const shift = Math.abs(rows[4 * k + 3]) > near;
   if (!isWarp(turn)) return shift ? null : { twist: sign * along * turn.twist };
   if (turn.twirl !== 0 && (shift || Math.abs(Math.abs(along) - scale) > near)) return null;
@@ -128,7 +127,7 @@ function taken(turns, dimension) {
   return count;
 }
 
-/** Throws NotLive where a model's vector has no room for a chain in its normal form, or a map has no inverse. */
+/** Throws NotLive where a model's vector has no room for a chain in its normal form, or no map an inverse. */
 export function checkChain(steps, form) {
   const { dimension, turns: [inner, outer] } = form;
   const runs = [[]];
@@ -140,10 +139,12 @@ export function checkChain(steps, form) {
       runs.push([]);
     }
   }
-  if (steps.some(isTurn) && !fits(runs, maps, inner, outer, dimension)) refuse("more deformations than the model holds");
+  const roomy = !steps.some(isTurn) || fits(runs, maps, inner, outer, dimension);
+  if (!roomy) refuse("more deformations than the model holds");
   if (maps.length > 1) maps.push(mapOfChain(steps));
   if (!maps.every((rows) => usableMap(rows, dimension))) refuse("transforms that compose to a singular one");
-  if (!steps.every((step) => step.rows || mild(...Object.values(step)))) refuse("deformations beyond float32");
+  const tame = steps.every((step) => step.rows || mild(...Object.values(step)));
+  if (!tame) refuse("deformations beyond float32");
 }
 
 function fits([first, second, third], maps, inner, outer, dimension) {

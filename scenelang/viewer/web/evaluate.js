@@ -1,8 +1,9 @@
 // A scene's form, prepared once and run for any params and any frame. `scenelang/viewer/form.py` makes forms;
 // what a statement means is in `scenelang/evaluate/prepare`.
 
-import { NotLive, Progression, Time, Angle, Vec, Wearing } from "./values.js";
-import { bare, equal, kindOf, numbersOf, radians, refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
+import { Progression, Time, Angle, Vec, Wearing } from "./values.js";
+import { bare, equal, kindOf, numbersOf, radians } from "./values.js";
+import { refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
 import { entering, prepared } from "./expressions.js";
 import { MAPS } from "./maps.js";
 import { USUAL_BLEND } from "./bounds.js";
@@ -19,14 +20,14 @@ const preparedForms = new WeakMap();
 /**
  * What is drawn of a scene.
  * @param form - of a view
- * @param {{params?: Object, frame?: number}} inputs - values of params by name: numbers in radians and seconds,
+ * @param {{params?: Object, frame?: number}} inputs - values of params by name: numbers, radians, seconds,
  *   booleans, strings, arrays; those left out have their defaults
  * @returns {{rows: Object[], stage: ?Object, background: ?number[]}} as docs/architecture.md has them
  * @throws {NotLive} there is no picture of these; the message says why
  */
 export function evaluateForm(form, inputs = {}) {
-  if (!preparedForms.has(form)) preparedForms.set(form, new SceneRun(form));
   try {
+    if (!preparedForms.has(form)) preparedForms.set(form, new SceneRun(form));
     return preparedForms.get(form).picture(inputs);
   } catch (error) {
     if (error instanceof RangeError) refuse("the scene is nested too deep");
@@ -221,7 +222,7 @@ const STATEMENTS_OF_FORMS = {
       const given = Object.hasOwn(run.params, name) ? run.params[name] : undefined;
       const value = given === undefined ? like : fromOutside(given, like);
       const allowed = bounds();
-      if (allowed !== undefined && !allowedBy(value, allowed)) refuse(`${name} = ${given} is outside its range`);
+      if (allowed !== undefined && !allowedBy(value, allowed)) refuse(`\`${name}\` is outside its range`);
       run.globals[slot] = value;
     };
   },

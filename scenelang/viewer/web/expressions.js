@@ -2,7 +2,7 @@
 
 import { Progression, Time, Angle, Vec, Wearing } from "./values.js";
 import { ARITHMETIC, ORDER, arithmetic, bare, equal, finite, kindOf, negative, ordered } from "./values.js";
-import { positive, quantity, refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
+import { positive, refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
 import { FUNCTIONS } from "./functions.js";
 
 const UNITS_WRITTEN = {
@@ -73,14 +73,15 @@ const logic = (decides) => (parts, run) => {
 
 function itemOf(value, index) {
   const at = bare(index);
-  const length = value instanceof Vec ? value.items.length : value instanceof Progression ? value.count() : -1;
-  if (length < 0) refuse(`${kindOf(value)} has no items`);
+  const numbered = value instanceof Vec || value instanceof Progression;
+  const length = FUNCTIONS.len(numbered ? value : refuse(`${kindOf(value)} has no items`));
   if (!Number.isInteger(at) || at < 0 || at >= length) refuse(`index ${at} is not one of ${length} items`);
   return value instanceof Vec ? value.items[at] : value.item(at);
 }
 
 function memberOf(value, at) {
-  return value instanceof Vec && at < value.items.length ? value.items[at] : refuse(`${kindOf(value)} lacks a part`);
+  const has = value instanceof Vec && at < value.items.length;
+  return has ? value.items[at] : refuse(`${kindOf(value)} has no such part`);
 }
 
 function progression(exclusive, start, stop, step) {

@@ -1,4 +1,4 @@
-// Nothing is seen from inside something opaque: the exact fold at the eye, as in `scenelang/passes/check_eye.py`.
+// Nothing is seen from inside something opaque: the exact fold at the eye; see `passes/check_eye.py`.
 
 import { refuse } from "./values.js";
 
@@ -26,7 +26,7 @@ function carriedBack(steps, point) {
   return [x, y, z];
 }
 
-/** Throws NotLive where the eye is inside an opaque object; geometries without a formula are taken as far away. */
+/** Throws NotLive where the eye is inside an opaque object; what has no formula counts as far away. */
 export function checkEye({ rows, stage }, { geometries, media }) {
   let [depth, holder] = [Infinity, null];
   for (const row of rows) {

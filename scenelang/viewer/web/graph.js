@@ -1,7 +1,7 @@
 // From a scene's tree to rows: transforms go to the leaves, empty nodes vanish, booleans become one stream.
 //
-// A leaf of the tree is {shape, steps, worn}, a fold {links: [{op, k, node}], steps, worn}; steps are nearest the
-// leaf first. See `scenelang/graph/lower.py`, `passes/drop.py`, `leaves.py` and `linearise.py`.
+// A leaf of the tree is {shape, steps, worn}, a fold {links: [{op, k, node}], steps, worn}; steps are nearest
+// the leaf first. See `scenelang/graph/lower.py`, `passes/drop.py`, `leaves.py` and `linearise.py`.
 
 import { Wearing, refuse } from "./values.js";
 import { flatMap, invertedMap, usableMap } from "./maps.js";
@@ -18,7 +18,8 @@ export function rowsOf(links, form) {
   const state = { form, objects: 0, looks: new Map(), plain: new Wearing(form.plain, -1, []) };
   const root = lowered({ links, steps: [], worn: null }, [], null, state);
   const stream = new Stream();
-  if (root !== null) takeLinks(root.leaf ? [{ op: "union", k: USUAL_BLEND, node: root }] : root.links, stream);
+  if (root?.leaf) stream.push("union", finishedLeaf(root), USUAL_BLEND);
+  else if (root !== null) takeLinks(root.links, stream);
   return stream.rows.map((row, at) => rowData(row, at, form));
 }
 
@@ -46,7 +47,8 @@ function lowered(node, outward, around, state) {
 /** The steps of a node's own transforms, maps as its space has them. */
 function ownSteps(node, { dimension }) {
   return node.steps.map((step, at) => {
-    if (step.amount !== undefined && (at > 0 || node.links)) refuse("`displace` does not stand first in its block");
+    const late = step.amount !== undefined && (at > 0 || node.links);
+    if (late) refuse("`displace` does not stand first in the block of an object");
     if (!step.rows) return step;
     const rows = dimension === 2 ? flatMap(step.rows) : step.rows;
     if (rows === null) refuse("a transform leaves the plane");
@@ -129,7 +131,7 @@ function rowData({ op, leaf, k }, at, { dimension }) {
   const { look, shape, number } = leaf;
   const bump = leaf.steps.find((step) => step.amount !== undefined);
   const steps = wayBack(leaf.steps, dimension);
-  if (steps.length > MOST_ROW_STEPS) refuse(`more than ${MOST_ROW_STEPS} steps between the world and an object`);
+  if (steps.length > MOST_ROW_STEPS) refuse(`more than ${MOST_ROW_STEPS} steps from the world to an object`);
   return {
     token: at === 0 ? 0 : TOKENS.indexOf(op),
     shape,

@@ -1,5 +1,5 @@
-// Affine maps as the upper three rows of a 4 x 4 matrix, row by row, for column vectors; those of the plane leave
-// z alone. And the transforms of the language: what each makes of its arguments.
+// Affine maps as the upper three rows of a 4 x 4 matrix, row by row, for column vectors; those of the plane
+// leave z alone. And the transforms of the language: what each makes of its arguments.
 
 import { Vec } from "./values.js";
 import { bare, kindOf, numbersOf, radians, refuse } from "./values.js";
@@ -173,7 +173,7 @@ export const MAPS = {
   matrix([rows]) {
     if (!(rows instanceof Vec) || rows.items.length !== 4) refuse("expected 4 rows of 4 numbers");
     const numbers = rows.items.map((row) => numbersOf(row, 4));
-    if (numbers[3].some((number, at) => number !== (at === 3 ? 1 : 0))) refuse("the last row is not 0, 0, 0, 1");
+    if (numbers[3].join() !== "0,0,0,1") refuse("the last row of a matrix is not 0, 0, 0, 1");
     if (flattens(numbers.slice(0, 3))) refuse("a singular matrix flattens what it moves");
     return [...numbers[0], ...numbers[1], ...numbers[2]];
   },

@@ -1,6 +1,6 @@
 // Camera, light, ground and sky of a scene in space, and the background of one in the plane.
 
-import { bare, kindOf, numbersOf, radians, refuse } from "./values.js";
+import { bare, numbersOf, radians, refuse } from "./values.js";
 import { linearColour } from "./looks.js";
 
 const MOST_OF_STAGE = 1e12; // of a stage's numbers
@@ -9,7 +9,7 @@ const USUAL_GROUND = [0.5, 0.48, 0.45]; // linear
 
 /**
  * What `evaluateForm` says besides rows.
- * @param settings - values of the arguments of `background`, `camera`, `light` and `ground`, where they were given
+ * @param settings - values of the arguments of `background`, `camera`, `light` and `ground`, where given
  */
 export function stageFrom({ background, camera = [], light = [], ground = [] }, dimension) {
   const sky = background === undefined ? undefined : background[0] === null ? null : shares(background[0]);
@@ -20,7 +20,7 @@ export function stageFrom({ background, camera = [], light = [], ground = [] }, 
   const to = pointFrom(target, [0, 0, 0]);
   const view = fov === undefined ? 2 * Math.atan(1 / 3) : radians(fov);
   if (at.every((number, axis) => number === to[axis])) refuse("the eye is the target");
-  if (!(view > 1 / MOST_OF_STAGE && view < Math.PI)) refuse("a field of view that is not between 0° and 180°");
+  if (!(view > 1 / MOST_OF_STAGE && view < Math.PI)) refuse("a field of view not between 0° and 180°");
   const [position, power, rgb] = light;
   const strength = power === undefined ? 28 : bounded(bare(power));
   if (strength < 0) refuse(`a power of ${strength} is negative`);
@@ -41,7 +41,8 @@ export function stageFrom({ background, camera = [], light = [], ground = [] }, 
 
 function groundFrom([y, rgb]) {
   if (y === null) return rgb === undefined ? null : refuse("`ground(none)` has no colour");
-  return { y: y === undefined ? -1 : bounded(bare(y)), rgb: rgb === undefined ? USUAL_GROUND : linearColour(shares(rgb)) };
+  const height = y === undefined ? -1 : bounded(bare(y));
+  return { y: height, rgb: rgb === undefined ? USUAL_GROUND : linearColour(shares(rgb)) };
 }
 
 function bounded(number) {
@@ -54,7 +55,7 @@ function pointFrom(value, otherwise) {
 
 function shares(value) {
   const rgb = numbersOf(value, 3);
-  return rgb.every((part) => part >= 0 && part <= 1) ? rgb : refuse(`${kindOf(value)} is not a colour in 0..1`);
+  return rgb.every((part) => part >= 0 && part <= 1) ? rgb : refuse("a colour is outside 0..1");
 }
 
 /** Unit vectors forward, right and up; seen straight along y, up is -z. */

@@ -1,5 +1,5 @@
-// Values of the language and what its operators do with them. Numbers, booleans and strings are JavaScript's own,
-// `none` is null. What would be a mistake in a scene throws NotLive.
+// Values of the language and what its operators do with them. Numbers, booleans and strings are JavaScript's
+// own, `none` is null. What would be a mistake in a scene throws NotLive.
 
 /** The scene has no picture for these params and this frame; the message says why. */
 export class NotLive extends Error {}
@@ -36,7 +36,7 @@ export class Vec {
   }
 }
 
-/** A material as a value: how it is lit and its colours, by their places in the view, and what is done to them. */
+/** A material as a value: how it is lit and its colours, by places in the view, and what is done to them. */
 export class Wearing {
   constructor(lit, paint, ops) {
     Object.assign(this, { lit, paint, ops });
@@ -178,7 +178,7 @@ function unitOfResult(op, a, unitA, b, unitB) {
   } else if (unitA === NUMBER && unitB === NUMBER) {
     return NUMBER;
   }
-  return refuse(`an operation that these units do not have`);
+  return refuse("an operation that these units do not have");
 }
 
 /** `a op b` for the arithmetic operators, componentwise on vectors. */
