@@ -16,7 +16,7 @@ MODULES: Final = (
     *("values", "functions", "maps", "looks", "chain", "bounds", "graph", "stage"),
     *("eye", "expressions", "evaluate"),
     *("elements", "balls", "solid"),
-    *("camera", "pace", "viewer", "dom", "steer", "controls", "page"),
+    *("camera", "pace", "surface", "viewer", "dom", "steer", "controls", "page"),
 )
 """Of ``web/``; each stands behind what it imports."""
 

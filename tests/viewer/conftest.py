@@ -16,10 +16,21 @@ const [message, more] = JSON.parse(TEXT);
 globalThis.told = [];
 globalThis.refused = [];
 globalThis.scales = [];
+globalThis.pieces = [];
 globalThis.made = 0;
 planeDrawer = solidDrawer = (gl, view) => {
   made += 1;
+  const inPieces = view.dimension === 3 && {
+    *pieces(program, size) {
+      for (let piece = 0; piece < 3; piece += 1) {
+        pieces.push(piece);
+        yield;
+      }
+      this.draw(program, size);
+    },
+  };
   return {
+    ...inPieces,
     draw(program, { width, height, scale }) {
       gl.viewport(0, 0, width, height);
       gl.clearColor(program.shade ?? 0, scale, program.stage ? 0.5 : 0, 1);

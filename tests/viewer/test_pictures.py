@@ -36,8 +36,6 @@ SNAPSHOT = """async (params) => {
   return picture.result.split(",")[1];
 }"""
 
-pytestmark = pytest.mark.browser
-
 
 def opened(page: Any, path: Path) -> dict[str, Any]:
     """Open a viewer of a scene's file; its view."""
@@ -64,6 +62,7 @@ def over_grey(image: np.ndarray) -> np.ndarray:
     return image[..., :3] * image[..., 3:] + 0.5 * (1 - image[..., 3:])
 
 
+@pytest.mark.browser
 @pytest.mark.parametrize("name", ["caterpillar", "die", "saturn"])
 def test_the_line_of_a_moved_camera_gives_its_picture(viewer_page: Any, tmp_path: Path, name: str) -> None:
     path = next(path for path in EXAMPLES if path.stem == name)

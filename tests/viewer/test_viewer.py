@@ -95,7 +95,20 @@ def test_it_draws_coarser_while_it_cannot_keep_up(shown: Any) -> None:
 def test_solids_begin_coarse_and_end_full(shown: Any) -> None:
     page = shown(SOLID)
     ask(page, "viewer.orbit(0.1, 0)")
-    page.wait_for_function("() => scales.includes(0.25) && drawn.scale === 1")
+    page.wait_for_function("() => scales.includes(0.25) && drawn.scale === 1 && canvas.width === 64")
+    assert ask(page, "pieces.slice(-3)") == [0, 1, 2]
+    found = page.evaluate(
+        """async () => {
+          const copy = new OffscreenCanvas(64, 48).getContext("2d");
+          await new Promise((done) => viewer.watch(({ kind }) => {
+            if (kind !== "drawn" || canvas.width !== 64) return;
+            copy.drawImage(canvas, 0, 0);
+            done();
+          }) && viewer.orbit(0.1, 0));
+          return Array.from(copy.getImageData(30, 20, 1, 1).data);
+        }"""
+    )
+    assert found == [0, 255, 128, 255], "what was drawn behind is on the canvas"
 
 
 def test_a_lost_context_comes_back(shown: Any) -> None:

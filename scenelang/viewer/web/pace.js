@@ -1,7 +1,7 @@
 const SLOW_MS = 33; // a frame that takes longer is drawn coarser while something moves
 const EASY_MS = 20; // one that would take less is drawn finer again
 const REST_MS = 200; // how long nothing moves before it is drawn in full
-const MOST_MS = 2000; // nothing that would take longer is begun: browsers end what hangs the screen
+const MOST_MS = 2000; // nothing that would take longer is begun in one piece: it would hang the screen
 const POLL_MS = 4;
 const SCALES = [1, 0.75, 0.5, 0.375, 0.25, 0.1875, 0.125];
 
@@ -17,6 +17,7 @@ export class Pace {
   #started = 0;
   #fence = null;
   #timer = 0;
+  #inPieces = false; // whether a frame in full can be drawn a piece at a time
 
   /** @param {function} wake - called when another frame can be drawn, with whether what is shown is too coarse */
   constructor(gl, wake) {
@@ -29,10 +30,11 @@ export class Pace {
     return this.#fence !== null;
   }
 
-  /** Begin with a new shader. */
-  begin(dimension) {
+  /** Begin with a new shader; one that draws in pieces begins coarse. */
+  begin(inPieces) {
     this.stop();
-    this.#moving = dimension === 3 ? 0.25 : 1;
+    this.#inPieces = inPieces;
+    this.#moving = inPieces ? 0.25 : 1;
     this.#first = true;
     this.#costs = null;
   }
@@ -44,7 +46,7 @@ export class Pace {
 
   /** The scale to draw at now: a share of the canvas's sides. */
   scale(playing) {
-    return playing || this.#rest() > 0 ? this.#moving : this.#finest();
+    return playing || this.#inPieces || this.#rest() > 0 ? this.#moving : this.#finest();
   }
 
   /** A frame begins. */
@@ -56,9 +58,19 @@ export class Pace {
 
   /** It has been handed to the graphics card. */
   end() {
-    this.#fence = this.#gl.fenceSync(this.#gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    this.#gl.flush();
-    this.#timer = setTimeout(() => this.#look(), 0);
+    this.#after(() => {
+      this.#learn(performance.now() - this.#started);
+      this.#wake(false);
+      if (this.#drawn < this.#finest() || (this.#costs === null && this.#drawn < 1)) {
+        this.#timer = setTimeout(() => this.#wake(true), this.#rest());
+      }
+    });
+  }
+
+  /** Call `next` again and again, while it returns true, each time when all is done that it handed over. */
+  pieces(next) {
+    this.stop();
+    if (next()) this.#after(() => this.pieces(next));
   }
 
   /** Forget the frame that is under way. */
@@ -68,18 +80,20 @@ export class Pace {
     this.#fence = null;
   }
 
-  #look() {
-    if (this.#gl.clientWaitSync(this.#fence, 0, 0) === this.#gl.TIMEOUT_EXPIRED) {
-      this.#timer = setTimeout(() => this.#look(), POLL_MS);
-      return;
-    }
-    this.#gl.deleteSync(this.#fence);
-    this.#fence = null;
-    this.#learn(performance.now() - this.#started);
-    this.#wake(false);
-    if (this.#drawn < this.#finest() || (this.#costs === null && this.#drawn < 1)) {
-      this.#timer = setTimeout(() => this.#wake(true), this.#rest());
-    }
+  /** Call when the graphics card has done all that it was given. */
+  #after(act) {
+    this.#fence = this.#gl.fenceSync(this.#gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    this.#gl.flush();
+    const look = () => {
+      if (this.#gl.clientWaitSync(this.#fence, 0, 0) === this.#gl.TIMEOUT_EXPIRED) {
+        this.#timer = setTimeout(look, POLL_MS);
+        return;
+      }
+      this.#gl.deleteSync(this.#fence);
+      this.#fence = null;
+      act();
+    };
+    this.#timer = setTimeout(look, 0);
   }
 
   /** Time until nothing has moved for long enough. */
@@ -88,6 +102,7 @@ export class Pace {
   }
 
   #finest() {
+    if (this.#inPieces) return 1;
     return this.#costs === null ? this.#moving : this.#fits(MOST_MS);
   }
 

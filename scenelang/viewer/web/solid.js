@@ -180,22 +180,23 @@ export function solidDrawer(gl, view) {
     gl.uniform4fv(at("cells"), network.cells);
   };
 
-  /** Draw a picture in bands, so that no call takes long. */
-  const bands = () => {
+  /** Draw a picture in bands, so that no call takes long; stops after each. */
+  function* bands() {
     const { width, height } = ready, rows = Math.max(1, Math.floor(BAND / width));
-    gl.viewport(0, 0, width, height);
-    gl.disable(gl.BLEND);
-    gl.enable(gl.SCISSOR_TEST);
     for (let bottom = 0; bottom < height; bottom += rows) {
+      gl.viewport(0, 0, width, height);
+      gl.disable(gl.BLEND);
+      gl.enable(gl.SCISSOR_TEST);
       gl.scissor(0, bottom, width, rows);
       triangle(gl);
+      gl.disable(gl.SCISSOR_TEST);
       gl.flush();
+      yield;
     }
-    gl.disable(gl.SCISSOR_TEST);
-  };
+  }
 
   /** One sample of each pixel, then four where these differ. */
-  const render = (into, format, names) => {
+  function* render(into, format, names) {
     const { width, height } = ready;
     if (!first || first.width !== width || first.height !== height || first.format !== format) {
       if (first) dropScreens(gl, first);
@@ -203,18 +204,23 @@ export function solidDrawer(gl, view) {
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, first.framebuffer);
     use(names);
-    bands();
+    yield* bands();
     gl.bindFramebuffer(gl.FRAMEBUFFER, into);
     use([...names, "FOUR"], { once: first.textures[0], shown: first.textures[1] });
-    bands();
-  };
+    yield* bands();
+  }
 
   return {
     /** Draw into the bound framebuffer. */
-    draw(program, { width, height }) {
+    draw(program, size) {
+      for (const _ of this.pieces(program, size));
+    },
+
+    /** The same, a band after the other; in between nothing else may draw. */
+    *pieces(program, { width, height }) {
       const into = gl.getParameter(gl.FRAMEBUFFER_BINDING);
       prepare(program, width, height);
-      render(into, gl.RGBA8, []);
+      yield* render(into, gl.RGBA8, []);
     },
 
     /** What the field has at points (M * 3): distance, linear colour and medium (M * 5). */
@@ -247,7 +253,7 @@ export function solidDrawer(gl, view) {
       if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("no framebuffers of floats here");
       prepare(program, width, height);
       const screen = screens(gl, width, height, [gl.RGBA32F]);
-      render(screen.framebuffer, gl.RGBA32F, ["COUNT"]);
+      for (const _ of render(screen.framebuffer, gl.RGBA32F, ["COUNT"]));
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, numbers);
       dropScreens(gl, screen);
       gl.bindFramebuffer(gl.FRAMEBUFFER, into);

@@ -4,6 +4,7 @@ import { Pace } from "./pace.js";
 import { planeDrawer } from "./plane.js";
 import { solidDrawer } from "./solid.js";
 import { alike, WITH_ARRAYS } from "./store.js";
+import { Surface } from "./surface.js";
 
 const DRAWN_FROM = ["dimension", ...WITH_ARRAYS]; // what a drawer is made of
 
@@ -18,10 +19,10 @@ export class Viewer {
   #refused = false; // whether the params give no picture
   #stale = true; // whether rows belong to other params or another frame
   #dirty = false; // whether what is shown is not what is to be shown
-  #drawnFor = null; // pixels of the screen that the canvas had
   #request = 0;
   #origin = 0; // when frame 0 would have been shown, in ms
   #pace;
+  #surface;
   #watchers = new Set();
   #observers = [];
   #shown = true;
@@ -39,18 +40,17 @@ export class Viewer {
     this.params = defaults(view);
     this.frame = 0;
     this.playing = false;
-    this.size = [canvas.width, canvas.height];
-    pin(canvas, view.canvas);
     this.#watchers.add(onchange);
     this.#view = view;
     this.#gl = canvas.getContext("webgl2", { antialias: false, depth: false, stencil: false });
     if (!this.#gl) throw new Error("this browser has no WebGL2, or keeps it off");
-    this.#pace = new Pace(this.#gl, (coarse) => this.#ask(coarse));
+    this.#surface = new Surface(canvas, this.#gl, view.canvas);
+    this.#pace = new Pace(this.#gl, (coarse) => (coarse ? this.#refine() : this.#ask(false)));
     this.#drawer = this.#made(view);
     canvas.addEventListener("webglcontextlost", this);
     canvas.addEventListener("webglcontextrestored", this);
     this.#observe(new ResizeObserver(() => {
-      if (!alike(this.#full(), this.#drawnFor)) this.#touch();
+      if (this.#surface.resized) this.#touch();
     }));
     this.#observe(new IntersectionObserver(([entry]) => {
       this.#shown = entry.isIntersecting;
@@ -92,7 +92,7 @@ export class Viewer {
     }
     this.params = params;
     this.#view = next;
-    this.canvas.style.aspectRatio = next.canvas.join("/");
+    this.#surface.aspect = next.canvas;
     this.#program = null;
     if (next.dimension !== before.dimension) this.#camera = null;
     if (!next.animation) this.playing = false;
@@ -231,8 +231,9 @@ export class Viewer {
   }
 
   #made(view) {
-    this.#pace.begin(view.dimension);
-    return (view.dimension === 3 ? solidDrawer : planeDrawer)(this.#gl, view);
+    const drawer = (view.dimension === 3 ? solidDrawer : planeDrawer)(this.#gl, view);
+    this.#pace.begin(drawer.pieces !== undefined);
+    return drawer;
   }
 
   #observe(observer) {
@@ -264,21 +265,21 @@ export class Viewer {
   #ask(dirty) {
     this.#dirty ||= dirty;
     if ((this.#dirty || this.playing) && this.#shown && this.#request === 0) {
-      this.#request = requestAnimationFrame((now) => this.#next(now));
+      this.#request = requestAnimationFrame(() => this.#next());
     }
   }
 
-  #next(now) {
+  #next() {
     this.#request = 0;
     if (this.#gl.isContextLost()) return;
-    if (this.playing) this.#advance(now);
+    if (this.playing) this.#advance();
     if (this.#dirty && !this.#pace.busy) this.#paint(this.#pace.scale(this.playing));
     if (this.playing) this.#ask(false); // otherwise the end of the frame under way does
   }
 
-  #advance(now) {
+  #advance() {
     const { fps, loop } = this.#view.animation;
-    const at = Math.max(0, Math.floor(((now - this.#origin) * fps) / 1000 + 1e-6));
+    const at = Math.max(0, Math.floor(((performance.now() - this.#origin) * fps) / 1000 + 1e-6));
     const frame = loop ? at % this.frames : Math.min(at, this.frames - 1);
     if (frame !== this.frame) {
       this.frame = frame;
@@ -312,13 +313,9 @@ export class Viewer {
     if (this.#gl.isContextLost()) return;
     const program = this.program;
     this.#dirty = false;
-    this.#drawnFor = this.#full();
-    const [width, height] = this.#drawnFor.map((side) => Math.max(1, Math.round(side * scale)));
-    if (this.canvas.width !== width) this.canvas.width = width;
-    if (this.canvas.height !== height) this.canvas.height = height;
     this.#pace.start(scale);
     try {
-      this.#drawer.draw(program, { width, height, scale });
+      this.#surface.draw(this.#drawer, program, scale);
     } catch (error) { // shaders are made for what a scene shows
       this.onerror({ kind: "shader", message: error.message });
       return;
@@ -327,21 +324,25 @@ export class Viewer {
     this.#tell("drawn");
   }
 
-  /** Pixels of the screen that the canvas has. */
-  #full() {
-    const box = this.canvas.getBoundingClientRect();
-    if (!box.width || !box.height) return this.size;
-    return [box.width * devicePixelRatio, box.height * devicePixelRatio].map(Math.round);
+  /** Draw in full what rests, a piece at a time if that can be. */
+  #refine() {
+    if (!this.#drawer.pieces) {
+      this.#ask(true);
+      return;
+    }
+    this.#surface.begin(this.#drawer, this.program);
+    this.#pace.pieces(() => {
+      const goesOn = !this.#dirty && !this.playing;
+      if (goesOn && this.#surface.step()) return true;
+      if (goesOn) {
+        this.#surface.show();
+        this.#pace.start(1);
+        this.#tell("drawn");
+      }
+      this.#ask(false);
+      return false;
+    });
   }
-}
-
-/** Give a canvas the aspect of a scene, and where no style gives it a size the one that it has now. */
-function pin(canvas, [width, height]) {
-  canvas.style.aspectRatio = `${width}/${height}`;
-  const before = canvas.getBoundingClientRect();
-  canvas.width *= 2;
-  if (canvas.getBoundingClientRect().width !== before.width) canvas.style.width = `${before.width}px`;
-  canvas.width /= 2;
 }
 
 function defaults(view) {
