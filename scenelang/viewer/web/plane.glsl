@@ -40,17 +40,24 @@ vec4 texel(sampler2D data, int at) {
 
 // ------------------------------------------------------------ the way to the leaf
 
-vec2 local(vec2 p, int at, int steps) {
+/**
+ * A point behind an object's steps.
+ * @param spread radius of a disc around the point, world units; then of one in which the points of that lie
+ */
+vec2 local(vec2 p, int at, int steps, inout float spread) {
   for (int i = 0; i < steps; i++) {
-    vec4 a = texel(rows, at++);
+    vec4 a = texel(rows, at++); // the upper row of a map and 0, or a turn's numbers and its rate
     if (a.w == 0.0) {
       vec4 b = texel(rows, at++);
       p = vec2(dot(a.xy, p) + a.z, dot(b.xy, p) + b.z);
-      SPEND(4);
+      spread *= b.w;
+      SPEND(5);
     } else {
-      vec2 turn = direction(a.x * length(p) + dot(a.yz, p));
+      float radius = length(p);
+      vec2 turn = direction(a.x * radius + dot(a.yz, p));
       p = vec2(dot(p, turn), dot(p, vec2(-turn.y, turn.x)));
-      SPEND(24);
+      spread *= 1.0 + (radius + spread) * a.w;
+      SPEND(26);
     }
     p = clamp(p, -FAR, FAR);
   }
@@ -138,7 +145,7 @@ bool idle(int gate, float narrow, float distance, float state) {
 }
 
 // Of the first objects of a tile what a pixel's middle said: a distance that its samples can do with, too.
-#define KNOWN 16
+#define KNOWN 32
 const float SKIPPED = 3e38; // it changes nothing
 const float OPEN = 2e38; // its outline is near, or a blend needs it exactly
 float known[KNOWN];
@@ -156,27 +163,29 @@ vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
   bool tied = false, doubtful = false, middle = gap > 0.0;
   near = false;
   for (int i = first; i < span.y; i++) {
-    float distance = OPEN;
+    float distance = OPEN, room = 0.0;
     if (!middle && px > 0.0 && i < KNOWN) distance = known[i];
     if (distance == SKIPPED) continue;
     int at = int(texel(lists, span.x + (i >> 2))[i & 3]);
     vec4 a = texel(rows, at);
-    float stretch = a.y, narrow = a.w, room = gap * stretch;
-    int kind = int(a.z), token = kind & 3, steps = kind >> 3, gate = token * (LINES + 2);
-    bool blends = (kind & 4) > 0;
+    float scale = a.x, narrow = a.y;
+    int token = int(a.z), steps = int(a.w), gate = (token & 3) * (LINES + 2);
+    bool blends = token > 3;
+    token &= 3;
     vec4 c = texel(rows, at + 2), own = texel(rows, at + 3);
-    vec2 q;
 
     if (distance == OPEN) {
       // no decoder where the leaf is proved so far away that nothing changes
       vec4 b = texel(rows, at + 1);
-      q = local(p, at + 4, steps);
+      room = gap;
+      vec2 q = local(p, at + 4, steps, room);
+      room *= scale;
       float radius = length(q);
-      float least = a.x * max(max(abs(q.x) - b.x, abs(q.y) - b.y), radius - b.z) - room;
+      float least = own.a * max(max(abs(q.x) - b.x, abs(q.y) - b.y), radius - b.z) - room;
       SPEND(8 + 3 * (LINES + 1));
       bool skipped = least > 0.0 && idle(gate, narrow, least, state);
 #ifndef POINTS
-      skipped = skipped || a.x * (radius - b.w) > room;
+      skipped = skipped || scale * (radius - b.w) > room;
       if (middle && i < KNOWN) known[i] = SKIPPED;
 #endif
       if (skipped) continue;
@@ -190,7 +199,7 @@ vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
 #else
         distance = learned(int(c.x), q);
 #endif
-        distance *= own.a;
+        distance *= scale;
       }
     }
 
@@ -205,7 +214,7 @@ vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
         doubtful = doubtful || (tied && paint > LEAST && paint < 1.0 - LEAST);
 #ifdef PICTURES
         float width = BLEND / narrow;
-        doubtful = doubtful || (px > NARROW * width && margin < width + CORNER * px * (1.0 + stretch));
+        doubtful = doubtful || (px > NARROW * width && margin < width + CORNER * (px + room / NEAR));
 #endif
       } else if (token == UNION) {
         tied = tied || margin < 2.0 * CORNER * px;
@@ -225,7 +234,7 @@ vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
       int count = middle ? 4 : 1;
       for (int k = 0; k < count; k++) {
         vec2 spot = middle ? p + px * OFFSETS[k + 1] : p;
-        own.rgb += painted(local(spot, at + 4, steps), at + int(c.z)) / float(count);
+        own.rgb += painted(local(spot, at + 4, steps, room), at + int(c.z)) / float(count);
       }
     }
 #endif

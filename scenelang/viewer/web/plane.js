@@ -2,7 +2,7 @@
 
 import { floats, linked, target, triangle } from "./gl.js";
 import { distances } from "./grids.js";
-import { discInWorld, reaches, tileLists } from "./ways.js";
+import { rateOf, reaches, steepest, tileLists } from "./ways.js";
 
 const WIDE = 1024; // texels of a row of numbers; as in plane.glsl
 
@@ -63,6 +63,11 @@ function sheet(gl, data, [inner, format, type], channels) {
   return texture;
 }
 
+/** A step as texels: a map's rows, with 0 and its steepness behind; or a turn's numbers and its rate. */
+function texelsOf([kind, a, b, u, c, d, v]) {
+  return kind === "map" ? [a, b, u, 0, c, d, v, steepest(a, b, c, d)] : [a, b, u, rateOf([kind, a, b, u])];
+}
+
 /** Numbers of all rows, and the texel at which each begins; see `rows` of plane.glsl. */
 function packed({ network, materials }, leaves, pictures, { rows }, reach) {
   const [numbers, begins] = [[], []];
@@ -76,14 +81,11 @@ function packed({ network, materials }, leaves, pictures, { rows }, reach) {
     const moves = steps.reduce((total, [kind]) => total + (kind === "map" ? 2 : 1), 0);
     const albedo = materials[row.material].albedo;
     const colour = row.colour.map((share, k) => Math.min(Math.max(share * albedo[k], 0), 1));
-    const kind = row.token + 4 * (i <= lastBlend) + 8 * steps.length;
-    numbers.push(Math.min(far, 1) * scale, discInWorld(steps, 1).stretch, kind, narrow);
+    numbers.push(scale, narrow, row.token + 4 * (i <= lastBlend), steps.length);
     numbers.push(...bounds, Math.min(reach[i], 1e30));
-    numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : 4 + moves, 0, ...colour, scale);
-    for (const [kind, a, b, c, ...rest] of steps) {
-      numbers.push(a, b, c, kind === "map" ? 0 : 1);
-      if (kind === "map") numbers.push(...rest, 0);
-    }
+    numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : 4 + moves, 0);
+    numbers.push(...colour, Math.min(far, 1) * scale);
+    for (const step of steps) numbers.push(...texelsOf(step));
     if (paint < 0) return;
     const [a, b, u, c, d, v] = row.place; // to shares of the picture's sides, from its upper left corner
     numbers.push(a / 2, b / 2, (u + 1) / 2 - Math.floor((u + 1) / 2), 0);
@@ -164,7 +166,7 @@ export function planeDrawer(gl, view) {
     const px = 2 / Math.min(width, height);
     const { reach, widest } = reaches(program.rows, network);
     const { numbers, begins } = packed(view, leaves, pictures, program, reach);
-    const tile = 8 * Math.ceil(Math.min(width, height) / 256); // as many at any size, for JavaScript's time
+    const tile = 8 * Math.ceil(Math.min(width, height) / 400); // few enough for JavaScript
     const lists = define === "POINTS"
       ? { starts: [0, begins.length], objects: begins.map((_, i) => i) }
       : tileLists(program.rows, reach, { width, height, tile, px }, network.draws);

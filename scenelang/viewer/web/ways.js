@@ -9,19 +9,16 @@ function inverse([a, b, u, c, d, v]) {
 }
 
 /** How much farther apart a linear map [a, b, c, d] takes points at most. */
-function steepest(a, b, c, d) {
+export function steepest(a, b, c, d) {
   return 0.5 * (Math.hypot(a + d, c - b) + Math.hypot(a - d, c + b));
 }
 
-const rateOf = ([, twirl, x, y]) => Math.abs(twirl) + Math.hypot(x, y);
+/** How fast a turn's angle changes at most, per distance. */
+export const rateOf = ([, twirl, x, y]) => Math.abs(twirl) + Math.hypot(x, y);
 
-/**
- * The world's box around a leaf's disc, by its centre and half its sides, and how much faster a distance
- * can change than one world unit per world unit.
- */
-export function discInWorld(steps, radius) {
+/** The world's box around a leaf's disc, by its centre and half its sides. */
+function discInWorld(steps, radius) {
   let [a, b, u, c, d, v] = [radius, 0, 0, 0, radius, 0];
-  let stretch = 1;
   for (const step of [...steps].reverse()) {
     if (step[0] === "map") {
       const [e, f, g, h, i, j] = inverse(step.slice(1));
@@ -30,14 +27,13 @@ export function discInWorld(steps, radius) {
       ];
     } else { // a turn keeps the way to the origin, and no more is known
       const most = Math.hypot(u, v) + steepest(a, b, c, d);
-      stretch *= 1 + most * rateOf(step);
       [a, b, u, c, d, v] = [most, 0, 0, 0, most, 0];
     }
   }
-  return { centre: [u, v], half: [Math.hypot(a, b), Math.hypot(c, d)], stretch };
+  return { centre: [u, v], half: [Math.hypot(a, b), Math.hypot(c, d)] };
 }
 
-/** Steps as numbers, eight each: of a map six, 0 and its steepness; of a turn three, at the end 1 and its rate. */
+/** Steps as numbers, eight each: of a map six, 0 and its steepness; of a turn three, then 1 and rate. */
 function flattened(steps) {
   const numbers = new Float64Array(8 * steps.length);
   steps.forEach((step, i) => {
