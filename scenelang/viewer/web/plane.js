@@ -5,6 +5,7 @@ import { distances } from "./grids.js";
 import { rateOf, reaches, steepest, tileLists } from "./ways.js";
 
 const WIDE = 1024; // texels of a row of numbers; as in plane.glsl
+const MOST_AT_ONCE = 2 ** 28; // pairs of an object and a pixel
 
 /** GLSL of a decoder: weights as numbers in the text, which is several times as fast as fetching them. */
 function decoderText(name, { units: [n, m], weights, far }) {
@@ -166,10 +167,10 @@ export function planeDrawer(gl, view) {
     const px = 2 / Math.min(width, height);
     const { reach, widest } = reaches(program.rows, network);
     const { numbers, begins } = packed(view, leaves, pictures, program, reach);
-    const tile = 8 * Math.ceil(Math.min(width, height) / 400); // few enough for JavaScript
+    const wanted = 8 * Math.ceil(Math.min(width, height) / 400); // few enough for JavaScript
     const lists = define === "POINTS"
-      ? { starts: [0, begins.length], objects: begins.map((_, i) => i) }
-      : tileLists(program.rows, reach, { width, height, tile, px }, network.draws);
+      ? { starts: [0, begins.length], objects: [...begins.keys()], tile: height, across: 1, down: 1 }
+      : tileLists(program.rows, reach, { width, height, tile: wanted, px }, network.draws);
     floats(gl, new Float32Array(numbers), WIDE, held.rows);
     floats(gl, listed(lists, begins), WIDE, held.lists);
     textures.forEach((name, unit) => {
@@ -183,11 +184,11 @@ export function planeDrawer(gl, view) {
     gl.uniform1f(place("px"), define === "POINTS" ? 0 : px);
     gl.uniform1f(place("empty"), (network.empty * widest) / network.blend);
     gl.uniform1f(place("widest"), widest);
-    gl.uniform1i(place("tile"), tile);
-    gl.uniform1i(place("across"), Math.ceil(width / tile));
+    gl.uniform1i(place("tile"), lists.tile);
+    gl.uniform1i(place("across"), lists.across);
     gl.viewport(0, 0, width, height);
     gl.disable(gl.BLEND);
-    triangle(gl);
+    bands(gl, lists, width);
   }
 
   /** Numbers (width * height * 4) that a variant of the shader answers. */
@@ -226,6 +227,19 @@ export function planeDrawer(gl, view) {
       programs.clear();
     },
   };
+}
+
+/** Draw rows of tiles, as many at a time as a GPU that shows other windows, too, may be kept with. */
+function bands(gl, { starts, tile, across, down }, width) {
+  gl.enable(gl.SCISSOR_TEST);
+  for (let low = 0, high = 1; low < down; low = high++) {
+    const met = (end) => (starts[across * end] - starts[across * low]) * tile * tile;
+    while (high < down && met(high + 1) < MOST_AT_ONCE) high++;
+    gl.scissor(0, low * tile, width, (high - low) * tile);
+    triangle(gl);
+    if (high < down) gl.flush();
+  }
+  gl.disable(gl.SCISSOR_TEST);
 }
 
 /** Arrays of a kind one after the other, and where each begins. */

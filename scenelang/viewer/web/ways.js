@@ -1,6 +1,8 @@
 // Where objects of the plane lie in the world: how far they reach, and in which tiles of a frame.
 // Steps lead from the world to a leaf; balls are carried the other way, as renderers/frames.py does.
 
+const MOST_PAIRS = 2 ** 22; // of an object and a tile
+
 /** The inverse of a map of six numbers. */
 function inverse([a, b, u, c, d, v]) {
   const det = a * d - b * c;
@@ -88,7 +90,8 @@ export function reaches(rows, { tokens, blend, slack, farther, farthest }) {
  * Which objects each tile of a frame meets, in stream order.
  * @param reach - of the rows, as `reaches` has them
  * @param draws - of a token, whether it draws something where nothing is
- * @returns {{starts: Int32Array, objects: Int32Array}} starts: (tiles + 1), tiles from the lower left corner
+ * @returns {{starts: Int32Array, objects: Int32Array, tile, across, down}} starts: (tiles + 1), tiles from
+ *     the lower left corner; they are larger than `tile` where the lists would be too long
  */
 export function tileLists(rows, reach, { width, height, tile, px }, draws) {
   const [across, down] = [Math.ceil(width / tile), Math.ceil(height / tile)];
@@ -97,8 +100,9 @@ export function tileLists(rows, reach, { width, height, tile, px }, draws) {
   const [left, low] = [-0.5 * width * px, -0.5 * height * px];
   const drawn = new Uint8Array(across * down);
   const [tiles, objects] = [[], []];
-  const most = 2 ** Math.ceil(Math.log2(Math.max(across, down, 1)));
-  rows.forEach(({ steps, token }, object) => {
+  const whole = 2 ** Math.ceil(Math.log2(Math.max(across, down)));
+  for (let object = 0; object < rows.length; object++) {
+    const { steps, token } = rows[object];
     let [x0, x1, y0, y1] = [0, across - 1, 0, down - 1];
     if (reach[object] < Infinity) {
       const { centre: [x, y], half: [w, h] } = discInWorld(steps, reach[object]);
@@ -127,13 +131,16 @@ export function tileLists(rows, reach, { width, height, tile, px }, draws) {
       tiles.push(at);
       objects.push(object);
     };
-    look(0, 0, most);
-  });
+    look(0, 0, whole);
+    if (tiles.length > MOST_PAIRS && whole > 1) {
+      return tileLists(rows, reach, { width, height, tile: 2 * tile, px }, draws);
+    }
+  }
   const starts = new Int32Array(across * down + 1);
   for (const at of tiles) starts[at + 1]++;
   for (let at = 0; at < across * down; at++) starts[at + 1] += starts[at];
   const next = starts.slice();
   const sorted = new Int32Array(objects.length);
   tiles.forEach((at, pair) => { sorted[next[at]++] = objects[pair]; });
-  return { starts, objects: sorted };
+  return { starts, objects: sorted, tile, across, down };
 }
