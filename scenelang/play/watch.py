@@ -55,7 +55,8 @@ async def _tell(play: Play, paths: set[Path]) -> None:
     for page in play.pages:
         for path in paths:
             page.imported(path)
-    await play.refresh()
+    if names or any(path.is_dir() or not path.exists() for path in paths):
+        await play.refresh()
 
 
 async def _reread(play: Play, name: str) -> None:
