@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterable
 from typing import Any, Final
 
+from scenelang.deep import deep_stack
 from scenelang.elements.element import Element
 from scenelang.evaluate.evaluation import Evaluation
 from scenelang.evaluate.file_context import FileContext, Place
@@ -25,7 +26,7 @@ from scenelang.viewer.trees import Writer
 
 _KINDS: Final = {float: "number", Angle: "angle", Time: "time", bool: "bool", str: "string"}
 _WHY: Final = {"canvas": "the canvas hangs on it", "animate": "the length of the animation hangs on it"}
-_LABEL: Final = re.compile(r"[^\n;]*;[ \t]*//[ \t]*([^\n]*)")
+_LABEL: Final = re.compile(r"[ \t)]*;[ \t]*//[ \t]*([^\n]*)")
 
 
 class Form(Record):
@@ -53,13 +54,13 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
         manifest: the model that draws the page.
         elements: those of the Program of that run; they come first among shapes and paints, in their order.
     """
-    writer = Writer(evaluation.context, manifest, elements)
-    lines = writer.file(evaluation.context, evaluation.file, Scope(), imported=False)
-    needed = writer.reached(bound for line in lines if line.bound is None for bound in line.uses)
-    reasons: dict[str, str] = {}
-    for word, uses in writer.lengths.items():
-        reached = writer.reached(uses)
-        reasons |= {name: _WHY[word] for name, _, _, bound in writer.params if id(bound) in reached}
+    writer, reasons = Writer(evaluation.context, manifest, elements), dict[str, str]()
+    with deep_stack():
+        lines = writer.file(evaluation.context, evaluation.file, Scope(), imported=False)
+        needed = writer.reached(bound for line in lines if line.bound is None for bound in line.uses)
+        for word, uses in writer.lengths.items():
+            reached = writer.reached(uses)
+            reasons |= {name: _WHY[word] for name, _, _, bound in writer.params if id(bound) in reached}
     outlines = [manifest.outlines.get(name) for name in manifest.geometries]
     data = {
         "model": manifest.name,
@@ -95,16 +96,22 @@ def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any
         if isinstance(allowed, Vec):
             data["choices"] = _json(allowed)
         elif isinstance(allowed, RangeValue):
-            low, high = allowed.start, allowed.stop
-            data |= {"low": min(low, high), "high": max(low, high)}
-            data |= {"exclusive": True} if allowed.exclusive else {}
-            data |= {"step": allowed.step} if allowed.step is not None else {}
+            data |= _bounds(allowed)
     if isinstance(value, Angle | Time):
         units = (node.unit for node in nodes.walk(stmt.default) if isinstance(node, nodes.Number))
         data["unit"] = next(filter(None, units), "deg" if isinstance(value, Angle) else "s")
-    if label := _LABEL.match(stmt.span.source.text, stmt.default.span.end):
+    if label := _LABEL.match(stmt.span.source.text, (stmt.range or stmt.default).span.end):
         data["label"] = label[1].strip()
     return data
+
+
+def _bounds(allowed: RangeValue) -> dict[str, Any]:
+    """The least and the greatest value; a stepped range may go downwards, and need not reach its end."""
+    if allowed.step is None:
+        bounds = {"low": allowed.start, "high": allowed.stop}
+        return {**bounds, "exclusive": True} if allowed.exclusive else bounds
+    ends = sorted((allowed.start, allowed.at(max(0, allowed.count() - 1))))
+    return {"low": ends[0], "high": ends[1], "step": abs(allowed.step)}
 
 
 def _kind(value: Any, default: nodes.Expr) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Iterable
 from pathlib import Path
@@ -113,6 +114,29 @@ def test_what_would_be_a_mistake_is_refused_in_words(
     assert why in str(answer)
     assert isinstance(before, dict)
     assert before == after  # a run that ends early leaves nothing behind
+
+
+@pytest.mark.parametrize(
+    ("written", "data"),
+    [
+        ("0.6 in 0..1;  // how far ", {"low": 0, "high": 1, "label": "how far"}),
+        ("1 in 0..<4", {"low": 0, "high": 4, "exclusive": True}),
+        ("1 in 0..<4 step 1", {"low": 0, "high": 3, "step": 1}),
+        ("7 in 10..0 step -3", {"low": 1, "high": 10, "step": 3}),
+        ("0.3 in 0..1 step 0.3", {"low": 0, "high": pytest.approx(0.9), "step": 0.3}),
+        ("0.25turn in 0deg..180deg", {"kind": "angle", "unit": "turn", "high": pytest.approx(math.pi)}),
+        ("40ms in 0s..1s", {"kind": "time", "unit": "ms", "value": 0.04, "high": 1}),
+        ('"a" in ["a", "b;"];  // which', {"kind": "string", "choices": ["a", "b;"], "label": "which"}),
+        ("rgb(1, 0, 0.5)", {"kind": "color", "value": [1, 0, 0.5]}),
+        ("[[1, 2], [3]]", {"kind": "vector", "value": [[1, 2], [3]]}),
+        ("true", {"kind": "bool", "value": True}),
+    ],
+)
+def test_params_tell_what_a_page_has_to_know(written: str, data: dict[str, Any]) -> None:
+    end = "" if ";  //" in written else ";"
+    text = f"param p = {written}{end}\nlet used = p; let v = [used]; square {{ scale(len(v)); }}"
+    (param,) = compiled(SourceFile("", text)).form().params
+    assert param == {**param, **data}
 
 
 def test_names_of_params_mean_nothing_to_the_page(viewer_page: Any) -> None:

@@ -1,4 +1,4 @@
-// Conservative boxes around leaves, and streams of rows with what boxes prove of them: `spaces.py`, `solid.py`
+// Conservative boxes around leaves, and streams of rows with what boxes prove: `spaces.py`, `solid.py`
 // and `stream.py` of `scenelang/graph` have the proofs. A box is [xmin, xmax, ymin, ymax, zmin, zmax].
 
 import { IDENTITY, composedMap, mappedPoint, stretchesOf } from "./maps.js";

@@ -1,6 +1,6 @@
 // Chains of steps from a leaf into the world, nearest the leaf first, and their normal form: deformations as
 // near to the leaf, and as few steps, as may be. A step is {rows} of a map, {twirl, x, y} of a turn about z
-// by twirl |p| + x p.x + y p.y, {twist} of one about y by twist p.y, or {amount, frequency} of a displacement.
+// by twirl |p| + x p.x + y p.y, {twist} of one about y by twist p.y, {amount, frequency} of a displacement.
 
 import { refuse } from "./values.js";
 import { IDENTITY, composedMap, idleMap, invertedMap, mild, stretchesOf, usableMap } from "./maps.js";
