@@ -87,6 +87,27 @@ def test_completion_hover_and_arguments_know_the_language(page: Page) -> None:
     page.page.locator(".cm-tooltip-hover .markdown", has_text="in 0..1").wait_for()
 
 
+def test_keys_do_what_they_do_in_editors(page: Page) -> None:
+    page.click_text("background")
+    keyboard = page.page.keyboard
+    keyboard.type("\ngroup {\nsphere {\n")
+    lines = page.page.locator(".cm-line").all_inner_texts()
+    assert lines[4:9] == ["group {", "  sphere {", "    ", "  }", "}"], (
+        "brackets close, and what is in them is indented"
+    )
+    keyboard.press("Control+/")
+    page.has("    // ")
+    for _ in range(40):
+        keyboard.press("Control+z")
+    assert page.text() == SCENE
+    page.click_text("param", "Home")
+    keyboard.press("Control+/")
+    page.has("// param r")
+    keyboard.press("Control+f")
+    page.page.locator(".cm-search input[name=search]").press_sequentially("ff0000")
+    page.page.locator(".cm-searchMatch", has_text="ff0000").wait_for()
+
+
 def test_a_slider_is_drawn_by_the_shader_and_then_by_the_network(page: Page) -> None:
     before = page.picture()
     page.page.locator("#controls input[type=range]").fill("0.9")

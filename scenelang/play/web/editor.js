@@ -49,7 +49,7 @@ export function makeEditor(parent, { nonce, onchange, onsave, extensions }) {
     lineNumbers(), highlightActiveLineGutter(), highlightSpecialChars({ addSpecialChars: BIDI }), history(),
     drawSelection(), dropCursor(), EditorState.allowMultipleSelections.of(true), indentOnInput(), indentUnit.of("  "),
     bracketMatching(), closeBrackets(), rectangularSelection(), crosshairCursor(), highlightActiveLine(),
-    highlightSelectionMatches(), lintGutter(), search({ top: true }), scenelang, theme, extensions,
+    highlightSelectionMatches(), lintGutter(), search({ top: true }), EditorView.lineWrapping, scenelang, theme, extensions,
     EditorView.contentAttributes.of({ "aria-label": "scene", spellcheck: "false" }),
     keymap.of([
       { key: "Mod-s", preventDefault: true, run: () => (onsave(), true) },

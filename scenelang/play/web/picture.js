@@ -280,7 +280,7 @@ export function makePicture(at, { send, oncamera }) {
       faulty = view === null && errors > 0;
       if (faulty) {
         const count = `${errors} ${errors === 1 ? "mistake" : "mistakes"}`;
-        const isOf = at.still.dataset.version || isLive() ? "The last picture without mistakes" : "No picture";
+        const isOf = at.stage.dataset.shows === "none" ? "No picture" : "The last picture without mistakes";
         note(`${isOf}: the text has ${count}`);
         return;
       }
