@@ -29,7 +29,7 @@ FILES: Final = {
     "nsg": "text/plain",
 }
 KEEP_S: Final = 0.5  # between two keepings of an unsaved text
-MOST_WAITING: Final = 1000  # messages for a page that does not read
+MOST_WAITING: Final = 1 << 26  # characters for a page that does not read
 MOST_OPEN: Final = 100
 
 
@@ -52,7 +52,9 @@ class Live:
     def __init__(self, play: Play, socket: WebSocket) -> None:
         self._play, self._socket = play, socket
         self.open: dict[str, Open] = {}
-        self._out: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
+        self._out: asyncio.Queue[str] = asyncio.Queue()
+        self._waiting = 0  # characters of what is to be sent
+        self._over = asyncio.Event()
         self._jobs = Jobs(self.tell)
 
     @property
@@ -63,15 +65,14 @@ class Live:
     async def run(self) -> None:
         """Answer the page until it is gone."""
         await self._socket.accept()
-        writes = asyncio.create_task(self._write())
-        reads = asyncio.create_task(self._read())
+        tasks = [asyncio.create_task(work) for work in (self._write(), self._read(), self._over.wait())]
         try:
             self.tell(await self._play.files())
-            await asyncio.wait([reads, writes], return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            reads.cancel()
-            writes.cancel()
             self._jobs.close()
+            for task in tasks:
+                task.cancel()
             for name in list(self.open):
                 self._keep(name)
             with contextlib.suppress(RuntimeError, WebSocketDisconnect):
@@ -79,33 +80,39 @@ class Live:
 
     def tell(self, message: Json | str) -> None:
         """Send a message as soon as those before are sent; a page that does not read is given up."""
-        try:
-            self._out.put_nowait(message if isinstance(message, str) else json.dumps(message))
-        except asyncio.QueueFull:
-            self._jobs.close()
-            while not self._out.empty():
-                self._out.get_nowait()
-            self._out.put_nowait("")
+        text = message if isinstance(message, str) else json.dumps(message)
+        self._waiting += len(text)
+        if self._waiting > MOST_WAITING:
+            self._over.set()
+        else:
+            self._out.put_nowait(text)
 
     async def _write(self) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-            while text := await self._out.get():
+            while True:
+                text = await self._out.get()
                 await self._socket.send_text(text)
+                self._waiting -= len(text)
 
     async def _read(self) -> None:
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError, KeyError):  # KeyError: bytes, not text
-            while True:
+        while True:
+            try:
                 text = await self._socket.receive_text()
-                await asyncio.sleep(0)  # whatever is to be sent goes first, though there may be more to read
-                message: Json = {}
-                try:
-                    given = read_json(text.encode("utf-8"))
-                    message = given if isinstance(given, dict) else {}
-                    await self._answer(message)
-                except (Refused, OSError) as error:
-                    self._trouble(message, str(error))
-                except (ValueError, TypeError, KeyError, RecursionError) as error:
-                    self._trouble(message, f"not a message: {error}")
+            except (WebSocketDisconnect, RuntimeError, KeyError):  # KeyError: bytes, not text
+                return
+            await asyncio.sleep(0)  # whatever is to be sent goes first, though there may be more to read
+            message: Json = {}
+            try:
+                given = read_json(text.encode("utf-8"))
+                message = given if isinstance(given, dict) else {}
+                await self._answer(message)
+            except (Refused, OSError) as error:
+                self._trouble(message, str(error))
+            except (ValueError, RecursionError) as error:
+                self._trouble(message, f"not a message: {error}")
+            except Exception as error:
+                log.exception("internal error")
+                self._trouble(message, f"internal error: {error!r}")
 
     def _trouble(self, message: Json, why: str) -> None:
         id, file = message.get("id"), message.get("file")

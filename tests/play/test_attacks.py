@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+from pathlib import Path
 from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosed
 
+from scenelang.play.folder import Folder
+from scenelang.play.journal import Journal
+from scenelang.play.live import Live
+from scenelang.play.shared import Play
 from tests.play.client import Page, Server
 from tests.play.conftest import SQUARE
 
@@ -83,6 +89,40 @@ def test_halves_of_characters_and_large_texts_are_refused(page: Page) -> None:
     for text in ("\ud800", "x" * 10_000_001):
         page.say("edit", file="b.nsg", version=1, text=text)
         page.until("error", file="b.nsg")
+
+
+def test_who_does_not_listen_is_given_up() -> None:
+    """What is said to a page that reads nothing is bounded; it is let go, and others are not."""
+
+    class Deaf:
+        def __init__(self) -> None:
+            self.sent, self.closed = 0, False
+
+        async def accept(self) -> None:
+            pass
+
+        async def receive_text(self) -> str:
+            return await asyncio.get_running_loop().create_future()
+
+        async def send_text(self, text: str) -> None:
+            self.sent += 1
+            await asyncio.get_running_loop().create_future()
+
+        async def close(self) -> None:
+            self.closed = True
+
+    async def run(tmp: Path) -> Deaf:
+        socket = Deaf()
+        live = Live(Play(Folder(tmp), journal=Journal(tmp)), socket)  # type: ignore[arg-type]
+        running = asyncio.create_task(live.run())
+        async with asyncio.timeout(60):
+            while not running.done():
+                live.tell("x" * (1 << 22))
+                await asyncio.sleep(0)
+        return socket
+
+    deaf = asyncio.run(run(Path(__file__).parent))
+    assert (deaf.sent, deaf.closed) == (1, True)
 
 
 def test_an_oversized_message_ends_its_page_alone(server: Server, page: Page) -> None:
