@@ -207,6 +207,7 @@ export class Viewer {
     cancelAnimationFrame(this.#request);
     this.#request = -1; // never again
     this.#pace.stop();
+    this.#surface.drop();
     for (const observer of this.#observers) observer.disconnect();
     this.canvas.removeEventListener("webglcontextlost", this);
     this.canvas.removeEventListener("webglcontextrestored", this);
@@ -326,10 +327,7 @@ export class Viewer {
 
   /** Draw in full what rests, a piece at a time if that can be. */
   #refine() {
-    if (!this.#drawer.pieces) {
-      this.#ask(true);
-      return;
-    }
+    if (!this.#drawer.pieces) return void this.#ask(true);
     this.#surface.begin(this.#drawer, this.program);
     this.#pace.pieces(() => {
       const goesOn = !this.#dirty && !this.playing;
