@@ -5,7 +5,9 @@
     note.textContent = `A still picture: ${why}.`;
     note.hidden = false;
   };
-  addEventListener("error", () => still("this browser does not run the page"));
+  for (const trouble of ["error", "unhandledrejection"]) {
+    addEventListener(trouble, () => still("this browser does not run the page"));
+  }
   if (!self.DecompressionStream) {
     still("this browser cannot unpack the page");
     return;

@@ -219,6 +219,7 @@ export class Viewer {
     if (event.type === "webglcontextlost") {
       event.preventDefault(); // or it would not come back
       this.#pace.stop();
+      this.#surface.drop();
       this.onerror({ kind: "lost", message: "the graphics card was taken away for a moment" });
       return;
     }
