@@ -3,7 +3,7 @@ export {
   EditorView, keymap, hoverTooltip, showTooltip, lineNumbers, highlightActiveLine, highlightActiveLineGutter,
   highlightSpecialChars, drawSelection, dropCursor, rectangularSelection, crosshairCursor,
 } from "@codemirror/view";
-export { EditorState, StateEffect, StateField, Annotation, Text } from "@codemirror/state";
+export { EditorState, StateEffect, StateField, Text } from "@codemirror/state";
 export {
   StreamLanguage, HighlightStyle, syntaxHighlighting, bracketMatching, indentOnInput, indentUnit,
 } from "@codemirror/language";

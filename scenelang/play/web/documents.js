@@ -1,6 +1,5 @@
 // The open files: their texts here, in the editor, with the server and on the disk, kept in step.
 import { Text } from "./codemirror.js";
-import { elsewhere } from "./editor.js";
 
 const SEND_MS = 15;  // edits that come faster go together
 const KEEP_MS = 400;  // how long after an edit its text is kept in this browser too
@@ -79,14 +78,14 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
   function show(document) {
     if (current && current !== document) current.state = editor.view.state;
     current = document;
-    editor.view.setState(document.state);
+    editor.show(document.state);
     onshow(document);
     onstate();
   }
 
   /** Make a document's text another one, shown or not. */
   function replace(document, text) {
-    if (document === current) editor.replace(text, "server");
+    if (document === current) editor.replace(text);
     else {
       document.state = editor.state(text);
       document.version += 1;
@@ -197,7 +196,7 @@ export function makeDocuments({ editor, server, send, bars, onshow, onsent, onst
       sendSoon(current);
       server.change(current.uri, update.startState.doc, update.changes, update.state.doc);
       keepSoon(current);
-      onstate(update.transactions.some((transaction) => transaction.annotation(elsewhere)));
+      onstate();
     },
     ontext(message) {
       const document = documents.get(message.file);

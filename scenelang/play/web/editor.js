@@ -1,6 +1,6 @@
 // The editor: one view, a state for each text.
 import {
-  Annotation, bracketMatching, closeBrackets, closeBracketsKeymap, completionKeymap, crosshairCursor, defaultKeymap,
+  bracketMatching, closeBrackets, closeBracketsKeymap, completionKeymap, crosshairCursor, defaultKeymap,
   drawSelection, dropCursor, EditorState, EditorView, highlightActiveLine, highlightActiveLineGutter,
   highlightSelectionMatches, highlightSpecialChars, history, historyKeymap, indentOnInput, indentUnit, isolateHistory,
   indentWithTab, keymap, lineNumbers, lintGutter, lintKeymap, rectangularSelection, searchKeymap, search,
@@ -9,9 +9,6 @@ import { scenelang } from "./language.js";
 import { difference } from "./statements.js";
 
 const BIDI = /[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g;
-
-/** Marks a change that came from elsewhere than the keyboard: the disk, a journal. */
-export const elsewhere = Annotation.define();
 
 const theme = EditorView.theme({
   "&": { height: "100%", color: "var(--ink)", backgroundColor: "var(--paper)", fontSize: "13.5px" },
@@ -63,15 +60,20 @@ export function makeEditor(parent, { nonce, onchange, onsave, extensions }) {
     view,
     /** A state for a text. */
     state,
-    /** Change the shown text in one step of undo; `from` says where a change from elsewhere is from. */
-    change(changes, from = null) {
-      const annotations = [isolateHistory.of("full"), ...(from ? [elsewhere.of(from)] : [])];
-      view.dispatch({ changes, annotations, userEvent: "input.made" });
+    /** Show a state, with its cursor in sight. */
+    show(next) {
+      view.setState(next);
+      view.dispatch({ effects: EditorView.scrollIntoView(next.selection.main.head) });
+    },
+    /** Change the shown text in one step of undo, and show where, unless it is not to move. */
+    change(changes, moves = true) {
+      const effects = moves ? EditorView.scrollIntoView(changes.from) : [];
+      view.dispatch({ changes, effects, annotations: isolateHistory.of("full"), userEvent: "input.made" });
     },
     /** Make the shown text another one, with cursors where they are as far as that goes. */
-    replace(text, from) {
+    replace(text) {
       const before = view.state.doc.toString();
-      if (before !== text) this.change(difference(before, text), from);
+      if (before !== text) this.change(difference(before, text), false);
     },
     /** Put the cursor somewhere, in sight. */
     go(offset) {
