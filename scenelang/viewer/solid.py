@@ -1,9 +1,8 @@
 """The solid network for the page's shader: its layers as GLSL, its numbers as one array.
 
 Each shape's decoder and each token's cell is prepared here, as a renderer would: weights linear in a code,
-gains behind their exponential. What the scene decides, its rows, is the page's (``web/solid.js``). The other
-half of the shader, the same for every network, is ``web/solid.glsl`` (the field and the way along rays) and
-``web/light.glsl``.
+gains behind their exponential. What the scene decides, its rows, is the page's (``web/solid.js``). The rest of
+the shader, the same for every network, are the files of `FILES`.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ from scenelang.renderers.solid.passes import SLACK
 from scenelang.viewer.script import web
 from scenelang.viewer.store import Store
 
+FILES: Final = ("solid.glsl", "rays.glsl", "look.glsl", "light.glsl")  # of ``web/``, one behind the other
 _CONSTANTS: Final = {
     "EMPTY": EMPTY,
     "RADIUS": RADIUS,
@@ -46,7 +46,7 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     ]
     parts += [_decoders(decoders, sloped=False), _decoders(decoders, sloped=True), _gates(paint, kind)]
     return {
-        "shader": {"source": web("solid.glsl").replace("//network//", "\n".join(parts)) + web("light.glsl")},
+        "shader": {"source": "".join(map(web, FILES)).replace("//network//", "\n".join(parts))},
         "network": {
             "cells": store.add(cells.astype(np.float32).reshape(-1)),
             "boxes": store.add(

@@ -7,6 +7,11 @@ void main() {
 
 /** A linked program that draws a triangle over everything; throws an Error with the compiler's log. */
 export function linked(gl, fragment, vertex = CORNERS) {
+  return checkedProgram(gl, linking(gl, fragment, vertex));
+}
+
+/** The same while it is still compiled, so that several are at a time. */
+export function linking(gl, fragment, vertex = CORNERS) {
   const program = gl.createProgram();
   for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
     const shader = gl.createShader(kind);
@@ -16,6 +21,11 @@ export function linked(gl, fragment, vertex = CORNERS) {
     gl.deleteShader(shader);
   }
   gl.linkProgram(program);
+  return program;
+}
+
+/** A program of `linking` once it is done; throws an Error with the compiler's log. */
+export function checkedProgram(gl, program) {
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
     const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
     const log = [...logs, gl.getProgramInfoLog(program)].join("\n").trim();

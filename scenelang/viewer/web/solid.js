@@ -1,6 +1,6 @@
 // Draws solids: rows and light to pictures, by the shader of `solid.glsl` and `light.glsl`.
 
-import { floats, linked, triangle, unfiltered } from "./gl.js";
+import { checkedProgram, floats, linking, triangle, unfiltered } from "./gl.js";
 import { solidElements } from "./elements.js";
 import { cellsOf, cubeOf, listsOf, solidBalls } from "./balls.js";
 
@@ -115,7 +115,8 @@ function dropScreens(gl, { framebuffer, textures }) {
 export function solidDrawer(gl, view) {
   const { network } = view, shaders = new Map(), table = gl.createTexture(), lists = gl.createTexture();
   const elements = solidElements(gl, view);
-  let first = null, ready = {};
+  const features = new Set(); // and slots only grow, so that frames of an animation share a shader
+  let slots = 8, first = null, ready = {};
 
   const boxOf = (row) => {
     if (row.shape >= network.geometries) return elements.grids[row.shape].box;
@@ -123,19 +124,24 @@ export function solidDrawer(gl, view) {
     return [numbers.slice(0, 3), numbers.slice(3)];
   };
 
-  /** The shader with some defines, compiled once. */
+  /** The shader for what is known and some defines more, compiled once; it may be under way yet. */
   const shaderOf = (names) => {
-    const key = names.join();
+    const all = [...features, `SLOTS=${slots}`, ...names], key = all.join();
     if (!shaders.has(key)) {
-      const defines = names.map((name) => `#define ${name}\n`.replace("=", " ")).join("");
-      const program = linked(gl, `#version 300 es\n${defines}${view.shader.source}`);
-      const places = new Map();
-      shaders.set(key, { program, at(name) {
-        if (!places.has(name)) places.set(name, gl.getUniformLocation(program, name));
-        return places.get(name);
-      } });
+      const defines = all.map((name) => `#define ${name}\n`.replace("=", " ")).join("");
+      shaders.set(key, { program: linking(gl, `#version 300 es\n${defines}${view.shader.source}`), places: null });
     }
     return shaders.get(key);
+  };
+
+  /** A shader in use, and a function from names of its uniforms to where these are. */
+  const begin = (shader) => {
+    shader.places ??= checkedProgram(gl, shader.program) && new Map();
+    gl.useProgram(shader.program);
+    return (name) => {
+      if (!shader.places.has(name)) shader.places.set(name, gl.getUniformLocation(shader.program, name));
+      return shader.places.get(name);
+    };
   };
 
   /** Take rows in, and cells for a picture of a size. */
@@ -149,17 +155,16 @@ export function solidDrawer(gl, view) {
     const { data, longest } = listsOf(rows, balls, [seen, ...cubeOf(stage.light, CUBE_SIDE)]);
     wholes(gl, data, lists);
     floats(gl, tableOf(view, rows, balls, elements), 1024, table);
-    const slots = `SLOTS=${Math.min(MOST_SLOTS, Math.max(8, 8 * Math.ceil(longest / 8)))}`;
+    for (const name of featuresOf(view, rows, balls)) features.add(name);
+    while (slots < Math.min(MOST_SLOTS, longest)) slots *= 2;
     ready = {
-      program, width, height, features: [...featuresOf(view, rows, balls), slots],
-      cells: [TILE_SIDE, tiles[0], 1 + seen.count, CUBE_SIDE], pixel, near,
+      program, width, height, pixel, near, cells: [TILE_SIDE, tiles[0], 1 + seen.count, CUBE_SIDE],
     };
   };
 
   /** Begin to draw by a shader. */
   const use = (names, textures = {}) => {
-    const { stage } = ready.program, { program, at } = shaderOf([...ready.features, ...names]);
-    gl.useProgram(program);
+    const { stage } = ready.program, at = begin(shaderOf(names));
     Object.entries({ table, lists, ...elements.textures, ...textures }).forEach(([name, texture], unit) => {
       const space = name === "grids" || name === "colours";
       gl.activeTexture(gl.TEXTURE0 + unit);
@@ -202,6 +207,8 @@ export function solidDrawer(gl, view) {
       if (first) dropScreens(gl, first);
       first = { ...screens(gl, width, height, [format, gl.RGBA8]), format };
     }
+    shaderOf(names);
+    shaderOf([...names, "FOUR"]);
     gl.bindFramebuffer(gl.FRAMEBUFFER, first.framebuffer);
     use(names);
     yield* bands();

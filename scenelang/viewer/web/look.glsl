@@ -1,0 +1,129 @@
+
+// What is at a point: distance, kind, colours, gradient. Colours are linear.
+
+#ifdef TEXTURES
+uniform sampler2D pictures;
+uniform usampler3D colours;
+#endif
+
+// Colour, the same with plain colours in place of textures', gradient of the distance.
+vec3 seen, even, slope;
+bool worn; // whether there is a texture
+
+#ifdef TEXTURES
+vec3 hued(vec3 rgb, float turns) {
+  float value = max(rgb.r, max(rgb.g, rgb.b)), least = min(rgb.r, min(rgb.g, rgb.b)), chroma = value - least;
+  float sixth = 1.0 / max(chroma, 1e-12);
+  float hue = value == rgb.r ? (rgb.g - rgb.b) * sixth
+    : value == rgb.g ? (rgb.b - rgb.r) * sixth + 2.0 : (rgb.r - rgb.g) * sixth + 4.0;
+  hue = fract(hue / 6.0 + turns) * 6.0;
+  return least + chroma * clamp(vec3(abs(hue - 3.0) - 1.0, 2.0 - abs(hue - 2.0), 2.0 - abs(hue - 4.0)), 0.0, 1.0);
+}
+
+vec3 texel(ivec3 at) {
+  return vec3(texelFetch(colours, at, 0).rgb) / 65535.0;
+}
+
+// The colour that a row's texture has at a point of the leaf.
+vec3 textured(int row, vec4 paint, vec3 q) {
+  vec4 u = part(row, PLACE), v = part(row, PLACE + 1), size = part(row, GRID);
+  vec3 rgb;
+  if (paint.x < 1.5) {
+    vec2 sides = size.zw, place = vec2(dot(u.xyz, vec3(q.xy, 1.0)), dot(v.xyz, vec3(q.xy, 1.0)));
+    place = fract(place) * sides - 0.5;
+    vec2 cell = floor(place), share = place - cell;
+    ivec2 a = ivec2(mod(cell, sides)), b = ivec2(mod(cell + 1.0, sides)), top = ivec2(0, int(u.w));
+    vec3 low = mix(texelFetch(pictures, a + top, 0).rgb, texelFetch(pictures, ivec2(b.x, a.y) + top, 0).rgb, share.x);
+    vec3 high = mix(texelFetch(pictures, ivec2(a.x, b.y) + top, 0).rgb, texelFetch(pictures, b + top, 0).rgb, share.x);
+    rgb = mix(low, high, share.y);
+  } else {
+    vec3 place = (clamp(q, -1.0, 1.0) + 1.0) * (0.5 * (size.z - 1.0));
+    vec3 cell = clamp(floor(place), 0.0, size.z - 2.0), share = place - cell;
+    ivec3 at = ivec3(cell.zyx) + ivec3(0, 0, int(u.w));
+    rgb = vec3(0.0);
+    for (int i = zero; i < 8; i++) {
+      ivec3 off = ivec3(i & 1, i >> 1 & 1, i >> 2);
+      vec3 part_ = mix(1.0 - share.zyx, share.zyx, vec3(off));
+      rgb += part_.x * part_.y * part_.z * texel(at + off);
+    }
+  }
+  for (int i = zero; i < int(paint.z); i++) {
+    vec4 op = part(int(paint.y), i);
+    if (op.x < 0.5) rgb *= op.yzw;
+    else if (op.x < 1.5) rgb = mix(rgb, vec3(dot(rgb, vec3(0.2126, 0.7152, 0.0722))), op.y);
+    else rgb = hued(rgb, op.y);
+    rgb = clamp(rgb, 0.0, 1.0);
+  }
+  return rgb;
+}
+#endif
+
+// Let a point a little off another one, p, meet the objects of a list in whose balls that is.
+void look(ivec2 list, vec3 p, vec3 off) {
+  bool touched = false;
+  worn = false;
+  state = EMPTY;
+  dense = 0.0;
+  seen = even = slope = vec3(0.0);
+  for (int i = list.y - 1; i >= zero; i--) {
+    int row = listed(list.x + i);
+    vec4 head = part(row, HEAD);
+    vec3 q = mapped(row, 0, p), g;
+    int token = int(head.x);
+    if (dot(q, q) > part(row, LOW).w) {
+#ifdef OTHERS
+      if (token == INTERSECT) { // nothing is left of what came before
+        touched = worn = false;
+        state = EMPTY;
+        dense = 0.0;
+        seen = even = slope = vec3(0.0);
+      }
+#endif
+      continue;
+    }
+#ifdef OTHERS
+    if (token >= SUBTRACT && !touched) continue;
+#endif
+    touched = true;
+    mat3 way = transpose(mat3(part(row, 0).xyz, part(row, 1).xyz, part(row, 2).xyz));
+    q += way * off;
+#ifdef TURNS
+    q = turned(part(row, MORE), q, way);
+#endif
+    float d = leaf(row, head, q, g) * head.z, before = state;
+    g = g * way * head.z;
+    int at = token * CELL;
+    float own = d * head.w, past = before * head.w;
+    float take = taking(at, own, past), keep = 1.0 - take;
+    vec4 made = cells[at], line = cells[at + 1] * head.w;
+    float bump = made.y / head.w;
+    state = take * (d * made.x - keep * bump) + keep * before;
+    float rate = take > 0.0 && take < 1.0 ? d * made.x - before - (1.0 - 2.0 * take) * bump : 0.0;
+    slope = (take * made.x + rate * line.x) * g + (keep + rate * line.y) * slope;
+    vec4 own_ = part(row, LOOK);
+    float gate = painting(at, own, past);
+    dense += kind(at, own, past) * (own_.w - dense);
+#ifdef TEXTURES
+    vec4 paint = part(row, PAINT);
+    vec3 plain = own_.rgb;
+    if (paint.x > 0.5) {
+      worn = true;
+      plain = 0.4 + 0.6 * fract(vec3(0.618034, 0.754878, 0.569840) * float(row + 1));
+      own_.rgb = textured(row, paint, q);
+    }
+    even += gate * (plain - even);
+#endif
+    seen += gate * (own_.rgb - seen);
+  }
+#ifndef TEXTURES
+  even = seen;
+#endif
+}
+
+void look(ivec2 list, vec3 p) {
+  look(list, p, vec3(0.0));
+}
+
+ivec2 cell(int at) {
+  return ivec2(listed(2 * at), listed(2 * at + 1));
+}

@@ -1,0 +1,205 @@
+
+// Rays: the balls that one passes, and the way along it.
+
+const float TOUCH = 1e-5; // world units: so near counts as met
+const float GAP = 0.009; // by which steps may go beyond what is certain
+const int STEPS = 800; // of a ray
+const int WINDOWS = 16; // of a ray that passes more balls than it keeps
+const int HALVINGS = 16; // of the way on which a medium gives way to a solid
+
+vec3 rayFrom, rayWay;
+vec4 slots[SLOTS]; // the balls that a ray passes: row, -1 less it of one that does not draw; begin, end, rate
+int slotCount;
+
+// Let a point of the ray meet the objects in whose balls it is.
+void meet(float t) {
+  state = EMPTY;
+  dense = 0.0;
+  change = EMPTY;
+  bool touched = false;
+  vec3 p = rayFrom + t * rayWay;
+  for (int i = slotCount - 1; i >= zero; i--) {
+    vec4 slot = slots[i];
+    if (t < slot.y || t > slot.z) continue;
+    int row = int(slot.x);
+#ifdef OTHERS
+    if (row < 0) {
+      if (!touched) continue;
+      row = -1 - row;
+    }
+#endif
+    touched = true;
+    vec4 head = part(row, HEAD);
+    vec3 q = mapped(row, 0, p);
+#ifdef TURNS
+    q = turned(part(row, MORE), q);
+#endif
+    float d = leaf(row, head, q) * head.z, before = state;
+    int at = int(head.x) * CELL;
+    float take = taking(at, d * head.w, before * head.w), keep = 1.0 - take;
+    vec4 made = cells[at];
+    state = take * (d * made.x - keep * made.y / head.w) + keep * before;
+#ifdef MIXED
+    float medium = part(row, LOOK).w, gap = abs(d);
+    if (int(head.x) == 1) gap = min(gap, abs(before - d) / 2.0);
+    if (abs(dense - medium) > 0.5) change = min(change, gap);
+    dense += kind(at, d * head.w, before * head.w) * (medium - dense);
+#endif
+  }
+  change = min(change, abs(state));
+}
+
+// Keep the balls of a list that the ray passes between low and high; returns up to where these are all.
+float gather(ivec2 list, float low, float high) {
+  float sure = high;
+  slotCount = 0;
+  for (int i = zero; i < list.y; i++) {
+    int row = listed(list.x + i);
+    vec4 around = part(row, AROUND);
+    vec3 to = around.xyz - rayFrom, aside = to - dot(to, rayWay) * rayWay;
+    float begin = NEVER, end = -NEVER, rate = 0.0;
+    if (dot(aside, aside) <= around.w) {
+      vec4 x = part(row, 0), y = part(row, 1), z = part(row, 2), p = vec4(rayFrom, 1.0);
+      vec3 from = vec3(dot(x, p), dot(y, p), dot(z, p));
+      vec3 way = vec3(dot(x.xyz, rayWay), dot(y.xyz, rayWay), dot(z.xyz, rayWay));
+      vec4 least = part(row, LOW), most = part(row, HIGH);
+      float square = dot(way, way), middle = -dot(from, way) / square;
+      vec3 closest = from + middle * way;
+      float left = least.w - dot(closest, closest);
+      if (left > 0.0) {
+        float wide = sqrt(left / square);
+        vec3 a = (least.xyz - from) / way, b = (most.xyz - from) / way, first = min(a, b), last = max(a, b);
+        begin = max(max(middle - wide, low), max(first.x, max(first.y, first.z)));
+        end = min(min(middle + wide, high), min(last.x, min(last.y, last.z)));
+        rate = most.w * sqrt(square);
+      }
+    }
+    bool some = begin <= end;
+#ifdef OTHERS
+    int token = int(part(row, HEAD).x);
+    if (token == INTERSECT) { // outside its ball nothing is left of what came before
+      low = some ? begin : NEVER;
+      high = some ? end : -NEVER;
+    }
+    float name = float(token < SUBTRACT ? row : -1 - row);
+#else
+    float name = float(row);
+#endif
+    if (!some || begin > sure) continue;
+    if (slotCount == SLOTS) { // the farthest has to wait
+      int far = 0;
+      for (int j = zero; j < SLOTS; j++) if (slots[j].y > slots[far].y) far = j;
+      sure = min(sure, max(begin, slots[far].y));
+      if (begin >= slots[far].y) continue;
+      for (int j = far; j < SLOTS - 1; j++) slots[j] = slots[j + 1];
+      slotCount--;
+    }
+    slots[slotCount++] = vec4(name, begin, end, rate);
+  }
+  return sure;
+}
+
+// What a ray met: how far the first surface is, the way in media before it, whether one of these ends there.
+float hit, fog;
+bool soft;
+#ifdef MEDIA
+const int PIECES = 12;
+vec2 pieces[PIECES]; // ways through media
+int pieceCount;
+bool seeing; // whether the ray is the eye's
+
+void close(float begin, float end) {
+  end = max(begin, end);
+  if (seeing && pieceCount < PIECES) pieces[pieceCount++] = vec2(begin, end);
+  fog += end - begin;
+}
+#endif
+
+// Follow a ray: how far nothing can change, and up to GAP farther where the last distances let expect a surface.
+void march(ivec2 list, vec3 from, vec3 way, float limit) {
+  rayFrom = from;
+  rayWay = way;
+  hit = NEVER;
+  fog = 0.0;
+  soft = false;
+  float t = -1.0, next = -1.0, past = -1.0, before = 0.0, low = 0.0, since = 0.0;
+  bool within = false;
+  int steps = 0;
+  for (int window = zero; window < WINDOWS; window++) {
+    float sure = gather(list, low, limit), until = -2.0, pace = 1.0;
+    for (; steps < STEPS; steps++) {
+      if (next > until) { // other objects are met
+        float to = NEVER;
+        for (int i = zero; i < slotCount; i++) {
+          vec4 slot = slots[i];
+          float at = slot.y > t ? slot.y : next;
+          if (within && slot.z > t) at = min(at, slot.z);
+          if (slot.x >= 0.0 && at <= slot.z) to = min(to, at);
+        }
+        if (to >= NEVER || to > sure) break;
+        if (to > next) {
+          past = to * (1.0 - 1e-6);
+          before = 0.0;
+        }
+        next = to;
+        until = sure;
+        float rate = 1e-3;
+        for (int i = zero; i < slotCount; i++) {
+          vec4 slot = slots[i];
+          if (slot.y > next) until = min(until, slot.y);
+          else if (slot.z >= next) {
+            until = min(until, slot.z);
+            rate = max(rate, slot.w);
+          }
+        }
+        pace = 1.0 / rate;
+      }
+      t = next;
+      meet(t);
+      float far = abs(state), root;
+#ifdef MEDIA
+#ifdef MIXED
+      bool is = dense > 0.5;
+      if (state < 0.0 && is) far = change;
+#else
+      const bool is = true;
+#endif
+      bool inside = state < 0.0 && is, done = state < 0.0 && !is;
+      root = max(past + (t - past) * (before / max(before + far, 1e-9)), t - GAP);
+      if (done) {
+        if (within) { // where a medium ends the distance need not be 0
+          float a = past, b = t;
+          for (int i = zero; i < HALVINGS; i++) {
+            float half_ = 0.5 * (a + b);
+            meet(half_);
+            if (state < 0.0 && dense > 0.5) a = half_; else b = half_;
+          }
+          close(since, b);
+          hit = b;
+          soft = true;
+        } else {
+          hit = root;
+        }
+        return;
+      }
+      if (inside && !within) since = root;
+      if (!inside && within) close(since, root);
+      within = inside;
+#else
+      if (state < TOUCH) {
+        hit = max(past + (t - past) * (before / max(before + far, 1e-9)), t - GAP);
+        return;
+      }
+#endif
+      float safe = far * pace, hope = 1.05 * far * (t - past) / max(before - far, 1e-12) + TOUCH;
+      next = t + min(max(hope, safe), safe + GAP);
+      past = t;
+      before = far;
+    }
+    if (sure >= limit || steps >= STEPS) break;
+    low = sure;
+  }
+#ifdef MEDIA
+  if (within) close(since, t);
+#endif
+}
