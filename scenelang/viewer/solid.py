@@ -1,8 +1,8 @@
 """The solid network for the page's shader: its layers as GLSL, its numbers as one array.
 
 Each shape's decoder and each token's cell is prepared here, as a renderer would: weights linear in a code,
-gains behind their exponential. What the scene decides, its rows, is the page's (``web/solid.js``). The rest of
-the shader, the same for every network, are the files of `FILES`.
+gains behind their exponential. What the scene decides, its rows, is the page's (``web/solid.js``). The rest
+of the shader, the same for every network, are the files of `FILES`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from scenelang.renderers.solid.passes import SLACK
 from scenelang.viewer.script import web
 from scenelang.viewer.store import Store
 
-FILES: Final = ("solid.glsl", "rays.glsl", "look.glsl", "light.glsl")  # of ``web/``, one behind the other
+FILES: Final = ("solid.glsl", "rays.glsl", "look.glsl", "light.glsl")
+"""Of ``web/``, one behind the other."""
 _CONSTANTS: Final = {
     "EMPTY": EMPTY,
     "RADIUS": RADIUS,
@@ -39,7 +40,7 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     paint, kind, width = config.paint_lines, config.kind_lines, config.width
     cells = np.concatenate([_cell(network, token) for token in range(TOKENS)])
     sizes = {"CELL": 2 + paint + kind, "GEOMETRIES": len(decoders)}
-    parts = [f"const float {name} = {value!r};" for name, value in _CONSTANTS.items()]
+    parts = [web("angles.glsl"), *(f"const float {name} = {value!r};" for name, value in _CONSTANTS.items())]
     parts += [f"const int {name} = {value};" for name, value in sizes.items()]
     parts += [
         f"uniform vec4 cells[{len(cells)}]; // of each token what is made of a distance, a bump; then lines"

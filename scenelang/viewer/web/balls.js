@@ -20,8 +20,9 @@ function stretched([kind, ...strengths], radius) {
 
 /**
  * Of each row where rays may meet it: `outer`, the map into the space in which it lies in a ball about the
- * origin, `rest`, the steps behind that, its `radius` in leaf units and the `ball`'s there, the `rate` at which its world distance changes at
- * most per step of 1 there, a ball (`centre`, `extent`) of the world around it, and a `box` [low, high] behind `outer`.
+ * origin; `rest`, the steps behind that; its `radius` in leaf units and the `ball`'s there; the `rate` at
+ * which its world distance changes at most per step of 1 there; a ball (`centre`, `extent`) of the world around it,
+ * and a `box` [low, high] behind `outer`.
  * @param {object[]} rows
  * @param {{slack: number}} network - of a view
  * @param {(row: object) => number[][]} boxOf - the box of a row's leaf
@@ -48,7 +49,8 @@ export function solidBalls(rows, network, boxOf) {
     }
     const back = invertedMap(outer), centre = [back[3], back[7], back[11]], extent = longest(back) * ball;
     const [low, high] = boxOf(row), slim = high.some((side, i) => side - low[i] <= SMALL_SIDE);
-    const box = slim && !rest.length ? [low.map((v) => v - radius + 1), high.map((v) => v + radius - 1)]  : FREE_BOX;
+    const wider = [low.map((v) => v - radius + 1), high.map((v) => v + radius - 1)];
+    const box = slim && !rest.length ? wider : FREE_BOX;
     return { outer, rest, radius, ball, rate: row.scale * growth, centre, extent, box };
   }).reverse();
 }
@@ -90,7 +92,7 @@ export function cellsOf(from, axes, scale, middle, counts) {
   };
 }
 
-/** The six sides of a cube around a point, each of side x side cells; a side is that of an axis and a sign. */
+/** The six sides of a cube around a point, each of side x side cells, two for each axis. */
 export function cubeOf(from, side) {
   const unit = (i) => [0, 1, 2].map((j) => Number(i % 3 === j));
   return [0, 1, 2, 3, 4, 5].map((face) => {
@@ -101,8 +103,8 @@ export function cubeOf(from, side) {
 }
 
 /**
- * Lists of the rows whose balls may be met in each cell, the last row first: of each cell where its list begins
- * and how long it is, then the lists. The first cell has all rows.
+ * Lists of the rows whose balls may be met in each cell, the last row first: of each cell where its list
+ * begins and how long it is, then the lists. The first cell has all rows.
  * @param {object[]} rows
  * @param {object[]} balls - of `solidBalls`
  * @param {object[]} groups - of cells

@@ -19,11 +19,15 @@ function filledBox(grid, side) {
   return high[0] < 0 ? [[-1, -1, -1], [1, 1, 1]] : [low.map(place), high.map(place)];
 }
 
+function checkSide(side, most) {
+  if (side > most) throw new Error(`elements need a texture of ${side} texels a side, at most ${most} here`);
+}
+
 /** Cubes of texels one above the other in a texture of space; throws an Error where that is too high. */
 function stacked(gl, cubes, internal, format, type, empty) {
   const width = Math.max(1, ...cubes.map((cube) => cube.side));
   const depth = Math.max(1, cubes.reduce((sum, cube) => sum + cube.side, 0)), texture = gl.createTexture();
-  if (Math.max(width, depth) > gl.getParameter(gl.MAX_3D_TEXTURE_SIZE)) throw new Error("elements too large to draw here");
+  checkSide(Math.max(width, depth), gl.getParameter(gl.MAX_3D_TEXTURE_SIZE));
   gl.bindTexture(gl.TEXTURE_3D, texture);
   gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
   gl.texStorage3D(gl.TEXTURE_3D, 1, internal, width, width, depth);
@@ -38,8 +42,9 @@ function stacked(gl, cubes, internal, format, type, empty) {
 /** Pictures one above the other in a texture; sRGB, so that texels are linear. */
 function atlas(gl, pictures) {
   const width = Math.max(1, ...pictures.map((picture) => picture.wide));
-  const height = Math.max(1, pictures.reduce((sum, picture) => sum + picture.high, 0)), texture = gl.createTexture();
-  if (Math.max(width, height) > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new Error("pictures too large to draw here");
+  const height = Math.max(1, pictures.reduce((sum, picture) => sum + picture.high, 0));
+  const texture = gl.createTexture();
+  checkSide(Math.max(width, height), gl.getParameter(gl.MAX_TEXTURE_SIZE));
   gl.bindTexture(gl.TEXTURE_2D, texture);
   gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
   gl.texStorage2D(gl.TEXTURE_2D, 1, gl.SRGB8, width, height);
@@ -62,8 +67,8 @@ function placed(parts, size) {
 
 /**
  * The elements of a view of solids.
- * @returns {{grids: object[], paints: object[], textures: object}} by numbers of shapes {side, first, box}; by
- *   numbers of paints {kind: 1 picture, 2 colours, first, sides: what the shader takes}; textures by samplers
+ * @returns {{grids: object[], paints: object[], textures: object}} by numbers of shapes {side, first, box};
+ *   by numbers of paints {kind: 1 picture, 2 colours, first, sides: as the shader takes them}; by samplers
  */
 export function solidElements(gl, view) {
   const grids = [], paints = [], cubes = [];
@@ -85,7 +90,8 @@ export function solidElements(gl, view) {
   if (cubes.length) textures.grids = stacked(gl, solid, gl.R32F, gl.RED, gl.FLOAT);
   if (view.paints.length) {
     textures.pictures = atlas(gl, flat);
-    textures.colours = stacked(gl, coloured, gl.RGB16UI, gl.RGB_INTEGER, gl.UNSIGNED_SHORT, new Uint16Array(3));
+    const none = new Uint16Array(3);
+    textures.colours = stacked(gl, coloured, gl.RGB16UI, gl.RGB_INTEGER, gl.UNSIGNED_SHORT, none);
   }
   return { grids, paints, textures };
 }

@@ -59,15 +59,16 @@ export function distances({ dimension, sides, finest, steps, codec }) {
 function halfway(grid, n, inner) {
   const wide = 2 * n - 1, found = new Float32Array((grid.length / n) * wide);
   for (let at = 0; at < found.length; at++) {
-    const o = Math.floor(at / inner / wide), k = Math.floor(at / inner) % wide, from = (o * n + (k >> 1)) * inner + (at % inner);
+    const [o, k] = [Math.floor(at / inner / wide), Math.floor(at / inner) % wide];
+    const from = (o * n + (k >> 1)) * inner + (at % inner);
     found[at] = k & 1 ? (grid[from] + grid[from + inner]) / 2 : grid[from];
   }
   return found;
 }
 
 /**
- * The colours of a paint of kind "colours", as elements/colours.py has them: linear, whole numbers up to `unit`,
- * at n^3 nodes, z first to change, a Uint16Array of three a node.
+ * The colours of a paint of kind "colours", as elements/colours.py has them: linear, whole numbers up to
+ * `unit`, at n^3 nodes, z first to change, a Uint16Array of three a node.
  */
 export function spaceColours({ sides, steps, fineness }, unit) {
   let [grid, from] = [null, 0];
@@ -75,7 +76,7 @@ export function spaceColours({ sides, steps, fineness }, unit) {
     const count = side ** 3;
     if (grid) for (let axis = 2; axis >= 0; axis--) grid = halfway(grid, (side + 1) / 2, side ** (2 - axis));
     grid ??= new Float32Array(3 * count);
-    for (let at = 0; at < 3 * count; at++) grid[at] += steps[from + at] * (Math.fround(at < count ? 1 : 2) / fineness);
+    for (let at = 0; at < 3 * count; at++) grid[at] += (steps[from + at] * (at < count ? 1 : 2)) / fineness;
     from += 3 * count;
   }
   const count = grid.length / 3, found = new Uint16Array(grid.length);

@@ -19,7 +19,8 @@ float lit(vec3 p, bool edge) {
   a = abs(way);
   int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
   vec3 turned_ = axis == 0 ? way : axis == 1 ? way.yzx : way.zxy;
-  ivec2 at = ivec2(clamp((turned_.yz / abs(turned_.x) * 0.5 + 0.5) * float(grid.w), 0.0, float(grid.w) - 1.0));
+  float side = float(grid.w);
+  ivec2 at = ivec2(clamp((turned_.yz / abs(turned_.x) * 0.5 + 0.5) * side, 0.0, side - 1.0));
   int face = 2 * axis + (turned_.x > 0.0 ? 0 : 1);
   march(cell(grid.z + (face * grid.w + at.y) * grid.w + at.x), lamp, way, r - (edge ? 0.0 : CLEAR));
   return hit < NEVER ? 0.0 : exp(-EXTINCTION * fog);
@@ -32,12 +33,13 @@ const float LEAST = 0.04; // of what is seen, that a piece has to have a part of
 const float LONG = 2.0; // world units: longer pieces are cut
 const float STEEP = 1.2; // how much more light the last node may get than the first
 const float NARROW = 0.8; // cosine: pieces that the light sees under a larger angle are cut
-const float CUTS[8] = float[](-14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0); // tangents of angles at the light
+// tangents of angles at the light
+const float CUTS[8] = float[](-14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0);
 const int PARTS = 3; // of pieces of which the nodes do not tell enough
 
 vec3 glow, evenGlow; // light that media send towards the eye
 
-// Light from a piece of a ray: from three nodes, and from those of three parts where these do not tell enough.
+// Light from a piece of a ray: from three nodes, or those of its parts where these do not tell enough.
 void scatter(ivec2 list, vec3 way, float begin, float end, float before) {
   vec3 total = vec3(0.0), evenTotal = vec3(0.0);
   float share = 0.0, first = 0.0, last = 0.0, free = 0.0;
@@ -167,7 +169,8 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
 #ifdef MEDIA
   if (pieceCount > 0) {
     glow = evenGlow = vec3(0.0);
-    float before = 0.0, middle = dot(lamp - eye, way), aside = max(length(lamp - eye - middle * way), NEAREST);
+    float before = 0.0, middle = dot(lamp - eye, way);
+    float aside = max(length(lamp - eye - middle * way), NEAREST);
     for (int i = zero; i < pieceCount; i++) {
       vec2 piece = pieces[i];
       float from = piece.x;
@@ -225,7 +228,8 @@ layout(location = 1) out vec4 brightness;
 // Premultiplied and sRGB-encoded.
 vec4 encoded(vec4 light) {
   vec3 x = clamp(light.rgb / max(light.a, 1e-6), 0.0, 1.0);
-  x = mix(1.055 * pow(max(x, vec3(1e-9)), vec3(1.0 / 2.4)) - 0.055, 12.92 * x, vec3(lessThanEqual(x, vec3(0.0031308))));
+  vec3 curved = 1.055 * pow(max(x, vec3(1e-9)), vec3(1.0 / 2.4)) - 0.055;
+  x = mix(curved, 12.92 * x, vec3(lessThanEqual(x, vec3(0.0031308))));
   return vec4(x * light.a, light.a);
 }
 

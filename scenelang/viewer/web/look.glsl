@@ -17,7 +17,12 @@ vec3 hued(vec3 rgb, float turns) {
   float hue = value == rgb.r ? (rgb.g - rgb.b) * sixth
     : value == rgb.g ? (rgb.b - rgb.r) * sixth + 2.0 : (rgb.r - rgb.g) * sixth + 4.0;
   hue = fract(hue / 6.0 + turns) * 6.0;
-  return least + chroma * clamp(vec3(abs(hue - 3.0) - 1.0, 2.0 - abs(hue - 2.0), 2.0 - abs(hue - 4.0)), 0.0, 1.0);
+  vec3 shares = vec3(abs(hue - 3.0) - 1.0, 2.0 - abs(hue - 2.0), 2.0 - abs(hue - 4.0));
+  return least + chroma * clamp(shares, 0.0, 1.0);
+}
+
+vec3 texel(ivec2 at) {
+  return texelFetch(pictures, at, 0).rgb;
 }
 
 vec3 texel(ivec3 at) {
@@ -33,9 +38,8 @@ vec3 textured(int row, vec4 paint, vec3 q) {
     place = fract(place) * sides - 0.5;
     vec2 cell = floor(place), share = place - cell;
     ivec2 a = ivec2(mod(cell, sides)), b = ivec2(mod(cell + 1.0, sides)), top = ivec2(0, int(u.w));
-    vec3 low = mix(texelFetch(pictures, a + top, 0).rgb, texelFetch(pictures, ivec2(b.x, a.y) + top, 0).rgb, share.x);
-    vec3 high = mix(texelFetch(pictures, ivec2(a.x, b.y) + top, 0).rgb, texelFetch(pictures, b + top, 0).rgb, share.x);
-    rgb = mix(low, high, share.y);
+    rgb = mix(mix(texel(a + top), texel(ivec2(b.x, a.y) + top), share.x),
+      mix(texel(ivec2(a.x, b.y) + top), texel(b + top), share.x), share.y);
   } else {
     vec3 place = (clamp(q, -1.0, 1.0) + 1.0) * (0.5 * (size.z - 1.0));
     vec3 cell = clamp(floor(place), 0.0, size.z - 2.0), share = place - cell;
@@ -85,7 +89,7 @@ void look(ivec2 list, vec3 p, vec3 off) {
     if (token >= SUBTRACT && !touched) continue;
 #endif
     touched = true;
-    mat3 way = transpose(mat3(part(row, 0).xyz, part(row, 1).xyz, part(row, 2).xyz));
+    mat3 way = linear(row, 0);
     q += way * off;
 #ifdef TURNS
     q = turned(part(row, MORE), q, way);

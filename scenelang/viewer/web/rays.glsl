@@ -68,7 +68,8 @@ float gather(ivec2 list, float low, float high) {
       float left = least.w - dot(closest, closest);
       if (left > 0.0) {
         float wide = sqrt(left / square);
-        vec3 a = (least.xyz - from) / way, b = (most.xyz - from) / way, first = min(a, b), last = max(a, b);
+        vec3 a = (least.xyz - from) / way, b = (most.xyz - from) / way;
+        vec3 first = min(a, b), last = max(a, b);
         begin = max(max(middle - wide, low), max(first.x, max(first.y, first.z)));
         end = min(min(middle + wide, high), min(last.x, min(last.y, last.z)));
         rate = most.w * sqrt(square);
@@ -115,7 +116,8 @@ void close(float begin, float end) {
 }
 #endif
 
-// Follow a ray: how far nothing can change, and up to GAP farther where the last distances let expect a surface.
+// Follow a ray: steps go as far as nothing can change, and up to GAP farther where the last two distances let
+// expect a surface.
 void march(ivec2 list, vec3 from, vec3 way, float limit) {
   rayFrom = from;
   rayWay = way;

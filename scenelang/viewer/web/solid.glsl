@@ -9,8 +9,8 @@ precision highp usampler3D;
 //network//
 
 // The field of solids. Of what a scene lacks nothing is compiled: SHAPE_i (a geometry), MEDIA, MIXED (with
-// solids), COLOURED (media of several colours), TEXTURES, GRIDS, TURNS, BUMPS, OTHERS (than objects that draw),
-// FAR (points from leaves). SLOTS: balls that a ray keeps.
+// solids), COLOURED (media of several colours), TEXTURES, GRIDS, TURNS, BUMPS, OTHERS (than objects that
+// draw), FAR (points from leaves). SLOTS: balls that a ray keeps.
 
 const float NEVER = 1e30;
 const int SUBTRACT = 2, INTERSECT = 3;
@@ -46,17 +46,12 @@ vec3 mapped(int row, int first, vec3 p) {
   return vec3(dot(part(row, first), q), dot(part(row, first + 1), q), dot(part(row, first + 2), q));
 }
 
-#ifdef TURNS
-// Cosine and sine; those of many drivers are right to three digits.
-vec2 circle(float a) {
-  float k = floor(a * 0.63661977 + 0.5), r = (a - k * 1.5707964) + k * 4.371139e-8, x = r * r;
-  float c = 1.0 + x * (-0.5 + x * (1.0 / 24.0 + x * (-1.0 / 720.0 + x / 40320.0)));
-  float s = r * (1.0 + x * (-1.0 / 6.0 + x * (1.0 / 120.0 + x * (-1.0 / 5040.0 + x / 362880.0))));
-  int turn = int(k) & 3;
-  vec2 found = (turn & 1) == 0 ? vec2(c, s) : vec2(-s, c);
-  return turn < 2 ? found : -found;
+// The derivative of what `mapped` gives.
+mat3 linear(int row, int first) {
+  return transpose(mat3(part(row, first).xyz, part(row, first + 1).xyz, part(row, first + 2).xyz));
 }
 
+#ifdef TURNS
 // A point behind a row's map, taken through its turns and further maps to the leaf.
 vec3 turned(vec4 more, vec3 p) {
   for (int i = zero; i < int(more.w); i++) {
@@ -65,10 +60,10 @@ vec3 turned(vec4 more, vec3 p) {
     if (step_.x < 0.5) {
       p = mapped(int(more.z), at + 1, p);
     } else if (step_.x < 1.5) {
-      vec2 a = circle(step_.y * length(p) + step_.z * p.x);
+      vec2 a = direction(step_.y * length(p) + step_.z * p.x);
       p.xy = vec2(a.x * p.x + a.y * p.y, a.x * p.y - a.y * p.x);
     } else {
-      vec2 a = circle(step_.y * p.y);
+      vec2 a = direction(step_.y * p.y);
       p.xz = vec2(a.x * p.x + a.y * p.z, a.x * p.z - a.y * p.x);
     }
   }
@@ -82,12 +77,12 @@ vec3 turned(vec4 more, vec3 p, inout mat3 change) {
     vec4 step_ = part(int(more.z), at);
     mat3 own;
     if (step_.x < 0.5) {
-      own = transpose(mat3(part(int(more.z), at + 1).xyz, part(int(more.z), at + 2).xyz, part(int(more.z), at + 3).xyz));
+      own = linear(int(more.z), at + 1);
       p = mapped(int(more.z), at + 1, p);
     } else {
       bool twist = step_.x > 1.5;
       float r = length(p);
-      vec2 a = circle(twist ? step_.y * p.y : step_.y * r + step_.z * p.x);
+      vec2 a = direction(twist ? step_.y * p.y : step_.y * r + step_.z * p.x);
       float c = a.x, s = a.y;
       vec3 slope = twist ? vec3(0.0, step_.y, 0.0) : step_.y / max(r, 1e-12) * p + vec3(step_.z, 0.0, 0.0);
       mat3 turn = twist ? mat3(c, 0, -s, 0, 1, 0, s, 0, c) : mat3(c, -s, 0, s, c, 0, 0, 0, 1);
@@ -101,8 +96,10 @@ vec3 turned(vec4 more, vec3 p, inout mat3 change) {
 #endif
 
 #ifdef GRIDS
-float node(ivec3 at) {
-  return texelFetch(grids, at, 0).x;
+// Distances at the nodes of a square across x.
+vec4 nodes(ivec3 at) {
+  return vec4(texelFetch(grids, at, 0).x, texelFetch(grids, at + ivec3(0, 1, 0), 0).x,
+    texelFetch(grids, at + ivec3(0, 0, 1), 0).x, texelFetch(grids, at + ivec3(0, 1, 1), 0).x);
 }
 
 // A grid's distance at a point of the leaf.
@@ -111,9 +108,7 @@ float gridded(vec4 grid, vec3 q) {
   vec3 place = (at + 1.0) * (0.5 * (grid.x - 1.0)), cell = clamp(floor(place), 0.0, grid.x - 2.0);
   vec3 share = place - cell;
   ivec3 first = ivec3(cell.zyx) + ivec3(0, 0, int(grid.y)); // slices lie along x
-  vec4 near = vec4(node(first), node(first + ivec3(0, 1, 0)), node(first + ivec3(0, 0, 1)), node(first + ivec3(0, 1, 1)));
-  first.x++;
-  vec4 far = vec4(node(first), node(first + ivec3(0, 1, 0)), node(first + ivec3(0, 0, 1)), node(first + ivec3(0, 1, 1)));
+  vec4 near = nodes(first), far = nodes(first + ivec3(1, 0, 0));
   near = mix(near, far, share.z);
   near.xy = mix(near.xz, near.yw, share.y);
   float found = mix(near.x, near.y, share.x), beyond = dot(off, off);

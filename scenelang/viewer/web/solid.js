@@ -33,7 +33,8 @@ function tableOf(view, rows, balls, elements) {
     return first;
   };
   rows.forEach((row, i) => {
-    const { outer, rest, ball, rate, centre, extent, box } = balls[i], material = view.materials[row.material];
+    const { outer, rest, ball, rate, centre, extent, box } = balls[i];
+    const material = view.materials[row.material];
     const steps = rest.map(([kind, ...n]) => (kind === "map" ? [0, 0, 0, 0, ...n]
       : [...(kind === "turn" ? [1, n[0], n[1], 0] : [2, n[0], 0, 0]), ...new Array(12).fill(0)]));
     const paint = row.paint < 0 ? null : elements.paints[row.paint];
@@ -83,7 +84,8 @@ function featuresOf(view, rows, balls) {
 
 /** A texture of whole numbers to fetch. */
 function wholes(gl, data, texture) {
-  const height = Math.max(1, Math.ceil(data.length / LIST_WIDTH)), padded = new Int32Array(LIST_WIDTH * height);
+  const height = Math.max(1, Math.ceil(data.length / LIST_WIDTH));
+  const padded = new Int32Array(LIST_WIDTH * height);
   padded.set(data);
   gl.bindTexture(gl.TEXTURE_2D, texture);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32I, LIST_WIDTH, height, 0, gl.RED_INTEGER, gl.INT, padded);
@@ -129,7 +131,8 @@ export function solidDrawer(gl, view) {
     const all = [...features, `SLOTS=${slots}`, ...names], key = all.join();
     if (!shaders.has(key)) {
       const defines = all.map((name) => `#define ${name}\n`.replace("=", " ")).join("");
-      shaders.set(key, { program: linking(gl, `#version 300 es\n${defines}${view.shader.source}`), places: null });
+      const program = linking(gl, `#version 300 es\n${defines}${view.shader.source}`);
+      shaders.set(key, { program, places: null });
     }
     return shaders.get(key);
   };
@@ -149,7 +152,8 @@ export function solidDrawer(gl, view) {
     if (ready.program === program && ready.width === width && ready.height === height) return;
     const { rows, stage } = program, balls = solidBalls(rows, network, boxOf);
     const pixel = 2 / Math.min(width, height), near = 1 / Math.tan(stage.fov / 2);
-    const tiles = [width, height].map((side) => Math.ceil(side / TILE_SIDE)), scale = near / pixel / TILE_SIDE;
+    const tiles = [width, height].map((side) => Math.ceil(side / TILE_SIDE));
+    const scale = near / pixel / TILE_SIDE;
     const seen = cellsOf(stage.eye, stage.axes, [scale, scale],
       [width / 2 / TILE_SIDE, height / 2 / TILE_SIDE], tiles);
     const { data, longest } = listsOf(rows, balls, [seen, ...cubeOf(stage.light, CUBE_SIDE)]);
@@ -173,7 +177,8 @@ export function solidDrawer(gl, view) {
     });
     gl.uniform1i(at("zero"), 0);
     const vectors = {
-      eye: stage.eye, forward: stage.axes[0].map((v) => v * ready.near), right: stage.axes[1], up: stage.axes[2],
+      eye: stage.eye, forward: stage.axes[0].map((v) => v * ready.near),
+      right: stage.axes[1], up: stage.axes[2],
       lamp: stage.light, power: stage.lightRgb.map((v) => v * stage.power),
       horizon: stage.horizon, zenith: stage.zenith, canvas: [ready.width, ready.height, ready.pixel],
     };
@@ -246,7 +251,9 @@ export function solidDrawer(gl, view) {
       [4, 1].forEach((parts, i) => {
         gl.readBuffer(gl.COLOR_ATTACHMENT0 + i);
         gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, numbers);
-        for (let at = 0; at < count; at++) found.set(numbers.subarray(4 * at, 4 * at + parts), 5 * at + 4 * i);
+        for (let at = 0; at < count; at++) {
+          found.set(numbers.subarray(4 * at, 4 * at + parts), 5 * at + 4 * i);
+        }
       });
       dropScreens(gl, screen);
       gl.deleteTexture(places);
