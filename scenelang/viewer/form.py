@@ -25,7 +25,10 @@ from scenelang.viewer.names import Json, Scope
 from scenelang.viewer.trees import Writer
 
 _KINDS: Final = {float: "number", Angle: "angle", Time: "time", bool: "bool", str: "string"}
-_WHY: Final = {"canvas": "the canvas hangs on it", "animate": "the length of the animation hangs on it"}
+_WHY: Final = {
+    "canvas": "the size of the canvas depends on it",
+    "animate": "the length of the animation depends on it",
+}
 _LABEL: Final = re.compile(r"[ \t)]*;[ \t]*//[ \t]*([^\n]*)")
 
 

@@ -90,7 +90,7 @@ def test_controls_show_params(controls: Any) -> None:
     assert controls.locator("#param-turn").input_value() == "30"
     assert controls.locator("#param-wait").get_attribute("max") == "2000"
     assert controls.locator("#param-ink").input_value() == "#ff8000"
-    assert controls.locator("#param-list").input_value() == "[1,[0.5,2]]"
+    assert controls.locator("#param-list").input_value() == "[1, [0.5, 2]]"
     assert controls.locator("[role=switch]").count() == 1
     assert controls.locator("#param-side").count() == 0
     put(controls, "#param-k", "2.5")

@@ -120,7 +120,10 @@ function listInput(_, change) {
 }
 
 function asText(value) {
-  return typeof value === "string" ? value : JSON.stringify(value, (_, v) => (Number.isFinite(v) ? +v.toFixed(6) : v));
+  if (typeof value === "string") return value;
+  const within = (item) => (typeof item === "string" ? JSON.stringify(item) : asText(item));
+  if (Array.isArray(value)) return `[${value.map(within).join(", ")}]`;
+  return typeof value === "number" ? plainNumber(value, 6) : String(value);
 }
 
 /** Play, pause and scrub an animation. */
