@@ -24,6 +24,7 @@ from scenelang.words import TOKENS
 
 NODES: Final = 129  # along a side of the grid that bounds are looked for on
 QUARTERED: Final = 7  # times that a square may be, in a proof that a unit is never above zero
+INSIDE: Final = 0.01  # leaf units by which a point has to lie inside to be covered
 UNKNOWN: Final = 1e9  # leaf units: a bound that rules nothing out
 
 Floats = npt.NDArray[np.float64]
@@ -39,6 +40,7 @@ class Leaf(NamedTuple):
         far: growth beyond the rim.
         bounds: (3,) x, y and radius; it is no nearer than |q.x| - x, |q.y| - y and |q| - radius, times `far`
             where that is below 1.
+        inner: radius of a disc that it covers, 0 where none is known.
     """
 
     first: Floats
@@ -46,6 +48,7 @@ class Leaf(NamedTuple):
     last: Floats
     far: float
     bounds: tuple[float, ...]
+    inner: float
 
 
 def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
@@ -95,6 +98,7 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
                     "weights": store.add(np.concatenate([*map(np.ravel, leaf[:3])], dtype=np.float32)),
                     "far": leaf.far,
                     "bounds": leaf.bounds,
+                    "inner": leaf.inner,
                 }
                 for leaf in leaves(network)
             ],
@@ -113,26 +117,25 @@ def leaves(network: FramedArrays) -> list[Leaf]:
         layers = [(np.asarray(w, np.float64), np.asarray(b, np.float64)) for w, b in decoder.layers]
         slopes = network.slopes.get(code.tobytes())
         bounds: tuple[float, ...] = (UNKNOWN,) * 3
+        inner = 0.0
         if slopes is not None and far > 0:
-            least = network.decode(p, np.hypot(*p), 1.0, decoder)[0] - slopes.rise(
-                p, np.full(p.shape[1], off)
-            )
-            seen = np.hypot(*p) <= RADIUS + off
-            lengths = *abs(p), np.hypot(*p)
-            bounds = tuple([float((n - least / min(far, 1.0))[seen].max() + off) for n in lengths])
-        found.append(_pruned(layers, far, bounds))
+            radius = np.hypot(*p)
+            middle = network.decode(p, radius, 1.0, decoder)[0]
+            rise, seen = slopes.rise(p, np.full(p.shape[1], off)), radius <= RADIUS + off
+            gaps = [n - (middle - rise) / min(far, 1.0) for n in (*abs(p), radius)]
+            bounds = tuple([float(gap[seen].max()) + off for gap in gaps])
+            inner = max(0.0, float(radius[middle + rise > -INSIDE].min()) - off)
+        found.append(Leaf(*_pruned(layers), far, bounds, inner))
     return found
 
 
-def _pruned(layers: list[tuple[Floats, Floats]], far: float, bounds: tuple[float, ...]) -> Leaf:
-    """A decoder without the units that are nowhere above zero."""
+def _pruned(layers: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats, Floats]:
+    """The layers of a `Leaf`: a decoder without the units that are nowhere above zero."""
     (w, b), (v, c), (u, d) = layers
     first = b + RADIUS * np.hypot(*w.T) > 0
     w, b, v = w[first], b[first], v[:, first]
     second = _firing(w, b, v, c)
-    return Leaf(
-        np.column_stack([w, b]), np.column_stack([c, v])[second], np.append(u[0, second], d[0]), far, bounds
-    )
+    return np.column_stack([w, b]), np.column_stack([c, v])[second], np.append(u[0, second], d[0])
 
 
 def _firing(w: Floats, b: Floats, v: Floats, c: Floats) -> npt.NDArray[np.bool_]:

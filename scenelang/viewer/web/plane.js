@@ -72,7 +72,7 @@ function texelsOf([kind, a, b, u, c, d, v]) {
 /** Numbers of all rows, and the texel at which each begins; see `rows` of plane.glsl. */
 function packed({ network, materials }, leaves, pictures, { rows }, reach) {
   const [numbers, begins] = [[], []];
-  const lastBlend = rows.reduce((last, { token }, i) => (token === network.tokens.smooth ? i : last), -1);
+  const last = lastBlend(rows, network);
   rows.forEach((row, i) => {
     const { steps, scale } = row;
     const paint = network.draws[row.token] ? row.paint : -1; // the others leave colours as they are
@@ -82,7 +82,7 @@ function packed({ network, materials }, leaves, pictures, { rows }, reach) {
     const moves = steps.reduce((total, [kind]) => total + (kind === "map" ? 2 : 1), 0);
     const albedo = materials[row.material].albedo;
     const colour = row.colour.map((share, k) => Math.min(Math.max(share * albedo[k], 0), 1));
-    numbers.push(scale, narrow, row.token + 4 * (i <= lastBlend), steps.length);
+    numbers.push(scale, narrow, row.token + 4 * (i <= last), steps.length);
     numbers.push(...bounds, Math.min(reach[i], 1e30));
     numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : 4 + moves, 0);
     numbers.push(...colour, Math.min(far, 1) * scale);
@@ -98,6 +98,11 @@ function packed({ network, materials }, leaves, pictures, { rows }, reach) {
     }
   });
   return { numbers, begins };
+}
+
+/** The number of the last object that joins by a blend, -1 for none. */
+function lastBlend(rows, { tokens }) {
+  return rows.reduce((last, { token }, i) => (token === tokens.smooth ? i : last), -1);
 }
 
 /** Tiles' lists as texels: where each begins and how long it is, then texels of rows, four to one. */
@@ -135,7 +140,7 @@ export function planeDrawer(gl, view) {
   const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels), Uint8Array);
   const leaves = [
     ...network.decoders.map((decoder) => ({ ...decoder, side: 0 })),
-    ...grids.map(({ bounds, finest }, i) => ({ bounds, far: 1, side: finest, first: ofGrid[i] })),
+    ...grids.map(({ bounds, finest }, i) => ({ bounds, inner: 0, far: 1, side: finest, first: ofGrid[i] })),
   ];
   const pictures = view.paints.map((paint, i) => ({ ...paint, first: ofPicture[i] / 3 }));
   if (grids.length) {
@@ -166,11 +171,14 @@ export function planeDrawer(gl, view) {
     const { found, place } = compiled(program, define);
     const px = 2 / Math.min(width, height);
     const { reach, widest } = reaches(program.rows, network);
+    const last = lastBlend(program.rows, network);
+    const hides = ({ token }, i) => token === network.tokens.union && i > last;
+    const inner = program.rows.map((row, i) => (hides(row, i) ? leaves[row.shape].inner : 0));
     const { numbers, begins } = packed(view, leaves, pictures, program, reach);
     const wanted = 8 * Math.ceil(Math.min(width, height) / 400); // few enough for JavaScript
     const lists = define === "POINTS"
       ? { starts: [0, begins.length], objects: [...begins.keys()], tile: height, across: 1, down: 1 }
-      : tileLists(program.rows, reach, { width, height, tile: wanted, px }, network.draws);
+      : tileLists(program.rows, reach, inner, { width, height, tile: wanted, px }, network.draws);
     floats(gl, new Float32Array(numbers), WIDE, held.rows);
     floats(gl, listed(lists, begins), WIDE, held.lists);
     textures.forEach((name, unit) => {

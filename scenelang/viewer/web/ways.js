@@ -47,8 +47,8 @@ function flattened(steps) {
   return numbers;
 }
 
-/** How near to a leaf's origin a point of a disc in the world is at least, in leaf units. */
-function nearest(way, x, y, radius) {
+/** How far from a leaf's origin the points of a disc in the world are at least and at most, in leaf units. */
+function extent(way, x, y, radius) {
   for (let i = 0; i < way.length; i += 8) {
     const [a, b, c] = [way[i], way[i + 1], way[i + 2]];
     if (way[i + 6] === 0) {
@@ -67,7 +67,8 @@ function nearest(way, x, y, radius) {
       x = moved;
     }
   }
-  return Math.sqrt(x * x + y * y) - radius;
+  const length = Math.sqrt(x * x + y * y);
+  return [length - radius, length + radius];
 }
 
 /**
@@ -89,16 +90,18 @@ export function reaches(rows, { tokens, blend, slack, farther, farthest }) {
 /**
  * Which objects each tile of a frame meets, in stream order.
  * @param reach - of the rows, as `reaches` has them
+ * @param inner - radii of discs of the rows' leaves in which they hide what was before, 0 for none
  * @param draws - of a token, whether it draws something where nothing is
  * @returns {{starts: Int32Array, objects: Int32Array, tile, across, down}} starts: (tiles + 1), tiles from
  *     the lower left corner; they are larger than `tile` where the lists would be too long
  */
-export function tileLists(rows, reach, { width, height, tile, px }, draws) {
+export function tileLists(rows, reach, inner, { width, height, tile, px }, draws) {
   const [across, down] = [Math.ceil(width / tile), Math.ceil(height / tile)];
   const side = tile * px;
   const around = side * Math.SQRT1_2 * (1 + 1e-6);
   const [left, low] = [-0.5 * width * px, -0.5 * height * px];
   const drawn = new Uint8Array(across * down);
+  const hidden = new Int32Array(across * down); // up to which pair all is hidden
   const [tiles, objects] = [[], []];
   const whole = 2 ** Math.ceil(Math.log2(Math.max(across, down)));
   for (let object = 0; object < rows.length; object++) {
@@ -114,33 +117,35 @@ export function tileLists(rows, reach, { width, height, tile, px }, draws) {
     }
     const way = flattened(steps);
     /** Squares of tiles that may be in reach are looked at in quarters. */
-    const look = (i, j, size) => {
+    const look = (i, j, size, hides) => {
       if (i > x1 || j > y1 || i + size <= x0 || j + size <= y0) return;
       const half = 0.5 * size;
-      if (reach[object] < Infinity) {
-        const middle = [left + (i + half) * side, low + (j + half) * side];
-        if (nearest(way, ...middle, size * around) > reach[object]) return;
+      if (reach[object] < Infinity && !hides) {
+        const [least, most] = extent(way, left + (i + half) * side, low + (j + half) * side, size * around);
+        if (least > reach[object]) return;
+        hides = most < inner[object];
       }
       if (size > 1) {
-        for (let k = 0; k < 4; k++) look(i + half * (k & 1), j + half * (k >> 1), half);
+        for (let k = 0; k < 4; k++) look(i + half * (k & 1), j + half * (k >> 1), half, hides);
         return;
       }
       const at = j * across + i;
       if (!draws[token] && !drawn[at]) return;
+      if (hides) hidden[at] = tiles.length;
       drawn[at] = 1;
       tiles.push(at);
       objects.push(object);
     };
-    look(0, 0, whole);
+    look(0, 0, whole, false);
     if (tiles.length > MOST_PAIRS && whole > 1) {
-      return tileLists(rows, reach, { width, height, tile: 2 * tile, px }, draws);
+      return tileLists(rows, reach, inner, { width, height, tile: 2 * tile, px }, draws);
     }
   }
   const starts = new Int32Array(across * down + 1);
-  for (const at of tiles) starts[at + 1]++;
+  tiles.forEach((at, pair) => { starts[at + 1] += pair >= hidden[at]; });
   for (let at = 0; at < across * down; at++) starts[at + 1] += starts[at];
   const next = starts.slice();
-  const sorted = new Int32Array(objects.length);
-  tiles.forEach((at, pair) => { sorted[next[at]++] = objects[pair]; });
+  const sorted = new Int32Array(starts[across * down]);
+  tiles.forEach((at, pair) => { if (pair >= hidden[at]) sorted[next[at]++] = objects[pair]; });
   return { starts, objects: sorted, tile, across, down };
 }
