@@ -93,6 +93,11 @@ globalThis.pictured = async (message, width, height) => {
   if (gl.getError()) throw new Error("an error of GL");
   return close(pixels);
 };
+globalThis.counted = async (message, width, height) => {
+  const { view, drawer, close } = await opened(message, 1, 1);
+  const products = drawer.operations(view.program, { width, height });
+  return close(new Float64Array([products / view.network.products]));
+};
 globalThis.answered = async (message, points) => {
   const { view, drawer, close } = await opened(message, 1, 1);
   return close(drawer.points(view.program, new Float32Array(points)));
@@ -173,6 +178,14 @@ def test_corners_are_the_networks(page: Any, tmp_path: Path, name: str) -> None:
     program = corner(name, tmp_path)
     check_points(page, program)
     assert psnr(pictured(page, program), network_picture(program)) > 40
+
+
+@pytest.mark.parametrize("name", ["chess", "die", "saturn"])
+def test_objects_meet_rays_where_the_networks_do(page: Any, name: str) -> None:
+    program = dataclasses.replace(nsg.compile(nsg.load(EXAMPLES / f"{name}.nsg")), canvas=(96, 64))
+    met = np.frombuffer(called(page, "counted", program, 96, 64), np.float64).item()
+    known = draw_objects(network(), program, threads=1, split=1).work.met / (96 * 64)
+    assert 0.8 * known < met < 1.3 * known
 
 
 @pytest.mark.parametrize("name", SCENES)
