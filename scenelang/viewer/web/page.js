@@ -12,7 +12,7 @@ export async function openPage() {
   try {
     return showView(await readView(message), at);
   } catch (error) {
-    at("note").textContent = `A still picture: ${error.message}.`;
+    at("note").textContent = `A still picture: ${firstLine(error.message)}.`;
     at("note").hidden = false;
     return null;
   }
@@ -25,7 +25,7 @@ function showView(view, at) {
   const refusals = {
     param: ({ name, message }) => controls?.refuse(name, message),
     lost: ({ message }) => say(message),
-    shader: ({ message }) => say(`The picture cannot be drawn any more: ${message}`),
+    shader: ({ message }) => say(`The picture cannot be drawn any more: ${firstLine(message)}`),
   };
   const say = (text) => {
     note.textContent = text ?? "";
@@ -53,6 +53,9 @@ function showView(view, at) {
   if (view.animation && !matchMedia("(prefers-reduced-motion: reduce)").matches) viewer.play();
   return viewer;
 }
+
+/** What a note has room for; compilers of shaders say more. */
+const firstLine = (text) => text.split("\n", 1)[0].slice(0, 200);
 
 /** Sources and licences, below the picture. */
 function showTexts({ source, licences }, box) {
