@@ -62,6 +62,7 @@ def make_app(play: Play) -> Starlette:
     async def running(_: Starlette) -> AsyncIterator[None]:
         stop = asyncio.Event()
         play.quick.start()
+        play.views.start()
         languages.start()
         play.later(asyncio.to_thread(play.journal.tidy))
         play.later(watch(play, stop))

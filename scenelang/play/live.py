@@ -258,7 +258,7 @@ class Live:
                 known.angles = frozenset(answer.head.get("angles", known.angles))
 
         message = {"kind": "view", "file": name, "version": version}
-        self._start(("view", name), None, name, {"do": "view", "message": message}, self._play.quick, found)
+        self._start(("view", name), None, name, {"do": "view", "message": message}, self._play.views, found)
 
     async def _draw(self, message: Json) -> None:
         name, known = self._known(message)

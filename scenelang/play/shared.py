@@ -49,7 +49,9 @@ class Play:
     def __init__(self, folder: Folder, first: str | None = None, journal: Journal | None = None) -> None:
         self.folder, self.first = folder, first
         self.journal = journal if journal is not None else Journal()
-        self.quick = Pool(most=max(3, usable_cores()), warm=2)  # what is looked at while typing
+        most = max(3, usable_cores())
+        self.quick = Pool(most, warm=1)  # pictures that are looked at while typing
+        self.views = Pool(most, warm=1, nice=5)  # which stand back for them
         self.slow = Pool(most=2, warm=0, nice=10)
         self.store = Files()
         self.pages: set[Page] = set()
@@ -73,8 +75,8 @@ class Play:
         for task in list(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        await self.quick.close()
-        await self.slow.close()
+        for pool in (self.quick, self.views, self.slow):
+            await pool.close()
 
     async def files(self) -> Json:
         """The message that lists what there is."""
