@@ -193,14 +193,14 @@ def test_what_was_not_saved_is_back_after_a_crash(chromium: Any, scene: Path, tm
 
 def test_a_definition_in_another_file_is_gone_to(page: Page, scene: Path) -> None:
     library = "nsg 1;\n\nmodule dot(r) {\n  square { scale(r); }\n}\n"
-    scene.with_name("lib.nsg").write_text(library, "utf-8")
+    scene.with_name("lib (1).nsg").write_text(library, "utf-8")
     page.picture()
     page.knows()
     page.click_text("square")
-    page.page.keyboard.insert_text('\nimport "lib.nsg" as lib;\nlib.dot(0.1);')
+    page.page.keyboard.insert_text('\nimport "lib (1).nsg" as lib;\nlib.dot(0.1);')
     page.page.locator(".cm-line", has_text="lib.dot").get_by_text("dot", exact=False).last.click()
     page.page.keyboard.press("F12")
-    page.page.locator("#files option:checked", has_text="lib.nsg").wait_for(state="attached")
+    page.page.locator("#files option:checked", has_text="lib (1).nsg").wait_for(state="attached")
     page.page.locator(".cm-activeLine", has_text="module dot(r)").wait_for()
 
 

@@ -6,6 +6,7 @@ import { toOffset, toPosition } from "./languageserver.js";
 import { markdown } from "./markdown.js";
 import { element } from "./viewer/dom.js";
 
+const FORMAT_MS = 2000;  // how long a save waits for the layout
 const KINDS = {  // of the protocol -> CodeMirror's pictures
   2: "function", 3: "function", 6: "variable", 7: "class", 9: "namespace", 10: "property", 11: "constant",
   12: "constant", 14: "keyword", 15: "text", 17: "text", 20: "enum", 21: "constant",
@@ -151,11 +152,12 @@ export async function showMistakes(server, document, view, found) {
   if (fixes?.length && view.state.doc === text) view.dispatch(setDiagnostics(view.state, made(fixes)));
 }
 
-/** Lays a text out as `scenelang fmt` does, where it has no mistake that forbids it. */
+/** Lays a text out as `scenelang fmt` does, where it has no mistake that forbids it and the answer is not late. */
 export async function format(server, document, view) {
   const before = view.state.doc;
   const options = { tabSize: 2, insertSpaces: true };
-  const edits = await server.ask("formatting", document.uri, { options });
+  const late = new Promise((done) => setTimeout(done, FORMAT_MS));
+  const edits = await Promise.race([server.ask("formatting", document.uri, { options }), late]);
   if (!edits?.length || view.state.doc !== before) return;
   view.dispatch({ changes: toChanges(before, edits), userEvent: "format" });
 }

@@ -18,7 +18,7 @@ const SHORT = "nsg 1;\n\nsquare { scale(0.6); material flat { color(#2a6f97); } 
 let known = { files: [], examples: [], most: {} };
 let download = null;  // {id, done} of the one that is being made
 let renaming = null;  // [file, to]
-let goal = null;  // {uri, position} to go to once it is shown
+let goal = null;  // {file, position} to go to once it is shown
 
 const bars = makeBars(at("bars"));
 const server = languageServer(address("lsp"), {
@@ -178,16 +178,16 @@ async function rename() {
   live.send({ kind: "rename", file: shown.file, to: asked.file });
 }
 
-/** Show a place of a file, which may have to be opened. */
+/** Show a place of a file of the folder, which may have to be opened. */
 function go(uri, position) {
-  goal = { uri, position };
-  const inside = uri.startsWith(documents.folder());
-  if (documents.current().uri === uri) reach();
-  else if (inside) documents.open(decodeURIComponent(uri.slice(documents.folder().length)));
+  if (!uri.startsWith(documents.folder())) return;
+  goal = { file: decodeURIComponent(uri.slice(documents.folder().length)), position };
+  if (documents.current().file === goal.file) reach();
+  else documents.open(goal.file);
 }
 
 function reach() {
-  if (goal === null || documents.current().uri !== goal.uri) return;
+  if (documents.current().file !== goal?.file) return;
   editor.go(toOffset(editor.view.state.doc, goal.position));
   goal = null;
 }
