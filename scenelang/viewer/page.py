@@ -9,6 +9,7 @@ import unicodedata
 import zlib
 from html import escape
 from importlib.metadata import version
+from math import ceil
 from typing import Any, Final
 
 from scenelang.viewer.script import script, web
@@ -62,9 +63,11 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
 def control_rows(view: View) -> int:
     """About how high the controls of a view are, in rem."""
     data = view.data
-    params, fixed = len(data["params"]), len(data["fixed"])
+    fixed = {one["name"] for one in data["fixed"]}
+    live = [param for param in data["params"] if param["name"] not in fixed]
+    told = sum("label" in param for param in live)
     timeline, camera = bool(data["animation"]), bool(data["dimension"] == 3)
-    return 2 * params + 2 * fixed + 3 * (params > 0) + 3 * timeline + 6 * camera
+    return ceil(2.5 * len(live) + 1.5 * told + 2 * len(fixed) + 3 * bool(live) + 3 * timeline + 6 * camera)
 
 
 def plain(text: str) -> str:
