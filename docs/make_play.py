@@ -29,7 +29,7 @@ OUT = ROOT / "docs/pictures/play.webp"
 SIZE = {"width": 900, "height": 540}
 SCENES = "chain", "saturn"
 TYPED = "\nstar {\n  scale(0.3);\n  translate(0.4, -0.5);\n  material flat { color(#2a9d8f); }\n}"
-QUALITY = 45
+QUALITY = 30
 SOON_MS, REST_MS, LONG_MS = 70, 350, 1500
 
 
