@@ -32,6 +32,7 @@ planeDrawer = solidDrawer = (gl, view) => {
   return {
     ...inPieces,
     draw(program, { width, height, scale }) {
+      if (globalThis.broken === scale) throw new Error("no shader");
       gl.viewport(0, 0, width, height);
       gl.clearColor(program.shade ?? 0, scale, program.stage ? 0.5 : 0, 1);
       gl.clear(gl.COLOR_BUFFER_BIT);

@@ -111,6 +111,14 @@ def test_solids_begin_coarse_and_end_full(shown: Any) -> None:
     assert found == [0, 255, 128, 255], "what was drawn behind is on the canvas"
 
 
+@pytest.mark.parametrize("scale", [0.25, 1])
+def test_what_cannot_be_drawn_is_told(shown: Any, scale: float) -> None:
+    page = shown(SOLID)
+    ask(page, f"void (globalThis.broken = {scale}, viewer.orbit(0.1, 0))")
+    page.wait_for_function("() => refused.length > 0")
+    assert ask(page, "refused[0]") == {"kind": "shader", "message": "no shader"}
+
+
 def test_a_lost_context_comes_back(shown: Any) -> None:
     page = shown(**FORM)
     settled(page)

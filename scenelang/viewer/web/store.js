@@ -29,6 +29,11 @@ export function inflated(text) {
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate")));
 }
 
+/** Values of a view's params by their names, as they are at first. */
+export function defaultsOf(view) {
+  return Object.fromEntries(view.params.map(({ name, value }) => [name, value]));
+}
+
 /** Whether two pieces of data are equal; typed arrays too. */
 export function alike(a, b) {
   if (a === b) return true;

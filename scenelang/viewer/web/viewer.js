@@ -3,7 +3,7 @@ import { evaluateForm } from "./evaluate.js";
 import { Pace } from "./pace.js";
 import { planeDrawer } from "./plane.js";
 import { solidDrawer } from "./solid.js";
-import { alike, WITH_ARRAYS } from "./store.js";
+import { alike, defaultsOf, WITH_ARRAYS } from "./store.js";
 import { Surface } from "./surface.js";
 
 const DRAWN_FROM = ["dimension", ...WITH_ARRAYS]; // what a drawer is made of
@@ -37,7 +37,7 @@ export class Viewer {
   constructor(canvas, view, { onchange = () => {}, onerror = () => {} } = {}) {
     this.canvas = canvas;
     this.onerror = onerror;
-    this.params = defaults(view);
+    this.params = defaultsOf(view);
     this.frame = 0;
     this.playing = false;
     this.#watchers.add(onchange);
@@ -83,9 +83,9 @@ export class Viewer {
       this.#drawer.dispose();
       this.#drawer = drawer;
     }
-    const old = defaults(before);
+    const old = defaultsOf(before);
     const kinds = Object.fromEntries(before.params.map(({ name, kind }) => [name, kind]));
-    const params = defaults(next);
+    const params = defaultsOf(next);
     for (const { name, kind } of next.params) {
       const moved = kinds[name] === kind && !alike(this.params[name], old[name]);
       if (moved) params[name] = this.params[name];
@@ -117,7 +117,7 @@ export class Viewer {
 
   /** Give every param its default. */
   reset() {
-    this.params = defaults(this.#view);
+    this.params = defaultsOf(this.#view);
     this.#outdated("param");
   }
 
@@ -316,14 +316,19 @@ export class Viewer {
     const program = this.program;
     this.#dirty = false;
     this.#pace.start(scale);
-    try {
-      this.#surface.draw(this.#drawer, program, scale);
-    } catch (error) { // shaders are made for what a scene shows
-      this.onerror({ kind: "shader", message: error.message });
-      return;
-    }
+    if (this.#tried(() => this.#surface.draw(this.#drawer, program, scale)) === null) return;
     this.#pace.end();
     this.#tell("drawn");
+  }
+
+  /** What a call that draws returns; null where it cannot: shaders are made for what a scene shows. */
+  #tried(call) {
+    try {
+      return call();
+    } catch (error) {
+      this.onerror({ kind: "shader", message: error.message });
+      return null;
+    }
   }
 
   /** Draw in full what rests, a piece at a time if that can be. */
@@ -331,9 +336,9 @@ export class Viewer {
     if (!this.#drawer.pieces) return void this.#ask(true);
     this.#surface.begin(this.#drawer, this.program);
     this.#pace.pieces(() => {
-      const goesOn = !this.#dirty && !this.playing;
-      if (goesOn && this.#surface.step()) return true;
-      if (goesOn) {
+      const more = this.#dirty || this.playing ? null : this.#tried(() => this.#surface.step());
+      if (more) return true;
+      if (more === false) {
         this.#surface.show();
         this.#pace.start(1);
         this.#tell("drawn");
@@ -342,8 +347,4 @@ export class Viewer {
       return false;
     });
   }
-}
-
-function defaults(view) {
-  return Object.fromEntries(view.params.map(({ name, value }) => [name, value]));
 }
