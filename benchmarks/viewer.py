@@ -25,7 +25,8 @@ from tests.browser import ARGUMENTS, NAMES
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SMALL = "200 small objects"
-PLANE = ("chain", "tangram", "flower", "night", SMALL)
+NIGHT = "night, 200 stars"
+PLANE = ("chain", "tangram", "flower", NIGHT, SMALL)
 SOLID = ("chess", "lotus", "clouds")
 
 TIMED = """async ([message, side, frames]) => {
@@ -51,9 +52,11 @@ TIMED = """async ([message, side, frames]) => {
 
 
 def scene(name: str, side: int) -> nsg.Scene:
-    """A scene by the name of an example, or `SMALL`."""
+    """A scene by the name of an example, `SMALL` or `NIGHT`."""
     if name == SMALL:
         return stars(0, 200, 0.05, side)  # type: ignore[no-any-return]
+    if name == NIGHT:
+        return nsg.load(EXAMPLES / "night.nsg", params={"stars": 200}).sized((side, side))
     return nsg.load(EXAMPLES / f"{name}.nsg").sized((side, side))
 
 

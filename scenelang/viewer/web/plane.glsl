@@ -11,6 +11,7 @@ uniform vec2 size; // of the frame, pixels
 uniform float px; // side of a pixel, world units; 0: single points
 uniform float empty; // the state before the first object
 uniform float widest; // of the blends, world units
+uniform int most; // times that a pixel asks, 5; a number here would have some compilers write the loop out
 uniform int tile; // side of a tile, pixels
 uniform int across; // tiles in a row
 #ifdef POINTS
@@ -255,7 +256,7 @@ void main() {
   ivec2 at = ivec2(gl_FragCoord.xy) / tile, span = ivec2(texel(lists, at.y * across + at.x).xy);
   vec2 middle = (gl_FragCoord.xy - 0.5 * size) * px;
   vec4 sum = vec4(0.0);
-  for (int k = 0; k < 5; k++) {
+  for (int k = 0; k < most; k++) {
     vec4 found = met(middle + px * OFFSETS[k], span, k == 0 ? NEAR * px : 0.0, near);
     float alpha = clamp(0.5 - found.a * SLOPE, 0.0, 1.0);
     vec4 picture = vec4(found.rgb * alpha, alpha);

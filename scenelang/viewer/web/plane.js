@@ -192,6 +192,7 @@ export function planeDrawer(gl, view) {
     gl.uniform1f(place("px"), define === "POINTS" ? 0 : px);
     gl.uniform1f(place("empty"), (network.empty * widest) / network.blend);
     gl.uniform1f(place("widest"), widest);
+    gl.uniform1i(place("most"), 5);
     gl.uniform1i(place("tile"), lists.tile);
     gl.uniform1i(place("across"), lists.across);
     gl.viewport(0, 0, width, height);
