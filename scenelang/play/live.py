@@ -134,8 +134,9 @@ class Live:
         path = self._play.folder.place(name)
         if name not in self.open and len(self.open) >= MOST_OPEN:
             raise Refused(f"more than {MOST_OPEN} open files")
-        text, disk = await asyncio.to_thread(self._play.folder.read, name)
         kept = await asyncio.to_thread(self._play.journal.find, path)
+        async with self._play.reading:
+            text, disk = await asyncio.to_thread(self._play.folder.read, name)
         known = self.open.get(name)
         if known is None:
             known = self.open[name] = Open(path, text or "", disk)

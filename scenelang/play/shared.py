@@ -55,6 +55,8 @@ class Play:
         self.slow = Pool(most=2, warm=0, nice=10)
         self.store = Files()
         self.pages: set[Page] = set()
+        self.reading = asyncio.Lock()
+        """Held from reading or writing a file to telling pages of it: what is older is told first."""
         self._tasks: set[asyncio.Future[Any]] = set()
         self._listed: list[str] | None = None
 
@@ -101,14 +103,15 @@ class Play:
 
     async def write(self, name: str, text: str, base: str | None, page: Page) -> str:
         """Write a file for a page, and tell the others; the file's digest. Raises as `Folder.write`."""
-        disk = await asyncio.to_thread(self.folder.write, name, text, base)
-        for other in self.pages:
-            if other is not page:
-                other.changed(name, text, disk)
-            other.imported(self.folder.path / name)
-        if self._listed is not None and name not in self._listed:
-            await self.refresh()
-        return disk
+        async with self.reading:
+            disk = await asyncio.to_thread(self.folder.write, name, text, base)
+            for other in self.pages:
+                if other is not page:
+                    other.changed(name, text, disk)
+                other.imported(self.folder.path / name)
+            if self._listed is not None and name not in self._listed:
+                await self.refresh()
+            return disk
 
     def keep(self, path: Path, text: str, saved: str, disk: str | None) -> None:
         """Keep a text that is not saved; where it is, forget what was kept."""

@@ -60,13 +60,15 @@ async def _tell(play: Play, paths: set[Path]) -> None:
 
 
 async def _reread(play: Play, name: str) -> None:
-    try:
-        text, disk = await asyncio.to_thread(play.folder.read, name)
-        if not text:
-            await asyncio.sleep(PATIENCE_S)
-            text, disk = await asyncio.to_thread(play.folder.read, name)
-    except Refused as error:
-        log.warning("%s", error)
-        return
-    for page in play.pages:
-        page.changed(name, text, disk)
+    for patient in (False, True):
+        async with play.reading:
+            try:
+                text, disk = await asyncio.to_thread(play.folder.read, name)
+            except Refused as error:
+                log.warning("%s", error)
+                return
+            if text or patient:
+                for page in play.pages:
+                    page.changed(name, text, disk)
+                return
+        await asyncio.sleep(PATIENCE_S)

@@ -34,6 +34,7 @@ def quoted(text: str) -> bool:
         (" " in text.strip() or text == "'x'")
         and not pattern
         and PYTHONS not in text
+        and "-src '" not in text  # a page's content policy
         and bool(QUOTED.search(SHELL.sub("", text)))
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -75,3 +76,39 @@ def test_changes_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: 
         "large": [False],
         "polling": [True, False],
     }[way]
+
+
+class Slow(Folder):
+    """Hands out what it first reads only when it may."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.has_read, self.may_go, self.first = threading.Event(), threading.Event(), True
+
+    def read(self, name: str) -> tuple[str | None, str | None]:
+        found = super().read(name)
+        if self.first:
+            self.first = False
+            self.has_read.set()
+            assert self.may_go.wait(20)
+        return found
+
+
+def test_what_was_read_before_a_save_is_not_told_behind_it(tmp_path: Path) -> None:
+    (tmp_path / "a.nsg").write_text("square;\n")
+    folder = Slow(tmp_path)
+    _, base = Folder(tmp_path).read("a.nsg")
+
+    async def both() -> list[Any]:
+        play, page, saver = Play(folder, journal=Journal(tmp_path / "kept")), Page(), Page()
+        play.pages |= {page, saver}
+        looks = asyncio.create_task(watching._reread(play, "a.nsg"))
+        await asyncio.to_thread(folder.has_read.wait, 20)
+        saves = asyncio.create_task(play.write("a.nsg", "star;\n", base, saver))
+        await asyncio.wait([saves], timeout=0.3)
+        folder.may_go.set()
+        await asyncio.gather(looks, saves)
+        return [told[1] for told in page.told if isinstance(told, tuple)]
+
+    assert asyncio.run(both()) == ["square;\n", "star;\n"]
+    assert (tmp_path / "a.nsg").read_text() == "star;\n"
