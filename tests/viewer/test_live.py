@@ -152,7 +152,7 @@ def test_what_the_canvas_and_the_length_hang_on_is_fixed() -> None:
         param unused = 1; fn wide(n) = n * w; let side = wide(1); canvas(side, 100);
         animate(4 / speed, 10); square { scale(k + t); }"""
     form = compiled(SourceFile("", text)).form()
-    assert {one["name"]: one["reason"].split()[1] for one in form.fixed} == {"w": "canvas", "speed": "length"}
+    assert {one["name"]: one["reason"].split()[1] for one in form.fixed} == {"w": "size", "speed": "length"}
     assert [param["name"] for param in form.params] == ["w", "speed", "k"]
     assert form.params[2]["label"] == "how far"
     assert "wide" not in str(form.data)
