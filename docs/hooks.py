@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from blocks import pictured
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -39,11 +40,6 @@ _LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 _SHIM = re.compile(r"<script src=\"?https://unpkg\.com/iframe-worker/shim\"?></script>")
 _CODES = re.compile(r"^(```nsg)(?: [EW]\d{4})+", re.MULTILINE)  # the codes that a test expects of a scene
 _PICTURE = re.compile(r"(\[)?(!\[[^\]]*\]\((?:\.\./)*pictures/([\w/-]+)\.(?:png|webp)\))(?(1)\]\([^)]*\))")
-_SCENE = re.compile(
-    r"^```nsg(?: title=[^\n]*)?\n((?:(?!```)[^\n]*\n)*)```\n\n"
-    r"!\[[^\]]*\]\(pictures/([\w/-]+)\.(?:png|webp)\)",
-    re.MULTILINE,
-)
 _SHOWN = re.compile(r"^// Shown( \w+)?:", re.MULTILINE)
 LIVE: dict[str, str] = {}
 """Attributes of links to the pages that draw scenes, by the names of their pictures: lines of controls, 16 px
@@ -94,7 +90,8 @@ def live_scenes() -> dict[str, str | Path]:
         shown = _SHOWN.findall(path.read_text("utf-8"))
         found |= {f"language/{name.strip() or path.stem}": path for name in shown}
     for page in (ROOT / "docs").glob("*.md"):
-        found |= {name: text for text, name in _SCENE.findall(page.read_text("utf-8"))}
+        shown = pictured(page.read_text("utf-8"))
+        found |= {name.rpartition(".")[0]: text for text, name in shown}
     return found
 
 

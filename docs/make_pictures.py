@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from blocks import pictured
 from PIL import Image as pillow
 from PIL import ImageDraw, ImageFont
 
@@ -65,11 +66,6 @@ MOVING_BYTES = 220_000
 PALETTE = 256
 SHADED = 3000  # colours from which on a palette is dithered, so that shading shows no bands
 NEAR = 2.5  # a palette that changes values by more than this on average (of 255) is not used
-_SCENE = re.compile(
-    r"^```nsg(?: title=[^\n]*)?\n((?:(?!```)[^\n]*\n)*)```\n\n"
-    r"!\[[^\]]*\]\(pictures/([\w/-]+\.(?:png|webp))\)",
-    re.MULTILINE,
-)
 _SHOWN = re.compile(r"^// Shown( \w+)?: (.*)$", re.MULTILINE)
 
 
@@ -277,7 +273,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
         for name, cells in strips(path).items():
             made[f"language/{name}.png"] = lambda cells=cells: strip(cells)
     for page in sorted(DOCS.glob("*.md")):
-        for text, name in _SCENE.findall(page.read_text("utf-8")):
+        for text, name in pictured(page.read_text("utf-8")):
             if name in made:
                 raise SystemExit(f"{page.name}: {name} is drawn twice")
             draw = moving if name.endswith(".webp") else still

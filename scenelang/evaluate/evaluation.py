@@ -182,14 +182,26 @@ def load_scene(
     Raises:
         OSError: the file cannot be opened.
     """
-    inputs["path"] = where = Path(path)
+    inputs["path"] = Path(path)
+    source = read_scene(path, diagnostics)
+    if source is None:
+        return None, SpanMap()
+    return load_source(source, diagnostics=diagnostics, **inputs)
+
+
+def read_scene(path: str | os.PathLike[str], diagnostics: Diagnostics) -> SourceFile | None:
+    """The text of a scene file; None, and a diagnostic, where it is not text.
+
+    Raises:
+        OSError: the file cannot be opened.
+    """
+    where = Path(path)
     try:
-        source = read_source(where, os.fspath(path))
+        return read_source(where, os.fspath(path))
     except Unreadable as error:
         empty = SourceFile(os.fspath(path), "")
         diagnostics.add(error.code, f"cannot read `{where.name}`: {error}", Span(empty, 0, 0))
-        return None, SpanMap()
-    return load_source(source, diagnostics=diagnostics, **inputs)
+        return None
 
 
 def load_source(

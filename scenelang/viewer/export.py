@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from scenelang.backend.render import render
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.evaluation import Evaluation
-from scenelang.evaluate.loader import Unreadable, read_source
+from scenelang.evaluate.evaluation import Evaluation, read_scene
 from scenelang.files import write_output
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
@@ -189,13 +188,12 @@ def _evaluated(
     path: Path, params: Mapping[str, Any] | None, model: str | None, root: str | os.PathLike[str] | None
 ) -> tuple[Scene, Evaluation]:
     found = Diagnostics()
-    try:
-        source = read_source(path, os.fspath(path))
-    except Unreadable as error:
-        found.add(error.code, f"cannot read `{path.name}`: {error}", None)
-        raise SceneError(found) from None
-    tree = parse(source, found)
-    evaluation = Evaluation(tree, diagnostics=found, defines=params, model=model, root=root, path=path)
+    source = read_scene(path, found)
+    if source is None:
+        raise SceneError(found)
+    evaluation = Evaluation(
+        parse(source, found), diagnostics=found, defines=params, model=model, root=root, path=path
+    )
     scene, _ = evaluation.run(0)
     if scene is None or found.errors:
         raise SceneError(found)

@@ -6,13 +6,13 @@ import base64
 import hashlib
 import re
 import unicodedata
-import zlib
 from html import escape
 from importlib.metadata import version
 from math import ceil
 from typing import Any, Final
 
 from scenelang.viewer.script import script, web
+from scenelang.viewer.store import packed
 from scenelang.viewer.view import View
 
 MOST_TITLE: Final = 200
@@ -53,8 +53,8 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
         "height": str(height),
         "alt": alt,
         "model": told(data["model"]),
-        "view": _packed(view.message()),
-        "code": _packed(code),
+        "view": packed(view.message().encode()),
+        "code": packed(code.encode()),
         "loader": loader,
     }
     return _SLOT.sub(lambda slot: parts[slot[1]], web("page.html"))
@@ -87,11 +87,6 @@ def told(model: dict[str, Any]) -> str:
             f"{figures['cap']:g}) and {figures['flip']:.4f} (mean FLIP) from the exact picture"
         )
     return f"{line}."
-
-
-def _packed(text: str) -> str:
-    """Deflated (zlib), in base64."""
-    return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
 
 
 def _digest(text: str) -> str:

@@ -5,7 +5,7 @@ The page's own evaluator (``web/graph.js``) makes rows of a scene; rows of a Pro
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +13,9 @@ from scenelang.graph.stage import Stage
 from scenelang.lifting.layout import LAYOUTS, Layout
 from scenelang.models.manifest import Manifest
 from scenelang.program.program import Program, ProgramError
-from scenelang.renderers.field import BLEND
+from scenelang.renderers.field import BLEND, SMOOTH
 from scenelang.renderers.frames import Frames
 from scenelang.renderers.solid.frames import read_solid_frame
-from scenelang.words import TOKENS
-
-MOST_STEPS: Final = 24  # of a row, between the world and its leaf
-SMOOTH: Final = TOKENS["smooth"]
 
 Row = dict[str, Any]
 Step = list[Any]

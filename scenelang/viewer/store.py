@@ -6,6 +6,8 @@ blob, a multiple of 4, and a count of numbers.
 
 from __future__ import annotations
 
+import base64
+import zlib
 from typing import Any, Final
 
 import numpy as np
@@ -38,3 +40,8 @@ class Store:
     def bytes(self) -> bytes:
         """The blob."""
         return b"".join(self._parts)
+
+
+def packed(data: bytes) -> str:
+    """Deflated (zlib), in base64."""
+    return base64.b64encode(zlib.compress(data, 9)).decode()

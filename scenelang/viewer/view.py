@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import json
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -23,7 +21,7 @@ from scenelang.viewer.describe import alternative
 from scenelang.viewer.form import Form
 from scenelang.viewer.grids import paints_of, shapes_of
 from scenelang.viewer.rows import rows_of, stage_of
-from scenelang.viewer.store import Store
+from scenelang.viewer.store import Store, packed
 
 FORMAT: Final = 1
 
@@ -42,8 +40,7 @@ class View:
 
     def message(self) -> str:
         """One JSON text: the data, and under ``blob`` the arrays, deflated (zlib) and in base64."""
-        packed = base64.b64encode(zlib.compress(self.blob, 9)).decode()
-        return json.dumps({**self.data, "blob": packed}, separators=(",", ":"), allow_nan=False)
+        return json.dumps({**self.data, "blob": packed(self.blob)}, separators=(",", ":"), allow_nan=False)
 
 
 def view_of(
@@ -87,14 +84,12 @@ def view_of(
             "weights": digest,
             "measured": _measured(manifest),
         },
-        "shader": {},
-        "network": {},
-        "shapes": geometries,
+        "shapes": [*geometries, *shapes_of(elements, store)],
         "materials": [
             {"name": name, "albedo": row[:3].tolist(), "medium": float(row[3]) if len(row) > 3 else 0.0}
             for name, row in zip(manifest.materials, albedo.astype(np.float64), strict=True)
         ],
-        "paints": [],
+        "paints": paints_of(elements, store),
         "program": {
             "rows": rows_of(program, manifest, network.codes, network.material_codes),
             "stage": program.stage and stage_of(program.stage),
@@ -113,8 +108,6 @@ def view_of(
         data |= plane.shader(network, store)
     elif isinstance(network, SolidArrays):
         data |= solid.shader(network, store)
-    data["paints"] = paints_of(elements, store)
-    data["shapes"] += shapes_of(elements, store)
     data["alt"] = alternative(data)
     return View(data, store.bytes())
 

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +11,7 @@ import pytest
 from PIL import Image
 
 from tests.browser import watched
+from tests.test_docs import build_site
 
 ROOT = Path(__file__).parents[2]
 
@@ -26,19 +24,7 @@ def seen(data: bytes) -> np.ndarray:
 
 @pytest.mark.browser
 def test_a_click_brings_a_picture_to_life(chromium: Any, tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "mkdocs",
-        "build",
-        "--strict",
-        "-q",
-        "-f",
-        ROOT / "mkdocs.yml",
-        "-d",
-        tmp_path,
-    ]
-    subprocess.run(command, check=True, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"})
+    build_site(tmp_path)
     with watched(chromium, viewport={"width": 1200, "height": 900}) as page:
         page.goto((tmp_path / "examples.html").as_uri())
         link = page.locator('a.live[href$="viewers/chain.html"]')
