@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable
-from typing import Any
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final
 
 import torch
 
@@ -12,6 +15,8 @@ from scenelang.training.loop import revision
 
 Report = Callable[[str, int, int], None]
 """Called with what is measured, how much of it is done, and all."""
+FOLDERS: Final = {"-o", "--out", "--kept", "--known"}
+"""Options of commands that change where things lie, and no figure."""
 
 
 def silent(what: str, done: int, count: int) -> None:
@@ -19,10 +24,38 @@ def silent(what: str, done: int, count: int) -> None:
 
 
 def about() -> dict[str, Any]:
-    """Revision, kind of machine, torch and its threads."""
+    """The command that is running, revision, kind of machine, torch and its threads."""
     return {
+        "command": command_line(sys.argv),
         "revision": revision(),
         "machine": platform.machine(),
         "torch": torch.__version__.split("+")[0],
         "threads": torch.get_num_threads(),
     }
+
+
+def command_line(argv: Sequence[str]) -> str:
+    """A command as one types it, without where it reads and writes: ``scenelang lab eval shapes2d``.
+
+    Args:
+        argv: as in `sys.argv`.
+    """
+    spec = getattr(sys.modules["__main__"], "__spec__", None)
+    module, first = spec.name if spec else "", Path(argv[0]).name
+    if module == "scenelang.__main__":
+        first = "scenelang"
+    elif module:
+        first = f"python -m {module}"
+    elif first.endswith(".py"):
+        first = f"python {argv[0]}"
+    return " ".join([first, *map(shlex.quote, _figures(argv[1:]))])
+
+
+def _figures(arguments: Sequence[str]) -> Iterator[str]:
+    """Arguments without those of `FOLDERS`."""
+    left = iter(arguments)
+    for argument in left:
+        if argument in FOLDERS:
+            next(left, None)
+        elif argument.partition("=")[0] not in FOLDERS:
+            yield argument
