@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scenelang.image import Image
 from scenelang.lab.about import Report, about, silent
 from scenelang.measure.metrics import MOST_DB, UNCAPPED_DB, contact_sheet, psnr, side_by_side
-from scenelang.measure.scenes import draw_scene, interval, reference_of, spread
+from scenelang.measure.scenes import draw_scene, reference_of, spread
 from scenelang.measure.varied_solids import shadow
 from scenelang.models.load import Model
 from scenelang.models.manifest import Manifest
@@ -92,8 +92,4 @@ def measure_shadows(
 
 def _summary(found: Sequence[dict[str, float]]) -> dict[str, Any]:
     bad_ends = {"wrong_percent": 95}
-    return {
-        name: spread([one[name] for one in found], bad_ends.get(name, 5))
-        | {"interval": interval([one[name] for one in found])}
-        for name in found[0]
-    }
+    return {name: spread([one[name] for one in found], bad_ends.get(name, 5)) for name in found[0]}

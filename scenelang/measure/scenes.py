@@ -115,11 +115,12 @@ def draw_scene(model: Model, scene: Scene, threads: int = 1) -> tuple[Program, I
     return program, draw_program(program, model, threads=threads).image
 
 
-def spread(values: list[float], bad_end: int) -> dict[str, float]:
-    """Mean, worst and the percentile ``bad_end``, which says where the bad values lie; named p5."""
+def spread(values: Sequence[float], bad_end: int) -> dict[str, float]:
+    """Mean and its `interval`, worst, and the percentile ``bad_end``, where the bad values lie; named p5."""
     worst = max(values) if bad_end > 50 else min(values)
     return {
         "mean": round(float(np.mean(values)), 5),
+        "interval": interval(values),
         "p5": round(float(np.percentile(values, bad_end)), 5),
         "worst": round(worst, 5),
     }
@@ -127,7 +128,7 @@ def spread(values: list[float], bad_end: int) -> dict[str, float]:
 
 def interval(values: Sequence[float]) -> float:
     """Half the width of the 95 % interval of a mean, by its normal approximation."""
-    return round(1.96 * float(np.std(values, ddof=1)) / math.sqrt(len(values)), 3) if len(values) > 1 else 0.0
+    return round(1.96 * float(np.std(values, ddof=1)) / math.sqrt(len(values)), 5) if len(values) > 1 else 0.0
 
 
 def summarise(cases: Sequence[Mapping[str, float]]) -> dict[str, dict[str, float]]:

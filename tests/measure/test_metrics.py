@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scenelang.measure.metrics import compare, flip, flip_map, psnr, ssim
-from scenelang.measure.scenes import sets_of
+from scenelang.measure.scenes import interval, sets_of, spread
 from scenelang.measure.sets import GEOMETRIES, SETS, random_scene
 from scenelang.models.choose import uses as uses_of
 from scenelang.models.manifest import load_manifest
@@ -29,6 +29,15 @@ def test_psnr_of_equal_pictures_is_the_cap() -> None:
 def test_ssim_and_flip_of_equal_pictures() -> None:
     assert ssim(GREY, GREY) == pytest.approx(1.0)
     assert flip(GREY, GREY) == 0.0
+
+
+def test_intervals_hold_the_mean_19_times_in_20() -> None:
+    rng = np.random.default_rng(3)
+    drawn = [rng.normal(7.0, 2.0, 40).tolist() for _ in range(1000)]
+    held = sum(abs(np.mean(values) - 7.0) < interval(values) for values in drawn)
+    assert 920 < held < 970
+    assert spread([40.0, 42.0], 5) == {"mean": 41.0, "interval": 1.96, "p5": 40.1, "worst": 40.0}
+    assert interval([50.0]) == 0.0
 
 
 def test_alpha_is_put_over_white_and_sizes_are_compared() -> None:

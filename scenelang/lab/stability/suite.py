@@ -28,7 +28,7 @@ from scenelang.lifting import exact
 from scenelang.lifting.layout import LAYOUTS
 from scenelang.lifting.learned import lift_geometry
 from scenelang.measure.metrics import flip, psnr
-from scenelang.measure.scenes import LEAST_COVER, coverage, interval, reference_of, sized, spread
+from scenelang.measure.scenes import LEAST_COVER, coverage, reference_of, sized, spread
 from scenelang.models.load import Model
 from scenelang.models.manifest import Manifest
 from scenelang.passes import OPTIONAL
@@ -183,7 +183,7 @@ def run_probe(model: Model, name: str, scenes: int, seed: int, report: Report = 
         rows.append(
             {
                 "value": value,
-                "psnr": spread([e.psnr for e in found], 5) | {"interval": interval([e.psnr for e in found])},
+                "psnr": spread([e.psnr for e in found], 5),
                 "flip": spread([e.flip for e in found], 95),
                 "db": round(-10 * math.log10(max(1e-12, float(np.mean([e.square for e in found])))), 3),
                 "per_edge": round(float(np.mean([e.per_edge for e in found])), 6),
