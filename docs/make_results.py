@@ -205,6 +205,21 @@ def rivals() -> str:
     return "\n\n".join([markdown(heads, rows), *said])
 
 
+def smallest_run() -> str:
+    """What everything took at its smallest, and most of it."""
+    path = HERE / "results" / "all.json"
+    if not path.exists():
+        return "*Not measured yet.*"
+    found = json.loads(path.read_text())
+    steps = sorted((s for s in found["steps"] if "exit" in s), key=lambda step: -step["processor_s"])
+    longest = "; ".join(f"`{step['command']}` {step['processor_s']:.0f} s" for step in steps[:3])
+    return (
+        f"`{found['command']}` at revision `{found['revision'][:8]}`: {len(steps)} commands, "
+        f"{sum(bool(step['exit']) for step in steps)} failed, {found['processor_s'] / 60:.0f} minutes of "
+        f"processor time; the longest are {longest}."
+    )
+
+
 BLOCKS: dict[str, Callable[[], str]] = {
     "accuracy": accuracy,
     "stability": stability,
@@ -216,6 +231,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "texels": texels,
     "rivals": rivals,
     "shadows": shadows,
+    "all": smallest_run,
     **{name: experiment(name) for name in EXPERIMENTS},
 }
 """What stands between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``."""

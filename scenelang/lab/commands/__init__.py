@@ -17,6 +17,7 @@ TABLE: Final = {
     "experiment": "Train several designs alike and compare them.",
     "chart": "Draw tables and charts of experiments.",
     "train": "Train the weights of another renderer or lifting.",
+    "all": "Measure everything that the documentation reports.",
 }
 
 
