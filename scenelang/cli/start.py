@@ -17,6 +17,14 @@ _UNLESS_SET = {
 }
 
 
+class Interruption(KeyboardInterrupt):
+    """Ctrl-C.
+
+    Python remembers a plain `KeyboardInterrupt` that leaves a text given to `exec`, as dataclasses and named
+    tuples are made by, and ends the process by the signal whatever catches it later.
+    """
+
+
 def main() -> None:
     """Run the command line and exit.
 
@@ -24,6 +32,8 @@ def main() -> None:
     """
     try:
         signal.signal(signal.SIGTERM, _terminate)
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not where it is ignored
+            signal.signal(signal.SIGINT, _interrupt)
         gc.set_threshold(_COLLECTED_AFTER)
         for name, value in _UNLESS_SET.items():
             os.environ.setdefault(name, value)
@@ -35,6 +45,10 @@ def main() -> None:
     finally:
         # What is left is for the interpreter to tidy up: an interruption there would only print a traceback.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise Interruption
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

@@ -173,3 +173,20 @@ def test_interrupted(folder: Folder) -> None:
     assert run.returncode == 130, err
     assert "Traceback" not in err
     assert os.listdir() == ["a.nsg"]
+
+
+INSIDE_EXEC = """
+import sys, types
+command = types.ModuleType("scenelang.cli.main")
+command.main = lambda: exec("import signal; signal.raise_signal(signal.SIGINT)")
+sys.modules[command.__name__] = command
+from scenelang.cli.start import main
+main()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
+def test_interrupted_while_a_class_is_made_from_text(folder: Folder) -> None:
+    folder.write("probe.py", INSIDE_EXEC)
+    found = subprocess.run([sys.executable, "-m", "probe"], capture_output=True, check=False)
+    assert (found.returncode, found.stderr) == (130, b"")
