@@ -1,0 +1,4 @@
+"""Figures in docs/index.md."""
+
+CLAIMS: list[str] = []
+GIVEN: dict[str, str] = {}
