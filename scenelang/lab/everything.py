@@ -22,18 +22,23 @@ class Step(NamedTuple):
     """A command line of the laboratory, or of a module of the repository's benchmarks.
 
     ``{out}`` is the run's folder, ``{budget}`` processor minutes of a training, ``{scenes}`` of an
-    evaluation, ``{more}`` as many but at least 8, ``{few}`` a twentieth but at least 2, for what draws many
+    evaluation, ``{more}`` as many but at least 8, ``{few}`` a twentieth but at least 1, for what draws many
     for each value, ``{examples}`` that many files.
     """
 
     line: str
-    needs: tuple[str, ...] = ()  # modules or programs besides the extra `dev`; left out where one is missing
+    # modules, programs or variables of the environment besides the extra `dev`; left out where one lacks
+    needs: tuple[str, ...] = ()
 
 
 STEPS: Final = (
     Step("lab eval shapes2d --all-sets --scenes {scenes} -o {out}/eval"),
     Step("lab eval textures2d --set textures2d --set textures2d-mixed --scenes {scenes} -o {out}/textures2d"),
-    Step("lab eval solids3d --all-sets --scenes {scenes} -o {out}/solids3d"),
+    Step(
+        "lab eval solids3d --set solids3d --set diffuse --set media --set deformed --set booleans "
+        "--set shuffled --set wide --set staged --set mixed --scenes {scenes} -o {out}/solids3d"
+    ),
+    Step("lab eval solids3d --set meshes3d --scenes {scenes} -o {out}/meshes3d", ("SCENELANG_ORIGINALS",)),
     Step("lab stability shapes2d --scenes {few} -o {out}/stability-shapes2d"),
     Step("lab stability textures2d --scenes {few} -o {out}/stability-textures2d"),
     Step("lab stability solids3d --scenes {few} -o {out}/stability-solids3d"),
@@ -78,7 +83,7 @@ def command_lines(out: Path, budget: float, scenes: int) -> list[tuple[list[str]
         "{budget}": [f"{budget:g}"],
         "{scenes}": [str(scenes)],
         "{more}": [str(max(8, scenes))],
-        "{few}": [str(max(2, scenes // 20))],
+        "{few}": [str(max(1, scenes // 20))],
         "{examples}": [str(path.relative_to(ROOT)) for path in examples],
     }
 
@@ -133,4 +138,4 @@ def _children_s() -> float:
 
 
 def _there(name: str) -> bool:
-    return shutil.which(name) is not None or importlib.util.find_spec(name) is not None
+    return name in os.environ or shutil.which(name) is not None or importlib.util.find_spec(name) is not None

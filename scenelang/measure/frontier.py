@@ -46,6 +46,9 @@ class Times:
     __pydantic_config__ = _STRICT
     median: Amount
     p95: Amount
+    # the 95 % interval of the median, by its order statistics
+    low: Amount = 0.0
+    high: Amount = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +58,9 @@ class Errors:
     __pydantic_config__ = _STRICT
     mean: Amount
     p95: Amount
-    bound: Amount  # what is promised: the 97.5th percentile
+    bound: Amount  # what is promised
     worst: Amount
+    interval: Amount = 0.0  # half the width of the 95 % interval of the mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +71,20 @@ class Quality:
     mean: Amount
     p5: Amount
     worst: Amount
+    interval: Amount = 0.0  # half the width of the 95 % interval of the mean
+
+
+@dataclass(frozen=True, slots=True)
+class Ratio:
+    """How many times as long one way took as another, on the same scenes drawn in turn."""
+
+    __pydantic_config__ = _STRICT
+    # names of points
+    slow: str
+    fast: str
+    scenes: Count
+    mean: Amount  # of the scenes' ratios
+    interval: Amount  # half the width of its 95 % interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +161,16 @@ class Frontier:
     # mean FLIP of some points against 64 samples a pixel, by name: how near the definition is
     converged: dict[str, Amount]
     points: tuple[Point, ...]  # in the order of their time
+    ratios: tuple[Ratio, ...] = ()
+    command: str = ""  # that measured it
+
+    def point(self, name: str) -> Point | None:
+        """The point of a name, if it was measured."""
+        return next((p for p in self.points if p.name == name), None)
+
+    def ratio(self, slow: str, fast: str) -> Ratio | None:
+        """What one way's time is of another's, if that was measured."""
+        return next((r for r in self.ratios if (r.slow, r.fast) == (slow, fast)), None)
 
     def to_json(self) -> str:
         """The file's text."""

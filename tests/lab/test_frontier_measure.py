@@ -6,11 +6,12 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import scenelang as nsg
 from scenelang.lab.frontier import measure, verify, ways
-from scenelang.lab.frontier.verify import Case
+from scenelang.lab.frontier.measure import Case, median_interval
 from scenelang.measure.frontier import Errors, Frontier, between
 from tests.cli.conftest import Folder
 from tests.cli.conftest import folder as folder
@@ -24,8 +25,7 @@ def measured(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> Frontier:
     """Of two scenes, without the paper's full-size renderer, which takes seconds a frame."""
     monkeypatch.setattr(ways, "_paper", lambda base: iter(()))
     monkeypatch.setattr(ways, "available", lambda: ["shapes2d"])
-    monkeypatch.setattr(measure, "SIDES", (32,))
-    monkeypatch.setattr(measure, "FITTED", 1)
+    monkeypatch.setattr(measure, "CASES", (measure.CASES[0], Case("32 x 32", "", (32, 32), 0.5)))
     monkeypatch.setattr(measure, "CONVERGED", 1)
     result = folder.run("lab", "frontier", "shapes2d", "-o", "out", "--scenes", "2", "--seed", "5")
     assert result.exit_code == 0, result.output
@@ -42,8 +42,11 @@ def test_a_small_run(measured: Frontier) -> None:
         "shapes2d, one sample",
         "shapes2d, draft",
         "shapes2d, nothing skipped",
+        "shapes2d, nothing skipped, four samples",
         "exact field",
         "exact field, four samples",
+        "exact field, nothing skipped",
+        "exact field, nothing skipped, four samples",
         "exact field, one sample",
         "exact reference, 1 spp",
         "exact reference, 4 spp",
@@ -66,19 +69,23 @@ def test_a_small_run(measured: Frontier) -> None:
     assert plain.psnr.mean > 45 > one.psnr.mean > 25
     assert measured.converged["exact reference, 16 spp"] < measured.converged["exact reference, 4 spp"]
     assert between(measured.points) >= 1
+    for savings in ("", ", four samples", ", nothing skipped", ", nothing skipped, four samples"):
+        ratio = measured.ratio(f"shapes2d{savings}", f"exact field{savings}")
+        assert ratio is not None
+        assert (ratio.scenes, ratio.mean > 0) == (2, True)
     for name in ("frontier.html", "frontier.png"):
         assert Path("out", name).stat().st_size > 10_000
     page = Path("out/frontier.html").read_text("utf-8")
     data = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
-    assert [len(p["pictures"]) for p in data["points"]] == [2] * 11
+    assert [len(p["pictures"]) for p in data["points"]] == [2] * 14
 
 
 @pytest.mark.slow
 def test_a_small_run_of_solids(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     """The exact field draws in the same march: as near as the network, and never chosen."""
     monkeypatch.setattr(ways, "_paper", lambda base: iter(()))
-    for name, value in (("SIDE", 48), ("SIDES", ()), ("FITTED", 1)):
-        monkeypatch.setattr(measure, name, value)
+    monkeypatch.setattr(measure, "SIDE", 48)
+    monkeypatch.setattr(measure, "CASES", measure.CASES[:1])
     result = folder.run("lab", "frontier", "solids3d", "-o", "out", "--scenes", "2", "--seed", "5")
     assert result.exit_code == 0, result.output
     found = Frontier.from_json(Path("out/frontier.json").read_bytes())
@@ -96,6 +103,15 @@ def test_a_small_run_of_solids(folder: Folder, monkeypatch: pytest.MonkeyPatch) 
     assert flips["exact field"] < flips["solids3d, one sample"] < flips["solids3d, draft"]
     assert not points["exact field"].offered
     assert points["solids3d, quick"].cost is not None
+
+
+def test_the_interval_of_a_median_covers_it_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(3)
+    for n in (9, 40, 120):
+        ends = np.array([median_interval(rng.exponential(size=n)) for _ in range(2000)])
+        covered = np.mean((ends[:, 0] <= np.log(2)) & (np.log(2) <= ends[:, 1]))
+        assert 0.94 <= covered <= 0.985, n
+    assert median_interval([3.0]) == (3.0, 3.0)
 
 
 def test_nothing_is_kept_between_frames() -> None:

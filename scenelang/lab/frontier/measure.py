@@ -12,9 +12,10 @@ import math
 import platform
 import statistics
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -23,13 +24,13 @@ from scenelang.backend.load import Load, load_of
 from scenelang.backend.neural import open_model
 from scenelang.backend.options import keep_memory
 from scenelang.image import Image, enlarged, from_samples
-from scenelang.lab.about import Report, silent
+from scenelang.lab.about import Report, about, silent
 from scenelang.lab.frontier.fit import fit_cost
-from scenelang.lab.frontier.ways import Draw, Way, ways_of
-from scenelang.measure.choose import yardstick
-from scenelang.measure.frontier import Cost, Errors, Frontier, Point, Quality, Times, front
+from scenelang.lab.frontier.ways import PAPER, Draw, Way, paired, ways_of
+from scenelang.measure.choose import error_scale, yardstick
+from scenelang.measure.frontier import Cost, Errors, Frontier, Point, Quality, Ratio, Times, front
 from scenelang.measure.metrics import flip, over_white, psnr
-from scenelang.measure.scenes import reference_of, scenes_of, usual_set
+from scenelang.measure.scenes import interval, reference_of, scenes_of, usual_set
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.scene.schema import Scene
@@ -39,14 +40,38 @@ SHOWN = 4  # scenes whose pictures are kept
 CONVERGED = 8  # scenes compared with 64 samples a pixel
 SLOW_S = 20.0  # a way draws so long at most, but at least on `LEAST` scenes
 LEAST = 4
-COMPARED = 30  # scenes of ways that are measured for comparison and promise nothing
-TIMED = 8  # scenes of ways of which only the time is taken
+COMPARED = 30  # scenes of the reference with other samples than the definition's
+TIMED = 20  # scenes of ways of which only the time is taken
 SIDE = 256  # pixels along a side of the scenes
-SIDES = (128, 512)  # further canvases that times are fitted on
-MANY = "many"  # set of more objects that times are fitted on
-FITTED = 6  # scenes of each of these
+OTHERS = 1000  # index of the first scene of the other cases
+LATE_MS = 1000.0  # ways that take longer draw nothing of these
 PROMISED = 0.975
 MARGIN = 1.25  # of 40 scenes without it, one scene in ten of another seed was worse than promised
+
+
+class Case(NamedTuple):
+    """Scenes that promises are made and tried on: of a set, on a canvas or the set's own."""
+
+    name: str
+    set: str
+    canvas: tuple[int, int] | None
+    share: float  # of the scenes that are asked for
+
+    def scenes(self, asked: int) -> int:
+        """How many of its scenes are drawn where so many are asked for."""
+        return max(1, round(asked * self.share))
+
+    def on(self, scene: Scene) -> Scene:
+        """The scene on its canvas."""
+        return scene if self.canvas is None else scene.model_copy(update={"canvas": self.canvas})
+
+
+CASES: tuple[Case, ...] = (
+    Case("256 x 256", "", None, 1.0),
+    Case("128 x 128", "", (128, 128), 1 / 3),
+    Case("512 x 512", "", (512, 512), 1 / 3),
+    Case("16 objects", "many", None, 1 / 3),
+)
 
 
 @dataclass(slots=True)
@@ -62,6 +87,7 @@ class Record:
     fitted: list[float] = field(default_factory=list)
     pictures: list[Image] = field(default_factory=list)  # of the first scenes
     converged: list[float] = field(default_factory=list)  # FLIP against 64 samples a pixel
+    others: list[list[float]] = field(default_factory=list)  # FLIP of each other case, over `error_scale`
 
 
 def measure_frontier(
@@ -94,8 +120,9 @@ def measure_frontier(
         turn = index % len(wanted)
         _one_scene(scene, wanted[turn:] + wanted[:turn], records, manifest, index, threads)
         report("scenes", index + 1, scenes)
-    _other_loads(base, [way for way in ways if way.offered], records, seed, threads, report)
-    paper = next((records[w.name] for w in ways if w.name.startswith("the paper's")), None)
+    offered_ways = [way for way in ways if way.offered]
+    _other_cases(base, offered_ways, records, scenes, seed, threads, report)
+    paper = next((records[w.name] for w in ways if w.name.startswith(PAPER)), None)
     points = [_point(way, records[way.name], paper) for way in ways]
     offered = [p for p in points if p.offered and p.flip is not None and not p.side]
     kept = front([(p.ms.median, p.flip.mean) for p in offered if p.flip is not None])
@@ -115,6 +142,8 @@ def measure_frontier(
         streaming_ms=statistics.median(paper.ms) if paper is not None else 0.0,
         converged={n: float(np.mean(r.converged)) for n, r in records.items() if r.converged},
         points=tuple(sorted(points, key=lambda p: p.ms.median)),
+        ratios=tuple(_ratios(base, records)),
+        command=about()["command"],
     )
     pictures = {name: record.pictures for name, record in records.items() if record.pictures}
     shown = [_white(reference_of(scene_at(i), manifest)) for i in range(min(SHOWN, scenes))]
@@ -137,7 +166,7 @@ def _quota(way: Way, scene: Scene, scenes: int, threads: int) -> int:
     """How many scenes a way draws; its first frames, which load and warm up, are not counted."""
     for _ in range(2):
         ms, _ = _timed(way.prepare(scene), threads)
-    most = TIMED if not way.drawn else scenes if way.offered else COMPARED
+    most = TIMED if not way.drawn else scenes if way.offered or way.backend == "neural" else COMPARED
     return max(1, min(scenes, most, max(LEAST, int(1000 * SLOW_S / ms))))
 
 
@@ -171,34 +200,41 @@ def _one_scene(
             record.converged.append(flip(picture, many))
 
 
-def _other_loads(
+def _other_cases(
     base: str,
     ways: Sequence[Way],
     records: dict[str, Record],
+    scenes: int,
     seed: int,
     threads: int,
     report: Report,
 ) -> None:
-    """Time offered ways on other canvases and on more objects, so that their cost can be told from them."""
+    """Draw offered ways on other canvases and of more objects: what cost is told from, and promises too."""
     manifest = load_manifest(base)
     model = open_model(base)
-    plain, many = (scenes_of(model, name, seed, SIDE) for name in (usual_set(manifest), MANY))
-    # of solids others than those of `SIDE`: they differ more in what a pixel takes
-    offset = 0 if manifest.dimension == 2 else 1000
-    cases = [(plain(offset + i), (side, side), i) for side in SIDES for i in range(FITTED + 1)]
-    cases += [(many(i), many(i).canvas, i) for i in range(FITTED + 1)]
-    for done, (scene, canvas, index) in enumerate(cases):
-        scene = scene.model_copy(update={"canvas": canvas})
-        load = load_of(compile_scene(scene, model=base))
-        for way in ways:
-            record = records[way.name]
-            if (way.side and canvas != plain(0).canvas) or statistics.median(record.ms) > 1000:
-                continue
-            ms, _ = _timed(way.prepare(scene), threads)
-            if index:  # the first of its kind finds its memory
+    for case in CASES[1:]:
+        scene_at = scenes_of(model, case.set or usual_set(manifest), seed, SIDE)
+        count = case.scenes(scenes)
+        errors: dict[str, list[float]] = {}
+        for index in range(-1, count):  # the first of its kind finds its memory, and is not counted
+            scene = case.on(scene_at(OTHERS + index))
+            program = compile_scene(scene, model=base)
+            load, scale = load_of(program), error_scale(scene.canvas, len(program))
+            exact = over_white(reference_of(scene, manifest)) if index >= 0 else None
+            for way in ways:
+                record = records[way.name]
+                if (way.side and case.canvas) or statistics.median(record.ms) > LATE_MS:
+                    continue
+                ms, image = _timed(way.prepare(scene), threads)
+                if exact is None:
+                    continue
                 record.loads.append(load)
                 record.fitted.append(ms)
-        report("other canvases and counts", done + 1, len(cases))
+                if not way.side:
+                    errors.setdefault(way.name, []).append(flip(over_white(image), exact) / scale)
+            report(case.name, index + 1, count)
+        for name, values in errors.items():
+            records[name].others.append(values)
 
 
 def promised(values: Sequence[float]) -> float:
@@ -220,10 +256,16 @@ def _point(way: Way, record: Record, paper: Record | None) -> Point:
         errors = Errors(
             float(np.mean(record.flip)),
             float(np.percentile(record.flip, 95)),
-            MARGIN * promised(record.flip),
+            MARGIN * max(map(promised, [record.flip, *record.others])),
             max(record.flip),
+            interval(record.flip),
         )
-        quality = Quality(float(np.mean(record.psnr)), float(np.percentile(record.psnr, 5)), min(record.psnr))
+        quality = Quality(
+            float(np.mean(record.psnr)),
+            float(np.percentile(record.psnr, 5)),
+            min(record.psnr),
+            interval(record.psnr),
+        )
     cost: Cost | None = None
     if way.offered:
         cost = fit_cost(record.loads, record.fitted, way.skip, fixed=bool(way.side))
@@ -232,13 +274,30 @@ def _point(way: Way, record: Record, paper: Record | None) -> Point:
         **shared,
         offered=way.offered,
         scenes=len(record.ms),
-        ms=Times(statistics.median(record.ms), float(np.percentile(record.ms, 95))),
+        ms=Times(
+            statistics.median(record.ms), float(np.percentile(record.ms, 95)), *median_interval(record.ms)
+        ),
         ratio_to_streaming=_ratio(paper, record),
         flip=errors,
         psnr=quality,
         cost=cost,
         on_front=False,
     )
+
+
+def median_interval(values: Sequence[float]) -> tuple[float, float]:
+    """The 95 % interval of a median: the values whose ranks are 0.98 √n from the middle, or the extremes."""
+    ordered, n = sorted(values), len(values)
+    rank = max(1, round(n / 2 - 0.98 * math.sqrt(n)))
+    return ordered[rank - 1], ordered[n - rank]
+
+
+def _ratios(base: str, records: dict[str, Record]) -> Iterator[Ratio]:
+    for slow, fast in paired(base):
+        if slow in records and fast in records:
+            pairs = zip(records[slow].ms, records[fast].ms, strict=False)  # the slower drew fewer
+            found = [a / b for a, b in pairs if b > 0]
+            yield Ratio(slow, fast, len(found), float(np.mean(found)), interval(found))
 
 
 def _ratio(paper: Record | None, record: Record) -> float:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import torch
 
 from scenelang.backend.neural import open_model
 from scenelang.lab.about import Report, about, silent
-from scenelang.lab.frontier.measure import SIDE
+from scenelang.lab.frontier.measure import CASES, SIDE
 from scenelang.lab.frontier.ways import ways_of
 from scenelang.measure.choose import error_scale
 from scenelang.measure.frontier import Frontier
@@ -21,23 +21,6 @@ KEPT: Final = 0.95
 """Share of scenes in which a promise has to hold."""
 SLOW: Final = 6
 """Scenes of the first case for ways that take over half a second a frame; the other cases have none."""
-
-
-class Case(NamedTuple):
-    """Scenes that promises are tried on: of a set, on a canvas or the set's own."""
-
-    name: str
-    set: str
-    canvas: tuple[int, int] | None
-    share: float  # of the scenes that are asked for
-
-
-CASES: Final = (
-    Case("256 x 256", "", None, 1.0),
-    Case("128 x 128", "", (128, 128), 0.3),
-    Case("512 x 512", "", (512, 512), 0.2),
-    Case("16 objects", "many", None, 0.2),
-)
 
 
 def verify(
@@ -72,12 +55,10 @@ def verify(
     cases = {}
     for case in CASES:
         scene_at = scenes_of(model, case.set or usual_set(manifest), seed, SIDE)
-        count = max(1, round(scenes * case.share))
+        count = case.scenes(scenes)
         ratios: dict[str, list[float]] = {way.name: [] for way in ways}
         for index in range(count):
-            scene = scene_at(index)
-            if case.canvas is not None:
-                scene = scene.model_copy(update={"canvas": case.canvas})
+            scene = case.on(scene_at(index))
             exact = over_white(reference_of(scene, manifest))
             scale = error_scale(scene.canvas, len(compile_scene(scene, model=base)))
             for way in ways:

@@ -34,6 +34,8 @@ TITLES: dict[Samples, str] = {
     "draft": ", draft",
     "quick": ", quick",
 }
+UNSKIPPED: tuple[Samples, ...] = ("adaptive", "four")
+FIELD, REFERENCE, PAPER = "exact field", "exact reference", "the paper's streaming"
 Draw = Callable[[], Image]
 Prepare = Callable[[Scene], Draw]
 """Compiles a scene, which is not timed, and returns what draws it, which is."""
@@ -114,17 +116,28 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
     }
     for samples in known.get(manifest.renderer, ("adaptive",)):
         yield way(name + TITLES[samples], samples=samples)
-    if manifest.renderer == "framed":
-        yield way(f"{name}, nothing skipped", "the same picture, later", skip=False)
-    for samples in known.get(manifest.renderer, ()) if name == base else ():
-        if samples != "draft":
-            yield Way(
-                f"exact field{TITLES[samples]}",
-                _formulas(name, threads, samples),
-                renderer="exact field",
-                samples=samples,
-                why_not="formulas in place of the network, all else alike",
-            )
+    if name != base:
+        return
+    for samples in UNSKIPPED if manifest.renderer == "framed" else ():
+        yield way(
+            f"{name}, nothing skipped{TITLES[samples]}",
+            "drawn for comparison: without one of the savings",
+            samples=samples,
+            skip=False,
+        )
+    fields: list[tuple[Samples, bool]] = [
+        (samples, True) for samples in known.get(manifest.renderer, ()) if samples != "draft"
+    ]
+    fields += [(samples, False) for samples in UNSKIPPED] if manifest.renderer == "framed" else []
+    for samples, skip in fields:
+        yield Way(
+            f"{FIELD}{'' if skip else ', nothing skipped'}{TITLES[samples]}",
+            _formulas(name, threads, samples, skip),
+            renderer=FIELD,
+            samples=samples,
+            skip=skip,
+            why_not="formulas in place of the network, all else alike",
+        )
 
 
 def _neural(name: str, side: int, threads: int, samples: Samples = "adaptive", skip: bool = True) -> Prepare:
@@ -144,12 +157,23 @@ def _neural(name: str, side: int, threads: int, samples: Samples = "adaptive", s
     return prepare
 
 
-def _formulas(name: str, threads: int, samples: Samples) -> Prepare:
+def _formulas(name: str, threads: int, samples: Samples, skip: bool) -> Prepare:
     def prepare(scene: Scene) -> Draw:
         program, field = compile_scene(scene, model=name), closed_forms(name)
-        return lambda: draw_objects(field, program, threads=threads, samples=samples).image
+        return lambda: draw_objects(field, program, threads=threads, samples=samples, skip=skip).image
 
     return prepare
+
+
+def paired(base: str) -> list[tuple[str, str]]:
+    """Pairs of ways whose times are told as a ratio, the slower first: network and exact field with the same
+    savings, either without the savings, and the paper's renderer and the reference over either.
+    """
+    savings = ["", TITLES["four"], ", nothing skipped", f", nothing skipped{TITLES['four']}"]
+    pairs = [(base + saved, FIELD + saved) for saved in [*savings, TITLES["one"], TITLES["quick"]]]
+    pairs += [(name + saved, name) for name in (base, FIELD) for saved in savings[1:]]
+    others = f"{PAPER}, {FULL}²", f"{REFERENCE}, 4 spp"
+    return pairs + [(other, name) for other in others for name in (base, FIELD)]
 
 
 def _references(manifest: Manifest) -> Iterator[Way]:
@@ -159,7 +183,7 @@ def _references(manifest: Manifest) -> Iterator[Way]:
         (4, "drawn for comparison: the language defines four"),
     )[: 2 if manifest.dimension == 3 else 3]:  # a picture of solids with 16 takes half a minute
         yield Way(
-            f"exact reference, {per_side**2} spp",
+            f"{REFERENCE}, {per_side**2} spp",
             _exact(manifest, per_side),
             backend="reference",
             spp=per_side**2,
@@ -179,7 +203,7 @@ def _exact(manifest: Manifest, per_side: int) -> Prepare:
 
 def _paper(base: str) -> Iterator[Way]:
     """The paper's streaming renderer at the full size, untrained: what a frame of it takes."""
-    for width, title in ((1.0, "the paper's streaming"), (1 / 8, "streaming, 1/8 of the filters")):
+    for width, title in ((1.0, PAPER), (1 / 8, "streaming, 1/8 of the filters")):
         yield Way(
             f"{title}, {FULL}²",
             _untrained(base, width),
