@@ -1,7 +1,7 @@
 """Where the time of a warm frame goes, and what the exact field takes in the network's place.
 
     python -m benchmarks.floor [--frames N] [--scene NAME ...]            shares by part, on numpy
-    python -m benchmarks.floor --exact [...]                              formulas beside the network
+    python -m benchmarks.floor --exact [-o docs/results/floor.json] [...] formulas beside the network
     python -m benchmarks.floor --threads 2 [...]                          wall time, beside that of one thread
     python -m benchmarks.floor --against CHECKOUT [--library torch] [...] another checkout beside this one
 
@@ -34,6 +34,8 @@ import numpy as np
 
 import scenelang as nsg
 from scenelang.backend.options import keep_memory
+from scenelang.files import write_whole
+from scenelang.lab.about import about
 from scenelang.measure.sets import SETS, random_scene
 from scenelang.measure.solid_sets import SOLID_SETS, random_solid
 from scenelang.models.framed import load_arrays
@@ -214,6 +216,11 @@ def told(title: str, frames: Sequence[Frame], rate: float) -> str:
     return f"{title}: {1e3 * seconds:.2f} ms, {1e3 * first:.2f} drawn first; {counts}{floor}"
 
 
+def middle(frames: Sequence[Frame]) -> dict[str, float]:
+    """Medians of seconds and of pairs met."""
+    return {what: statistics.median(getattr(f, what) for f in frames) for what in ("seconds", "pairs")}
+
+
 def against(ours: Sequence[Frame], theirs: Sequence[Frame], title: str) -> str:
     """How two rivals compare, frame by frame."""
     ratio = statistics.median(b.seconds / a.seconds for a, b in zip(ours, theirs, strict=True))
@@ -252,7 +259,9 @@ def main() -> None:
     parser.add_argument("--threads", type=int, metavar="N")
     parser.add_argument("--against", metavar="CHECKOUT")
     parser.add_argument("--worker", metavar="FOLDER", help=argparse.SUPPRESS)
+    parser.add_argument("-o", "--out", type=Path, metavar="FILE")
     given = parser.parse_args()
+    rows: dict[str, Any] = {}
     for name in given.scene or SCENES:
         if given.against:
             with contextlib.ExitStack() as stack:
@@ -284,6 +293,15 @@ def main() -> None:
                 print(line, flush=True)
         if given.exact:
             print(f"{name}, {against(raced[1], raced[0], 'the network')}", flush=True)
+            rows[name] = {
+                "frames": len(raced[0]),
+                "ratio": statistics.median(a.seconds / b.seconds for a, b in zip(*raced, strict=True)),
+                **{way: middle(frames) for way, frames in zip(("network", "exact"), raced, strict=True)},
+            }
+    if given.out:
+        write_whole(
+            given.out, (json.dumps({**about(), "rounds": ROUNDS, "scenes": rows}, indent=1) + "\n").encode()
+        )
 
 
 def gemm_rate() -> float:

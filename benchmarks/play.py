@@ -1,4 +1,6 @@
-"""From key press to changed picture in `scenelang play`: ``python benchmarks/play.py [SCENE] [KEYS]``.
+"""From key press to changed picture in `scenelang play`.
+
+    python benchmarks/play.py [SCENE] [KEYS] [-o docs/results/play.json]
 
 A server and Chromium with software GL run on this machine. A digit of the scene's first number behind a
 bracket is typed and taken back, each key a pause after the picture of the one before. Measured in the page,
@@ -8,6 +10,8 @@ been put in, at the scene's own size; beside it what the server says that compil
 
 from __future__ import annotations
 
+import argparse
+import json
 import os
 import re
 import shutil
@@ -20,6 +24,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from playwright.sync_api import sync_playwright
 
+from scenelang.files import write_whole
+from scenelang.lab.about import about
 from tests.browser import ARGUMENTS, _path
 from tests.play.page import Page, served
 
@@ -43,7 +49,7 @@ WATCH = """() => {
 PAUSE_MS = 900  # behind each picture: by then it has been drawn as large as it is shown
 
 
-def main(scene: Path, keys: int) -> None:
+def main(scene: Path, keys: int, out: Path | None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(shutil.copy(scene, folder))
         load = os.getloadavg()[0]
@@ -69,10 +75,17 @@ def main(scene: Path, keys: int) -> None:
     print(f"median {statistics.median(times):.0f} ms, from {times[0]:.0f} to {times[-1]:.0f} ms")
     drawn = [int(found[1]) for _, told in took if (found := re.search(r"(\d+) ms", told))]
     print(f"of which the server compiles and draws {statistics.median(drawn):.0f} ms; {took[-1][1]}")
+    if out:
+        figures = {"median_ms": statistics.median(times), "slowest_ms": times[-1], "load": load}
+        figures["drawn_ms"] = statistics.median(drawn)
+        record = {**about(), "scene": scene.name, "keys": len(times), "cores": os.cpu_count(), **figures}
+        write_whole(out, (json.dumps(record, indent=1) + "\n").encode())
 
 
 if __name__ == "__main__":
-    main(
-        Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1] / "examples/chain.nsg",
-        int(sys.argv[2]) if len(sys.argv) > 2 else 20,
-    )
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("scene", nargs="?", type=Path, default=Path("examples/chain.nsg"))
+    parser.add_argument("keys", nargs="?", type=int, default=20)
+    parser.add_argument("-o", "--out", type=Path, metavar="FILE")
+    given = parser.parse_args()
+    main(given.scene, given.keys, given.out)

@@ -1,12 +1,13 @@
 """What is proved of pictures of evaluation sets, whether a pixel breaks its proof, and what proofs cost.
 
-    python -m benchmarks.proof [--scenes N] [--set NAME ...] [--seed N]
+    python -m benchmarks.proof [--scenes N] [--set NAME ...] [--seed N] [-o docs/results/proof.json]
 
-A line of JSON for each set: means of the share of pixels proved right to 1/255, of those that are, and of
-those drawn again; the largest bound and difference from the exact picture; and how many pixels are farther
-from it than their bound, before and after they were drawn again. Of processor time of one thread, medians of
-ratios to a plain frame: of a proof, of what drawing again adds to it, of the exact field with regions ruled
-out alike, and of the reference. Of each the least of three counts, in turn; the reference is drawn once.
+A line of JSON for each set, and all of them in a record: means of the share of pixels proved right to
+1/255, of those that are, and of those drawn again; the largest bound and difference from the exact picture;
+and how many pixels are farther from it than their bound, before and after they were drawn again. Of processor
+time of one thread, medians of ratios to a plain frame: of a proof, of what drawing again adds to it, of the
+exact field with regions ruled out alike, and of the reference. Of each the least of three counts, in turn;
+the reference is drawn once.
 Exits with 1 if a pixel breaks its proof.
 """
 
@@ -16,14 +17,17 @@ import argparse
 import json
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scenelang.backend.options import keep_memory
 from scenelang.backend.small import draw_small
+from scenelang.files import write_whole
 from scenelang.graph.nodes import Graph
-from scenelang.measure.scenes import sets_of
+from scenelang.lab.about import about
+from scenelang.measure.scenes import interval, sets_of
 from scenelang.measure.sets import SETS
 from scenelang.models.manifest import load_manifest
 from scenelang.outputs import PROVED
@@ -87,6 +91,7 @@ def measured(name: str, index: int, seed: int) -> dict[str, float]:
     (_, proof), (again, whole) = found["proof"], found["both"]
     off, mended = (abs(over(picture) - reference).max(-1) for picture in (image, again))
     return {
+        "pixels": proof.bound.size,
         "proved": proof.share,
         "right": (off <= PROVED).mean(),
         "redrawn": whole.redrawn / proof.bound.size,
@@ -107,22 +112,28 @@ def main() -> int:
     parser.add_argument("--scenes", type=int, default=40)
     parser.add_argument("--seed", type=int, default=2021)
     parser.add_argument("--set", action="append", choices=list(SETS))
+    parser.add_argument("-o", "--out", type=Path, metavar="FILE")
     given = parser.parse_args()
     keep_memory()
-    broken = 0
+    found = []
     for name in given.set or SETS:
         cases = [measured(name, index, given.seed) for index in range(given.scenes)]
-        row: dict[str, Any] = {"set": name, "scenes": len(cases)}
-        for key in cases[0]:
+        row: dict[str, Any] = {"set": name, "scenes": len(cases), "pixels": sum(c["pixels"] for c in cases)}
+        for key in [key for key in cases[0] if key != "pixels"]:
             values = [case[key] for case in cases]
             if key == "broken":
                 row[key] = int(sum(values))
             else:
                 function = np.max if key in ("bound", "off") else np.median if key[:2] == "x_" else np.mean
                 row[key] = round(float(function(values)), 2 if key[:2] == "x_" else 5)
-        broken += row["broken"]
+        row["proved_interval"] = interval([case["proved"] for case in cases])
+        found.append(row)
         print(json.dumps(row), flush=True)
-    return int(broken > 0)
+    if given.out:
+        write_whole(
+            given.out, (json.dumps({**about(), "seed": given.seed, "sets": found}, indent=1) + "\n").encode()
+        )
+    return int(any(row["broken"] for row in found))
 
 
 if __name__ == "__main__":

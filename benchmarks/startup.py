@@ -3,11 +3,13 @@
 Each round runs every command once, in a process of its own, so that a busy or slow machine slows all of
 them alike; the figures that matter are the ratios of the medians. Bytecode is cached, as after an install.
 
-    python benchmarks/startup.py [ROUNDS]
+    python benchmarks/startup.py [ROUNDS] [-o docs/results/startup.json]
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import os
 import statistics
 import subprocess
@@ -16,6 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from scenelang.files import write_whole
 from scenelang.formatting import format_text
 
 CHECK_LIMIT_S = 0.25
@@ -57,7 +60,10 @@ def seconds(command: list[str], environment: dict[str, str]) -> float:
 
 def main() -> None:
     """Run all commands, round after round, and print their medians."""
-    rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 11
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("rounds", nargs="?", type=int, default=11)
+    parser.add_argument("-o", "--out", type=Path, metavar="FILE")
+    given = parser.parse_args()
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     with tempfile.TemporaryDirectory() as folder:
         forty, four = Path(folder, "forty.nsg"), Path(folder, "four.nsg")
@@ -79,7 +85,7 @@ def main() -> None:
         taken: dict[str, list[float]] = {name: [] for name in commands}
         for command in commands.values():
             seconds(command, environment)  # files into the page cache, bytecode onto the disk
-        for _ in range(rounds):
+        for _ in range(given.rounds):
             for name, command in commands.items():
                 taken[name].append(seconds(command, environment))
     median = {name: statistics.median(values) for name, values in taken.items()}
@@ -94,6 +100,11 @@ def main() -> None:
     print(f"        {needed:.2f} of click and pydantic, at most {CHECK_LIMIT}")
     print(f"fmt:    {fmt_s:.3f} s of {CHECK_LIMIT_S} s")
     print(f"render: {render:.2f} of import torch, at most {RENDER_LIMIT}")
+    if given.out:
+        from scenelang.lab.about import about
+
+        record = {**about(), "rounds": given.rounds, "median_s": median}
+        write_whole(given.out, (json.dumps(record, indent=1) + "\n").encode())
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Frames of the viewer's shader in Chromium with software GL, and operations a pixel.
 
-    python -m benchmarks.viewer [--side N] [--frames K] [names …]
+    python -m benchmarks.viewer [--side N] [--frames K] [-o docs/results/viewer.json] [names …]
 
 Draws each scene K times on a canvas of N pixels a side and says how long the first frame took, compilation of
 the shader with it, how long the fastest of the others, and the multiply-adds a pixel takes on average, with
@@ -11,6 +11,7 @@ texture units, so its times are upper bounds.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import shutil
 from collections.abc import Callable
@@ -19,6 +20,8 @@ from typing import Any
 
 import scenelang as nsg
 from benchmarks.floor import stars
+from scenelang.files import write_whole
+from scenelang.lab.about import about
 from scenelang.viewer.script import script
 from scenelang.viewer.view import view_of
 from tests.browser import ARGUMENTS, NAMES
@@ -89,16 +92,27 @@ def main() -> None:
     parser.add_argument("--side", type=int, default=256, help="pixels along a side")
     parser.add_argument("--frames", type=int, default=5, help="frames after the first")
     parser.add_argument("names", nargs="*", default=PLANE + SOLID, help="of examples")
+    parser.add_argument("-o", "--out", type=Path, metavar="FILE")
     given = parser.parse_args()
+    rows: dict[str, dict[str, float]] = {}
 
     def work(page: Any) -> None:
         print(f"{'scene':20} {'first ms':>9} {'frame ms':>9} {'operations a pixel':>19}")
         for name in given.names:
-            found = timed(page, name, given.side, given.frames)
+            found = rows[name] = timed(page, name, given.side, given.frames)
             print(f"{name:20} {found['first']:9.0f} {found['least']:9.1f} {found['operations']:19,.0f}")
 
     print(f"{given.side} x {given.side} pixels; {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     in_chromium(work)
+    if given.out:
+        record = {
+            **about(),
+            "side": given.side,
+            "frames": given.frames,
+            "cores": os.cpu_count(),
+            "scenes": rows,
+        }
+        write_whole(given.out, (json.dumps(record, indent=1) + "\n").encode())
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ again around its words (``python docs/make_claims.py``); a figure that neither n
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
@@ -45,11 +46,12 @@ class Word(str):
 
 @cache
 def read(name: str) -> Any:
-    """A record of docs/results, named without its ending."""
-    return json.loads((RESULTS / f"{name}.json").read_text("utf-8"))
+    """A record of docs/results, or one that is shipped (``models/…``), named without its ending."""
+    folder = PACKAGE if name.startswith("models/") else RESULTS
+    return json.loads((folder / f"{name}.json").read_text("utf-8"))
 
 
-def at(name: str, keys: str = "", **where: object) -> Any:
+def at(name: str, keys: str = "", /, **where: object) -> Any:
     """What lies in a record at keys joined by slashes; of a list the entry in which ``where`` holds."""
     found = read(name)
     for key in filter(None, keys.split("/")):
@@ -64,6 +66,13 @@ def at(name: str, keys: str = "", **where: object) -> Any:
 def kilobytes(name: str) -> Figure:
     """Size of a file of the package, named without its ending."""
     return Figure((PACKAGE / f"{name}.safetensors").stat().st_size / 1000)
+
+
+def numbers(name: str) -> Figure:
+    """How many numbers a file of the package holds, named without its ending."""
+    with open(PACKAGE / f"{name}.safetensors", "rb") as file:
+        header = json.loads(file.read(int.from_bytes(file.read(8), "little")))
+    return Figure(sum(math.prod(entry["shape"]) for key, entry in header.items() if key != "__metadata__"))
 
 
 def _pattern(claim: str) -> re.Pattern[str]:
@@ -109,7 +118,7 @@ _UNITS = (
 )
 _NUMBER = r"(?<![\w.])[-+−]?\d[\d,]*(?:\.\d+)?(?![\w.]*\d)"
 _FIGURE = re.compile(
-    rf"{_NUMBER}(?=(?:\s+(?:to|and|or|of)\s+{_NUMBER})?\s*(?:{_UNITS})(?!\w))"
+    rf"{_NUMBER}(?=(?:\s+(?:to|and|or|of)\s+{_NUMBER})?\s*(?:{_UNITS})(?!\w|\s*\d))"
     r"|(?<![\w.,])[-+−]?(?:\d[\d,]*\.\d+|\d{1,3}(?:,\d{3})+)(?![\d.])"
     rf"|\b(?:{_WORDS.replace(' ', '|')}|hundred|thousand|million)(?:[- ]\w+)?(?=\s+(?:times|dB|ms|percent)\b)"
     r"|\b(?:twice|half)(?=\s+as\b)",

@@ -1,7 +1,7 @@
-"""Write the tables of docs/results.md from the JSON files in docs/results/.
+"""Write the tables of docs/results.md and of other pages from the JSON files in docs/results/.
 
-python docs/make_results.py            writes the page
-python docs/make_results.py --check    fails where it is out of date
+python docs/make_results.py            writes the pages
+python docs/make_results.py --check    fails where one is out of date
 
 What `scenelang lab eval` measured lies in docs/results/, what `scenelang lab experiment` did in
 docs/results/experiments/; charts and strips of the latter are drawn by `scenelang lab chart`.
@@ -14,6 +14,8 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+
+import costs
 
 from scenelang.lab.experiments.runs import EXPERIMENTS as RUNNABLE
 from scenelang.lab.experiments.tables import markdown, table_of
@@ -38,6 +40,7 @@ WHAT = {
     "strong": "deformations up to ±2.4",
     "large": "three times the size",
 }
+PAGES = ("results.md",)
 EXPERIMENTS = ("overfit", "compare", "table1", "table2", "table3", "table4", "losses", "seeds")
 
 
@@ -231,6 +234,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "texels": texels,
     "rivals": rivals,
     "shadows": shadows,
+    **costs.BLOCKS,
     "all": smallest_run,
     **{name: experiment(name) for name in EXPERIMENTS},
 }
@@ -249,13 +253,12 @@ def filled(text: str) -> str:
 
 
 def main() -> None:
-    page = HERE / "results.md"
-    text = page.read_text("utf-8")
-    if "--check" in sys.argv:
-        if filled(text) != text:
-            raise SystemExit("docs/results.md is out of date: python docs/make_results.py")
-        return
-    page.write_text(filled(text), "utf-8")
+    for name in PAGES:
+        page = HERE / name
+        text = page.read_text("utf-8")
+        if filled(text) != text and "--check" in sys.argv:
+            raise SystemExit(f"docs/{name} is out of date: python docs/make_results.py")
+        page.write_text(filled(text), "utf-8")
 
 
 if __name__ == "__main__":
