@@ -161,5 +161,5 @@ def uncovered(text: str, claims: Iterable[str], given: Mapping[str, str]) -> Ite
     spans |= {match.span(1) for match in _CELL.finditer(plain)}
     for start, end in sorted(spans):
         if not any(first <= start and end <= last for first, last in covered):
-            words = re.sub(r"\s+", " ", text[max(0, start - 40) : end + 30])
-            yield text[:start].count("\n") + 1, words
+            words = f"{text[max(0, start - 40) : start]}[{text[start:end]}]{text[end : end + 30]}"
+            yield text[:start].count("\n") + 1, re.sub(r"\s+", " ", words)
