@@ -70,9 +70,17 @@ def kilobytes(name: str) -> Figure:
 
 def numbers(name: str) -> Figure:
     """How many numbers a file of the package holds, named without its ending."""
+    return Figure(sum(math.prod(e["shape"]) for key, e in _header(name).items() if key != "__metadata__"))
+
+
+def told(name: str) -> Any:
+    """What the header of a model's weights tells of their training."""
+    return json.loads(_header(f"models/{name}/weights")["__metadata__"]["scenelang"])
+
+
+def _header(name: str) -> Any:
     with open(PACKAGE / f"{name}.safetensors", "rb") as file:
-        header = json.loads(file.read(int.from_bytes(file.read(8), "little")))
-    return Figure(sum(math.prod(entry["shape"]) for key, entry in header.items() if key != "__metadata__"))
+        return json.loads(file.read(int.from_bytes(file.read(8), "little")))
 
 
 def _pattern(claim: str) -> re.Pattern[str]:

@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 
 import costs
+import reported
 
 from scenelang.lab.experiments.runs import EXPERIMENTS as RUNNABLE
 from scenelang.lab.experiments.tables import markdown, table_of
@@ -40,7 +41,7 @@ WHAT = {
     "strong": "deformations up to ±2.4",
     "large": "three times the size",
 }
-PAGES = ("results.md",)
+PAGES = ("results.md", "report.md", "proof.md")
 EXPERIMENTS = ("overfit", "compare", "table1", "table2", "table3", "table4", "losses", "seeds")
 
 
@@ -235,6 +236,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "rivals": rivals,
     "shadows": shadows,
     **costs.BLOCKS,
+    **reported.BLOCKS,
     "all": smallest_run,
     **{name: experiment(name) for name in EXPERIMENTS},
 }

@@ -44,6 +44,9 @@ GEOMETRY_SIZES: dict[int, Figures] = {
 SHAPES = Figures(35.91, 0.984, 0.007, 0.050)
 """Table 2, left: up to four deformed shapes, 256 x 256."""
 
+SOLIDS = Figures(36.41, 0.982, 0.007, 0.049)
+"""Table 2, right: up to three spheres and tori, diffuse or volumetric, 256 x 256."""
+
 STREAMING = Figures(30.52, 0.967, 0.010, 0.058)
 READING = Figures(30.65, 0.968, 0.011, 0.059)
 """Table 4: the two renderers."""
