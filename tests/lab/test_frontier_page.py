@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import itertools
 import json
 import re
 import subprocess
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import PIL.Image
 import pytest
+from matplotlib.text import Text
 
 from scenelang.image import Image, from_samples
 from scenelang.lab.charts import pyplot
@@ -125,16 +127,25 @@ def test_pictures_are_what_was_drawn() -> None:
 
 
 def test_charts_label_every_point_that_has_an_error() -> None:
-    figure = frontier_figure(frontier(*POINTS[:5], POINTS[6]))
+    near = point("near", 10.3, 0.0101)
+    figure = frontier_figure(frontier(*POINTS[:5], POINTS[6], near))
     for axis in figure.axes:
-        told = [text.get_text() for text in axis.texts]
-        assert sorted(told[1:]) == sorted(short_name(one, "shapes2d") for one in POINTS[:5])
+        told = [name for text in axis.texts for name in text.get_text().split(", ")]
+        assert sorted(told[1:]) == sorted(short_name(one, "shapes2d") for one in [*POINTS[:5], near])
         assert told[0] == "paper (time only)"
-        inside = axis.get_window_extent().padded(1)
-        assert all(inside.contains(*text.get_window_extent().min) for text in axis.texts)
+        inside = axis.get_window_extent().padded(2)
+        boxes = [Text.get_window_extent(text) for text in axis.texts]  # without lines to marks
+        assert all(inside.contains(*box.min) and inside.contains(*box.max) for box in boxes)
+        assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+        # pixels of letters where a page shows the chart 760 wide
+        sizes = [t.get_fontsize() for t in [*axis.texts, *axis.get_xticklabels(), axis.xaxis.label]]
+        assert min(sizes) * 760 / 72 / figure.get_figwidth() >= 9
+    axis = figure.axes[0]
+    assert axis.get_ylim()[0] == 0
+    assert "0" in [tick.get_text() for tick in axis.get_yticklabels()]
+    assert "four & <more>, near" in [text.get_text() for text in axis.texts]
     pyplot().close(figure)
-    png = frontier_chart(frontier(*POINTS[:5]))
-    assert PIL.Image.open(io.BytesIO(png)).size == (1100, 1300)
+    assert PIL.Image.open(io.BytesIO(frontier_chart(frontier(*POINTS[:5])))).width == 2 * 760
 
 
 @pytest.mark.skipif(not frontier_path("shapes2d").exists(), reason="no frontier is shipped")

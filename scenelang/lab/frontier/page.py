@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenelang.image import Image
-from scenelang.lab.frontier.chart import FLOOR, mark_of, short_name
+from scenelang.lab.frontier.chart import LINEAR, base_of, mark_of, short_name
 from scenelang.measure.frontier import Frontier, Point
 
 _PAGE: Final = Path(__file__).with_name("page.html")
@@ -32,7 +32,7 @@ def frontier_page(frontier: Frontier, pictures: Mapping[str, Sequence[Image]], e
         pictures: of the same scenes, of each point, by its name.
         exact: the exact ones.
     """
-    points = [_facts(p, frontier.set, pictures.get(p.name, ())) for p in frontier.points]
+    points = [_facts(p, base_of(frontier), pictures.get(p.name, ())) for p in frontier.points]
     width, height = frontier.canvas
     cores = "one core" if frontier.threads == 1 else f"{frontier.threads} cores"
     data = {
@@ -40,7 +40,7 @@ def frontier_page(frontier: Frontier, pictures: Mapping[str, Sequence[Image]], e
         "exact": [picture_uri(image) for image in exact],
         "streaming_ms": frontier.streaming_ms,
         "canvas": [width, height],
-        "floor": FLOOR,
+        "linear": LINEAR,
     }
     about = (
         f"{frontier.scenes} scenes of the set {frontier.set} (seed {frontier.seed}), {width} × {height} "
@@ -51,6 +51,7 @@ def frontier_page(frontier: Frontier, pictures: Mapping[str, Sequence[Image]], e
     page = _PAGE.read_text("utf-8")
     for name, text in (
         ("SET", html.escape(frontier.set)),
+        ("BASE", html.escape(base_of(frontier))),
         ("ABOUT", html.escape(about)),
         ("ROWS", "\n".join(map(_row, range(len(points)), frontier.points))),
         # last, as it may hold anything; `<` cannot end the element it stands in
