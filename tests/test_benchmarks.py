@@ -7,7 +7,14 @@ import pytest
 
 from benchmarks.counted import counting
 from benchmarks.floor import here, network, programs
+from scenelang.backend.neural import open_model
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import lower
+from scenelang.lab.frontier.outlines import outlines
+from scenelang.measure.metrics import psnr
+from scenelang.measure.scenes import reference_of, scenes_of
 from scenelang.models.framed import load_arrays
+from scenelang.models.manifest import load_manifest
 
 
 @pytest.mark.parametrize("library", ["numpy", "exact"])
@@ -30,3 +37,17 @@ def test_calls_are_counted_by_part(library: str) -> None:
     before = len(calls)
     draw(0)
     assert len(calls) == before
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("index", range(4))
+def test_skia_paints_the_polygons_of_unions_as_the_definition_does(index: int) -> None:
+    """Of finer and finer samples the exact picture comes nearer to Skia's coverage."""
+    unions = pytest.importorskip("benchmarks.unions", reason="the extra `oracles` is not installed")
+    manifest = load_manifest("shapes2d")
+    scene = scenes_of(open_model("shapes2d"), "unions", 5)(index)
+    graph = lower(scene.model_copy(update={"model": "shapes2d"}), manifest, None, Diagnostics())
+    drawn = unions.by_skia(outlines(graph), scene.canvas)
+    four, many = (psnr(drawn, reference_of(scene, manifest, per_side=side), 100.0) for side in (2, 8))
+    assert four > 38
+    assert many > max(45, four)
