@@ -34,6 +34,9 @@ _ROUNDING = 1e-9
 """Balls and boxes grow by this much, relative, to cover the rounding of float64."""
 
 
+_THICKNESS = {"sphere": 2.0, "torus": 0.6}
+
+
 class Solid(Space):
     """The solid world."""
 
@@ -83,6 +86,9 @@ class Solid(Space):
         det = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
         smallest = abs(det) / (largest * middle) if largest * middle > 0.0 else 0.0
         return min(smallest, middle), largest
+
+    def thickness(self, geometry: str) -> float:
+        return _THICKNESS.get(geometry, inf)
 
     def before(self, rows: Rows, turn: Turn) -> Turn | None:
         """See the module for a proof."""

@@ -81,6 +81,10 @@ class Space(ABC):
     def stretches(self, rows: Rows) -> tuple[float, float]:
         """The smallest and largest singular value of the linear block."""
 
+    def thickness(self, geometry: str) -> float:
+        """How thick a leaf is where it is thinnest, before its moves; infinite where that says nothing."""
+        return inf
+
     @abstractmethod
     def before(self, rows: Rows, turn: Turn) -> Turn | None:
         """The turn that does before the map ``rows`` what ``turn`` does after it; None where none does."""

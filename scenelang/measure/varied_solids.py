@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from scenelang.graph.solid import Solid
 from scenelang.measure.sets import Rng
 from scenelang.measure.solid_sets import SOLID_SETS, WARP, random_solid
 from scenelang.measure.varied import rebuilt
@@ -22,6 +23,7 @@ from scenelang.scene.schema import (
     Scale,
     Scene,
     SceneNode,
+    Transform,
     Translate,
 )
 
@@ -44,6 +46,16 @@ def deformed(rng: Rng, **changes: object) -> Scene:
 def crowd(rng: Rng, count: float) -> Scene:
     """So many objects, from five on the smaller the more."""
     return scene(rng, objects=(int(count),) * 2, size=min(1.0, (4 / count) ** (1 / 3)))
+
+
+def thin(rng: Rng, thickness: float) -> Scene:
+    """Opaque objects squeezed to that thickness where they are thinnest."""
+
+    def squeezed(_: int, node: Object) -> list[Transform]:
+        y = thickness / Solid().thickness(node.geometry)
+        return [t.model_copy(update={"y": y}) if isinstance(t, Scale) else t for t in node.transforms]
+
+    return rebuilt(scene(rng, media=0.0), squeezed)
 
 
 def bulged(rng: Rng, amount: float, frequency: float) -> Scene:
@@ -91,6 +103,16 @@ def lit(rng: Rng, away: float) -> Scene:
     ball = Object("sphere", (Scale(radius), Translate(*place.tolist())), _look(rng, "diffuse"))
     lamp = place + (radius + away) * _direction(rng)
     return _beside(rng, ball, light=Light(tuple(lamp.tolist()), away))
+
+
+def close(rng: Rng, away: float) -> Scene:
+    """An eye this far from an opaque ball that it looks past, half a unit nearer than usual."""
+    eye, ahead = np.array(EYE) * (1 - 0.5 / AWAY), -np.array(EYE) / AWAY
+    aside = np.cross(ahead, _direction(rng))
+    radius, towards = float(rng.uniform(0.35, 0.85)), ahead + aside / math.sqrt(float(aside @ aside))
+    place = eye + (radius + away) * towards / math.sqrt(2)
+    ball = Object("sphere", (Scale(radius), Translate(*place.tolist())), _look(rng, "diffuse"))
+    return _beside(rng, ball, camera=Camera(tuple(eye.tolist())))
 
 
 def in_mist(rng: Rng, radius: float) -> Scene:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from math import dist, hypot, sqrt, tan
+from math import dist, hypot, inf, sqrt, tan
 from operator import itemgetter
 
 from scenelang.diagnostics.diagnostic import Label
@@ -87,18 +87,23 @@ _CODES = {
     "scale": "W0504",
     "smooth": "W0505",
     "thin": "W0506",
+    "thickness": "W0506",
     "blend": "W0507",
     "twist": "W0509",
     "displace": "W0510",
+    "frequency": "W0510",
     "texels": "W0511",
+    "width": "W0512",
 }
 _SUBJECTS = {
     "twirl": "a `twirl` of {value} on {name}",
     "bend": "a `bend` of {value} on {name}",
     "twist": "a `twist` of {value} on {name}",
     "displace": "a displacement of {value} of {name}",
+    "frequency": "a displacement of frequency {value} of {name}",
     "scale": "a scale of {value} of {name}",
     "thin": "{name}, {value} times as long as wide,",
+    "thickness": "{name}, {value} thick,",
     "texels": "a texture of {value} texels to a pixel on {name}",
 }
 """What is said of an object, in the order of the warnings."""
@@ -109,18 +114,20 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     """Warn once for each quantity outside its trained or measured range, at the object furthest out.
 
     Deformations are measured in the normal form, per unit length of the space they act in; the scale of an
-    object is each of the two stretches of its affine maps, and how thin it is their ratio. A texture's texels
-    are counted where they are densest; of a solid at its centre.
+    object is each of the two stretches of its affine maps, and how thin it is their ratio; of an opaque solid
+    it is how thick it is where it is thinnest. A texture's texels are counted where they are densest; of a
+    solid at its centre.
 
     Before: STREAM. After: unchanged.
     """
     rows, trained = graph.rows(), context.manifest.trained
     measures = partial(_measures, space=graph.space)
     outside: dict[str, list[tuple[float, float, Leaf]]] = {}  # (by how much, value, object)
-    for _, leaf in rows:
+    for op, leaf in rows:
         for quantity, value in (*leaf.noted("measures", measures), *_texels(leaf, graph)):
-            if quantity in trained:
+            if quantity in trained and not (quantity == "thickness" and op == "subtract"):
                 low, high = trained[quantity]
+                high = inf if quantity == "thickness" else high  # of which more does no harm
                 excess = max(low - value, value - high) / ((high - low) or 1.0)
                 if excess > _TOLERANCE:
                     outside.setdefault(quantity, []).append((excess, value, leaf))
@@ -131,6 +138,10 @@ def check_trained(graph: Graph, context: Context) -> Graph:
             said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
             others = f", as {more:,} more are" if more else ""
             _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf)
+    widths = [(link.k, link.node) for link in graph.root.links if link.op == "smooth"]
+    k, blended = max(widths, key=itemgetter(0), default=(0.0, None))
+    if isinstance(blended, Leaf) and "width" in trained and k > trained["width"][1]:
+        _warn(context, "width", f"a `smooth` of width {k:.3g} is outside the measured range {{}}", blended)
     smooth = [leaf for op, leaf in rows if op == "smooth"]
     if "smooth" in trained and len(smooth) > trained["smooth"][1]:
         fact = f"{len(smooth):,} smooth unions are outside the measured range {{}}"
@@ -175,6 +186,8 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
     found = [("scale", smallest), ("scale", largest)]
     if smallest > 0:
         found.append(("thin", largest / smallest))
+    if leaf.look.material == "diffuse":
+        found.append(("thickness", smallest * space.thickness(leaf.geometry)))
     for step in leaf.steps:
         if isinstance(step, Warp):
             if step.twirl:
@@ -184,7 +197,7 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
         elif isinstance(step, Twist):
             found.append(("twist", step.twist))
         elif isinstance(step, Displace):
-            found.append(("displace", abs(step.amount)))
+            found += [("displace", abs(step.amount)), ("frequency", abs(step.frequency))]
     return found
 
 

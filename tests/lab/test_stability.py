@@ -188,6 +188,19 @@ def test_recorded_invariants_hold(of: str) -> None:
     assert all(change < 1 / 255 for change in invariants["arithmetic"].values() if change != "skipping")
 
 
+def test_what_is_known_is_not_measured_again(model: Model) -> None:
+    first = run_stability(model, 2, 9, ("shear", "arithmetic"))
+    for row in first["probes"]["shear"]["rows"]:
+        assert 0 <= row["worst_scene"] < 2
+    told = dict(first["probes"]["shear"], rows=first["probes"]["shear"]["rows"][1:])
+    told["rows"][0]["psnr"] = {"mean": 7.0, "worst": 7.0}  # as no model draws
+    again = run_stability(model, 2, 9, ("shear",), known=[{**first, "probes": {"shear": told}}])
+    assert again["probes"]["shear"]["rows"] == [first["probes"]["shear"]["rows"][0], *told["rows"]]
+    assert again["invariants"] == first["invariants"]
+    with pytest.raises(ValueError, match="another seed"):
+        run_stability(model, 2, 10, ("shear",), known=[first])
+
+
 @pytest.mark.slow
 def test_the_whole_suite_runs(model: Model) -> None:
     found = run_stability(model, 1, 9)

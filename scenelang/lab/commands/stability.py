@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
@@ -17,11 +18,23 @@ from scenelang.lab.commands import common
 @click.option(
     "--scenes", default=20, show_default=True, type=click.IntRange(1, 10_000), help="Of each value."
 )
+@click.option(
+    "--known",
+    multiple=True,
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="What this command wrote before, whose values are not measured again; may be repeated.",
+)
 @common.seed
 @common.out
 @common.weights
 def command(
-    model: str, only: tuple[str, ...], scenes: int, seed: int, out: Path, weights: Path | None
+    model: str,
+    only: tuple[str, ...],
+    scenes: int,
+    known: tuple[Path, ...],
+    seed: int,
+    out: Path,
+    weights: Path | None,
 ) -> None:
     """Vary one quantity at a time, far beyond what MODEL was trained on, and measure.
 
@@ -35,8 +48,12 @@ def command(
     loaded = common.model_to_measure(model, weights)
     common.check_names("probe", only, [*kit_of(loaded.manifest).probes, *INVARIANTS])
     torch.set_num_threads(1)
-    with Bar() as bar:
-        found = run_stability(loaded, scenes, seed, only, bar)
+    earlier = [json.loads(path.read_text("utf-8")) for path in known]
+    try:
+        with Bar() as bar:
+            found = run_stability(loaded, scenes, seed, only, bar, earlier)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
     common.write_json(out / "stability.json", found)
     for name, probe in found["probes"].items():
         figures = [(row["value"], row["psnr"]["mean"], row["psnr"]["worst"]) for row in probe["rows"]]

@@ -22,11 +22,14 @@ WARP_OF, SCALES_OF = {2: WARP, 3: SOLID_WARP}, {2: SCALES, 3: SIDES}
 def quantities(dimension: int) -> dict[str, tuple[str, float, float]]:
     """Quantity of a manifest -> the probe that varies it, and by what either end of its values is multiplied.
 
-    Of solids the ratio of scales says little: what is thinner than 0.01 may be passed over, at any size.
+    Of solids the ratio of scales says little: rays may pass over what is thinner than 0.01, at any size.
     """
     most, scales = WARP_OF[dimension], SCALES_OF[dimension]
     warp = "warp", most, most
-    solid = {"twist": warp, "displace": ("amount", 1.0, 1.0)}
+    solid = {
+        "twist": warp,
+        **{name: (probe, 1.0, 1.0) for name, probe in SOLID.items()},
+    }
     return {
         "objects": ("objects", 1.0, 1.0),
         "smooth": ("blends", 1.0, 1.0),
@@ -38,12 +41,8 @@ def quantities(dimension: int) -> dict[str, tuple[str, float, float]]:
     }
 
 
-FROM_NOTHING = {
-    "smooth": 0.0,
-    "blend": 0.0,
-    "displace": 0.0,
-    "texels": 0.0,
-}  # what the least value is where the probe starts later
+SOLID = {"displace": "amount", "frequency": "frequency", "thickness": "thickness", "width": "width"}
+FROM_NOTHING = {"smooth", "blend", "displace", "frequency", "width", "texels"}  # the probe starts later
 BOTH_WAYS = {"twirl", "bend", "twist"}  # the range is the same on either side of 0
 
 
@@ -69,11 +68,12 @@ def measured_ranges(
         rows = probe["rows"]
         first, last = _healthy(rows, probe["healthy"])
         low, high = rows[first]["value"] * low_unit, rows[last]["value"] * high_unit
-        low = FROM_NOTHING.get(quantity, low)
+        low = 0.0 if quantity in FROM_NOTHING else low
         if quantity in BOTH_WAYS:
             low = -high
         ranges[quantity] = [int(v) if v == int(v) else round(v, 4) for v in (low, high)]
-        beyond = [*rows[:first], *rows[last + 1 :]] if quantity not in BOTH_WAYS else rows[last + 1 :]
+        below = [] if quantity in BOTH_WAYS | FROM_NOTHING else rows[:first]
+        beyond = [*below, *rows[last + 1 :]]
         shown = [beyond[0], beyond[-1]] if len(beyond) > 1 else beyond
         unit = {True: low_unit, False: high_unit}
         said = [

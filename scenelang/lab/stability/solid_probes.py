@@ -16,7 +16,7 @@ from scenelang.scene.schema import Camera, Object, Rotate, Scale, Scene, Transfo
 from scenelang.words import BLEND
 
 DEPTH = 3 * 2 * 0.6  # optical depth of a medium of middling scale
-MOST = {"operators": 6, "blends": 8, "size": 4, "thin": 100, "shear": 4, "canvas": 256}
+MOST = {"operators": 6, "blends": 8, "size": 4, "shear": 4, "canvas": 256}
 """Of probes of both dimensions, beyond which the exact picture of solids takes too long, or is empty."""
 
 
@@ -33,9 +33,17 @@ def _within(name: str, probe: Probe) -> Probe:
 
 
 PROBES: dict[str, Probe] = {
-    **{name: _within(name, probe) for name, probe in common(solids.scene, solids.deformed, WARP).items()},
+    **{
+        name: _within(name, probe)
+        for name, probe in common(solids.scene, solids.deformed, WARP).items()
+        if name != "thin"
+    },
     "objects": Probe(
         "objects of a scene, the smaller the more", "objects", (1, 2, 4, 16, 64, 100), 4, solids.crowd
+    ),
+    "thickness": Probe(
+        "thin solids, opaque", "thickness", (0.003, 0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.1, 0.3), 0.3,
+        solids.thin,
     ),
     "width": Probe(
         "widths of a blend", "k", (0.01, 0.05, 0.15, 0.3, 0.6, 1.2), BLEND,
@@ -66,6 +74,9 @@ PROBES: dict[str, Probe] = {
     "height": Probe(
         "heights of the eye", "degrees", (-5, 10, 30, 60, 90), 10,
         lambda rng, angle: solids.seen(rng, Camera(solids.high(math.radians(angle)))),
+    ),
+    "close": Probe(
+        "an eye near an object", "distance", (0.003, 0.01, 0.03, 0.1, 0.3, 1), 1, solids.close
     ),
     "light": Probe("a light near an object", "distance", (0.003, 0.01, 0.03, 0.1, 0.3, 1), 1, solids.lit),
 }  # fmt: skip

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,6 +38,7 @@ from scenelang.renderers.draw import draw
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.scene.schema import Chain, Object, Scene
+from scenelang.training.loop import revision
 
 EDGE = 2 / 255  # a pixel of an edge differs by more from a neighbour
 FRAMES = 8
@@ -45,6 +46,8 @@ SIZES = {"canvas"}  # probes that only models of any size can take
 IDEAL = 8  # samples along a pixel's side of a picture whose own sampling hardly shows
 
 Array = npt.NDArray[np.float64]
+Row = dict[str, Any]
+"""What was measured at a value of a probe."""
 
 
 def kit_of(manifest: Manifest) -> Kit:
@@ -164,13 +167,22 @@ def scene_of(probe: Probe, value: float, index: int, seed: int, model: Model) ->
     return scene
 
 
-def run_probe(model: Model, name: str, scenes: int, seed: int, report: Report = silent) -> dict[str, Any]:
-    """A curve: errors at every value of a probe; none for one that the model's canvas rules out."""
+def run_probe(
+    model: Model, name: str, scenes: int, seed: int, report: Report = silent, known: Sequence[Row] = ()
+) -> dict[str, Any]:
+    """A curve: errors at every value of a probe; none for one that the model's canvas rules out.
+
+    Rows that are ``known`` are taken as they are.
+    """
     probe = kit_of(model.manifest).probes[name]
-    rows = []
+    rows: list[Row] = []
+    before = {row["value"]: row for row in known}
     values = probe.values if name not in SIZES or not model.manifest.sizes else ()
     fine = name in SIZES and model.manifest.dimension == 2  # that of solids would take hours
     for at, value in enumerate(values):
+        if value in before:
+            rows.append(before[value])
+            continue
         found, ideal, changes = [], [], []
         for index in range(scenes):
             scene = scene_of(probe, value, index, seed, model)
@@ -183,11 +195,13 @@ def run_probe(model: Model, name: str, scenes: int, seed: int, report: Report = 
         rows.append(
             {
                 "value": value,
+                "worst_scene": int(np.argmax([e.square for e in found])),
                 "psnr": spread([e.psnr for e in found], 5),
                 "flip": spread([e.flip for e in found], 95),
                 "db": round(-10 * math.log10(max(1e-12, float(np.mean([e.square for e in found])))), 3),
                 "per_edge": round(float(np.mean([e.per_edge for e in found])), 6),
                 "per_covered": round(float(np.mean([e.per_covered for e in found])), 6),
+                "revision": revision(),
             }
         )
         if probe.sampled:
@@ -283,28 +297,38 @@ def run_stability(
     seed: int,
     only: tuple[str, ...] = (),
     report: Report = silent,
+    known: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
     """The whole suite, or the probes and invariants named.
 
     Args:
-        model: what draws.
-        scenes: of every value.
-        seed: of the scenes.
+        model, scenes, seed: what draws, how many scenes of every value, and their seed.
         only: names of probes and of `INVARIANTS`; all by default.
         report: called with a name, values done and all.
+        known: earlier results, whose values and invariants are not measured again.
 
     Returns:
         For JSON: ``probes`` and ``invariants`` by name, and what was measured on what.
+
+    Raises:
+        ValueError: an earlier result is of other weights, scenes or another seed.
     """
     started = time.perf_counter()
+    rows: dict[str, list[Row]] = {}
+    invariants: dict[str, Any] = {}
+    for earlier in known:
+        if (earlier["weights"], earlier["scenes"], earlier["seed"]) != (model.digest, scenes, seed):
+            raise ValueError("an earlier result is of other weights, scenes or another seed")
+        invariants |= earlier["invariants"]
+        for name, probe in earlier["probes"].items():
+            rows.setdefault(name, []).extend({"revision": earlier["revision"], **r} for r in probe["rows"])
     probes = {
-        n: run_probe(model, n, scenes, seed, report)
+        n: run_probe(model, n, scenes, seed, report, rows.get(n, ()))
         for n in kit_of(model.manifest).probes
         if not only or n in only
     }
-    invariants = {}
     for name, measure in INVARIANTS.items():
-        if not only or name in only:
+        if name not in invariants and (not only or name in only):
             invariants[name] = measure(model, scenes, seed)
             report(name, 1, 1)
     return {
