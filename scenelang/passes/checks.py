@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from math import dist, hypot, inf, sqrt, tan
+from math import dist, hypot, sqrt, tan
 from operator import itemgetter
 
 from scenelang.diagnostics.diagnostic import Label
@@ -127,8 +127,8 @@ def check_trained(graph: Graph, context: Context) -> Graph:
         for quantity, value in (*leaf.noted("measures", measures), *_texels(leaf, graph)):
             if quantity in trained and not (quantity == "thickness" and op == "subtract"):
                 low, high = trained[quantity]
-                high = inf if quantity == "thickness" else high  # of which more does no harm
-                excess = max(low - value, value - high) / ((high - low) or 1.0)
+                above = value - high if quantity != "thickness" else 0.0  # of which more does no harm
+                excess = max(low - value, above) / ((high - low) or 1.0)
                 if excess > _TOLERANCE:
                     outside.setdefault(quantity, []).append((excess, value, leaf))
     for quantity, subject in _SUBJECTS.items():

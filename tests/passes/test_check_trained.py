@@ -92,9 +92,13 @@ def test_what_a_model_does_not_state_is_not_looked_at() -> None:
 
 SOLIDS = dataclasses.replace(
     load_manifest("solids3d"),
-    trained={"twist": (-2, 2), "bend": (-1, 1), "displace": (0, 0.1), "scale": (0.1, 2), "thin": (1, 5)},
+    trained={
+        "twist": (-2, 2), "bend": (-1, 1), "displace": (0, 0.1), "frequency": (0, 9), "scale": (0.1, 2),
+        "thickness": (0.12, 1), "width": (0, 1),
+    },
     measured={},
-)
+)  # fmt: skip
+FLAT, MIST = "scale(1, 0.19, 1);", "material volumetric;"
 
 
 @pytest.mark.parametrize(
@@ -103,11 +107,15 @@ SOLIDS = dataclasses.replace(
         ("twist(-2);", "twist(-2.1);", "W0509 a `twist` of -2.1 on `torus` is outside the measured range -2"),
         ("twist(2); scale(2);", "scale(1, 2, 1); twist(2); twist(0.1);", "W0509 a `twist` of 4.2"),
         ("displace(-0.1, 9);", "displace(-0.2, 9);", "W0510 a displacement of 0.2 of `torus` is outside"),
-        ("scale(1, 1, 0.2);", "scale(2, 1, 0.3);", "W0506 `torus`, 6.67 times as long as wide,"),
+        ("displace(0.1, -9);", "displace(0.1, 10);", "W0510 a displacement of frequency 10 of `torus` is"),
+        ("scale(1, 0.2, 1);", FLAT, "W0506 `torus`, 0.114 thick, is outside the measured range 0.12 to 1"),
+        (f"{FLAT} {MIST}", f"{MIST} }} torus {{ {FLAT}", "W0506 `torus`, 0.114 thick,"),
+        (f"}} subtract torus {{ {FLAT}", f"}} torus {{ {FLAT}", "W0506"),
+        ("} smooth(k = 1) sphere {", "} smooth(k = 1.1) sphere {", "W0512 a `smooth` of width 1.1 is"),
         ("bend(1); scale(2);", "bend(1); scale(1, 1, 2.1);", "W0504 a scale of 2.1 of `torus`"),
     ],
 )  # fmt: skip
 def test_bounds_of_solids(inside: str, outside: str, words: str) -> None:
-    assert warned(f"torus {{ {inside} }}", SOLIDS) == []
-    (found,) = warned(f"torus {{ {outside} }}", SOLIDS)
+    assert warned(f"chain {{ torus {{ {inside} }} }}", SOLIDS) == []
+    (found,) = warned(f"chain {{ torus {{ {outside} }} }}", SOLIDS)
     assert found.startswith(words)
