@@ -30,6 +30,9 @@ _RANGES: Final = {
     "thin",
     "blend",
     "displace",
+    "frequency",
+    "thickness",
+    "width",
     "texels",
 }
 
