@@ -10,6 +10,7 @@ docs/results/experiments/; charts and strips of the latter are drawn by `scenela
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -55,6 +56,7 @@ SOLIDS = {
     "wide": "a canvas of 5 to 3",
     "staged": "random camera, light, ground and sky",
     "mixed": "1 to 4, deformed, booleans, on a random stage",
+    "many": "16 objects at 0.6 of the size, three in ten of mist",
     "meshes3d": "1 to 4 of bunny, teapot and monkey, diffuse; scaled, turned and moved in random order",
 }
 
@@ -66,27 +68,30 @@ TEXTURES = {
 }
 
 
+def mean(found: dict[str, float], digits: int) -> str:
+    """A mean and half its 95 % interval."""
+    return f"{found['mean']:.{digits}f} ± {found['interval']:.{digits}f}"
+
+
 def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
-    """The Markdown table of the sets of a folder that were measured; of solids also what no cap hides."""
-    heads = ["set", "what", "scenes", "PSNR, dB", "5th percentile", "worst"]
-    heads += ["SSIM", "FLIP", "FLIP, 95th percentile", *(["PSNR without the cap"] if folder else [])]
-    rows, said, drawn = [], "", set[str]()
+    """The Markdown table of the sets of a folder that were measured, with the commands."""
+    heads = ("set", "what", "scenes", "PSNR, dB", "worst", "without the cap", "SSIM", "FLIP")
+    rows: list[list[str]] = []
+    commands, revisions = dict[str, None](), dict[str, None]()
     for name, words in what.items():
         path = HERE / "results" / folder / f"{name}.json"
         if not path.exists():
             continue
         d = json.loads(path.read_text())
-        p, s, f = d["psnr"], d["ssim"], d["flip"]
-        cells = [f"{p[end]:.2f}" for end in ("mean", "p5", "worst")]
-        cells += [f"{s['mean']:.4f}", f"{f['mean']:.4f}", f"{f['p5']:.4f}"]
-        cells += [f"{d['psnr_uncapped']['mean']:.1f}"] if folder else []
-        rows.append([f"`{name}`", words, f"{d['scenes']:,}", *cells])
-        if folder:
-            drawn.add(f"`{d['revision'][:8]}`")
-            said = (
-                f"\n\nSeed {d['seed']}, weights `{d['weights'][:8]}…`, revision {' or '.join(sorted(drawn))}."
-            )
-    return markdown(heads, rows) + said
+        figures = [mean(d["psnr"], 2), f"{d['psnr']['worst']:.2f}", mean(d["psnr_uncapped"], 1)]
+        figures += [f"{d['ssim']['mean']:.4f}", mean(d["flip"], 5)]
+        rows.append([f"`{name}`", words, f"{d['scenes']:,}", *figures])
+        command = re.sub(r"(--set) \S+", r"\1 SET", d["command"])
+        commands[re.sub(r"(--scenes) \S+", r"\1 SCENES", command)] = None
+        revisions[f"`{d['revision'][:8]}`"] = None
+    asked, drawn = " or ".join(f"`{command}`" for command in commands), " or ".join(revisions)
+    said = f"{asked}; seed {d['seed']}, weights `{d['weights'][:8]}…`, revision {drawn}."
+    return f"{markdown(heads, rows)}\n\n{said}"
 
 
 def experiment(name: str) -> Callable[[], str]:
@@ -112,19 +117,24 @@ def experiment(name: str) -> Callable[[], str]:
 
 
 def stability(dimension: int = 2) -> str:
-    """Mean and worst PSNR at the healthy value and at both ends of every probe, of every model measured."""
-    rows = []
+    """Of every probe of every model measured the healthy mean PSNR, the least mean and the worst scene."""
+    rows, said = [], []
     for path in sorted((HERE / "results").glob("stability*.json"), key=lambda path: len(path.name)):
         found = json.loads(path.read_text())
         if load_manifest(found["model"]).dimension != dimension:
             continue
         for probe in found["probes"].values():
-            healthy = next(row for row in probe["rows"] if row["value"] == probe["healthy"])
-            cells = [f"{row['value']:g}: {row['psnr']['mean']:.1f}" for row in probe["rows"]]
-            rows.append(
-                [f"`{found['model']}`", probe["title"], f"{healthy['psnr']['mean']:.1f}", ", ".join(cells)]
-            )
-    return markdown(("model", "what", "healthy, dB", "value: mean PSNR, dB"), rows)
+            by = {row["value"]: row["psnr"] for row in probe["rows"]}
+            least, worst = (min(by, key=lambda value: by[value][k]) for k in ("mean", "worst"))
+            cells = [f"{probe['quantity']}, {min(by):g} to {max(by):g}", mean(by[probe["healthy"]], 1)]
+            cells += [mean(by[least], 1), f"{least:g}", f"{by[worst]['worst']:.1f}", f"{worst:g}"]
+            rows.append([f"`{found['model']}`", probe["title"], *cells])
+        said.append(
+            f"`{found['command']}`, {found['scenes']} scenes a value, seed {found['seed']}, weights "
+            f"`{found['weights'][:8]}…`."
+        )
+    heads = ("model", "what", "values", "healthy, dB", "least mean, dB", "at", "worst scene, dB", "at")
+    return "\n\n".join((markdown(heads, rows), *said))
 
 
 def blends() -> str:
@@ -136,12 +146,11 @@ def blends() -> str:
         for row in probe["rows"]:
             p, f = row["psnr"], row["flip"]
             contrast, size = (row["value"], LARGE) if name == "contrast" else (1, row["value"])
-            mean = f"{p['mean']:.1f} ± {p['interval']:.1f}"
             rows.append(
                 [
                     f"{contrast:g}",
                     f"{size:g}",
-                    mean,
+                    mean(p, 1),
                     f"{p['p5']:.1f}",
                     f"{p['worst']:.1f}",
                     f"{f['mean']:.4f}",
@@ -155,12 +164,14 @@ def blends() -> str:
 def texels() -> str:
     """What textures lose and how they flicker where they are drawn small."""
     found = json.loads((HERE / "results" / "stability-textures2d.json").read_text())
-    rows = [
-        [f"{row['value']:g}", *(f"{row['psnr'][k]:.1f}" for k in ("mean", "worst"))]
-        + [f"{row['flicker'][k]:.2f}" for k in ("mean", "worst")]
-        for row in found["probes"]["texels"]["rows"]
-    ]
-    return markdown(("texels to a pixel", "mean PSNR, dB", "worst", "flicker", "worst"), rows)
+    rows = []
+    for row in found["probes"]["texels"]["rows"]:
+        p, flicker = row["psnr"], row["flicker"]
+        cells = [mean(p, 1), f"{p['worst']:.1f}", mean(flicker, 2), f"{flicker['worst']:.2f}"]
+        rows.append([f"{row['value']:g}", *cells])
+    heads = ("texels to a pixel", "mean PSNR, dB", "worst", "flicker", "worst")
+    said = f"`{found['command']}`, {found['scenes']} scenes a value, seed {found['seed']}"
+    return f"{markdown(heads, rows)}\n\n{said}"
 
 
 def shadows() -> str:

@@ -10,10 +10,12 @@ from scenelang.measure.metrics import MOST_DB
 
 INK, FAINT, LINE, WARN = "#22303c", "#c9d1d8", "#1f77b4", "#c8452f"
 COLUMNS = 3
+WIDE_IN = 9.5  # 760 pixels, as pages show them
+TICKS = 6  # named along an axis
 
 
 def stability_chart(results: Sequence[Mapping[str, Any]]) -> bytes:
-    """PSNR of every probe: the mean as a line, from the 5th percentile up shaded, the worst as dots.
+    """PSNR of every probe: the mean and its interval, from the 5th percentile up shaded, the worst as dots.
 
     Args:
         results: of `run_stability`, one a model; the first is drawn in full.
@@ -22,17 +24,18 @@ def stability_chart(results: Sequence[Mapping[str, Any]]) -> bytes:
     first = results[0]
     names = list(first["probes"])
     lines = (len(names) + COLUMNS - 1) // COLUMNS
-    figure, axes = plt.subplots(lines, COLUMNS, figsize=(4.2 * COLUMNS, 2.7 * lines), squeeze=False)
-    lowest = min(row["psnr"]["worst"] for r in results for p in r["probes"].values() for row in p["rows"])
+    figure, axes = plt.subplots(lines, COLUMNS, figsize=(WIDE_IN, 2.1 * lines), squeeze=False)
     for axis, name in zip(axes.flat, names, strict=False):
-        _probe(axis, [{**r["probes"][name], "model": r["model"]} for r in results if name in r["probes"]])
+        curves = [{**r["probes"][name], "model": r["model"]} for r in results if name in r["probes"]]
+        _probe(axis, curves)
+        lowest = min(row["psnr"]["worst"] for curve in curves for row in curve["rows"])
         axis.set_ylim(min(40.0, lowest - 1), MOST_DB + 1)
     for axis in axes.flat[len(names) :]:
         axis.set_axis_off()
     if len(results) > 1:
         axes.flat[0].legend(fontsize=7, frameon=False)
     figure.tight_layout()
-    return figure_png(figure)
+    return figure_png(figure, dpi=120)
 
 
 def _probe(axis: Any, curves: Sequence[Mapping[str, Any]]) -> None:
@@ -42,15 +45,18 @@ def _probe(axis: Any, curves: Sequence[Mapping[str, Any]]) -> None:
         mean, p5, worst = ([row["psnr"][k] for row in curve["rows"]] for k in ("mean", "p5", "worst"))
         (line,) = axis.plot(x, mean, marker="o", markersize=3, linewidth=1.5, label=curve["model"])
         if i == 0:
+            off = [row["psnr"]["interval"] for row in curve["rows"]]
+            axis.errorbar(x, mean, yerr=off, fmt="none", ecolor=line.get_color(), elinewidth=1, capsize=2)
             axis.fill_between(x, p5, mean, color=line.get_color(), alpha=0.15, linewidth=0)
             axis.plot(x, worst, ".", color=WARN, markersize=4)
     values = [row["value"] for row in first["rows"]]
     if min(values) > 0 and max(values) / min(values) > 8:
         axis.set_xscale("log", base=2)
-    axis.set_xticks(values, [f"{v:g}" for v in values])
+    every = -(-len(values) // TICKS)
+    axis.set_xticks(values, [f"{v:g}" if i % every == 0 else "" for i, v in enumerate(values)])
     axis.minorticks_off()
     axis.axvline(first["healthy"], color=FAINT, linewidth=5, zorder=0)
-    axis.set_title(first["title"], fontsize=8.5, color=INK)
+    axis.set_title(first["title"], fontsize=8, color=INK, wrap=True)
     axis.set_xlabel(first["quantity"], fontsize=8)
     axis.set_ylabel("PSNR, dB", fontsize=8)
     axis.tick_params(labelsize=7)

@@ -95,7 +95,7 @@ def common(base: Base, deformed: Base, warp: float) -> dict[str, Probe]:
             partial(varied.blends, base),
         ),
         "contrast": Probe(
-            "blends of white and darker, three times the base set's size", "difference of the colours",
+            "blends of white and darker, large objects", "difference of the colours",
             (0, 0.125, 0.25, 0.5, 0.75, 1), 0.25, partial(varied.contrast, base),
         ),
         "deep": Probe(
@@ -103,7 +103,7 @@ def common(base: Base, deformed: Base, warp: float) -> dict[str, Probe]:
             lambda rng, size: varied.contrast(base, rng, 1.0, size),
         ),
         "affine": Probe(
-            "affine maps of each object, each lifted by itself", "affine maps", (3, 4, 8, 16, 32, 64), 3,
+            "affine maps, each lifted by itself", "affine maps", (3, 4, 8, 16, 32, 64), 3,
             partial(varied.affine, base), folded=False,
         ),
         "warp": Probe(
@@ -119,7 +119,7 @@ def common(base: Base, deformed: Base, warp: float) -> dict[str, Probe]:
         ),
         "shear": Probe("sheared objects", "shear", (0, 0.5, 1, 2, 4, 8), 0, partial(varied.sheared, base)),
         "order": Probe(
-            "orders of transformations", "order (0 as trained, 1 affine shuffled, 2 deformed last, 3 mixed)",
+            "orders of transformations", "0 as trained, 1 affine, 2 warps last, 3 mixed",
             (0, 1, 2, 3), 0, partial(varied.order, deformed),
         ),
         "canvas": Probe(
