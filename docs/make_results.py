@@ -56,7 +56,6 @@ SOLIDS = {
     "wide": "a canvas of 5 to 3",
     "staged": "random camera, light, ground and sky",
     "mixed": "1 to 4, deformed, booleans, on a random stage",
-    "many": "16 objects at 0.6 of the size, three in ten of mist",
     "meshes3d": "1 to 4 of bunny, teapot and monkey, diffuse; scaled, turned and moved in random order",
 }
 
@@ -70,7 +69,8 @@ TEXTURES = {
 
 def mean(found: dict[str, float], digits: int) -> str:
     """A mean and half its 95 % interval."""
-    return f"{found['mean']:.{digits}f} ± {found['interval']:.{digits}f}"
+    off = f" ± {found['interval']:.{digits}f}" if "interval" in found else ""
+    return f"{found['mean']:.{digits}f}{off}"
 
 
 def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
@@ -83,12 +83,16 @@ def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
         if not path.exists():
             continue
         d = json.loads(path.read_text())
-        figures = [mean(d["psnr"], 2), f"{d['psnr']['worst']:.2f}", mean(d["psnr_uncapped"], 1)]
+        figures = [
+            mean(d["psnr"], 2),
+            f"{d['psnr']['worst']:.2f}",
+            mean(d.get("psnr_uncapped", d["psnr"]), 1),
+        ]
         figures += [f"{d['ssim']['mean']:.4f}", mean(d["flip"], 5)]
         rows.append([f"`{name}`", words, f"{d['scenes']:,}", *figures])
-        command = re.sub(r"(--set) \S+", r"\1 SET", d["command"])
+        command = re.sub(r"(--set) \S+", r"\1 SET", d.get("command", "scenelang lab eval"))
         commands[re.sub(r"(--scenes) \S+", r"\1 SCENES", command)] = None
-        revisions[f"`{d['revision'][:8]}`"] = None
+        revisions[f"`{d.get('revision', 'unknown')[:8]}`"] = None
     asked, drawn = " or ".join(f"`{command}`" for command in commands), " or ".join(revisions)
     said = f"{asked}; seed {d['seed']}, weights `{d['weights'][:8]}…`, revision {drawn}."
     return f"{markdown(heads, rows)}\n\n{said}"
@@ -129,8 +133,11 @@ def stability(dimension: int = 2) -> str:
             cells = [f"{probe['quantity']}, {min(by):g} to {max(by):g}", mean(by[probe["healthy"]], 1)]
             cells += [mean(by[least], 1), f"{least:g}", f"{by[worst]['worst']:.1f}", f"{worst:g}"]
             rows.append([f"`{found['model']}`", probe["title"], *cells])
+        scenes = " or ".join(
+            f"{n}" for n in sorted({p.get("scenes", found["scenes"]) for p in found["probes"].values()})
+        )
         said.append(
-            f"`{found['command']}`, {found['scenes']} scenes a value, seed {found['seed']}, weights "
+            f"`{found.get('command')}`, {scenes} scenes a value, seed {found['seed']}, weights "
             f"`{found['weights'][:8]}…`."
         )
     heads = ("model", "what", "values", "healthy, dB", "least mean, dB", "at", "worst scene, dB", "at")
@@ -170,7 +177,7 @@ def texels() -> str:
         cells = [mean(p, 1), f"{p['worst']:.1f}", mean(flicker, 2), f"{flicker['worst']:.2f}"]
         rows.append([f"{row['value']:g}", *cells])
     heads = ("texels to a pixel", "mean PSNR, dB", "worst", "flicker", "worst")
-    said = f"`{found['command']}`, {found['scenes']} scenes a value, seed {found['seed']}"
+    said = f"`{found.get('command')}`, {found['scenes']} scenes a value, seed {found['seed']}"
     return f"{markdown(heads, rows)}\n\n{said}"
 
 

@@ -54,7 +54,7 @@ SUMMARY = [
     f"takes {RATIO:.0f} times as long for drawing four known polygons",
     f"({probe('deep', 3):.1f} ± {probe('deep', 3, 'psnr/interval'):.1f} dB on average at three",
     f"({probe('blends', 64):.1f} dB for 64 of them) and at slivers ({probe('thin', 300):.1f} dB), and in "
-    f"space at thin objects ({probe('thin', 100, record='stability-solids3d'):.1f} dB where",
+    f"space at thin objects ({probe('thickness', 0.003, record='stability-solids3d'):.1f} dB where",
 ]
 EDGES = [probe("canvas", side, "per_edge_ideal") for side in (32, 256, 1024)]
 SAMPLED = [probe("canvas", side, "per_edge") for side in (32, 256, 1024)]
@@ -91,7 +91,7 @@ GIVEN = {
     "6 dB less error": "half an error, in another unit",
     "against 64 samples": "what pictures are compared with",
     "36.41 dB, SSIM 0.982, FLIP 0.049": "the paper's Table 2",
-    "pass over, 0.01,": "the language's definition",
+    "thinner than 0.01, which": "the language's definition",
     "eight times for every point": "the paper's method",
     "1.6 million": "the paper's training",
     "trained on 16 scenes alone": "how long and on what it was trained",
