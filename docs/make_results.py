@@ -42,7 +42,7 @@ WHAT = {
     "strong": "deformations up to ±2.4",
     "large": "three times the size",
 }
-PAGES = ("results.md", "report.md", "proof.md")
+PAGES = ("results.md", "report.md", "proof.md", "viewer.md")
 EXPERIMENTS = ("overfit", "compare", "table1", "table2", "table3", "table4", "losses", "seeds")
 
 

@@ -10,7 +10,16 @@ from types import ModuleType
 import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = {"results.md", "proof.md", "report.md", "README.md", "index.md", "elements.md", "parsimony.md"}
+PAGES = {
+    "results.md",
+    "proof.md",
+    "report.md",
+    "viewer.md",
+    "README.md",
+    "index.md",
+    "elements.md",
+    "parsimony.md",
+}
 
 
 @pytest.fixture(scope="module", autouse=True)
