@@ -12,4 +12,4 @@ CLAIMS = [
     f"**{BROKEN} pixels are farther from the exact one than they are proved to be**",
     f"in {OPEN} of the sets a pixel is left that is not proved right to 1/255",
 ]
-GIVEN = {"128 × 128 cells": "the grid of the proof", "its 95 % interval": "the interval's level"}
+GIVEN = {"128 × 128 cells": "the grid of the proof"}

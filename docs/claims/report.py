@@ -41,7 +41,6 @@ CLAIMS = [
 GIVEN = {
     "under 2 % of the canvas": "how scenes are drawn",
     "PSNR counts at most 50 dB an image": "the cap",
-    "95 % interval": "the interval's level",
     "means of 1,000 scenes": "the paper's",
     "32 numbers in the plane": "the layout of vectors",
     "frames have 12 numbers": "the layout of vectors",

@@ -82,6 +82,7 @@ GIVEN = {
     "counts for at most 50": "the cap",
     "under 2 % of the canvas": "how scenes are drawn",
     "under 0.02 % for the tiny ones": "how scenes are drawn",
+    "where they are 0.003 thick": "a quantity that is varied",
     "three times the usual size": "a quantity that is varied",
     "three times the base range": "a quantity that is varied",
     "a thirtieth to eight times": "a quantity that is varied",
