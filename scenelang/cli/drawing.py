@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from scenelang.measure.frontier import Frontier, Limits, Point
     from scenelang.outputs import Output, Outputs, Proof
     from scenelang.program.program import Program
+    from scenelang.scene.schema import Scene
 
 Draw = Callable[[Job, Callable[[float], None]], "Image"]
 
@@ -185,7 +186,10 @@ def choose_point(job: Job, limits: Limits, model: str | None, here_ms: float) ->
     notes = program_notes(job.program, "chosen by the frontier") if point.backend == "neural" else []
     told = f"this machine takes {scale:.2f} times as long as the one that was measured"
     refused = [f"not in question: {name}: {why}" for name, why in choice.refused.items()]
-    job.notes = [*choice.notes, f"times are for one thread; {told}", *refused, *notes]
+    scene = job.source.scene if job.source is not None else None
+    like = f"errors are promised for scenes like those of the set `{frontier.set}`"
+    like += ", which have no elements" if scene is not None and scene.elements else ""
+    job.notes = [*choice.notes, f"times are for one thread; {told}", like, *refused, *notes]
     return point
 
 
@@ -226,7 +230,26 @@ def _refusal(point: Point, job: Job, program: Program, model: str | None) -> str
         return "not installed"
     manifest = load_manifest(point.model) if point.model is not None else None
     scene = job.source.scene if job.source is not None else None
+    if point.backend == "reference" and scene is not None and (missing := _missing(scene, program.model)):
+        return missing
     return refusal(point, manifest, scene, program.model if scene is None else None)
+
+
+def _missing(scene: Scene, model: str) -> str | None:
+    """Why the exact picture of a scene's elements cannot be drawn; None if it can."""
+    if not scene.elements:
+        return None
+    from scenelang.diagnostics.diagnostic import Diagnostics
+    from scenelang.fitting.mesh import FitError
+    from scenelang.fitting.originals import originals_of
+    from scenelang.graph.lower import lower
+    from scenelang.models.manifest import load_manifest
+
+    try:
+        originals_of(scene, lower(scene, load_manifest(model), None, Diagnostics()))
+    except (FitError, OSError) as error:
+        return str(error)
+    return None
 
 
 def _compiled(job: Job, program: Program, point: Point) -> Program | str:

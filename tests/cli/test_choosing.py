@@ -219,3 +219,24 @@ def test_solids_are_chosen_for(
     assert "drawn by numpy on one core" in result.stderr
     mist = folder.write("mist.nsg", "sphere { scale(1.5); material volumetric; }\n")
     assert folder.run("render", mist, "-o", "a.png", "--max-ms", "12", "--max-flip", "0.005").exit_code == 2
+
+
+def test_the_reference_is_not_chosen_where_it_lacks_what_elements_were_made_from(
+    folder: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draft = point("solids3d, draft", 3, 0.015, model="solids3d", renderer="solid", samples="draft")
+    exact = point("exact", 60, 0.0, renderer="reference", backend="reference", model=None)
+    path = folder.path / "solids.json"
+    path.write_text(replace(frontier(draft, exact), set="mixed").to_json(), "utf-8")
+    monkeypatch.setattr(frontier_file, "frontier_path", lambda model: path)
+    monkeypatch.delenv("SCENELANG_ORIGINALS", raising=False)
+    name = folder.write(
+        "m.nsg", 'nsg 1; canvas(24, 24); import "std/meshes" as m; m.monkey { scale(0.5); }\n'
+    )
+    result = folder.run("render", name, "-o", "a.png", "--max-flip", "0.0001")
+    assert result.exit_code == 2
+    assert "within FLIP 0.0001; the most exact is solids3d, draft" in result.stderr
+    result = folder.run("render", name, "-o", "a.png", "--max-flip", "0.9", "-v")
+    assert result.exit_code == 0, result.output
+    assert "not in question: exact: `m.monkey` was made from `monkey.obj`, which is not in" in result.stderr
+    assert "scenes like those of the set `mixed`, which have no elements" in result.stderr
