@@ -40,8 +40,8 @@ def verify(
         report: called with the case, scenes done and all.
 
     Returns:
-        For JSON: for each case and point ``scenes``, ``kept`` (share), ``worst`` (FLIP over the promise) and
-        ``promise`` (FLIP of a usual scene), and ``held``: whether every share is at least `KEPT`.
+        For JSON: for each case and point ``scenes``, ``kept`` (share), ``worst`` (FLIP over the promise); of
+        all together ``drawings`` and ``kept``; and ``held``: whether every share is at least `KEPT`.
 
     Raises:
         ValueError: the seed is the frontier's own.
@@ -80,13 +80,17 @@ def verify(
             for name, values in ratios.items()
             if values
         }
+    rows = [row for case in cases.values() for row in case.values()]
+    drawings = sum(row["scenes"] for row in rows)
     return {
         "format": 1,
-        "set": manifest.set,
+        "set": usual_set(manifest),
         "seed": seed,
         "frontier_seed": frontier.seed,
         "frontier_revision": frontier.revision,
         **about(),
-        "held": all(row["kept"] >= KEPT for rows in cases.values() for row in rows.values()),
+        "drawings": drawings,
+        "kept": round(sum(row["kept"] * row["scenes"] for row in rows) / drawings, 4),
+        "held": all(row["kept"] >= KEPT for row in rows),
         "cases": cases,
     }
