@@ -121,7 +121,7 @@ def filled(text: str, claims: Iterable[str]) -> str:
 
 _WORDS = "two three four five six seven eight nine ten eleven twelve fifteen twenty thirty forty fifty sixty"
 _UNITS = (
-    "dB|ms|s|µs|min|minutes?|hours?|seconds?|%|percent|×|times|KB|MB|GB|[MG]FLOP|bytes|kernels|scenes|seeds"
+    "dB|ms|s|µs|min|minutes?|hours?|seconds?|%|percent|×|times|KB|MB|GB|[MG]FLOP|bytes|scenes|seeds|sets"
     "|frames|pictures|images|parameters|numbers|weights|samples|pixels|steps|points|evaluations|levels"
 )
 _NUMBER = r"(?<![\w.])[-+−]?\d[\d,]*(?:\.\d+)?(?![\w.]*\d)"

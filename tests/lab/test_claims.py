@@ -11,6 +11,7 @@ import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {
+    "architecture.md",
     "results.md",
     "proof.md",
     "report.md",
@@ -54,13 +55,15 @@ def test_no_figure_is_without_a_record(pages: dict[Path, ModuleType]) -> None:
     from claims.common import GIVEN
     from figures import uncovered
 
-    bare = []
+    bare, common = [], set[str]()
     for page, module in pages.items():
         text = page.read_text("utf-8")
         given = {piece: why for piece, why in GIVEN.items() if piece in " ".join(text.split())}
+        common |= given.keys()
         found = uncovered(text, module.CLAIMS, {**given, **module.GIVEN})
         bare += [f"{page.name}:{line}: … {words} …" for line, words in found]
     assert not bare, "\n".join(bare)
+    assert common == GIVEN.keys()
 
 
 @pytest.mark.parametrize(
