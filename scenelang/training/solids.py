@@ -22,6 +22,7 @@ from torch.func import grad_and_value, jacrev, vmap
 
 from scenelang.files import write_whole
 from scenelang.reference.field import combine
+from scenelang.models.load import load_model
 from scenelang.renderers.solid.network import BLEND, Wanted
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.training.checkpoint import load_tensors, save_tensors
@@ -97,7 +98,7 @@ def fit_segments(network: Solids, steps: int, g: torch.Generator, points: int = 
     chunks = [[half_rays(leaf, 20_000, g) for leaf in LEAVES] for _ in range(min(10, 1 + steps // 100))]
     told = torch.cat([torch.stack([x.T for x, _ in chunk]) for chunk in chunks], 1)  # (leaves, M, 5)
     length = torch.cat([torch.stack([y for _, y in chunk]) for chunk in chunks], 1)
-    parts = [*network.segment_w, *network.segment_b]
+    parts = _segments(network)
     sizes = [(len(LEAVES), *part.shape[1:]) for part in parts]
     fitted = [
         (torch.randn(size, generator=g) * (size[1] ** -0.5 if len(size) > 2 else 0.3)).requires_grad_()
@@ -123,6 +124,22 @@ def fit_segments(network: Solids, steps: int, g: torch.Generator, points: int = 
         for part, goal in zip(parts, fitted, strict=True):
             _write(network, part, goal)
     return error
+
+
+def take_over(network: Solids, name: str) -> None:
+    """Copy the cell, the looks and the answers for whole segments of a shipped model, whatever its width."""
+    other = load_model(name).network
+    assert isinstance(other, Solids)
+    with torch.no_grad():
+        for part in ("material_codes", "albedo", "cell_lines", "cell_gain", "cell_bias", "candidate", "bump"):
+            getattr(network, part).copy_(getattr(other, part))
+        one = torch.cat([other.codes, torch.ones(len(LEAVES), 1)], 1)
+        for mine, theirs in zip(_segments(network), _segments(other), strict=True):
+            _write(network, mine, one @ theirs.reshape(len(theirs), -1))
+
+
+def _segments(network: Solids) -> list[torch.nn.Parameter]:
+    return [*network.segment_w, *network.segment_b]
 
 
 def _gauss_newton(
@@ -254,6 +271,8 @@ def train_solids(
         *[(ROUND, lambda steps, g: polish_decoders(network, steps, g))] * (config.polish // ROUND),
         (config.segments, lambda steps, g: {"segments": fit_segments(network, steps, g)}),
     ]
+    if config.like is not None:
+        parts = parts[1:-1]
     done, spent_s = 0, 0.0
     checkpoint = folder / "checkpoint.safetensors"
     if checkpoint.exists():
@@ -270,6 +289,8 @@ def train_solids(
             return False
         steps, part = parts[done]
         losses = part(steps, torch.Generator().manual_seed(1000 * config.seed + done))
+        if config.like is not None:
+            take_over(network, config.like)
         done += 1
         seconds = spent_s + time.perf_counter() - started
         told = {
