@@ -1,320 +1,266 @@
-"""What a frame of solids costs: ours, the formulas in the same march, the reference, POV-Ray, Mitsuba.
+"""Solids drawn by us, by formulas in the same march, by the reference, POV-Ray and Mitsuba: time and error.
 
-    python -m benchmarks.solids [-o docs/results/solid-rivals.json] [--rounds N]
+    python -m benchmarks.solids [-o docs/results/solid-rivals.json] [--scenes N ...] [--kept FOLDER]
 
-Processor time, all threads together, of frames of 256² pixels. Each of ours is of a Program that was not
-drawn before in the process, warm otherwise; the least of all rounds counts. POV-Ray and Mitsuba's
-`scalar_rgb` draw the same scene with the cheapest settings by which their picture is as near to their own
-converged one as ours is to the exact one, converged too: FLIP of the middle 96² pixels. Starting them, which
-includes reading the scene, is told apart. Mitsuba leaves out ambient light, the fade and the sky. The floor
-is what the products of the network's layers take, on batches of the sizes that came up. Needs the extra
-``oracles`` and POV-Ray.
+Every way draws every scene once, in turn. What counts is the processor time of a frame of 256² pixels, all
+threads together; of ours of a Program that was not drawn before, warm otherwise. Starting the others, which
+includes reading the scene, is told apart: of POV-Ray it is a picture of one pixel, of Mitsuba all up to the
+end of the first frame but for what the second takes. A picture is compared with what the same renderer makes
+of many samples a pixel, ours with the exact one, and with the four samples that the language defines.
+Mitsuba leaves out ambient light, the fade and the sky; it draws by vectors where there is an LLVM of at least
+16, which `DRJIT_LIBLLVM_PATH` may name, and one by one elsewhere. Needs the extra ``oracles`` and POV-Ray.
 """
 
 from __future__ import annotations
 
 import argparse
-import cProfile
+import copy
+import hashlib
 import json
-import platform
-import pstats
 import resource
+import statistics
+import subprocess
 import time
-from bisect import bisect_left
-from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import partial
-from math import ceil
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
-import scenelang as nsg
-from benchmarks.floor import SOLIDS
-from scenelang.backend.neural import draw_program, open_model, usable_cores
+from scenelang.backend.neural import open_model
+from scenelang.backend.options import Samples, keep_memory
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
-from scenelang.graph.nodes import Graph
+from scenelang.graph.nodes import Fold, Graph
 from scenelang.image import encoded
+from scenelang.lab.about import about
 from scenelang.lab.frontier.closed import closed_forms
-from scenelang.measure.metrics import flip
+from scenelang.lab.frontier.measure import machine
+from scenelang.measure.metrics import UNCAPPED_DB, flip, over_white, psnr
+from scenelang.measure.scenes import interval, scenes_of
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
-from scenelang.program.program import Program
-from scenelang.reference.samples import sample_points
-from scenelang.reference.solid.field import Field
-from scenelang.reference.solid.image import radiance, solid_image
-from scenelang.renderers.arrays import SMOOTH_BLOCK as BLOCK
-from scenelang.renderers.draw import Drawing, draw_objects
+from scenelang.program.compile import compile_scene
+from scenelang.reference.image import reference_image
+from scenelang.renderers.draw import draw_objects
+from scenelang.scene.schema import Scene
 from tests.reference import mitsuba_scenes, povray
 
-MODEL, SIDE, MIDDLE = "solids3d", 256, 96
-WINDOW = slice((SIDE - MIDDLE) // 2, (SIDE + MIDDLE) // 2)
+MODEL, SIDE, SEED = "solids3d", 256, 2021
+SETS = {"diffuse": 6, "solids3d": 10}  # and how many of their scenes
 OUT = Path("docs/results/solid-rivals.json")
-SCENES = {name: SOLIDS[name] for name in ("three diffuse solids", "two media and a solid")}
-GRIDS = [["-A"]]
-GRIDS += [["+AM1", f"+A{limit}", f"+R{side}"] for side in (2, 3) for limit in (0.3, 0.1, 0.03)]
-GRIDS += [["+AM2", f"+A{limit}", f"+R{side}"] for side in (2, 3, 4) for limit in (0.3, 0.1, 0.03)]
-"""Ways in which POV-Ray samples pixels."""
-STEPS = 3, 5, 10, 20, 40  # of its samples along a ray in a medium
-DENSE = 6  # samples along each side of a pixel in its converged picture, and in the exact one
-STRATA = 1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24  # along each side of Mitsuba's pixels
-CONVERGED = 40  # in its converged picture
+DENSE = 5  # samples along each side of a pixel in the converged pictures of the exact field and of POV-Ray
+GRIDS = ["-A", *(f"+AM1 +A{limit} +R3" for limit in (0.3, 0.1, 0.03))]
+GRIDS += [f"+AM2 +A{limit} +R{depth}" for limit, depth in ((0.3, 2), (0.1, 3), (0.03, 3), (0.01, 4))]
+LADDERS = {3: GRIDS[:3], 10: GRIDS, 40: GRIDS[:1] + GRIDS[2:7]}
+"""Ways in which POV-Ray samples pixels, by its samples along a ray in a medium."""
+MOST = max(LADDERS)  # the converged picture's
+SPP = 1, 4, 16, 64, 256  # samples of Mitsuba's pixels
+BATCHES = 2  # of the most samples, in its converged picture
+
+Picture = np.ndarray[Any, Any]  # (H, W, 3), encoded
 
 
-@contextmanager
-def processor_s(found: list[float], who: int = resource.RUSAGE_SELF) -> Iterator[None]:
-    """Append the processor time that this process, or its children, take within."""
+class Frame(NamedTuple):
+    """A picture, the seconds that it took, and those of starting."""
+
+    picture: Picture
+    seconds: float
+    start_s: float = 0.0
+
+
+class Renderer(NamedTuple):
+    """A renderer's ways to draw a scene, by their names, and its converged picture of it."""
+
+    ways: dict[str, Callable[[], Frame]]
+    converged: Callable[[], Picture]
+
+
+def timed(draw: Callable[[], Any], who: int = resource.RUSAGE_SELF) -> tuple[Any, float]:
+    """What was drawn, and the processor time that this process, or its children, took."""
     before = resource.getrusage(who)
-    yield
+    found = draw()
     after = resource.getrusage(who)
-    found.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return found, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def text(name: str, turn: int) -> str:
-    return f"nsg 1; canvas({SIDE}, {SIDE}); {SCENES[name].replace('TURN', f'{60 + turn}deg')}"
+def graph_of(scene: Scene) -> Graph:
+    """A random scene, which is one chain of leaves, as the others take it."""
+    graph = lower(scene, load_manifest(MODEL), None, Diagnostics())
+    chain = graph.root.links[0].node
+    assert isinstance(chain, Fold)
+    return replace(graph, root=chain)
 
 
-def graph_of(name: str) -> Graph:
-    """The scene that is drawn everywhere, lowered."""
-    return lower(nsg.loads(text(name, 0)), load_manifest(MODEL), None, Diagnostics())
+def ours(scene: Scene) -> Renderer:
+    """The network, the same where every ray is marched, formulas in its place, and the reference."""
+    graph, network = graph_of(scene), load_arrays(MODEL).network
+    marched = copy.copy(network)
+    marched.__dict__["segment_w"] = []
+    fields: dict[str, Any] = {"network": network, "marched": marched, "formulas": closed_forms(MODEL)}
 
+    def by(field: Any, samples: Samples) -> Frame:
+        program = compile_scene(scene, model=MODEL)
+        image, seconds = timed(lambda: draw_objects(field, program, threads=1, samples=samples).image)
+        return Frame(over_white(image), seconds)
 
-# ---------------------------------------------------------------- ours
+    def exact(per_side: int) -> Frame:
+        image, seconds = timed(lambda: reference_image(graph, per_side=per_side))
+        return Frame(over_white(image), seconds)
 
-Draw = Callable[[Program], Drawing]
-
-
-def ways() -> dict[str, Draw]:
-    """Ways of ours to draw a Program, on every core."""
-    cores, arrays, model, closed = (
-        usable_cores(),
-        load_arrays(MODEL).network,
-        open_model(MODEL),
-        closed_forms(MODEL),
-    )
-    return {
-        "network, numpy": lambda program: draw_objects(arrays, program, threads=cores),
-        "network, torch": lambda program: draw_program(program, model),
-        "formulas in the same march": lambda program: draw_objects(closed, program, threads=cores),
+    ways: dict[str, Callable[[], Frame]] = {
+        f"{name}, {samples}": partial(by, field, samples)
+        for (name, field), samples in product(fields.items(), get_args(Samples))
+        if name != "marched" or samples == "adaptive"
     }
+    ways |= {f"reference, {n * n} spp": partial(exact, n) for n in (1, 2)}
+    return Renderer(ways, lambda: exact(DENSE).picture)
 
 
-def frames(name: str, rounds: int) -> dict[str, list[float]]:
-    """Seconds of the frames of each way, in turn, each of a new Program."""
-    taken: dict[str, list[float]] = {way: [] for way in ways()}
-    for turn in range(rounds + 1):
-        for at, (way, draw) in enumerate(ways().items()):
-            program = nsg.compile(nsg.loads(text(name, len(taken) * turn + at)))
-            with processor_s(taken[way]):
-                draw(program)
-    return {way: seconds[1:] for way, seconds in taken.items()}  # the first is cold
-
-
-def exact_middle(graph: Graph, per_side: int) -> np.ndarray:
-    """The middle of the exact picture."""
-    rows = range(WINDOW.start, WINDOW.stop)
-    x, y = sample_points((SIDE, SIDE), rows, per_side)
-    part = np.reshape(x, (1, len(rows), per_side, SIDE, per_side))[..., WINDOW, :].reshape(1, -1)
-    along = np.reshape(y, (1, len(rows), per_side, SIDE, per_side))[..., WINDOW, :].reshape(1, -1)
+def by_povray(scene: Scene) -> Renderer:
+    graph = graph_of(scene)
     assert graph.stage is not None
-    forward, right, up = (np.reshape(axis, (3, 1)) for axis in graph.stage.camera.axes())
-    way = forward / np.tan(graph.stage.camera.fov_rad / 2) + part * right + along * up
-    light = radiance(Field(graph.root), graph.stage, way / np.linalg.norm(way, axis=0))[:3]
-    return np.moveaxis(encoded(light.reshape(3, MIDDLE, per_side, MIDDLE, per_side).mean((2, 4))), 0, 2)
+    text = povray.exported(graph.root, graph.stage, (SIDE, SIDE))
 
+    def draw(steps: int, side: int, *options: str) -> tuple[np.ndarray, float]:
+        some = text.replace(f"samples {MOST}", f"samples {steps}")
+        return timed(lambda: povray.traced(some, (side, side), *options), resource.RUSAGE_CHILDREN)
 
-def floor(network: Any, program: Program) -> dict[str, float]:
-    """A frame's evaluations: how many, seconds of the layers' products alone, and of all that they do."""
-    batches: Counter[int] = Counter()
-    ask = type(network).field
+    @cache  # where there are no media, they are not sampled
+    def way(grid: str, steps: int) -> Frame:
+        started = draw(steps, 1)[1]
+        light, seconds = draw(steps, SIDE, *grid.split())
+        return Frame(encoded(light), seconds - started, started)
 
-    def counted(q: np.ndarray, layers: Any, gradient: bool) -> Any:
-        count = q.shape[1]
-        batches.update([BLOCK] * (count // BLOCK) + [count % BLOCK] * (count % BLOCK > 0))
-        return ask(network, q, layers, gradient)
+    def converged() -> Picture:
+        dense = draw(MOST, DENSE * SIDE)[0]
+        return encoded(dense.reshape(SIDE, DENSE, SIDE, DENSE, 3).mean((1, 3)))
 
-    network.field = counted
-    try:
-        draw_objects(network, program)
-    finally:
-        del network.field
-    layers = network.decoder(network.codes[0])
-
-    def seconds(work: Callable[[], object], count: int, times: int) -> float:
-        """Of ``times`` calls, each for so many points."""
-        each: list[float] = []
-        repeats = max(times, ceil(3e4 / count))  # long enough for the clock
-        for _ in range(3):
-            with processor_s(each):
-                for _ in range(repeats):
-                    work()
-        return min(each) * times / repeats
-
-    def products(inputs: list[np.ndarray]) -> None:
-        for (weights, _), x in zip(layers, inputs, strict=True):
-            weights @ x
-
-    total = [0.0, 0.0]
-    for count, times in batches.items():
-        inputs = [np.random.default_rng(0).random((w.shape[1], count), np.float32) for w, _ in layers]
-        total[0] += seconds(partial(products, inputs), count, times)
-        total[1] += seconds(partial(ask, network, inputs[0], layers, False), count, times)
-    evaluations = sum(size * times for size, times in batches.items())
-    return {"evaluations": evaluations, "products_s": total[0], "whole_s": total[1]}
-
-
-def shares(network: Any, program: Program) -> dict[str, float]:
-    """Shares of a frame's time by the module of the renderer that spends it, on one core."""
-    draw_objects(network, program)
-    profile = cProfile.Profile()
-    profile.runcall(draw_objects, network, program)
-    stats: Any = pstats.Stats(profile).stats  # type: ignore[attr-defined]
-    spent = {function: entry[2] for function, entry in stats.items()}
-    for _ in range(8):  # what numpy and helpers spend is their callers'
-        for function, (_, _, _, _, callers) in stats.items():
-            if "/solid/" in function[0] or not callers:
-                continue
-            amount, spent[function] = spent[function], 0.0
-            weights = {caller: entry[3] + 1e-12 for caller, entry in callers.items()}
-            for caller, weight in weights.items():
-                spent[caller] = spent.get(caller, 0.0) + amount * weight / sum(weights.values())
-    found: Counter[str] = Counter()
-    for (file, _, _), seconds in spent.items():
-        found[Path(file).stem if "/solid/" in file else "rest"] += seconds
-    return {name: seconds / sum(found.values()) for name, seconds in found.most_common()}
-
-
-# ---------------------------------------------------------------- the others
-
-
-def difference(picture: np.ndarray, converged: np.ndarray) -> float:
-    """FLIP of the middles of two pictures of linear light."""
-    return flip(encoded(picture[WINDOW, WINDOW]), encoded(converged[WINDOW, WINDOW]))
-
-
-def by_povray(graph: Graph, target: float) -> dict[str, Any]:
-    """The cheapest settings with a FLIP up to the target, and what a frame takes with them."""
-    assert graph.stage is not None
-    scene = povray.exported(graph.root, graph.stage, (SIDE, SIDE))
-    media = "media {" in scene
-
-    def draw(grid: list[str], steps: int, side: int = SIDE, part: bool = False) -> np.ndarray:
-        first, last = side * WINDOW.start // SIDE, side * WINDOW.stop // SIDE
-        window = [f"+{end}{axis}{at}" for axis in "CR" for end, at in (("S", first + 1), ("E", last))]
-        text = scene.replace("samples 40", f"samples {steps}")
-        return povray.traced(text, (side, side), *grid, *(window if part else []))
-
-    dense = draw(["-A"], STEPS[-1], DENSE * SIDE, True)
-    converged = dense.reshape(SIDE, DENSE, SIDE, DENSE, 3).mean((1, 3))
-    found: list[tuple[float, float, list[str], int]] = []
-    for steps in STEPS if media else STEPS[-1:]:
-        for grid in GRIDS:
-            taken: list[float] = []
-            with processor_s(taken, resource.RUSAGE_CHILDREN):
-                picture = draw(grid, steps, part=True)
-            found.append((taken[0], difference(picture, converged), grid, steps))
-        if any(error <= target for _, error, _, _ in found):
-            break
-    _, error, grid, steps = min(each for each in found if each[1] <= target)
-    taken, started = [], []
-    for _ in range(3):
-        with processor_s(taken, resource.RUSAGE_CHILDREN):
-            draw(grid, steps)
-        with processor_s(started, resource.RUSAGE_CHILDREN):
-            draw(["-A"], steps, 1)
-    options = " ".join(grid) + (f", {steps} samples along a ray in a medium" if media else "")
-    seconds = min(taken) - min(started)
-    return {"options": options, "flip": error, "seconds": seconds, "start_s": min(started)}
-
-
-def by_mitsuba(graph: Graph, target: float) -> dict[str, Any]:
-    """As `by_povray`."""
-    assert graph.stage is not None
-    stage, started, taken = graph.stage, list[float](), list[float]()
-    with processor_s(started):
-        objects = mitsuba_scenes.solids(graph.root)
-    window = {f"crop_offset_{axis}": WINDOW.start for axis in "xy"} | {
-        "crop_width": MIDDLE,
-        "crop_height": MIDDLE,
+    ways: dict[str, Callable[[], Frame]] = {
+        f"POV-Ray, {grid}, {steps} in media": partial(way, grid, steps if "media {" in text else MOST)
+        for steps, grids in LADDERS.items()
+        for grid in grids
     }
-
-    def middle(side: int) -> np.ndarray:
-        scene = mitsuba_scenes.exported(objects, stage, (SIDE, SIDE), side * side, **window)
-        return encoded(mitsuba_scenes.picture(scene))
-
-    converged = middle(CONVERGED)
-    errors = {STRATA[-1]: float("nan")}
-
-    def enough(side: int) -> bool:
-        errors[side] = flip(middle(side), converged)
-        return errors[side] <= target
-
-    side = STRATA[min(bisect_left(STRATA, True, key=enough), len(STRATA) - 1)]
-    with processor_s(started):
-        scene = mitsuba_scenes.exported(objects, stage, (SIDE, SIDE), side * side)
-    with processor_s(taken):
-        mitsuba_scenes.picture(scene)
-    options = f"{side * side} samples a pixel" + (", the most tried" if errors[side] > target else "")
-    return {"options": options, "flip": errors[side], "seconds": taken[0], "start_s": sum(started)}
+    return Renderer(ways, converged)
 
 
-# ---------------------------------------------------------------- all of it
-
-
-def measured(name: str, rounds: int) -> dict[str, Any]:
-    """All about a scene."""
-    graph, program = graph_of(name), nsg.compile(nsg.loads(text(name, 0)))
-    network, reference = load_arrays(MODEL).network, list[float]()
-    converged, defined = exact_middle(graph, DENSE), exact_middle(graph, 2)
-    rows: dict[str, dict[str, Any]] = {}
-    for way, seconds in frames(name, rounds).items():
-        picture = np.asarray(ways()[way](program).image)[WINDOW, WINDOW]
-        errors = {"flip": flip(picture, converged), "flip_defined": flip(picture, defined)}
-        rows[way] = {"options": "", **errors, "seconds": min(seconds), "start_s": 0.0}
+def by_mitsuba(scene: Scene) -> Renderer:
+    graph = graph_of(scene)
     assert graph.stage is not None
-    with processor_s(reference):
-        solid_image(graph.root, graph.stage, (SIDE, SIDE))
-    error = flip(defined, converged)
-    rows["reference"] = {
-        "options": "",
-        "flip": error,
-        "flip_defined": 0.0,
-        "seconds": reference[0],
-        "start_s": 0.0,
+    stage = graph.stage
+
+    def load() -> Any:
+        return mitsuba_scenes.exported(mitsuba_scenes.solids(graph.root), stage, (SIDE, SIDE), SPP[-1])
+
+    scene_, loading_s = timed(load)
+
+    def light(spp: int, seed: int) -> tuple[np.ndarray, float]:
+        return timed(lambda: mitsuba_scenes.picture(scene_, seed, spp))
+
+    def way(spp: int) -> Frame:
+        first = light(spp, 1)[1]  # by vectors it is compiled for each number of samples
+        picture, seconds = light(spp, 0)
+        return Frame(encoded(picture), seconds, loading_s + max(0.0, first - seconds))
+
+    def converged() -> Picture:
+        return encoded(np.mean([light(SPP[-1], 2 + i)[0] for i in range(BATCHES)], 0))
+
+    return Renderer({f"Mitsuba, {spp} spp": partial(way, spp) for spp in SPP}, converged)
+
+
+RENDERERS: tuple[Callable[[Scene], Renderer], ...] = ours, by_povray, by_mitsuba
+
+
+def kept(folder: Path | None, name: str, scene: Scene, make: Callable[[], Picture]) -> Picture:
+    """A converged picture, from a folder where it was kept, or made and kept there."""
+    if folder is None:
+        return make()
+    path = folder / f"{name}-{hashlib.sha256(scene.model_dump_json().encode()).hexdigest()}.npy"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        np.save(path, make().astype(np.float32))
+    return np.asarray(np.load(path, allow_pickle=False), np.float64)
+
+
+def one_scene(scene: Scene, turn: int, folder: Path | None) -> dict[str, dict[str, float]]:
+    """What every way took of a scene, and how far its picture is off."""
+    defined = over_white(reference_image(graph_of(scene)))
+    rows: dict[str, dict[str, float]] = {}
+    each = [(make.__name__, make(scene)) for make in RENDERERS]
+    for renderer, (ways, make) in each[turn % len(each) :] + each[: turn % len(each)]:
+        converged = kept(folder, renderer, scene, make)
+        for name, way in ways.items():
+            picture, seconds, started = way()
+            rows[name] = {
+                "ms": 1e3 * seconds,
+                "start_ms": 1e3 * started,
+                "flip": flip(picture, converged),
+                "psnr": psnr(picture, converged, UNCAPPED_DB),
+                **({"flip_defined": flip(picture, defined)} if renderer == "ours" else {}),
+            }
+    return rows
+
+
+def summary(rows: list[dict[str, float]], ours_ms: list[float]) -> dict[str, Any]:
+    """Figures of a way over the scenes that it drew; times also as multiples of ours of the same scenes."""
+    ratios = [row["ms"] / ms for row, ms in zip(rows, ours_ms, strict=True)]
+    found: dict[str, Any] = {
+        "scenes": len(rows),
+        "ms": {"median": statistics.median(row["ms"] for row in rows)},
+        "start_ms": statistics.median(row["start_ms"] for row in rows),
+        "times": {"mean": float(np.mean(ratios)), "interval": interval(ratios)},
     }
-    target = rows["network, numpy"]["flip"]
-    rows["POV-Ray"] = by_povray(graph, target)
-    rows["Mitsuba"] = by_mitsuba(graph, target)
-    return {"ways": rows, "floor": floor(network, program), "shares": shares(network, program)}
+    for name in ("flip", "psnr", "flip_defined"):
+        values = [row[name] for row in rows if name in row]
+        if values:
+            found[name] = {"mean": round(float(np.mean(values)), 5), "interval": interval(values)}
+    return found
+
+
+def measured(name: str, count: int, folder: Path | None) -> dict[str, Any]:
+    """All ways on scenes of a set."""
+    scene_at = scenes_of(open_model(MODEL), name, SEED, SIDE)
+    for way in ours(scene_at(count)).ways.values():
+        way()  # loads and warms up
+    scenes = []
+    for index in range(count):
+        scenes.append(one_scene(scene_at(index), index, folder))
+        print(f"{name} {index + 1}/{count}", flush=True)
+    ways: dict[str, Any] = {}
+    for way in dict.fromkeys(way for rows in scenes for way in rows):
+        some = [rows for rows in scenes if way in rows]
+        ways[way] = summary([rows[way] for rows in some], [rows["network, adaptive"]["ms"] for rows in some])
+    return {"scenes": count, "ways": ways}
+
+
+def povray_version() -> str:
+    told = subprocess.run([str(povray.povray()), "--version"], capture_output=True, text=True, check=False)
+    return next(line for line in (told.stdout + told.stderr).splitlines() if line.startswith("POV-Ray"))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("-o", "--out", type=Path, default=OUT, metavar="FILE")
-    parser.add_argument("--rounds", type=int, default=6, metavar="N", help="frames of each of our ways")
+    parser.add_argument("--scenes", type=int, metavar="N", help="of each set, in place of the usual numbers")
+    parser.add_argument("--kept", type=Path, metavar="FOLDER", help="of converged pictures")
     given = parser.parse_args()
     started = time.perf_counter()
-    scenes = {}
-    for name in SCENES:
-        scenes[name] = found = measured(name, given.rounds)
-        print(name)
-        for way, row in found["ways"].items():
-            print(
-                f"  {way:28} {1e3 * row['seconds']:9.1f} ms  FLIP {row['flip']:.4f}"
-                f"  start {1e3 * row['start_s']:6.0f} ms  {row['options']}"
-            )
-        ours, least = found["ways"]["network, numpy"]["seconds"], found["floor"]
-        products, whole = (1e3 * least[name] for name in ("products_s", "whole_s"))
-        print(
-            f"  floor {products:.1f} ms, {products / ours / 10:.0f} % of a frame, for the products of "
-            f"{least['evaluations']:,} evaluations; {whole:.1f} ms for all of these"
-        )
-        print("  " + ", ".join(f"{part} {share:.0%}" for part, share in found["shares"].items()), flush=True)
-    record = {"side": SIDE, "rounds": given.rounds, "machine": platform.machine(), "scenes": scenes}
+    keep_memory()
+    others = {"povray": povray_version(), "mitsuba": mitsuba_scenes.by_vectors()}
+    sets = {name: measured(name, given.scenes or count, given.kept) for name, count in SETS.items()}
+    record = {"side": SIDE, "seed": SEED, **about(), **others, "machine": machine(), "sets": sets}
     given.out.write_text(json.dumps(record, indent=1) + "\n")
+    for name, found in sets.items():
+        print(name)
+        for way, row in sorted(found["ways"].items(), key=lambda each: each[1]["ms"]["median"]):
+            ms, error = row["ms"]["median"], row["flip"]
+            print(
+                f"  {way:30} {ms:9.1f} ms  start {row['start_ms']:6.0f} ms  FLIP {error['mean']:.4f}"
+                f" ± {error['interval']:.4f}  {row['psnr']['mean']:.1f} dB  {row['scenes']} scenes"
+            )
     print(f"{time.perf_counter() - started:.0f} s")
 
 

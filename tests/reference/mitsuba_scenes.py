@@ -12,18 +12,37 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from scenelang.graph.nodes import Fold, Leaf
 from scenelang.graph.stage import Stage
 
-mi.set_variant("scalar_rgb")
+SCALAR, VECTORS = "scalar_rgb", "llvm_ad_rgb"
+mi.set_variant(SCALAR)
+LEAST_LLVM = (16,)
 
 Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """From parameters in [0, 2π] and [0, π], (M,) each, to points and normals (3, M)."""
 
 NO_BSDF = {"type": "null"}
+
+
+def by_vectors() -> str:
+    """Draw scenes to come by vectors where there is an LLVM of at least 16; says how they are drawn.
+
+    An older one ends the process at what Mitsuba asks of it.
+    """
+    mi.set_variant(VECTORS)
+    try:
+        version: tuple[int, ...] = dr.detail.llvm_version()
+    except RuntimeError:
+        version = ()
+    if version < LEAST_LLVM:
+        mi.set_variant(SCALAR)
+        return f"Mitsuba {mi.__version__}, {SCALAR}"
+    return f"Mitsuba {mi.__version__}, {VECTORS}, LLVM {version[0]}"
 
 
 def ball(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,10 +97,8 @@ def solids(root: Fold) -> dict[str, Any]:
     return found
 
 
-def exported(
-    objects: dict[str, Any], stage: Stage, canvas: tuple[int, int], samples: int, **film: int
-) -> Any:
-    """A scene as Mitsuba renders it; samples of a pixel, a square number; more of the film, as a window."""
+def exported(objects: dict[str, Any], stage: Stage, canvas: tuple[int, int], samples: int) -> Any:
+    """A scene as Mitsuba renders it; samples of a pixel, a square number."""
     camera, light, ground = stage.camera, stage.light, stage.ground
     scene = {
         "type": "scene",
@@ -96,7 +113,6 @@ def exported(
                 "width": canvas[0],
                 "height": canvas[1],
                 "rfilter": {"type": "box"},
-                **film,
             },
             "sampler": {"type": "stratified", "sample_count": samples},
         },
@@ -113,6 +129,6 @@ def exported(
     return mi.load_dict(scene)
 
 
-def picture(scene: Any) -> np.ndarray:
-    """Linear light (H, W, 3)."""
-    return np.array(mi.render(scene))[..., :3]
+def picture(scene: Any, seed: int = 0, samples: int = 0) -> np.ndarray:
+    """Linear light (H, W, 3); samples of a pixel, by default those of the scene."""
+    return np.array(mi.render(scene, seed=seed, spp=samples))[..., :3]
