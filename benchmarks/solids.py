@@ -1,6 +1,6 @@
 """Solids drawn by us, by formulas in the same march, by the reference, POV-Ray and Mitsuba: time and error.
 
-    python -m benchmarks.solids [-o docs/results/solid-rivals.json] [--scenes N ...] [--kept FOLDER]
+    python -m benchmarks.solids [-o docs/results/solid-rivals.json] [--scenes N] [--weights FILE ...]
 
 Every way draws every scene once, in turn. What counts is the processor time of a frame of 256² pixels, all
 threads together; of ours of a Program that was not drawn before, warm otherwise. Starting the others, which
@@ -21,10 +21,9 @@ import resource
 import statistics
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -43,6 +42,8 @@ from scenelang.measure.metrics import UNCAPPED_DB, flip, over_white, psnr
 from scenelang.measure.scenes import interval, scenes_of
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
+from scenelang.models.solid import solid_arrays
+from scenelang.models.weights import Codes, codes_of
 from scenelang.program.compile import compile_scene
 from scenelang.reference.image import reference_image
 from scenelang.renderers.draw import draw_objects
@@ -50,7 +51,7 @@ from scenelang.scene.schema import Scene
 from tests.reference import mitsuba_scenes, povray
 
 MODEL, SIDE, SEED = "solids3d", 256, 2021
-SETS = {"diffuse": 6, "solids3d": 10}  # and how many of their scenes
+SETS = {"diffuse": 4, "solids3d": 10}  # and how many of their scenes
 OUT = Path("docs/results/solid-rivals.json")
 DENSE = 5  # samples along each side of a pixel in the converged pictures of the exact field and of POV-Ray
 GRIDS = ["-A", *(f"+AM1 +A{limit} +R3" for limit in (0.3, 0.1, 0.03))]
@@ -95,15 +96,37 @@ def graph_of(scene: Scene) -> Graph:
     return replace(graph, root=chain)
 
 
-def ours(scene: Scene) -> Renderer:
-    """The network, the same where every ray is marched, formulas in its place, and the reference."""
-    graph, network = graph_of(scene), load_arrays(MODEL).network
+class Net(NamedTuple):
+    """What answers where rays meet objects: a network or formulas, and the codes of Programs for it."""
+
+    field: Any
+    codes: Codes | None = None
+    samples: tuple[Samples, ...] = get_args(Samples)
+
+
+def nets(weights: Sequence[Path]) -> dict[str, Net]:
+    """The shipped network, the same where every ray is marched, formulas, and networks of other widths."""
+    network, manifest = load_arrays(MODEL).network, load_manifest(MODEL)
     marched = copy.copy(network)
     marched.__dict__["segment_w"] = []
-    fields: dict[str, Any] = {"network": network, "marched": marched, "formulas": closed_forms(MODEL)}
+    found = {
+        "network": Net(network),
+        "marched": Net(marched, samples=("adaptive",)),
+        "formulas": Net(closed_forms(MODEL)),
+    }
+    for path in weights:
+        data = path.read_bytes()
+        other = solid_arrays(data, len(manifest.geometries), len(manifest.materials))
+        found[f"width {other.config.width}"] = Net(other, codes_of(manifest, data), ("adaptive", "one"))
+    return found
 
-    def by(field: Any, samples: Samples) -> Frame:
-        program = compile_scene(scene, model=MODEL)
+
+def ours(known: dict[str, Net], scene: Scene) -> Renderer:
+    """All of these in the same march, and the reference."""
+    graph = graph_of(scene)
+
+    def by(net: Net, samples: Samples) -> Frame:
+        program, field = compile_scene(scene, model=MODEL, codes=net.codes), net.field
         image, seconds = timed(lambda: draw_objects(field, program, threads=1, samples=samples).image)
         return Frame(over_white(image), seconds)
 
@@ -112,9 +135,9 @@ def ours(scene: Scene) -> Renderer:
         return Frame(over_white(image), seconds)
 
     ways: dict[str, Callable[[], Frame]] = {
-        f"{name}, {samples}": partial(by, field, samples)
-        for (name, field), samples in product(fields.items(), get_args(Samples))
-        if name != "marched" or samples == "adaptive"
+        f"{name}, {samples}": partial(by, net, samples)
+        for name, net in known.items()
+        for samples in net.samples
     }
     ways |= {f"reference, {n * n} spp": partial(exact, n) for n in (1, 2)}
     return Renderer(ways, lambda: exact(DENSE).picture)
@@ -171,7 +194,7 @@ def by_mitsuba(scene: Scene) -> Renderer:
     return Renderer({f"Mitsuba, {spp} spp": partial(way, spp) for spp in SPP}, converged)
 
 
-RENDERERS: tuple[Callable[[Scene], Renderer], ...] = ours, by_povray, by_mitsuba
+Renderers = dict[str, Callable[[Scene], Renderer]]
 
 
 def kept(folder: Path | None, name: str, scene: Scene, make: Callable[[], Picture]) -> Picture:
@@ -185,11 +208,13 @@ def kept(folder: Path | None, name: str, scene: Scene, make: Callable[[], Pictur
     return np.asarray(np.load(path, allow_pickle=False), np.float64)
 
 
-def one_scene(scene: Scene, turn: int, folder: Path | None) -> dict[str, dict[str, float]]:
+def one_scene(
+    renderers: Renderers, scene: Scene, turn: int, folder: Path | None
+) -> dict[str, dict[str, float]]:
     """What every way took of a scene, and how far its picture is off."""
     defined = over_white(reference_image(graph_of(scene)))
     rows: dict[str, dict[str, float]] = {}
-    each = [(make.__name__, make(scene)) for make in RENDERERS]
+    each = [(name, make(scene)) for name, make in renderers.items()]
     for renderer, (ways, make) in each[turn % len(each) :] + each[: turn % len(each)]:
         converged = kept(folder, renderer, scene, make)
         for name, way in ways.items():
@@ -220,14 +245,14 @@ def summary(rows: list[dict[str, float]], ours_ms: list[float]) -> dict[str, Any
     return found
 
 
-def measured(name: str, count: int, folder: Path | None) -> dict[str, Any]:
+def measured(renderers: Renderers, name: str, count: int, folder: Path | None) -> dict[str, Any]:
     """All ways on scenes of a set."""
     scene_at = scenes_of(open_model(MODEL), name, SEED, SIDE)
-    for way in ours(scene_at(count)).ways.values():
-        way()  # loads and warms up
+    for draw in renderers["ours"](scene_at(count)).ways.values():
+        draw()  # loads and warms up
     scenes = []
     for index in range(count):
-        scenes.append(one_scene(scene_at(index), index, folder))
+        scenes.append(one_scene(renderers, scene_at(index), index, folder))
         print(f"{name} {index + 1}/{count}", flush=True)
     ways: dict[str, Any] = {}
     for way in dict.fromkeys(way for rows in scenes for way in rows):
@@ -245,12 +270,27 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("-o", "--out", type=Path, default=OUT, metavar="FILE")
     parser.add_argument("--scenes", type=int, metavar="N", help="of each set, in place of the usual numbers")
+    parser.add_argument(
+        "--weights",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="of another width, beside ours",
+    )
     parser.add_argument("--kept", type=Path, metavar="FOLDER", help="of converged pictures")
     given = parser.parse_args()
     started = time.perf_counter()
     keep_memory()
     others = {"povray": povray_version(), "mitsuba": mitsuba_scenes.by_vectors()}
-    sets = {name: measured(name, given.scenes or count, given.kept) for name, count in SETS.items()}
+    renderers: Renderers = {
+        "ours": partial(ours, nets(given.weights)),
+        "povray": by_povray,
+        "mitsuba": by_mitsuba,
+    }
+    sets = {
+        name: measured(renderers, name, given.scenes or count, given.kept) for name, count in SETS.items()
+    }
     record = {"side": SIDE, "seed": SEED, **about(), **others, "machine": machine(), "sets": sets}
     given.out.write_text(json.dumps(record, indent=1) + "\n")
     for name, found in sets.items():
