@@ -21,8 +21,8 @@ from torch import Tensor
 from torch.func import grad_and_value, jacrev, vmap
 
 from scenelang.files import write_whole
-from scenelang.reference.field import combine
 from scenelang.models.load import load_model
+from scenelang.reference.field import combine
 from scenelang.renderers.solid.network import BLEND, Wanted
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.training.checkpoint import load_tensors, save_tensors

@@ -131,4 +131,4 @@ def exported(objects: dict[str, Any], stage: Stage, canvas: tuple[int, int], sam
 
 def picture(scene: Any, seed: int = 0, samples: int = 0) -> np.ndarray:
     """Linear light (H, W, 3); samples of a pixel, by default those of the scene."""
-    return np.array(mi.render(scene, seed=seed, spp=samples))[..., :3]
+    return np.array(mi.render(scene, seed=mi.UInt32(seed), spp=samples))[..., :3]

@@ -25,6 +25,13 @@ weights = click.option(
 threads = click.option("--threads", default=1, show_default=True, type=click.IntRange(1, 256))
 seed = click.option("--seed", default=DEFAULT_SEED, show_default=True, type=click.IntRange(0, 2**31 - 1))
 
+kept = click.option(
+    "--kept",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="FOLDER",
+    help="Of exact pictures, which are drawn and kept there unless they are.",
+)
+
 
 def check_names(what: str, wanted: Iterable[str], known: Iterable[str]) -> None:
     """Refuse names that are not known.

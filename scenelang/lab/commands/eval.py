@@ -30,12 +30,7 @@ from scenelang.lab.commands import common
     metavar="PIXELS",
     help="Shorter side of the canvas. Default: as the set says.",
 )
-@click.option(
-    "--kept",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="FOLDER",
-    help="Of exact pictures, which are drawn and kept there unless they are.",
-)
+@common.kept
 @options.originals
 @common.seed
 @common.out

@@ -28,6 +28,7 @@ VERIFY_SEED = 4042
     help=f"Of the scenes.  [default: {common.DEFAULT_SEED}; {VERIFY_SEED} to verify]",
 )
 @common.threads
+@common.kept
 @click.option("--verify", is_flag=True, help="Check that promised errors hold on other scenes.")
 @click.option(
     "--promises",
@@ -43,6 +44,7 @@ def command(
     scenes: int,
     seed: int | None,
     threads: int,
+    kept: Path | None,
     verify: bool,
     promises: Path | None,
 ) -> None:
@@ -66,19 +68,19 @@ def command(
     need_metrics()
     out.mkdir(parents=True, exist_ok=True)
     if verify:
-        ctx.exit(0 if _verify(base, out, scenes, seed, promises) else 1)
+        ctx.exit(0 if _verify(base, out, scenes, seed, promises, kept) else 1)
     else:
-        _measure(base, out, scenes, common.DEFAULT_SEED if seed is None else seed, threads)
+        _measure(base, out, scenes, common.DEFAULT_SEED if seed is None else seed, threads, kept)
 
 
-def _measure(base: str, out: Path, scenes: int, seed: int, threads: int) -> None:
+def _measure(base: str, out: Path, scenes: int, seed: int, threads: int, kept: Path | None) -> None:
     from scenelang.lab.frontier.chart import frontier_chart
     from scenelang.lab.frontier.measure import measure_frontier
     from scenelang.lab.frontier.page import frontier_page
     from scenelang.measure.frontier import NAME
 
     with Bar() as bar:
-        frontier, pictures, exact = measure_frontier(base, scenes, seed, threads, bar)
+        frontier, pictures, exact = measure_frontier(base, scenes, seed, threads, bar, kept)
     write_whole(out / NAME, frontier.to_json().encode())
     write_whole(out / "frontier.html", frontier_page(frontier, pictures, exact).encode())
     common.write_chart(out / "frontier.png", lambda: frontier_chart(frontier))
@@ -99,7 +101,9 @@ def _table(frontier: Frontier) -> str:
     return "\n".join([*lines, f"* on the front. {count} points lie between the fastest and the nearest."])
 
 
-def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path | None) -> bool:
+def _verify(
+    base: str, out: Path, scenes: int, seed: int | None, promises: Path | None, kept: Path | None
+) -> bool:
     from scenelang.lab.frontier.verify import KEPT, verify
     from scenelang.measure.frontier import MOST_BYTES, Frontier, frontier_path
 
@@ -112,7 +116,7 @@ def _verify(base: str, out: Path, scenes: int, seed: int | None, promises: Path 
         raise click.UsageError(f"`{path}` is not a frontier: {error}") from None
     try:
         with Bar() as bar:
-            found = verify(frontier, base, scenes, VERIFY_SEED if seed is None else seed, bar)
+            found = verify(frontier, base, scenes, VERIFY_SEED if seed is None else seed, bar, kept)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     common.write_json(out / "verified.json", found)

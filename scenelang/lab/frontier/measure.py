@@ -25,6 +25,7 @@ from scenelang.backend.neural import open_model
 from scenelang.backend.options import keep_memory
 from scenelang.image import Image, enlarged, from_samples
 from scenelang.lab.about import Report, about, silent
+from scenelang.lab.evaluate import exact_of
 from scenelang.lab.frontier.fit import fit_cost
 from scenelang.lab.frontier.ways import PAPER, Draw, Way, paired, ways_of
 from scenelang.measure.choose import error_scale, yardstick
@@ -38,8 +39,8 @@ from scenelang.training.loop import revision
 
 SHOWN = 4  # scenes whose pictures are kept
 CONVERGED = 8  # scenes compared with 64 samples a pixel
-SLOW_S = 20.0  # a way draws so long at most, but at least on `LEAST` scenes
-LEAST = 4
+SLOW_S = 20.0  # a way that takes over `LATE_MS`, or is not offered, draws so long at most,
+LEAST = 4  # but at least so many scenes
 COMPARED = 30  # scenes of the reference with other samples than the definition's
 TIMED = 20  # scenes of ways of which only the time is taken
 SIDE = 256  # pixels along a side of the scenes
@@ -56,10 +57,11 @@ class Case(NamedTuple):
     set: str
     canvas: tuple[int, int] | None
     share: float  # of the scenes that are asked for
+    solid: float = 1 / 3  # of solids, whose exact pictures take long
 
-    def scenes(self, asked: int) -> int:
+    def scenes(self, asked: int, dimension: int) -> int:
         """How many of its scenes are drawn where so many are asked for."""
-        return max(1, round(asked * self.share))
+        return max(1, round(asked * (self.share if dimension == 2 else self.solid)))
 
     def on(self, scene: Scene) -> Scene:
         """The scene on its canvas."""
@@ -67,9 +69,9 @@ class Case(NamedTuple):
 
 
 CASES: tuple[Case, ...] = (
-    Case("256 x 256", "", None, 1.0),
+    Case("256 x 256", "", None, 1.0, 1.0),
     Case("128 x 128", "", (128, 128), 1 / 3),
-    Case("512 x 512", "", (512, 512), 1 / 3),
+    Case("512 x 512", "", (512, 512), 1 / 3, 1 / 8),
     Case("16 objects", "many", None, 1 / 3),
 )
 
@@ -91,7 +93,12 @@ class Record:
 
 
 def measure_frontier(
-    base: str, scenes: int, seed: int, threads: int, report: Report = silent
+    base: str,
+    scenes: int,
+    seed: int,
+    threads: int,
+    report: Report = silent,
+    kept: Path | None = None,
 ) -> tuple[Frontier, dict[str, list[Image]], list[Image]]:
     """Measure all ways to draw the scenes of a set.
 
@@ -101,6 +108,7 @@ def measure_frontier(
         seed: of the scenes.
         threads: cores to draw on.
         report: called with the stage, what is done and all.
+        kept: folder of exact pictures, which are drawn and kept there unless they are.
 
     Returns:
         The figures, pictures of the first scenes by the name of what drew them, and the exact ones.
@@ -118,10 +126,10 @@ def measure_frontier(
         scene = scene_at(index)
         wanted = [way for way in ways if index < quota[way.name]]
         turn = index % len(wanted)
-        _one_scene(scene, wanted[turn:] + wanted[:turn], records, manifest, index, threads)
+        _one_scene(scene, wanted[turn:] + wanted[:turn], records, manifest, index, threads, kept)
         report("scenes", index + 1, scenes)
     offered_ways = [way for way in ways if way.offered]
-    _other_cases(base, offered_ways, records, scenes, seed, threads, report)
+    _other_cases(base, offered_ways, records, scenes, seed, threads, report, kept)
     paper = next((records[w.name] for w in ways if w.name.startswith(PAPER)), None)
     points = [_point(way, records[way.name], paper) for way in ways]
     offered = [p for p in points if p.offered and p.flip is not None and not p.side]
@@ -146,7 +154,7 @@ def measure_frontier(
         command=about()["command"],
     )
     pictures = {name: record.pictures for name, record in records.items() if record.pictures}
-    shown = [_white(reference_of(scene_at(i), manifest)) for i in range(min(SHOWN, scenes))]
+    shown = [_white(exact_of(scene_at(i), manifest, kept)) for i in range(min(SHOWN, scenes))]
     return frontier, pictures, shown
 
 
@@ -167,7 +175,8 @@ def _quota(way: Way, scene: Scene, scenes: int, threads: int) -> int:
     for _ in range(2):
         ms, _ = _timed(way.prepare(scene), threads)
     most = TIMED if not way.drawn else scenes if way.offered or way.backend == "neural" else COMPARED
-    return max(1, min(scenes, most, max(LEAST, int(1000 * SLOW_S / ms))))
+    least = scenes if way.offered and ms < LATE_MS else LEAST  # which makes promises
+    return max(1, min(scenes, most, max(least, int(1000 * SLOW_S / ms))))
 
 
 def _one_scene(
@@ -177,8 +186,9 @@ def _one_scene(
     manifest: Manifest,
     index: int,
     threads: int,
+    kept: Path | None,
 ) -> None:
-    exact = over_white(reference_of(scene, manifest))
+    exact = over_white(exact_of(scene, manifest, kept))
     load = load_of(compile_scene(scene, model=manifest.name))
     many = None
     if index < CONVERGED and manifest.dimension == 2:  # with 64 samples a picture of solids takes minutes
@@ -208,19 +218,20 @@ def _other_cases(
     seed: int,
     threads: int,
     report: Report,
+    kept: Path | None,
 ) -> None:
     """Draw offered ways on other canvases and of more objects: what cost is told from, and promises too."""
     manifest = load_manifest(base)
     model = open_model(base)
     for case in CASES[1:]:
         scene_at = scenes_of(model, case.set or usual_set(manifest), seed, SIDE)
-        count = case.scenes(scenes)
+        count = case.scenes(scenes, manifest.dimension)
         errors: dict[str, list[float]] = {}
         for index in range(-1, count):  # the first of its kind finds its memory, and is not counted
             scene = case.on(scene_at(OTHERS + index))
             program = compile_scene(scene, model=base)
             load, scale = load_of(program), error_scale(scene.canvas, len(program))
-            exact = over_white(reference_of(scene, manifest)) if index >= 0 else None
+            exact = over_white(exact_of(scene, manifest, kept)) if index >= 0 else None
             for way in ways:
                 record = records[way.name]
                 if (way.side and case.canvas) or statistics.median(record.ms) > LATE_MS:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, Final
 
 import torch
 
 from scenelang.backend.neural import open_model
 from scenelang.lab.about import Report, about, silent
+from scenelang.lab.evaluate import exact_of
 from scenelang.lab.frontier.measure import CASES, SIDE
 from scenelang.lab.frontier.ways import ways_of
 from scenelang.measure.choose import error_scale
 from scenelang.measure.frontier import Frontier
 from scenelang.measure.metrics import flip, over_white
-from scenelang.measure.scenes import reference_of, scenes_of, usual_set
+from scenelang.measure.scenes import scenes_of, usual_set
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
 
@@ -29,6 +31,7 @@ def verify(
     scenes: int,
     seed: int,
     report: Report = silent,
+    kept: Path | None = None,
 ) -> dict[str, Any]:
     """Draw unseen scenes by every offered point and count in how many the promised FLIP is kept.
 
@@ -38,6 +41,7 @@ def verify(
         scenes: of the first case; the others take a share.
         seed: of the scenes; another than the frontier's.
         report: called with the case, scenes done and all.
+        kept: folder of exact pictures, which are drawn and kept there unless they are.
 
     Returns:
         For JSON: for each case and point ``scenes``, ``kept`` (share), ``worst`` (FLIP over the promise); of
@@ -55,11 +59,11 @@ def verify(
     cases = {}
     for case in CASES:
         scene_at = scenes_of(model, case.set or usual_set(manifest), seed, SIDE)
-        count = case.scenes(scenes)
+        count = case.scenes(scenes, manifest.dimension)
         ratios: dict[str, list[float]] = {way.name: [] for way in ways}
         for index in range(count):
             scene = case.on(scene_at(index))
-            exact = over_white(reference_of(scene, manifest))
+            exact = over_white(exact_of(scene, manifest, kept))
             scale = error_scale(scene.canvas, len(compile_scene(scene, model=base)))
             for way in ways:
                 point = points[way.name]
