@@ -2,7 +2,7 @@
 
     python -m benchmarks.solids [-o docs/results/solid-rivals.json] [--scenes N] [--weights FILE ...]
 
-Every way draws every scene once, in turn. What counts is the processor time of a frame of 256² pixels, all
+Every way draws every scene once, in turn. What counts is the processor time of a frame, all
 threads together; of ours of a Program that was not drawn before, warm otherwise. Starting the others, which
 includes reading the scene, is told apart: of POV-Ray it is a picture of one pixel, of Mitsuba all up to the
 end of the first frame but for what the second takes. A picture is compared with what the same renderer makes
@@ -146,21 +146,22 @@ def ours(known: dict[str, Net], scene: Scene) -> Renderer:
 def by_povray(scene: Scene) -> Renderer:
     graph = graph_of(scene)
     assert graph.stage is not None
-    text = povray.exported(graph.root, graph.stage, (SIDE, SIDE))
+    width, height = scene.canvas
+    text = povray.exported(graph.root, graph.stage, scene.canvas)
 
-    def draw(steps: int, side: int, *options: str) -> tuple[np.ndarray, float]:
+    def draw(steps: int, canvas: tuple[int, int], *options: str) -> tuple[np.ndarray, float]:
         some = text.replace(f"samples {MOST}", f"samples {steps}")
-        return timed(lambda: povray.traced(some, (side, side), *options), resource.RUSAGE_CHILDREN)
+        return timed(lambda: povray.traced(some, canvas, *options), resource.RUSAGE_CHILDREN)
 
     @cache  # where there are no media, they are not sampled
     def way(grid: str, steps: int) -> Frame:
-        started = draw(steps, 1)[1]
-        light, seconds = draw(steps, SIDE, *grid.split())
+        started = draw(steps, (1, 1))[1]
+        light, seconds = draw(steps, scene.canvas, *grid.split())
         return Frame(encoded(light), seconds - started, started)
 
     def converged() -> Picture:
-        dense = draw(MOST, DENSE * SIDE)[0]
-        return encoded(dense.reshape(SIDE, DENSE, SIDE, DENSE, 3).mean((1, 3)))
+        dense = draw(MOST, (DENSE * width, DENSE * height))[0]
+        return encoded(dense.reshape(height, DENSE, width, DENSE, 3).mean((1, 3)))
 
     ways: dict[str, Callable[[], Frame]] = {
         f"POV-Ray, {grid}, {steps} in media": partial(way, grid, steps if "media {" in text else MOST)
@@ -176,7 +177,7 @@ def by_mitsuba(scene: Scene) -> Renderer:
     stage = graph.stage
 
     def load() -> Any:
-        return mitsuba_scenes.exported(mitsuba_scenes.solids(graph.root), stage, (SIDE, SIDE), SPP[-1])
+        return mitsuba_scenes.exported(mitsuba_scenes.solids(graph.root), stage, scene.canvas, SPP[-1])
 
     scene_, loading_s = timed(load)
 
@@ -245,9 +246,9 @@ def summary(rows: list[dict[str, float]], ours_ms: list[float]) -> dict[str, Any
     return found
 
 
-def measured(renderers: Renderers, name: str, count: int, folder: Path | None) -> dict[str, Any]:
+def measured(renderers: Renderers, name: str, count: int, side: int, folder: Path | None) -> dict[str, Any]:
     """All ways on scenes of a set."""
-    scene_at = scenes_of(open_model(MODEL), name, SEED, SIDE)
+    scene_at = scenes_of(open_model(MODEL), name, SEED, side)
     for draw in renderers["ours"](scene_at(count)).ways.values():
         draw()  # loads and warms up
     scenes = []
@@ -269,6 +270,7 @@ def povray_version() -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("-o", "--out", type=Path, default=OUT, metavar="FILE")
+    parser.add_argument("--side", type=int, default=SIDE, metavar="PIXELS", help="of the pictures")
     parser.add_argument("--scenes", type=int, metavar="N", help="of each set, in place of the usual numbers")
     parser.add_argument(
         "--weights",
@@ -289,9 +291,10 @@ def main() -> None:
         "mitsuba": by_mitsuba,
     }
     sets = {
-        name: measured(renderers, name, given.scenes or count, given.kept) for name, count in SETS.items()
+        name: measured(renderers, name, given.scenes or count, given.side, given.kept)
+        for name, count in SETS.items()
     }
-    record = {"side": SIDE, "seed": SEED, **about(), **others, "machine": machine(), "sets": sets}
+    record = {"side": given.side, "seed": SEED, **about(), **others, "machine": machine(), "sets": sets}
     given.out.write_text(json.dumps(record, indent=1) + "\n")
     for name, found in sets.items():
         print(name)

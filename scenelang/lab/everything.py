@@ -58,7 +58,7 @@ STEPS: Final = (
     Step("benchmarks.mutations --count {few}"),
     Step("benchmarks.lsp 200"),
     Step("benchmarks.unions --scenes {scenes} -o {out}/unions-rivals.json", needs=("skia",)),
-    Step("benchmarks.solids --rounds 1 -o {out}/solid-rivals.json", needs=("mitsuba", "povray")),
+    Step("benchmarks.solids --scenes 1 --side 48 -o {out}/solid-rivals.json", needs=("mitsuba", "povray")),
 )
 """What is run, in this order: each command of the laboratory and each benchmark that a page cites."""
 

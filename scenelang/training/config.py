@@ -64,7 +64,7 @@ class SolidsConfig:
     polish: int  # Gauss-Newton steps for each leaf, a multiple of 20
     segments: int  # steps of Adam for the answers for whole segments
     network: SolidConfig  # sizes
-    # name of a model whose cell, looks and answers for whole segments the weights get, instead of fitting them
+    # name of a model whose cell, looks and answers for segments the weights get, in place of fitted ones
     like: str | None = None
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
+from scenelang.models.framed import load_arrays
 from scenelang.models.solid import solid_arrays
-from scenelang.renderers.solid.network import SolidConfig
+from scenelang.renderers.solid.network import SolidArrays, SolidConfig
 from scenelang.renderers.solid.parameters import Solids
 from scenelang.training.config import SolidsConfig, config_data, is_solids, read_solids_config
 from scenelang.training.leaves import half_rays
@@ -34,6 +36,23 @@ def test_a_stopped_training_goes_on_as_if_it_had_not(tmp_path: Path) -> None:
     assert told[-1] == (32, 32)
     with pytest.raises(ValueError, match="another configuration"):
         train_solids(replace(TINY, seed=4), tmp_path / "one")
+
+
+def test_another_width_takes_over_all_but_the_decoders(tmp_path: Path) -> None:
+    narrow = SolidConfig(width=4, segment=32)
+    assert train_solids(SolidsConfig("narrow", 3, 0, 4, 20, 0, narrow, "solids3d"), tmp_path)
+    mine = solid_arrays((tmp_path / "weights.safetensors").read_bytes(), 2, 2)
+    theirs = load_arrays("solids3d").network
+    assert isinstance(theirs, SolidArrays)
+    assert (mine.cell_lines == theirs.cell_lines).all()
+    assert mine.look(mine.material_codes) == pytest.approx(theirs.look(theirs.material_codes))
+    rays = np.random.default_rng(1).random((5, 100), np.float32)
+    for code, other in zip(mine.codes, theirs.codes, strict=True):
+        found, wanted = (
+            mine.field(rays, mine.segment(code), False),
+            theirs.field(rays, theirs.segment(other), False),
+        )
+        assert found == pytest.approx(wanted, abs=1e-4)
 
 
 def test_every_part_of_the_training_learns() -> None:
@@ -68,6 +87,7 @@ def test_answers_for_segments_learn_and_change_nothing_else() -> None:
         assert (found - length).square().mean() < 0.3 * length.var()
 
 
-def test_the_shipped_configuration_is_known() -> None:
-    assert is_solids(config_data("solids3d"))
-    assert read_solids_config("solids3d").network == SolidConfig(segment=32)
+@pytest.mark.parametrize(("name", "width"), [("solids3d", 8), ("solids3d-w4", 4), ("solids3d-w16", 16)])
+def test_the_configurations_are_known(name: str, width: int) -> None:
+    assert is_solids(config_data(name))
+    assert read_solids_config(name).network == SolidConfig(width=width, segment=32)
