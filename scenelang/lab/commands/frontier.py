@@ -123,8 +123,8 @@ def _verify(
     for case, rows in found["cases"].items():
         click.echo(case)
         for name, row in rows.items():
-            kept = f"{100 * row['kept']:5.1f} % of {row['scenes']}"
-            click.echo(f"  {name:40} kept in {kept}, at worst {row['worst']:.2f} of the promise")
+            share = f"{100 * row['kept']:5.1f} % of {row['scenes']}"
+            click.echo(f"  {name:40} kept in {share}, at worst {row['worst']:.2f} of the promise")
     least = f"every promise is kept in at least {100 * KEPT:.0f} % of the scenes"
     click.echo(least if found["held"] else f"not {least}")
     return bool(found["held"])

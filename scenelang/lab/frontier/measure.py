@@ -133,8 +133,8 @@ def measure_frontier(
     paper = next((records[w.name] for w in ways if w.name.startswith(PAPER)), None)
     points = [_point(way, records[way.name], paper) for way in ways]
     offered = [p for p in points if p.offered and p.flip is not None and not p.side]
-    kept = front([(p.ms.median, p.flip.mean) for p in offered if p.flip is not None])
-    on_front = {p.name for p, yes in zip(offered, kept, strict=True) if yes}
+    best = front([(p.ms.median, p.flip.mean) for p in offered if p.flip is not None])
+    on_front = {p.name for p, yes in zip(offered, best, strict=True) if yes}
     points = [replace(p, on_front=p.name in on_front) for p in points]
     frontier = Frontier(
         set=usual_set(manifest),
