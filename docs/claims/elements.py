@@ -24,7 +24,8 @@ CLAIMS = [
     f"at most `--color-error`, {Figure(colours.NEAR)}, up",
     f"about {Figure(colours.MOST_BYTES / 1000)} KB. A part",
     f"takes {min(TIMES[False]):.1f} to {max(TIMES[False]):.1f} times as long as with a torus in its place "
-    f"(the least of several drawings of each, in turn); of mist {min(TIMES[True]):.1f} to {max(TIMES[True]):.1f} times",
+    f"(the least of several drawings of each, in turn); of mist {min(TIMES[True]):.1f} "
+    f"to {max(TIMES[True]):.1f} times",
     f"Loading one takes {LOAD:.0f} ms",
     f"They take {kilobytes('std/meshes'):.0f} KB",
     f"at {at(SMALL, 'psnr/mean'):.1f} dB and FLIP {at(SMALL, 'flip/mean'):.4f} on average, the worst of "
