@@ -1,6 +1,6 @@
 """Figures in docs/results.md."""
 
-from figures import Figure, at, numbers, read
+from figures import Figure, Word, at, numbers, read
 from make_results import SOLIDS, WHAT
 
 from scenelang.lab.experiments import paper
@@ -21,10 +21,14 @@ def most(names: list[str]) -> Figure:
     return max(at(name, "flip/mean") for name in names)
 
 
-def share(base: str) -> Figure:
-    """The exact field's time by the network's."""
-    points = f"models/{base}/frontier", "points/ms/median"
-    return at(*points, name="exact field") / at(*points, name=base)
+def factor(base: str, slow: str, fast: str) -> Word:
+    """How many times as long one way takes as another, with its interval where that was measured."""
+    name = f"models/{base}/frontier"
+    for ratio in read(name).get("ratios", ()):
+        if (ratio["slow"], ratio["fast"]) == (slow, fast):
+            return Word(f"{ratio['mean']:.2f} ± {ratio['interval']:.2f}")
+    times = [float(at(name, "points/ms/median", name=way)) for way in (slow, fast)]
+    return Word(f"{times[0] / times[1]:.2f}")
 
 
 def probe(name: str, value: float, key: str = "psnr/mean", record: str = STABLE) -> Figure:
@@ -43,15 +47,16 @@ def of_paper(found: paper.Figures) -> str:
     return f"{Figure(found.psnr):.2f} dB, SSIM {Figure(found.ssim):.3f}, FLIP {Figure(found.flip):.3f}"
 
 
-RATIO = at("models/shapes2d/frontier", "points/ratio_to_streaming", name="shapes2d")
+FIELDS = [factor(base, base, "exact field") for base in ("shapes2d", "solids3d")]
+PAPERS = factor("shapes2d", "the paper's streaming, 256²", "shapes2d")
 SUMMARY = [
     f"in {numbers('models/shapes2d/weights'):,.0f} numbers for the plane and "
     f"{numbers('models/solids3d/weights'):,.0f} for space",
     f"over {Figure(len(PLANE))} sets of the plane the mean PSNR is at least {least(PLANE):.1f} dB",
     f"the mean FLIP at most {most(PLANE):.4f}; over {Figure(len(SPACE))} sets of space {least(SPACE):.1f} dB "
     f"and {most(SPACE):.4f} (both of meshes; of the others {least(BARE):.1f} dB)",
-    f"takes {share('shapes2d'):.2f} of the network's time in the plane and {share('solids3d'):.2f} in space",
-    f"takes {RATIO:.0f} times as long for drawing four known polygons",
+    f"the network takes {FIELDS[0]} times as long in the plane and {FIELDS[1]} times in space",
+    f"takes {PAPERS} times as long as `shapes2d` for drawing four known polygons",
     f"({probe('deep', 3):.1f} ± {probe('deep', 3, 'psnr/interval'):.1f} dB on average at three",
     f"({probe('blends', 64):.1f} dB for 64 of them) and at slivers ({probe('thin', 300):.1f} dB), and in "
     f"space at thin objects ({probe('thickness', 0.003, record='stability-solids3d'):.1f} dB where",
