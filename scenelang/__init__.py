@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from scenelang.fitting.api import learn as learn
     from scenelang.formatting.format import format_text as format_text
     from scenelang.image import Image as Image
+    from scenelang.inverse.api import fit as fit
+    from scenelang.inverse.fitted import Fit as Fit
     from scenelang.measure.metrics import compare as compare
     from scenelang.notebook import set_notebook as set_notebook
     from scenelang.outputs import Outputs as Outputs
@@ -84,6 +86,8 @@ _HOME: Final = {
     "scenelang.fitting.api": "FitError learn",
     "scenelang.formatting.format": "format_text",
     "scenelang.image": "Image",
+    "scenelang.inverse.api": "fit",
+    "scenelang.inverse.fitted": "Fit",
     "scenelang.measure.metrics": "compare",
     "scenelang.program.check": "check check_text fix_text",
     "scenelang.program.compile": "compile",

@@ -57,6 +57,7 @@ ORDER = (
     "scenelang.viewer",
     "scenelang.watching",
     "scenelang.measure",
+    "scenelang.inverse",
     "scenelang.play",
     "scenelang.cli",
     "scenelang.lab",
@@ -74,6 +75,7 @@ MAY_BE_HEAVY = (
     "scenelang.animation",
     "scenelang.watching",
     "scenelang.measure",
+    "scenelang.inverse",
     "scenelang.cli",
     "scenelang.lab",
 )

@@ -32,6 +32,7 @@ COMMANDS: Final = {
     "schema": "Print the JSON Schema of scenes.",
     "compile": "Compile a scene to a program.",
     "compare": "Draw a scene beside its exact picture.",
+    "fit": "Find the params of a scene from a picture.",
     "explain-plan": "Say what drawing a scene takes.",
     "dump": "Show what a scene is after each stage.",
     "graph": "Draw the graph of a scene.",

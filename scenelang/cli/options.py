@@ -29,16 +29,21 @@ def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tupl
     return width, height
 
 
-def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Defines:
-    from scenelang.evaluate.session import Defines
-
+def assignments(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
+    """What NAME=VALUE, given several times, says."""
     found: dict[str, str] = {}
     for value in values:
         name, equals, text = value.partition("=")
         if not equals or not re.fullmatch(r"[A-Za-z_][\w.]*", name.strip()):
             raise click.BadParameter(f"`{value}` is not NAME=value", ctx, param)
         found[name.strip()] = text.strip()
-    return Defines(found)
+    return found
+
+
+def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Defines:
+    from scenelang.evaluate.session import Defines
+
+    return Defines(assignments(ctx, param, values))
 
 
 def _originals(ctx: click.Context, param: click.Parameter, value: str | None) -> None:

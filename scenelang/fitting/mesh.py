@@ -26,7 +26,7 @@ _TOUCHING: Final = 1e-6  # leaf units from a surface to where its normals are th
 
 
 class FitError(ValueError):
-    """What cannot be made an element, and why."""
+    """What cannot be made an element, or which scene cannot be fitted to a picture, and why."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -160,8 +160,8 @@ def _from_outside(
 
 
 def from_python(value: Any) -> Any:
-    """A Python value as one of the language; None where there is none."""
-    if isinstance(value, bool | str):
+    """A Python value as one of the language, which one of the language is; None where there is none."""
+    if isinstance(value, bool | str | Angle | Time | Vec):
         return value
     if isinstance(value, Real):
         try:

@@ -1,0 +1,135 @@
+"""``scenelang fit``: the params of a scene from a picture."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scenelang.cli import options
+from scenelang.cli.main import Trouble
+from scenelang.cli.outputs import targets
+from scenelang.cli.progress import Bar
+from scenelang.cli.say import put_out, say_diagnostics, say_trouble
+
+if TYPE_CHECKING:
+    from scenelang.evaluate.session import Defines
+
+NOT_CONVERGED = 1
+
+
+def _crop(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int, int, int] | None:
+    found = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})\+(\d{1,5})\+(\d{1,5})", value or "")
+    if value is not None and (found is None or not int(found[1]) or not int(found[2])):
+        raise click.BadParameter(f"`{value}` is not a part such as 320x192+10+20", ctx, param)
+    return (int(found[3]), int(found[4]), int(found[1]), int(found[2])) if found else None
+
+
+def _colour(ctx: click.Context, param: click.Parameter, value: str) -> tuple[float, float, float]:
+    found = re.fullmatch(r"#?([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})", value)
+    if found is None:
+        raise click.BadParameter(f"`{value}` is not a colour such as #fff4e0", ctx, param)
+    return int(found[1], 16) / 255, int(found[2], 16) / 255, int(found[3], 16) / 255
+
+
+@click.command("fit")
+@click.argument("scene", metavar="SCENE", type=click.Path(path_type=Path))
+@click.option(
+    "--to", "target", required=True, type=click.Path(path_type=Path), metavar="PICTURE", help="PNG or JPEG."
+)
+@click.option("-o", "--out", metavar="OUT", help="The scene with what was found as defaults; - prints it.")
+@click.option(
+    "--params",
+    "names",
+    multiple=True,
+    metavar="NAME,…",
+    help="Params to find, instead of all that have a range.",
+)
+@click.option(
+    "--start",
+    multiple=True,
+    metavar="NAME=VALUE",
+    callback=options.assignments,
+    help="Begin there, instead of at the default.",
+)
+@options.define
+@click.option("--mask", type=click.Path(path_type=Path), metavar="PICTURE", help="Bright where pixels count.")
+@click.option(
+    "--crop", metavar="WxH+X+Y", callback=_crop, help="The part of the target that shows the scene."
+)
+@click.option(
+    "--background",
+    default="#ffffff",
+    metavar="COLOR",
+    callback=_colour,
+    show_default=True,
+    help="Behind what is transparent.",
+)
+@click.option("--compare", metavar="OUT.png", help="A picture: before, after, target.")
+@click.option("--seed", default=0, type=click.IntRange(0, 2**31 - 1), help="Of where to look.")
+@click.option(
+    "--budget",
+    default=300.0,
+    type=click.FloatRange(0, min_open=True),
+    show_default=True,
+    metavar="SECONDS",
+    help="Begin nothing new after this time.",
+)
+@options.frame
+@options.model
+@options.root
+@click.pass_context
+def command(
+    ctx: click.Context,
+    scene: Path,
+    target: Path,
+    out: str | None,
+    names: tuple[str, ...],
+    start: dict[str, str],
+    defines: Defines,
+    mask: Path | None,
+    crop: tuple[int, int, int, int] | None,
+    background: tuple[float, float, float],
+    compare: str | None,
+    seed: int,
+    budget: float,
+    frame: int,
+    model: str | None,
+    root: str | None,
+) -> None:
+    """Find the params of SCENE whose picture comes nearest to another picture.
+
+    All params with a range are searched, colours if --params names them; -D keeps one at a value. OUT is
+    SCENE with other defaults, all else as it was. The report says how near the picture is and how far each
+    param is known. The exit code is 1 where the search did not come to an end.
+    """
+    from scenelang.diagnostics.error import SceneError
+    from scenelang.fitting.mesh import FitError
+    from scenelang.inverse.api import fit
+
+    if compare is not None:
+        targets(["compare"], compare)
+    wanted = [name for listed in names for name in re.split(r"[,\s]+", listed) if name]
+    try:
+        with Bar() as bar:
+            found = fit(
+                scene, target, params=wanted, start=start, fixed=defines.values, mask=mask, crop=crop,
+                background=background, model=model, root=root, frame=frame, seed=seed, budget_s=budget,
+                progress=bar,
+            )  # fmt: skip
+    except SceneError as error:
+        say_diagnostics(error.diagnostics)
+        raise click.exceptions.Exit(1) from None
+    except FitError as error:
+        say_trouble(str(error))
+        raise click.exceptions.Exit(Trouble.exit_code) from None
+    if out is not None:
+        put_out(found.text, out)
+    if compare is not None:
+        found.sheet().save(compare)
+    for line in found.told():
+        click.echo(line, err=out == "-")
+    if not found.done:
+        ctx.exit(NOT_CONVERGED)

@@ -1,0 +1,186 @@
+"""`scenelang.fit`: a scene's params from a picture."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import read_scene
+from scenelang.fitting.mesh import FitError
+from scenelang.image import Image
+from scenelang.inverse import search
+from scenelang.inverse.fitted import Fit, felt, hindrances, numbers_of, ties
+from scenelang.inverse.problem import LEVELS, Problem, Source
+from scenelang.inverse.search import Found
+from scenelang.inverse.space import Point, Space, literals_of, rewritten, space_of
+from scenelang.inverse.target import WHITE, target_of
+from scenelang.measure.metrics import UNCAPPED_DB
+from scenelang.models.manifest import load_manifest
+from scenelang.syntax import parse
+
+Picture = npt.NDArray[np.floating] | str | os.PathLike[str]
+Progress = Callable[[str, int, int], None]
+SIDES: Final = (32, 64, 128, 256)  # of pictures from coarse to fine, pixels along the shorter side
+MOST_SOLID: Final = 128  # of solids, which take longer
+ALIKE: Final = 1.26  # errors that differ by 1 dB
+NEAREST_DB: Final = 45.0  # pictures this near count as alike however they differ
+
+
+def fit(
+    scene: str | os.PathLike[str] | SourceFile,
+    target: Picture,
+    *,
+    params: Iterable[str] = (),
+    start: Mapping[str, Any] | None = None,
+    fixed: Mapping[str, Any] | None = None,
+    mask: Picture | None = None,
+    crop: tuple[int, int, int, int] | None = None,
+    background: tuple[float, float, float] = WHITE,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    frame: int = 0,
+    seed: int = 0,
+    budget_s: float = 300.0,
+    progress: Progress = lambda what, done, count: None,
+) -> Fit:
+    """Find the values of params whose picture comes nearest to a target: ``fit("a.nsg", "a.png")``.
+
+    Args:
+        scene: the file, or its text, which then imports from ``root``.
+        target: a picture (.png, .jpg), or an array (H, W, 3 or 4) of sRGB-encoded values in [0, 1].
+        params: those to find, of the file itself; by default all that have a range. Colours need none.
+        start: values to begin with, as for `scenelang.load`; by default the scene's.
+        fixed: values of other params, which are kept.
+        mask: a picture of the target's size, bright where its pixels count.
+        crop: x, y, width and height of the part of the target that shows the scene.
+        background: sRGB-encoded, behind what is transparent in the target and in the scene.
+        model, root, frame: as for `scenelang.load`.
+        seed: of where to look; the same seed finds the same, unless time was out.
+        budget_s: nothing new is begun after so many seconds.
+        progress: called with what is done, how much of it, and all.
+
+    Returns:
+        What was found, also where it is not near.
+
+    Raises:
+        FitError: there is nothing to find, the target does not fit the scene, or no values give a picture.
+        SceneError: the scene has errors.
+        OSError: a file cannot be read.
+    """
+    until, found = time.monotonic() + budget_s, Diagnostics()
+    text = scene if isinstance(scene, SourceFile) else read_scene(scene, found)
+    tree = None if text is None else parse(text, found)
+    if tree is None or found.errors:
+        raise SceneError(found)
+    source = Source(
+        tree,
+        path=None if isinstance(scene, SourceFile) else Path(scene),
+        root=None if root is None else Path(root),
+        model=model,
+        frame=frame,
+        fixed=fixed,
+    )
+    evaluation, made = source.evaluated(start or {})
+    space = space_of(evaluation, params, fixed or {})
+    for name in start or {}:
+        if name not in space.names:
+            raise FitError(f"a start for `{name}`, which is not among the params to find")
+    first = space.point({})
+    program = source.program(space.values(first), made.canvas)
+    if program is None:
+        raise SceneError(source.trouble)
+    manifest = load_manifest(program.model)
+    if manifest.renderer not in ("framed", "solid"):
+        raise FitError(
+            f"model `{manifest.name}` draws pictures of one size only, and fitting needs small ones"
+        )
+    goal, solid = (
+        target_of(target, made.canvas, mask=mask, crop=crop, under=background),
+        program.stage is not None,
+    )
+    short = min(MOST_SOLID if solid else SIDES[-1], *made.canvas, *goal.weights.shape)
+    sides = [side for side in SIDES if side < short] + [short]
+    problems = [
+        Problem(
+            source, space, goal, _sized(made.canvas, side),
+            light=solid, soft=True, samples="adaptive" if at else "four", levels=max(1, LEVELS - at),
+        )
+        for at, side in enumerate(sides)
+    ]  # fmt: skip
+    if not solid:
+        problems.append(
+            Problem(source, space, goal, _sized(made.canvas, short), samples="adaptive", levels=1)
+        )
+    places, done = search.solve(problems, space, first, seed=seed, until=until, report=progress)
+    if not places:
+        raise FitError("no values that were tried give a picture")
+    return _fit(source, space, problems, first, places, done, literals_of(evaluation, fixed or {}))
+
+
+def _sized(canvas: tuple[int, int], side: int) -> tuple[int, int]:
+    factor = side / min(canvas)
+    return max(1, round(canvas[0] * factor)), max(1, round(canvas[1] * factor))
+
+
+def _fit(
+    source: Source,
+    space: Space,
+    problems: list[Problem],
+    first: Point,
+    places: list[Found],
+    done: bool,
+    kept: Mapping[str, str],
+) -> Fit:
+    """What there is to say of the places that a search came to; ``kept`` are literals of fixed params."""
+    last, best = problems[-1], places[0].point
+    every = [space.literals(place.point) for place in places]
+    text = rewritten(source.tree, {**kept, **every[0]})
+    after = last.drawn(source.reads(text).program({}, last.canvas))
+    before = last.picture(first)
+    if after is None:
+        raise FitError("the scene with the values that were found has no picture")
+    near = _db(last, after)
+    slopes = felt(last.pixels, space, best, 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1])
+    numbers = numbers_of(space, best, slopes)
+    others = [
+        literals
+        for place, literals in zip(places[1:], every[1:], strict=True)
+        if place.cost <= max(ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
+    ]
+    return Fit(
+        text=text,
+        values=every[0],
+        psnr=near,
+        start_psnr=_db(last, before) if before is not None else -math.inf,
+        size=last.canvas,
+        done=done,
+        notes=hindrances(space, best, numbers, near, done, last, after),
+        numbers=numbers,
+        tied=ties(space, slopes),
+        others=tuple(others),
+        frames=sum(problem.frames for problem in problems),
+        before=_image(after if before is None else before),
+        after=_image(after),
+        target=_image(last.colours),
+    )
+
+
+def _db(problem: Problem, picture: npt.NDArray[np.float64]) -> float:
+    """PSNR over the pixels that count."""
+    off = problem.residuals(picture)
+    error = float(off @ off)
+    return UNCAPPED_DB if error <= 0 else min(UNCAPPED_DB, -10 * math.log10(error))
+
+
+def _image(picture: npt.NDArray[np.float64]) -> Image:
+    return picture.astype(np.float32).view(Image)

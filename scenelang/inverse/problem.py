@@ -1,0 +1,157 @@
+"""A scene and a target: how far the picture of values is from the target, at a size."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from scenelang.backend.options import Samples
+from scenelang.backend.small import draw_small
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import Evaluation
+from scenelang.inverse.soft import softened
+from scenelang.inverse.space import Point, Space
+from scenelang.inverse.target import Picture, Target, over
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import Program
+from scenelang.renderers.draw import draw_objects
+from scenelang.scene.schema import Scene
+from scenelang.syntax import nodes, parse
+
+LEVELS: Final = 4  # of a pyramid: pixels, and means of 2, 4 and 8 pixels along each side
+
+
+class Source:
+    """A scene's text, parsed once, to be run with other values of its params.
+
+    Args:
+        tree: the parsed file.
+        path, root, model, frame: as of `scenelang.load`.
+        fixed: values of params that are not searched.
+
+    Attributes:
+        trouble: what was found the last time that values gave no scene.
+    """
+
+    def __init__(
+        self,
+        tree: nodes.File,
+        *,
+        path: Path | None,
+        root: Path | None = None,
+        model: str | None = None,
+        frame: int = 0,
+        fixed: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.tree, self.path, self.root, self.model, self.frame = tree, path, root, model, frame
+        self.fixed = dict(fixed or {})
+        self.trouble: tuple[Diagnostic, ...] = ()
+
+    def reads(self, text: str) -> Source:
+        """The same of another text."""
+        tree = parse(SourceFile(self.tree.span.source.name, text), Diagnostics())
+        return Source(tree, path=self.path, root=self.root, model=self.model, frame=self.frame)
+
+    def evaluated(self, values: Mapping[str, Any]) -> tuple[Evaluation, Scene]:
+        """The scene of values of its params.
+
+        Raises:
+            SceneError: it has errors.
+        """
+        found = Diagnostics()
+        evaluation = Evaluation(
+            self.tree, diagnostics=found, defines={**self.fixed, **values},
+            path=self.path, root=self.root, model=self.model, frame=self.frame,
+        )  # fmt: skip
+        scene, _ = evaluation.run(self.frame)
+        if scene is None:
+            raise SceneError(found)
+        return evaluation, scene
+
+    def program(self, values: Mapping[str, Any], canvas: tuple[int, int]) -> Program | None:
+        """What draws the scene of values on a canvas; None where there is none, for which see `trouble`."""
+        try:
+            scene = self.evaluated(values)[1]
+            return compile_scene(scene.sized(canvas), model=self.model)
+        except SceneError as error:
+            self.trouble = error.diagnostics
+            return None
+
+
+class Problem:
+    """How far pictures of one size are from the target.
+
+    Args:
+        source: what makes scenes.
+        space: the params.
+        target: what they are to look like.
+        canvas: width and height of the pictures.
+        light: whether pixels are means of linear light, as those of solids are.
+        soft: whether outlines are as wide as a pixel, of scenes of the plane, or sharp.
+        samples: of a pixel, as in `scenelang.render`; of soft pictures one.
+        levels: of the pyramid; 1 compares pixels alone. More feel outlines that do not meet yet.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        space: Space,
+        target: Target,
+        canvas: tuple[int, int],
+        *,
+        light: bool = False,
+        soft: bool = False,
+        samples: Samples = "four",
+        levels: int = LEVELS,
+    ) -> None:
+        self.source, self.space, self.under = source, space, target.under
+        self.canvas, self.light, self.samples, self.levels = canvas, light, samples, levels
+        self.soft = soft and not light
+        self.frames = 0  # drawn so far
+        self.colours, weights = target.sized(canvas, light)
+        self.root = np.sqrt(weights / max(1e-9, weights.mean()))[..., None]
+
+    def drawn(self, program: Program | None) -> Picture | None:
+        """The picture (H, W, 3) of a Program of this canvas; None of none."""
+        self.frames += 1
+        if program is None:
+            return None
+        if self.soft:
+            network = softened(program.model, 2 / min(self.canvas))
+            return over(draw_objects(network, program, samples="one").image, self.under)
+        return over(draw_small(program, samples=self.samples, threads=1).image, self.under)
+
+    def picture(self, u: Point) -> Picture | None:
+        """The picture of a point, None where its values give no scene."""
+        return self.drawn(self.source.program(self.space.values(u), self.canvas))
+
+    def __call__(self, u: Point) -> Point | None:
+        """Residuals (R,), whose squares add up to a mean square error of each level of the pyramid."""
+        picture = self.picture(u)
+        return None if picture is None else self.residuals(picture, self.levels)
+
+    def pixels(self, u: Point) -> Point | None:
+        """Residuals of pixels alone."""
+        picture = self.picture(u)
+        return None if picture is None else self.residuals(picture)
+
+    def residuals(self, picture: Picture, levels: int = 1) -> Point:
+        """Residuals of a picture, at so many levels of the pyramid."""
+        gap, parts = (picture - self.colours) * self.root, []
+        for level in range(levels):
+            if level:
+                gap = _halved(gap)
+            parts.append(gap.reshape(-1) / np.sqrt(gap.size))
+        return np.concatenate(parts)
+
+
+def _halved(x: Picture) -> Picture:
+    """Means of 2 x 2 pixels; the last row and column of an odd size stand twice."""
+    height, width = x.shape[:2]
+    x = np.pad(x, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    return np.asarray((x[::2, ::2] + x[1::2, ::2] + x[::2, 1::2] + x[1::2, 1::2]) / 4)

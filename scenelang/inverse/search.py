@@ -1,0 +1,213 @@
+"""The nearest picture: a look around, then descents from the best places, from coarse to fine.
+
+Everything is measured on pictures, so that whatever a scene may have, shadows and textures too, needs
+nothing of its own here. A descent is Levenberg's and Marquardt's (1944, 1963) on differences, a picture for
+each param and one: J'J tells what the picture says of each param.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.inverse.space import Point, Space
+from scenelang.records import Record
+
+Residuals = Callable[[Point], Point | None]
+Matrix = npt.NDArray[np.float64]
+APART: Final = 0.02  # shares of a range by which two solutions differ
+LOOKS: Final = 48  # places that a round looks at, times numbers to find and one
+DESCENTS: Final = 5  # of them that are followed
+KEPT: Final = 3  # and looked at more closely
+ROUNDS: Final = 4
+STEPS: Final = (
+    0.01,
+    0.006,
+    0.003,
+    0.002,
+    0.002,
+)  # of differences, shares of a range, in pictures of each size
+NEAR: Final = 10**-4.6  # mean square error that is near enough: 46 dB
+AGREED: Final = 0.02  # share by which a round has to lower the error, or it agrees with those before
+_TRIES: Final = 6  # steps that may fail in a row
+_ENOUGH: Final = 1e-3  # share of the error by which a step has to lower it
+_GRAIN: Final = 1e-7  # mean square error under which nothing is seen
+
+
+class Found(Record):
+    """A place that a search came to.
+
+    Args:
+        point: where it is.
+        cost: sum of squares of the residuals there.
+        steady: whether nothing near it was better, rather than that time was out.
+    """
+
+    point: Point
+    cost: float
+    steady: bool = True
+
+
+def spread(space: Space, count: int, seed: int) -> Iterator[Point]:
+    """Points all over the box: the generalised golden ratio's sequence, moved by a seed.
+
+    Source: Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018.
+    """
+    n = len(space.axes)
+    phi = 2.0
+    for _ in range(50):
+        phi = (1 + phi) ** (1 / (n + 1))
+    step, first = phi ** -np.arange(1.0, n + 1), np.random.default_rng(seed).random(n)
+    choices = np.array([max(1, len(axis.choices)) for axis in space.axes])
+    for index in range(1, count + 1):
+        u = (first + index * step) % 1.0
+        yield np.where(space.smooth, u, np.floor(u * choices))
+
+
+def slopes(
+    residuals: Residuals, space: Space, u: Point, at: Point, step: float, free: npt.NDArray[np.bool_]
+) -> Matrix:
+    """Derivatives (R, n) of residuals by differences, columns of axes that are not free 0.
+
+    Args:
+        at: the residuals at u.
+        step: in shares of a range; away from an end.
+    """
+    found = np.zeros((len(at), len(u)))
+    for axis in np.flatnonzero(free):
+        sign = -1.0 if u[axis] + step > 1.0 and not space.wraps[axis] else 1.0
+        moved = u.copy()
+        moved[axis] += sign * step
+        if (there := residuals(space.inside(moved))) is not None:
+            found[:, axis] = (there - at) / (sign * step)
+    return found
+
+
+def descend(residuals: Residuals, space: Space, u: Point, *, step: float, most: int = 12) -> Found | None:
+    """Follow the continuous axes down from a point; None where that has no picture.
+
+    Args:
+        step: of differences, in shares of a range.
+        most: steps.
+    """
+    at = residuals(u)
+    if at is None:
+        return None
+    cost, damping = float(at @ at), 1e-2
+    for _ in range(most):
+        if cost < _GRAIN or not space.smooth.any():
+            return Found(u, cost)
+        j = slopes(residuals, space, u, at, step, space.smooth)
+        pull = j.T @ at
+        ends = ~space.wraps & (((u <= 0.0) & (pull > 0)) | ((u >= 1.0) & (pull < 0)))
+        free = np.flatnonzero(space.smooth & ~ends & (np.square(j).sum(0) > 1e-12))
+        if not len(free):
+            return Found(u, cost)
+        square = j[:, free].T @ j[:, free]
+        before = cost
+        for _ in range(_TRIES):
+            scale = np.diag(damping * np.diag(square) + 1e-9 * np.trace(square))
+            move = np.zeros_like(u)
+            move[free] = -np.linalg.solve(square + scale, pull[free])
+            move *= min(1.0, 0.3 / max(1e-12, float(abs(move).max())))
+            moved = space.inside(u + move)
+            there = residuals(moved)
+            if there is not None and (lower := float(there @ there)) < cost:
+                u, at, cost, damping = moved, there, lower, max(1e-6, damping / 5)
+                break
+            damping = min(1e6, damping * 6)
+        if before - cost < _ENOUGH * before:
+            return Found(u, cost)
+    return Found(u, cost, False)
+
+
+def stepped(residuals: Residuals, space: Space, start: Found, *, step: float) -> Found:
+    """Try the neighbours of choices, and follow the continuous axes from each that is nearly as good."""
+    best, better = start, True
+    while better:
+        better = False
+        for axis in np.flatnonzero(~space.smooth):
+            for move in (-1.0, 1.0):
+                u = best.point.copy()
+                u[axis] += move
+                if not 0.0 <= u[axis] <= space.most[axis]:
+                    continue
+                found = descend(residuals, space, u, step=step, most=4)
+                if found is not None and found.cost < best.cost * (1 - _ENOUGH):
+                    best, better = found, True
+    return best
+
+
+def apart(space: Space, found: list[Found], most: int) -> list[Found]:
+    """The best of places that lie apart from each other, best first."""
+    kept: list[Found] = []
+    for one in sorted(found, key=lambda one: one.cost):
+        if all(float(space.gap(one.point, other.point).max()) > APART for other in kept):
+            kept.append(one)
+    return kept[:most]
+
+
+def solve(
+    problems: Sequence[Residuals],
+    space: Space,
+    start: Point,
+    *,
+    seed: int = 0,
+    until: float = math.inf,
+    near: float = NEAR,
+    report: Callable[[str, int, int], None] = lambda what, done, count: None,
+) -> tuple[list[Found], bool]:
+    """Places with the nearest pictures, the best first.
+
+    Each round looks around, follows the best places down in the smallest pictures, and the best of these
+    through larger ones. It ends when a picture is near enough, or when two rounds came to the same place.
+
+    Args:
+        problems: residuals at sizes from small to large, those of the last by pixels alone.
+        start: a place that is looked at first.
+        until: no new descent is begun after this time, as of `time.monotonic`.
+        near: sum of squares that is near enough.
+        report: called with what is done, how much of it, and all.
+
+    Returns:
+        Places that lie apart, and whether the search came to an end by itself; none where no place that was
+        looked at has a picture.
+    """
+    coarse, best = problems[0], math.inf
+    low: list[Found] = []  # that came near in the smallest pictures
+    ended: list[Found] = []
+    for turn in range(ROUNDS):
+        places = [*([start] if turn == 0 else []), *spread(space, LOOKS * (len(start) + 1), seed + turn)]
+        seen: list[Found] = []
+        for at, u in enumerate(places):
+            if time.monotonic() > until and seen:
+                break
+            report("looking around", at, len(places))
+            if (there := coarse(u)) is not None:
+                seen.append(Found(u, float(there @ there)))
+        picked, before = apart(space, seen, DESCENTS), list(low)
+        for at, one in enumerate(picked):
+            if time.monotonic() > until and low:
+                break
+            report("coming near", at, len(picked))
+            if (near_it := descend(coarse, space, one.point, step=STEPS[0])) is not None:
+                low.append(near_it if space.smooth.all() else stepped(coarse, space, near_it, step=STEPS[0]))
+        low = apart(space, low, KEPT)
+        fresh = [one for one in low if not any(one is other for other in before)]
+        for at, one in enumerate(fresh):
+            for problem, step in zip(problems[1:], STEPS[1:], strict=False):
+                report("looking closer", at, len(fresh))
+                one = descend(problem, space, one.point, step=step, most=8) or one
+            ended.append(one)
+        ended = apart(space, ended, KEPT)
+        was, best = best, min((one.cost for one in ended), default=math.inf)
+        if best <= near or best > was * (1 - AGREED):
+            return ended, True
+        if time.monotonic() > until:
+            break
+    return ended, False

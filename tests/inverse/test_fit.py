@@ -1,0 +1,169 @@
+"""Params from pictures, against scenes whose values are known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import scenelang
+from scenelang.cli.main import cli
+from scenelang.diagnostics.span import SourceFile
+from scenelang.image import Image
+from scenelang.inverse import search
+from scenelang.inverse.fitted import Fit
+from scenelang.measure.metrics import psnr
+
+SCENE = """\
+// where is it?
+nsg 1; canvas(40, 40); background(#ffffff);
+param x = -0.5 in -0.8..0.8; param y = 0.5 in -0.8..0.8;  // here
+star { scale(0.4); translate(x, y); material flat { color(#d33333); } }
+"""
+
+
+@pytest.fixture(autouse=True)
+def _fewer_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is looked for here is found sooner."""
+    monkeypatch.setattr(search, "LOOKS", 16)
+    monkeypatch.setattr(search, "ROUNDS", 2)
+
+
+def drawn(text: str, **values: object) -> Image:
+    """By the exact definition, not by what fits."""
+    return scenelang.render(scenelang.loads(text, params=values), backend="reference")
+
+
+def fitted(text: str, picture: Image, **options: object) -> Fit:
+    return scenelang.fit(SourceFile("a.nsg", text), picture, **options)  # type: ignore[arg-type]
+
+
+def near(found: Fit, name: str, value: float, share: float = 0.01) -> bool:
+    number = next(number for number in found.numbers if number.label == name)
+    return abs(number.value - value) <= share * (number.high - number.low)
+
+
+def test_outlines_that_do_not_meet_are_found_and_the_scene_is_written() -> None:
+    target = drawn(SCENE, x=0.3, y=-0.4)
+    found = fitted(SCENE, target)
+    assert found.done
+    assert near(found, "x", 0.3)
+    assert near(found, "y", -0.4)
+    assert found.psnr > 35 > 20 > found.start_psnr
+    again = scenelang.render(scenelang.loads(found.text))
+    assert psnr(again, target, 100.0) == pytest.approx(found.psnr, abs=0.1)
+    assert found.text.startswith("// where is it?\nnsg 1; canvas(40, 40);")
+
+
+def test_choices_are_found_with_numbers() -> None:
+    text = SCENE.replace("// here", "param n = 1 in 1..4 step 1; param dark = true;") + (
+        "for (i in 0..<n) { square { scale(0.1); translate(-0.6 + 0.4 * i, -0.7); "
+        "material flat { color(dark ? #111111 : #99bb99); } } }"
+    )
+    found = fitted(text, drawn(text, x=0.3, y=0.5, n=3, dark=False), params=["x", "n", "dark"])
+    assert found.values["n"] == "3"
+    assert found.values["dark"] == "false"
+    assert near(found, "x", 0.3)
+
+
+def test_mask_crop_size_and_background() -> None:
+    picture = np.asarray(drawn(SCENE.replace("#ffffff", "none"), x=0.3, y=-0.4)).repeat(2, 0).repeat(2, 1)
+    large = np.zeros((110, 130, 4), np.float32)
+    large[10:90, 20:100] = picture
+    large[10:30, 20:60] = (0.0, 1.0, 0.0, 1.0)  # a blot
+    mask = np.ones((110, 130, 3))
+    mask[10:30, 20:60] = 0
+    found = fitted(
+        SCENE.replace("#ffffff", "none"),
+        large.view(Image),
+        mask=mask,
+        crop=(20, 10, 80, 80),
+        background=(0.2, 0.2, 0.2),
+    )
+    assert near(found, "x", 0.3)
+    assert near(found, "y", -0.4)
+    assert found.target[35, 2] == pytest.approx([0.2, 0.2, 0.2], abs=0.01)
+
+
+def test_what_explains_the_same_is_said_and_what_is_not_seen() -> None:
+    """x and z only show as their sum, and w hides behind the canvas."""
+    text = (
+        SCENE.replace("translate(x, y)", "translate((x + z) / 2, y)").replace(
+            "// here", "param z = 0.1 in -0.8..0.8; param w = 0.5 in 0..1;"
+        )
+        + "square { scale(0.1); translate(5 + w, 5); }"
+    )
+    found = fitted(text, drawn(text, x=0.3, z=0.2, y=-0.4))
+    assert [pair[:2] for pair in found.tied] == [("x", "z")]
+    assert found.tied[0][2] == pytest.approx(-1.0, abs=0.02)
+    assert any("does not show `w`" in note for note in found.notes)
+
+
+def test_sensitivity_is_that_of_a_closed_form() -> None:
+    """A grey that fills the canvas changes all of it: 1/255 of it is 1/255 of its range."""
+    text = "canvas(32, 32); param v = 0.2 in 0..1; square { scale(9); material flat { color([v, v, v]); } }"
+    found = fitted(text, drawn(text, v=0.6))
+    assert found.numbers[0].felt == pytest.approx(1 / 255, rel=0.02)
+    assert near(found, "v", 0.6, 0.002)
+
+
+def test_two_places_that_look_the_same_are_both_told() -> None:
+    text = (
+        "canvas(32, 32); param v = 0.1 in -0.8..0.8; square { scale(0.2); translate(v * v, 0); "
+        "material flat { color(#203040); } }"
+    )
+    found = fitted(text, drawn(text, v=0.7))
+    values = [float(found.values["v"]), *(float(other["v"]) for other in found.others)]
+    assert sorted(values) == pytest.approx([-0.7, 0.7], abs=0.02)
+
+
+def test_a_target_that_the_scene_cannot_show_names_where() -> None:
+    target = drawn(SCENE, x=0.3, y=-0.4).copy()
+    target[2:9, 2:9] = (0.0, 0.0, 1.0)
+    found = fitted(SCENE, target)
+    note = next(note for note in found.notes if "differs from the target most" in note)
+    x, y = map(int, note.split("pixel ")[1].split(" of")[0].split(", "))
+    assert 2 <= x < 9
+    assert 2 <= y < 9
+    assert near(found, "x", 0.3)
+
+
+def test_a_solid_and_its_light() -> None:
+    text = (
+        "canvas(32, 32); param x = -1 in -1..1; param power = 12 in 10..50; light(power = power);"
+        "sphere { scale(0.6); translate(x, 0, 0); }"
+    )
+    found = fitted(text, drawn(text, x=0.4, power=35))
+    assert near(found, "x", 0.4)
+    assert near(found, "power", 35.0, 0.03)
+
+
+@pytest.mark.parametrize(
+    ("options", "fact"),
+    [
+        ({"crop": (30, 0, 40, 40)}, "leaves the target"),
+        ({"crop": (0, 0, 40, 20)}, "40 × 20 pixels for a canvas of 40 × 40"),
+        ({"mask": np.zeros((40, 40, 3))}, "no pixel counts"),
+        ({"mask": np.zeros((6, 40, 3))}, "40 × 6 pixels for a target"),
+        ({"start": {"x": 0.1}, "params": ["y"]}, "a start for `x`"),
+    ],
+)
+def test_what_does_not_fit_is_refused(options: dict[str, object], fact: str) -> None:
+    with pytest.raises(scenelang.FitError, match=fact):
+        fitted(SCENE, drawn(SCENE), **options)
+
+
+def test_the_command_writes_scene_and_pictures(tmp_path: Path) -> None:
+    scene, target, out = (tmp_path / name for name in ("a.nsg", "target.png", "b.nsg"))
+    scene.write_text(SCENE)
+    drawn(SCENE, x=0.3, y=0.5).save(target)
+    arguments = ["fit", str(scene), "--to", str(target), "-o", str(out), "-D", "y=0.5"]
+    run = CliRunner().invoke(cli, [*arguments, "--params", "x", "--compare", str(tmp_path / "c.png")])
+    assert run.exit_code == 0, run.output
+    assert "dB from the target" in run.output
+    assert abs(float(out.read_text().split("x = ")[1].split()[0]) - 0.3) < 0.016
+    assert (tmp_path / "c.png").exists()
+    for wrong in (["--params", "z"], ["--crop", "3x3"], ["--background", "red"]):
+        assert CliRunner().invoke(cli, [*arguments, *wrong]).exit_code == 2
