@@ -22,7 +22,7 @@ Residuals = Callable[[Point], Point | None]
 Matrix = npt.NDArray[np.float64]
 APART: Final = 0.02  # shares of a range by which two solutions differ
 LOOKS: Final = 48  # places that a round looks at, times numbers to find and one
-DESCENTS: Final = 5  # of them that are followed
+DESCENTS: Final = 4  # of them that are followed, and one for each number
 KEPT: Final = 3  # and looked at more closely
 ROUNDS: Final = 4
 STEPS: Final = (
@@ -32,6 +32,7 @@ STEPS: Final = (
     0.002,
     0.002,
 )  # of differences, shares of a range, in pictures of each size
+FAIR: Final = 1e-3  # 30 dB: farther off, a round without success is tried again
 NEAR: Final = 10**-4.6  # mean square error that is near enough: 46 dB
 AGREED: Final = 0.02  # share by which a round has to lower the error, or it agrees with those before
 _TRIES: Final = 6  # steps that may fail in a row
@@ -165,7 +166,7 @@ def solve(
     """Places with the nearest pictures, the best first.
 
     Each round looks around, follows the best places down in the smallest pictures, and the best of these
-    through larger ones. It ends when a picture is near enough, or when two rounds came to the same place.
+    through larger ones. It ends when a picture is near enough, or when a round or two found none nearer.
 
     Args:
         problems: residuals at sizes from small to large, those of the last by pixels alone.
@@ -178,7 +179,7 @@ def solve(
         Places that lie apart, and whether the search came to an end by itself; none where no place that was
         looked at has a picture.
     """
-    coarse, best = problems[0], math.inf
+    coarse, best, idle = problems[0], math.inf, 0
     low: list[Found] = []  # that came near in the smallest pictures
     ended: list[Found] = []
     for turn in range(ROUNDS):
@@ -190,7 +191,7 @@ def solve(
             report("looking around", at, len(places))
             if (there := coarse(u)) is not None:
                 seen.append(Found(u, float(there @ there)))
-        picked, before = apart(space, seen, DESCENTS), list(low)
+        picked, before = apart(space, seen, DESCENTS + len(start)), list(low)
         for at, one in enumerate(picked):
             if time.monotonic() > until and low:
                 break
@@ -206,7 +207,8 @@ def solve(
             ended.append(one)
         ended = apart(space, ended, KEPT)
         was, best = best, min((one.cost for one in ended), default=math.inf)
-        if best <= near or best > was * (1 - AGREED):
+        idle = idle + 1 if best > was * (1 - AGREED) else 0
+        if best <= near or idle >= (1 if best <= FAIR else 2):
             return ended, True
         if time.monotonic() > until:
             break

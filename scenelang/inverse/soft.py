@@ -16,7 +16,7 @@ import numpy as np
 
 from scenelang.models.framed import load_arrays
 from scenelang.renderers.field import UNION
-from scenelang.renderers.network import FramedArrays
+from scenelang.renderers.network import Cell, FramedArrays
 
 
 @lru_cache(maxsize=64)
@@ -25,7 +25,7 @@ def softened(name: str, width: float) -> FramedArrays:
     network = load_arrays(name).network
     assert isinstance(network, FramedArrays)
     soft = copy.copy(network)
-    cell = network.cell_weights()
+    cell = Cell(*network.cell_weights())
     unit = float(np.linalg.norm(cell.candidate[UNION, 0]))  # growth of the state per world unit
     soft.read_slope = np.float32(min(float(network.read_slope), math.log(4 / (unit * width))))
     features = network.config.features

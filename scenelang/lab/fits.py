@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import math
 import re
+import time
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 
+from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import loads
 from scenelang.image import Image
+from scenelang.inverse.api import fit
+from scenelang.inverse.fitted import Number
+from scenelang.lab.about import Report, about, silent
 from scenelang.measure.metrics import over_white, psnr
-from scenelang.measure.scenes import reference_of
+from scenelang.measure.scenes import interval, reference_of
 from scenelang.measure.sets import SETS, Rng, random_scene
 from scenelang.measure.solid_sets import SOLID_SETS, random_solid
-from scenelang.models.manifest import Manifest
+from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.records import Record
 from scenelang.scene.text import to_nsg
 
@@ -48,16 +54,69 @@ class Case(Record):
     """A scene to be fitted.
 
     Args:
+        set: what it was drawn from.
         text: the scene, whose params start at their defaults.
         truth: values of the target, as shares of their ranges.
         target: exact picture of these, 8 bits a channel, (H, W, 3) in [0, 1].
         start_db: how near the start's picture is to it.
     """
 
+    set: str
     text: str
     truth: dict[str, float]
     target: Image
     start_db: float
+
+
+def measure(
+    model: str, counts: Sequence[int], scenes: int, seed: int, side: int, report: Report = silent
+) -> dict[str, Any]:
+    """Fit seeded scenes, of so many params in turn, and say how often their values or a near picture are found.
+
+    Seconds are of the processor, one thread, the first look at a text to the report.
+    """
+    manifest, rows = load_manifest(model), []
+    for index in range(scenes):
+        report("fitting", index, scenes)
+        case = random_case(manifest, index, counts[index % len(counts)], seed, side)
+        started = time.process_time()
+        found = fit(SourceFile("scene", case.text), case.target, seed=seed)
+        spent = time.process_time() - started
+        off = max(_off(number, case.truth[number.label]) for number in found.numbers)
+        rows.append(
+            {
+                "set": case.set,
+                "params": len(case.truth),
+                "start_db": round(case.start_db, 2),
+                "db": round(found.psnr, 2),
+                "off": round(off, 5),
+                "found": bool(off <= NEAR or found.psnr >= NEAR_DB),
+                "done": found.done,
+                "frames": found.frames,
+                "seconds": round(spent, 2),
+            }
+        )
+    return {
+        **about(),
+        "model": model,
+        "set": " ".join(SOLID if manifest.dimension == 3 else PLANE),
+        "seed": seed,
+        "scenes": scenes,
+        "side": side,
+        "params": list(counts),
+        "found": sum(row["found"] for row in rows),
+        "share": round(float(np.mean([row["found"] for row in rows])), 4),
+        "interval": interval([float(row["found"]) for row in rows]),
+        "median_seconds": round(float(np.median([row["seconds"] for row in rows])), 2),
+        "median_frames": int(np.median([row["frames"] for row in rows])),
+        "cases": rows,
+    }
+
+
+def _off(number: Number, truth: float) -> float:
+    """How far a value is from the true one, in shares of its range; a full turn is none."""
+    off = abs((number.value - number.low) / (number.high - number.low) - truth)
+    return min(off, 1 - off) if math.isclose(number.high - number.low, math.tau, rel_tol=1e-6) else off
 
 
 def random_case(manifest: Manifest, index: int, count: int, seed: int, side: int) -> Case:
@@ -118,7 +177,7 @@ def _case(manifest: Manifest, rng: Rng, index: int, count: int, side: int) -> Ca
         target = exact(side, values)
     except ValueError:  # the eye is inside something opaque
         return None
-    return Case(text, truth, (np.floor(target * 255 + 0.5) / 255).view(Image), start_db)
+    return Case(name, text, truth, (np.floor(target * 255 + 0.5) / 255).view(Image), start_db)
 
 
 def _given(share: float, low: float, high: float) -> Any:

@@ -14,6 +14,7 @@ TABLE: Final = {
     "shadows": "Measure the error inside the shadows of media.",
     "frontier": "Measure speed against error of every way to draw.",
     "plans": "Measure what drawing scenes takes, and what leaving less out would cost.",
+    "fit": "Measure how often a scene's params are found from a picture.",
     "experiment": "Train several designs alike and compare them.",
     "chart": "Draw tables and charts of experiments.",
     "train": "Train the weights of another renderer or lifting.",
