@@ -71,11 +71,12 @@ class Case(Record):
 def measure(
     model: str, counts: Sequence[int], scenes: int, seed: int, side: int, report: Report = silent
 ) -> dict[str, Any]:
-    """Fit seeded scenes, of so many params in turn, and say how often their values or a near picture are found.
+    """Fit seeded scenes, of so many params in turn, and say how often these or a near picture are found.
 
     Seconds are of the processor, one thread, the first look at a text to the report.
     """
-    manifest, rows = load_manifest(model), []
+    manifest = load_manifest(model)
+    rows: list[dict[str, Any]] = []
     for index in range(scenes):
         report("fitting", index, scenes)
         case = random_case(manifest, index, counts[index % len(counts)], seed, side)
