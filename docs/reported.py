@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import solid_rivals
 from figures import RESULTS, kilobytes, numbers, read, told
 
 from scenelang.lab.experiments import paper
@@ -113,6 +114,22 @@ def front(base: str, names: tuple[str, ...]) -> str:
     return markdown(("way to draw", "ms", "FLIP", "PSNR, dB", "n"), rows)
 
 
+def rivals() -> str:
+    """The cheapest way of each renderer whose picture is as near to its own converged one as ours is."""
+    record, rows = read(solid_rivals.NAME), []
+    if "sets" not in record:
+        return "*Not measured yet.*"
+    for name, words in solid_rivals.SETS.items():
+        ways = solid_rivals.ways_of(name)
+        chosen = [solid_rivals.OURS, "formulas, adaptive"]
+        chosen += [solid_rivals.as_near(ways, other) or "" for other in ("POV-Ray", "Mitsuba")]
+        for way in filter(ways.get, chosen):
+            times, title = ways[way]["times"], solid_rivals.TITLES.get(way, way)
+            cells = [words, title, f"{times['mean']:.2f} ± {times['interval']:.2f}"]
+            rows.append([*cells, plus_minus(ways[way]["flip"], 4), str(record["sets"][name]["scenes"])])
+    return markdown(("scenes", "drawn by", "time, × the network", "FLIP to its own converged", "n"), rows)
+
+
 def stability() -> str:
     """Ends of probes."""
     rows = []
@@ -148,6 +165,7 @@ BLOCKS = {
     "report-accuracy": accuracy,
     "report-plane": lambda: front("shapes2d", PLANE),
     "report-space": lambda: front("solids3d", SPACE),
+    "report-rivals": rivals,
     "report-stability": stability,
     "report-commands": commands,
     "budgets": budgets,
