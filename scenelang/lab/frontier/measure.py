@@ -288,7 +288,7 @@ def _point(way: Way, record: Record, paper: Record | None) -> Point:
         ms=Times(
             statistics.median(record.ms), float(np.percentile(record.ms, 95)), *median_interval(record.ms)
         ),
-        ratio_to_streaming=_ratio(paper, record),
+        ratio_to_streaming=0.0 if paper is None else float(np.mean(_over(paper, record))),
         flip=errors,
         psnr=quality,
         cost=cost,
@@ -306,17 +306,13 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
 def _ratios(base: str, records: dict[str, Record]) -> Iterator[Ratio]:
     for slow, fast in paired(base):
         if slow in records and fast in records:
-            pairs = zip(records[slow].ms, records[fast].ms, strict=False)  # the slower drew fewer
-            found = [a / b for a, b in pairs if b > 0]
+            found = _over(records[slow], records[fast])
             yield Ratio(slow, fast, len(found), float(np.mean(found)), interval(found))
 
 
-def _ratio(paper: Record | None, record: Record) -> float:
-    """How many times as long the paper's frames took, on the scenes that both drew."""
-    if paper is None:
-        return 0.0
-    both = min(len(paper.ms), len(record.ms))
-    return sum(paper.ms[:both]) / sum(record.ms[:both])
+def _over(slow: Record, fast: Record) -> list[float]:
+    """How many times as long one way took as another, of each scene that both drew."""
+    return [a / b for a, b in zip(slow.ms, fast.ms, strict=False)]
 
 
 def machine() -> str:
