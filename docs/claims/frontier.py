@@ -15,6 +15,7 @@ GIVEN = {
     "four where neighbours differ by more than 0.15 | 0.04 | 2 |": "a setting",
     "| `one` | one | 0.04 | 2 |": "a setting",
     "one for each 2 x 2 pixels, enlarged | 0.04 | 2 |": "a setting",
+    "drawn in 256 pixels": "how a time is foretold",
     "what is thinner than 0.01": "a limit of the language",
     "a shell of 0.03": "a setting",
 }

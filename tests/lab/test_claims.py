@@ -20,6 +20,7 @@ PAGES = {
     "index.md",
     "elements.md",
     "parsimony.md",
+    "frontier.md",
 }
 
 

@@ -145,7 +145,7 @@ def test_charts_label_every_point_that_has_an_error() -> None:
     assert "0" in [tick.get_text() for tick in axis.get_yticklabels()]
     assert "four & <more>, near" in [text.get_text() for text in axis.texts]
     pyplot().close(figure)
-    assert PIL.Image.open(io.BytesIO(frontier_chart(frontier(*POINTS[:5])))).width == 1140
+    assert PIL.Image.open(io.BytesIO(frontier_chart(frontier(*POINTS[:5])))).width == 950
 
 
 @pytest.mark.skipif(not frontier_path("shapes2d").exists(), reason="no frontier is shipped")

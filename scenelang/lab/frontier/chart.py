@@ -16,7 +16,7 @@ from scenelang.measure.frontier import Frontier, Point, front
 
 LINEAR: Final = 1e-4
 """FLIP below which the axis is linear, so that 0 has its place at the bottom edge."""
-_WIDE, _HIGH, _DPI = 7.6, 10.4, 150
+_WIDE, _HIGH, _DPI = 7.6, 10.4, 125
 _CAPTION, _ROW = 0.075, 0.0165  # shares of the height: the caption, a row of the legend
 """Inches, and dots of one: a page shows it 760 pixels wide, where letters of 7 points are 9.7 pixels."""
 SMALL, USUAL, LARGE = 7, 7.8, 10  # points
