@@ -132,15 +132,20 @@ def stability(dimension: int = 2) -> str:
             least, worst = (min(by, key=lambda value: by[value][k]) for k in ("mean", "worst"))
             cells = [f"{probe['quantity']}, {min(by):g} to {max(by):g}", mean(by[probe["healthy"]], 1)]
             cells += [mean(by[least], 1), f"{least:g}", f"{by[worst]['worst']:.1f}", f"{worst:g}"]
-            rows.append([f"`{found['model']}`", probe["title"], *cells])
-        scenes = " or ".join(
-            f"{n}" for n in sorted({p.get("scenes", found["scenes"]) for p in found["probes"].values()})
-        )
-        said.append(
-            f"`{found.get('command')}`, {scenes} scenes a value, seed {found['seed']}, weights "
-            f"`{found['weights'][:8]}…`."
-        )
-    heads = ("model", "what", "values", "healthy, dB", "least mean, dB", "at", "worst scene, dB", "at")
+            scenes = f"{probe.get('scenes', found['scenes'])}"
+            rows.append([f"`{found['model']}`", probe["title"], scenes, *cells])
+        said.append(f"`{found.get('command')}`, seed {found['seed']}, weights `{found['weights'][:8]}…`.")
+    heads = (
+        "model",
+        "what",
+        "scenes",
+        "values",
+        "healthy, dB",
+        "least mean, dB",
+        "at",
+        "worst scene, dB",
+        "at",
+    )
     return "\n\n".join((markdown(heads, rows), *said))
 
 

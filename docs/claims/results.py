@@ -97,6 +97,8 @@ GIVEN = {
     "6 dB less error": "half an error, in another unit",
     "against 64 samples": "what pictures are compared with",
     "36.41 dB, SSIM 0.982, FLIP 0.049": "the paper's Table 2",
+    "they are 0.003 thick": "a quantity that is varied",
+    "95 % interval of the": "how sure means are said to be",
     "thinner than 0.01, which": "the language's definition",
     "eight times for every point": "the paper's method",
     "1.6 million": "the paper's training",

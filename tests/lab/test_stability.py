@@ -194,7 +194,9 @@ def test_what_is_known_is_not_measured_again(model: Model) -> None:
         assert 0 <= row["worst_scene"] < 2
     told = dict(first["probes"]["shear"], rows=first["probes"]["shear"]["rows"][1:])
     told["rows"][0]["psnr"] = {"mean": 7.0, "worst": 7.0}  # as no model draws
-    again = run_stability(model, 2, 9, ("shear",), known=[{**first, "probes": {"shear": told}}])
+    few = {"thin": {"scenes": 1, "rows": [{"value": 1}]}}
+    again = run_stability(model, 2, 9, ("shear",), known=[{**first, "probes": {"shear": told, **few}}])
+    assert again["probes"]["thin"] == few["thin"]  # not asked for
     assert again["probes"]["shear"]["rows"] == [first["probes"]["shear"]["rows"][0], *told["rows"]]
     assert again["invariants"] == first["invariants"]
     with pytest.raises(ValueError, match="another seed"):

@@ -22,7 +22,7 @@ from scenelang.lab.commands import common
     "--known",
     multiple=True,
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    help="What this command wrote before, whose values are not measured again; may be repeated.",
+    help="What this command wrote before: it is added to, not measured again; may be repeated.",
 )
 @common.seed
 @common.out

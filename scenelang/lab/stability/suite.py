@@ -305,28 +305,32 @@ def run_stability(
         model, scenes, seed: what draws, how many scenes of every value, and their seed.
         only: names of probes and of `INVARIANTS`; all by default.
         report: called with a name, values done and all.
-        known: earlier results, whose values and invariants are not measured again.
+        known: earlier results: values of as many scenes are not measured again, nor are invariants; probes
+            that are not asked for stay as they are.
 
     Returns:
         For JSON: ``probes`` and ``invariants`` by name, and what was measured on what.
 
     Raises:
-        ValueError: an earlier result is of other weights, scenes or another seed.
+        ValueError: an earlier result is of other weights or another seed.
     """
     started = time.perf_counter()
     rows: dict[str, list[Row]] = {}
+    probes: dict[str, dict[str, Any]] = {}
     invariants: dict[str, Any] = {}
     for earlier in known:
-        if (earlier["weights"], earlier["scenes"], earlier["seed"]) != (model.digest, scenes, seed):
-            raise ValueError("an earlier result is of other weights, scenes or another seed")
+        if (earlier["weights"], earlier["seed"]) != (model.digest, seed):
+            raise ValueError("an earlier result is of other weights or another seed")
         invariants |= earlier["invariants"]
         for name, probe in earlier["probes"].items():
-            rows.setdefault(name, []).extend({"revision": earlier["revision"], **r} for r in probe["rows"])
-    probes = {
-        n: run_probe(model, n, scenes, seed, report, rows.get(n, ()))
-        for n in kit_of(model.manifest).probes
-        if not only or n in only
-    }
+            probes[name] = {"scenes": earlier["scenes"], **probe}
+            if probes[name]["scenes"] == scenes:
+                rows[name] = rows.get(name, []) + [
+                    {"revision": earlier.get("revision", "unknown"), **row} for row in probe["rows"]
+                ]
+    for name in kit_of(model.manifest).probes:
+        if not only or name in only:
+            probes[name] = run_probe(model, name, scenes, seed, report, rows.get(name, ()))
     for name, measure in INVARIANTS.items():
         if name not in invariants and (not only or name in only):
             invariants[name] = measure(model, scenes, seed)
@@ -338,6 +342,6 @@ def run_stability(
         "seed": seed,
         **about(),
         "seconds": round(time.perf_counter() - started, 1),
-        "probes": {name: probe for name, probe in probes.items() if probe["rows"]},
+        "probes": {n: probes[n] for n in kit_of(model.manifest).probes if probes.get(n, {}).get("rows")},
         "invariants": invariants,
     }
