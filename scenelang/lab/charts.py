@@ -45,7 +45,7 @@ def _probe(axis: Any, curves: Sequence[Mapping[str, Any]]) -> None:
         mean, p5, worst = ([row["psnr"][k] for row in curve["rows"]] for k in ("mean", "p5", "worst"))
         (line,) = axis.plot(x, mean, marker="o", markersize=3, linewidth=1.5, label=curve["model"])
         if i == 0:
-            off = [row["psnr"]["interval"] for row in curve["rows"]]
+            off = [row["psnr"].get("interval", 0.0) for row in curve["rows"]]
             axis.errorbar(x, mean, yerr=off, fmt="none", ecolor=line.get_color(), elinewidth=1, capsize=2)
             axis.fill_between(x, p5, mean, color=line.get_color(), alpha=0.15, linewidth=0)
             axis.plot(x, worst, ".", color=WARN, markersize=4)
