@@ -18,6 +18,7 @@ from pathlib import Path
 
 import costs
 import reported
+import sizes
 
 from scenelang.lab.experiments.runs import EXPERIMENTS as RUNNABLE
 from scenelang.lab.experiments.tables import markdown, table_of
@@ -43,7 +44,7 @@ WHAT = {
     "large": "three times the size",
 }
 PAGES = ("results.md", "report.md", "proof.md", "viewer.md")
-EXPERIMENTS = ("overfit", "compare", "table1", "table2", "table3", "table4", "losses", "seeds")
+EXPERIMENTS = ("overfit", "compare", "table2", "table3", "table4", "losses", "seeds")
 
 
 SOLIDS = {
@@ -260,6 +261,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "shadows": shadows,
     **costs.BLOCKS,
     **reported.BLOCKS,
+    **sizes.BLOCKS,
     "all": smallest_run,
     **{name: experiment(name) for name in EXPERIMENTS},
 }

@@ -49,6 +49,11 @@ STEPS: Final = (
     Step("lab plans {examples} -o {out}/plans.json"),
     Step("lab experiment all --budget {budget} --scenes {more} -o {out}/experiments"),
     Step("lab chart {out}/experiments"),
+    Step("lab codes textures --scenes {few} --sizes 2,16 --seconds 1 -o {out}/codes"),
+    Step(
+        "lab codes meshes --scenes {few} --sizes 2,16 --seconds 1 -o {out}/codes",
+        ("SCENELANG_ORIGINALS", "igl", "trimesh"),
+    ),
     Step("lab train shapes2d-streaming --budget {budget} -o {out}/train"),
     Step("benchmarks.floor --exact --frames {few} --scene shapes2d --scene chains"),
     Step("benchmarks.startup {few}"),

@@ -15,7 +15,7 @@ from PIL import Image
 from scenelang.cli.main import cli
 from scenelang.lab.experiments import paper
 from scenelang.lab.experiments.experiment import Settings, run_experiment, run_one, unseen
-from scenelang.lab.experiments.runs import EXPERIMENTS, SIDE, SIZES_SIDE
+from scenelang.lab.experiments.runs import EXPERIMENTS, SIDE
 from scenelang.lab.experiments.tables import table_of
 
 
@@ -71,13 +71,6 @@ def test_parts_are_also_measured_where_all_is_blended(tmp_path: Path) -> None:
     assert not any(run.blends for name in EXPERIMENTS if name != "parts" for run in EXPERIMENTS[name](1.0, 1))
 
 
-def test_every_size_of_a_vector_is_drawn_at_its_own_resolution(tmp_path: Path) -> None:
-    """The size study has another resolution than the rest, on the way as at the end."""
-    (run,) = [run for run in EXPERIMENTS["table1"](0.3, 1) if run.name == "geometry 2"]
-    found = run_one(run, Settings(tmp_path, 8))
-    assert found["resolution"] == SIZES_SIDE
-
-
 def result(name: str, group: str, psnr: float, **more: Any) -> dict[str, Any]:
     spread = {"mean": psnr, "p5": psnr, "worst": psnr - 1}
     return {
@@ -98,15 +91,11 @@ def result(name: str, group: str, psnr: float, **more: Any) -> dict[str, Any]:
 
 
 def test_the_papers_figures_stand_beside_ours() -> None:
-    runs = [result("geometry 8", "geometry", 20.0), result("geometry 32", "geometry", 21.0)]
-    table = table_of({"experiment": "table1", "runs": runs})
-    geometry, material = table.split("\n\n")
-    eight = next(line for line in geometry.splitlines() if line.startswith("| 8 "))
-    assert "| 20.00 |" in eight
-    assert f"| {paper.GEOMETRY_SIZES[8].psnr:.2f} |" in eight
-    # 32 and 32 is one run, which stands in both
-    assert "| 21.00 |" in material
-    assert f"| {paper.MATERIAL_SIZES[32].psnr:.2f} |" in material
+    runs = [result("streaming+learned", "", 20.0), result("framed+exact", "", 21.0)]
+    ours, without = table_of({"experiment": "table2", "runs": runs}).splitlines()[2:]
+    assert "| 20.00 |" in ours
+    assert f"| {paper.SHAPES.psnr:.2f} |" in ours
+    assert without.endswith("| – | – | – | – |")
 
 
 def test_the_gain_of_a_larger_budget_is_told() -> None:

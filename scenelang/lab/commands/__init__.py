@@ -11,6 +11,7 @@ from scenelang.cli.main import Commands
 TABLE: Final = {
     "eval": "Measure a model on unseen scenes.",
     "stability": "Measure a model far beyond its training.",
+    "codes": "Measure how many numbers a texture or a mesh needs.",
     "shadows": "Measure the error inside the shadows of media.",
     "frontier": "Measure speed against error of every way to draw.",
     "plans": "Measure what drawing scenes takes, and what leaving less out would cost.",

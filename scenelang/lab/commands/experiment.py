@@ -51,7 +51,7 @@ def command(
 ) -> None:
     """Train several renderers and liftings for the same time each and measure them alike.
 
-    NAME is one or more of overfit, compare, table1, table2, table3, table4, seeds, parts, or all.
+    NAME is one or more of overfit, compare, table2, table3, table4, seeds, parts, or all.
     """
     need_metrics()
     from scenelang.lab.experiments.experiment import Settings, run_experiment

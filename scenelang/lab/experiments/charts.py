@@ -12,11 +12,9 @@ from PIL import ImageDraw
 
 from scenelang.image import Image
 from scenelang.lab.charts import FAINT, INK, figure_png, pyplot
-from scenelang.lab.experiments import paper
 
 Result = Mapping[str, Any]
 LABEL, LINE, ENLARGED = 170, 4, 2  # pixels; how much larger strips are shown
-THEIRS = "#8a97a3"
 
 
 def experiment_chart(found: Result) -> bytes:
@@ -54,33 +52,6 @@ def _compare(plt: Any, found: Result) -> Any:
     return _finish(figure, axis, f"unseen scenes at {found['runs'][0]['resolution']}²")
 
 
-def _table1(plt: Any, found: Result) -> Any:
-    """PSNR over the size of either vector, ours and the paper's."""
-    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.6), sharey=True)
-    sides = (("geometry", paper.GEOMETRY_SIZES), ("material", paper.MATERIAL_SIZES))
-    for axis, (side, published) in zip(axes, sides, strict=True):
-        runs = {run["name"]: run for run in found["runs"]}
-        if side == "material" and "geometry 32" in runs:
-            runs["material 32"] = runs["geometry 32"]
-        sizes = [d for d in published if f"{side} {d}" in runs]
-        axis.plot(
-            sizes, [runs[f"{side} {d}"]["psnr"]["mean"] for d in sizes], marker="o", label="ours, 2D shapes"
-        )
-        axis.plot(
-            list(published),
-            [line.psnr for line in published.values()],
-            "o--",
-            color=THEIRS,
-            label="the paper's",
-        )
-        axis.set_xscale("log", base=2)
-        axis.set_xticks(list(published), [str(d) for d in published])
-        axis.minorticks_off()
-        axis.set_xlabel(f"numbers of a {side} vector")
-        _finish(figure, axis, "")
-    return figure
-
-
 def _bars(plt: Any, found: Result) -> Any:
     """A bar a run, the worst scene as a dot."""
     runs = found["runs"]
@@ -106,7 +77,7 @@ def _finish(figure: Any, axis: Any, title: str) -> Any:
     return figure
 
 
-_DRAWN = {"compare": _compare, "table1": _table1}
+_DRAWN = {"compare": _compare}
 
 
 def strips(found: Result, folder: Path) -> Image:

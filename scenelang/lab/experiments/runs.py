@@ -9,21 +9,18 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 
 from scenelang.lab.designs.ablations import VARIANTS
-from scenelang.lab.designs.encoders import LiftingConfig
 from scenelang.lab.designs.students import LiftingName, RendererName, StudentConfig
 from scenelang.lab.designs.studies import RATES, StudyConfig
 from scenelang.renderers.network import FramedConfig
 from scenelang.renderers.streaming import StreamingConfig
 
 SIDE = 32  # pixels along a side of the pictures: what `streaming` reaches on a processor in minutes
-SIZES_SIDE = 16  # of the thirteen trainings of the size study
 PARTS_SIDE = 128  # where only renderers that answer points are compared
 Pair = tuple[RendererName, LiftingName]
 ALL: tuple[Pair, ...] = tuple(
     (renderer, lifting) for renderer in ("framed", "reading", "streaming") for lifting in ("exact", "learned")
 )
 BEST: tuple[Pair, ...] = (("streaming", "learned"), ("framed", "exact"))
-SIZES = (1, 2, 4, 8, 16, 32, 64)
 SEEDS = 3  # of the whole renderer: differences below their spread mean nothing
 
 TRIED: Mapping[str, tuple[int, ...]] = {
@@ -87,20 +84,6 @@ def overfit(budget_s: float, seed: int) -> list[Run]:
 def compare(budget_s: float, seed: int) -> list[Run]:
     """Every renderer with every lifting at a third of the budget and at all of it."""
     return [run for seconds in (budget_s / 3, budget_s) for run in _usual(ALL, seconds, seed)]
-
-
-def table1(budget_s: float, seed: int) -> list[Run]:
-    """Sizes 1 to 64 of the geometry vector and of the material vector, the other one 32 (Table 1)."""
-    base = plain("streaming", "learned", budget_s, seed)
-    sizes = replace(base.student.streaming, resolution=SIZES_SIDE)
-    runs = []
-    for side in ("geometry", "material"):
-        for d in SIZES:
-            if side == "material" and d == 32:
-                continue  # the same run as the geometry's
-            student = replace(base.student, streaming=sizes, learned=LiftingConfig(**{side: d}))
-            runs.append(Run(f"{side} {d}", side, replace(base, student=student), side=SIZES_SIDE))
-    return runs
 
 
 def table2(budget_s: float, seed: int) -> list[Run]:
@@ -169,7 +152,6 @@ def parts(budget_s: float, seed: int) -> list[Run]:
 EXPERIMENTS: dict[str, Callable[[float, int], list[Run]]] = {
     "overfit": overfit,
     "compare": compare,
-    "table1": table1,
     "table2": table2,
     "table3": table3,
     "table4": table4,

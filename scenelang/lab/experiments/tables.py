@@ -78,23 +78,6 @@ def compare(found: Result) -> str:
     return markdown((*head, "gain, dB"), rows)
 
 
-def table1(found: Result) -> str:
-    """Sizes of both vectors."""
-    by_name = {run["name"]: run for run in found["runs"]}
-    sides = (("geometry", paper.GEOMETRY_SIZES), ("material", paper.MATERIAL_SIZES))
-    parts = []
-    for side, published in sides:
-        rows = []
-        for d, line in published.items():
-            run = by_name.get(f"{side} {d}") or by_name.get(f"geometry {d}" if d == 32 else "")
-            if run is not None:
-                rows.append([str(d), *figures(run), *theirs(line)])
-        if "white" in found:
-            rows.append([NOTHING, *figures(found["white"]), *theirs(None)])
-        parts.append(markdown((f"{side} numbers", *HEAD, *PAPER_HEAD), rows))
-    return "\n\n".join(parts)
-
-
 def _beside(published: Mapping[str, paper.Figures]) -> Any:
     def table(found: Result) -> str:
         rows = [
@@ -130,7 +113,6 @@ def seeds(found: Result) -> str:
 
 TABLES: dict[str, Any] = {
     "compare": compare,
-    "table1": table1,
     "table2": _beside({"streaming+learned": paper.SHAPES}),
     "table4": _beside({"streaming+learned": paper.STREAMING, "reading+learned": paper.READING}),
     "seeds": seeds,
