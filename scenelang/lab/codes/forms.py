@@ -82,11 +82,11 @@ def off(found: Array, true: Array) -> float:
 
 def best_form(true: Array, d: int) -> tuple[str, Array]:
     """The form of d numbers that is nearest to a picture (h, w, 3) or to a solid's distances (n, n, n)."""
-    solid = true.shape[-1] != 3
-    found = {
-        name: form(true, d)
-        for name, form in FORMS.items()
-        if not (name == "balls" and (not solid or d > 4 * _MOST_BALLS))
-        and not (name == "nodes" and solid and d < 8)
-    }
+    fewest = {"cosines": 2, "nodes": 1, "balls": 1}
+    if true.shape[-1] != 3:
+        fewest["nodes"] = 8  # the corners of a cube
+    known = [name for name in FORMS if d >= fewest[name]]
+    if true.shape[-1] == 3 or d > 4 * _MOST_BALLS:
+        known.remove("balls")
+    found = {name: FORMS[name](true, d) for name in known}
     return min(found.items(), key=lambda one: off(one[1], true))
