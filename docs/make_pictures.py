@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import size_charts
 from blocks import pictured
 from PIL import Image as pillow
 from PIL import ImageDraw, ImageFont
@@ -247,6 +248,11 @@ def experiments() -> dict[str, Callable[[], bytes]]:
         if path.stem in STRIPPED:
             name = f"experiments/{path.stem}-strips.png"
             made[name] = lambda found=found: png(experiment_strips(found, folder).to_pil().quantize(128))
+    for path in sorted(folder.parent.glob("codes-*.png")):
+        made[f"experiments/{path.stem}-strips.png"] = lambda path=path: _few_colours(path.read_bytes())
+    for name, chart in size_charts.CHARTS.items():
+        if all((folder.parent / f"{record}.json").exists() for record in chart.records):
+            made[f"{name}.png"] = lambda chart=chart: _few_colours(chart.draw())
     return made
 
 

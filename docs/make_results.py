@@ -43,7 +43,7 @@ WHAT = {
     "strong": "deformations up to ±2.4",
     "large": "three times the size",
 }
-PAGES = ("results.md", "report.md", "proof.md", "viewer.md")
+PAGES = ("results.md", "report.md", "proof.md", "viewer.md", "elements.md")
 EXPERIMENTS = ("overfit", "compare", "table2", "table3", "table4", "losses", "seeds")
 
 

@@ -1,4 +1,4 @@
-"""Tables of what textures and meshes come to at so many numbers, from what ``scenelang lab codes`` wrote."""
+"""Tables of what textures and meshes come to at so many numbers or bytes, from records."""
 
 from __future__ import annotations
 
@@ -57,4 +57,32 @@ def table(what: str) -> str:
     return f"{markdown((*HEADS, 'paper: PSNR', 'SSIM', 'LPIPS', 'FLIP'), lines)}\n\n{said}"
 
 
-BLOCKS: dict[str, Callable[[], str]] = {f"codes-{what}": partial(table, what) for what in PAPER}
+def by_bytes() -> str:
+    """The best of each form at so many bytes, of meshes and of pictures."""
+    if not (RESULTS / "element-bytes.json").exists():
+        return "*Not measured yet.*"
+    found, tables = read("element-bytes"), []
+    for kind, what, digits in (
+        ("meshes", "mean distance off, radii", 4),
+        ("pictures", "PSNR of texels, dB", 1),
+    ):
+        cells = {
+            (row["form"], row["bytes"]): f"{row['mean']:.{digits}f} ± {row['interval']:.{digits}f}"
+            for row in found[kind]["rows"]
+        }
+        forms = dict.fromkeys(form for form, _ in cells)
+        rows = [
+            [f"{size:,}", *(cells.get((form, size), "–") for form in forms)]
+            for size in sorted({size for _, size in cells})
+        ]
+        tables.append(
+            f"{found[kind]['files']} {kind}, {what}:\n\n{markdown(('bytes at most', *forms), rows)}"
+        )
+    said = f"`{found['command']}`, ± 95 % over files, revision `{found['revision'][:8]}`"
+    return "\n\n".join([*tables, said])
+
+
+BLOCKS: dict[str, Callable[[], str]] = {
+    **{f"codes-{what}": partial(table, what) for what in PAPER},
+    "element-bytes": by_bytes,
+}

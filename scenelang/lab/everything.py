@@ -59,6 +59,11 @@ STEPS: Final = (
     Step("benchmarks.startup {few}"),
     Step("benchmarks.compile 100 1000 --json {out}/compile.json"),
     Step("benchmarks.elements --rounds 1 -o {out}/element-speed.json"),
+    Step(
+        "benchmarks.forms examples/originals/slab.obj examples/originals/tile.png "
+        "-o {out}/element-bytes.json",
+        ("igl", "trimesh"),
+    ),
     Step("benchmarks.proof --set shapes2d --scenes {few}"),
     Step("benchmarks.mutations --count {few}"),
     Step("benchmarks.lsp 200"),

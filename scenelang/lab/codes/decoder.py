@@ -87,7 +87,7 @@ def decoded(
         adam.step()
         steps += 1
     with torch.no_grad():
-        blocks = points.split(BLOCK)
+        blocks = torch.split(points, BLOCK)
         found = [
             torch.cat([decoder(torch.full((len(p),), i), p) for p in blocks]).reshape(*nodes, channels)
             for i in range(things)

@@ -37,8 +37,9 @@ def nodes(true: Array, d: int) -> Array:
     for axis in range(axes):
         at = np.linspace(0, side - 1, true.shape[axis])
         hats = np.maximum(1 - abs(at[:, None] - np.arange(side)), 0)
-        true = np.moveaxis(np.tensordot(hats @ np.linalg.pinv(hats), true, (1, axis)), 0, axis)
-    return np.asarray(true, np.float32)
+        fitted = np.tensordot(hats @ np.linalg.pinv(hats), true, (1, axis))
+        true = np.moveaxis(fitted.astype(np.float32), 0, axis)
+    return np.ascontiguousarray(true)
 
 
 def balls(true: Array, d: int) -> Array:
@@ -55,7 +56,8 @@ def balls(true: Array, d: int) -> Array:
     adam = torch.optim.Adam([centres, radii] if free else [radii], _RATE)
 
     def union(p: torch.Tensor) -> torch.Tensor:
-        return ((p[:, None] - centres).norm(dim=2) - radii).amin(1)
+        apart = torch.linalg.vector_norm(p[:, None] - centres, dim=2)
+        return (apart - radii).amin(1)
 
     for step in range(_STEPS):
         adam.param_groups[0]["lr"] = _RATE * (1 - step / _STEPS)
@@ -65,7 +67,7 @@ def balls(true: Array, d: int) -> Array:
         loss.backward()  # type: ignore[no-untyped-call]
         adam.step()
     with torch.no_grad():
-        found = torch.cat([union(p) for p in points.split(_POINTS)])
+        found = torch.cat([union(p) for p in torch.split(points, _POINTS)])
     return np.asarray(found.reshape(true.shape).numpy(), np.float32)
 
 

@@ -36,7 +36,7 @@ BEYOND: Final = (256, 1024, 4096, 16384, 65536)  # where forms go on
 SETS: Final = {"textures": "textures2d", "meshes": "meshes3d"}
 LOOKED_AT: Final = 8  # scenes that LPIPS is measured on
 SHOWN: Final = (1, 3, 8)  # scenes of a strip
-CELL, HEAD, SIDE = 128, 18, 62  # pixels of a strip
+CELL, HEAD, SIDE = 96, 18, 62  # pixels of a strip
 
 Scenes = list[tuple[Program, Array]]
 
@@ -72,7 +72,8 @@ def measured(found: World, way: Way, scenes: Scenes) -> tuple[dict[str, Any], Ar
     exact = [picture for _, picture in scenes]
     cases = [compare(a, b) for a, b in zip(pictures, exact, strict=True)]
     figures = summarise(cases)
-    apart = [_lpips()(a, b) for a, b in zip(pictures[:LOOKED_AT], exact, strict=False)] if _lpips() else []
+    look = _lpips()
+    apart = [look(a, b) for a, b in zip(pictures[:LOOKED_AT], exact, strict=False)] if look else []
     lpips = {"mean": round(sum(apart) / len(apart), 4), "interval": interval(apart)} if apart else None
     row = {"kind": way.kind, "d": way.d, **way.said, **figures, "lpips": lpips}
     return row, np.stack([pictures[at % len(pictures)] for at in SHOWN])
@@ -145,7 +146,7 @@ def study(
         "seconds": seconds,
         "rows": rows,
     }
-    return record, strip(shown, [scenes[at % count][1] for at in SHOWN], (*sizes, *beyond))
+    return record, strip(shown, [scenes[at % count][1] for at in SHOWN], sizes)
 
 
 def strip(shown: Mapping[str, Array], exact: Sequence[Array], sizes: Sequence[int]) -> Image:
