@@ -56,8 +56,8 @@ def balls(true: Array, d: int) -> Array:
     adam = torch.optim.Adam([centres, radii] if free else [radii], _RATE)
 
     def union(p: torch.Tensor) -> torch.Tensor:
-        apart = torch.linalg.vector_norm(p[:, None] - centres, dim=2)
-        return (apart - radii).amin(1)
+        apart: torch.Tensor = torch.linalg.vector_norm(p[:, None] - centres, dim=2) - radii
+        return apart.amin(1)
 
     for step in range(_STEPS):
         adam.param_groups[0]["lr"] = _RATE * (1 - step / _STEPS)
