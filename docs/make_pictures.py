@@ -30,9 +30,10 @@ import numpy as np
 import size_charts
 from blocks import pictured
 from PIL import Image as pillow
-from PIL import ImageDraw, ImageFont
+from PIL import ImageDraw, ImageFilter, ImageFont
 
 import scenelang as nsg
+from scenelang.diagnostics.span import SourceFile
 from scenelang.lab.charts import stability_chart
 from scenelang.lab.evaluate import Case, sheet
 from scenelang.lab.experiments.charts import experiment_chart
@@ -266,6 +267,20 @@ def frontier(model: str) -> bytes:
     return _few_colours(frontier_chart(Frontier.from_json(frontier_path(model).read_bytes())))
 
 
+def fitted() -> bytes:
+    """Before, after and target of the scene of docs/fit.md; the target is exact, blurred and has noise."""
+    found = re.search(
+        r"^```nsg[^\n]*\n(.*?)```", (DOCS / "fit.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
+    text = SourceFile("lost.nsg", found[1] if found else "")
+    true = {"x": -0.31, "y": 0.22, "size": 0.5, "turn": "20deg", "ink": "#dd3311", "stones": 4}
+    exact = nsg.render(nsg.loads(text.text, params=true), backend="reference").to_pil()
+    soft = np.asarray(exact.filter(ImageFilter.GaussianBlur(0.8)), np.float32) / 255
+    photo = np.clip(soft + np.random.default_rng(7).normal(0.0, 0.04, soft.shape), 0.0, 1.0)
+    names = ("x", "y", "size", "turn", "ink", "stones")
+    return _few_colours(png(nsg.fit(text, photo.astype(np.float32), params=names).sheet().to_pil()))
+
+
 def plan() -> dict[str, Callable[[], bytes]]:
     """What `docs/pictures` holds, and how each file of it is made."""
     made: dict[str, Callable[[], bytes]] = {}
@@ -285,6 +300,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
             draw = moving if name.endswith(".webp") else still
             made[name] = lambda draw=draw, source=Source(text=text): draw(source)
     made["gallery.png"] = gallery
+    made["fit.png"] = fitted
     made[f"{COMPARED}-compared.png"] = compared
     made["stability.png"] = lambda: stability(2)
     made["stability-solids.png"] = lambda: stability(3)

@@ -17,6 +17,7 @@ from functools import partial
 from pathlib import Path
 
 import costs
+import fits
 import reported
 import sizes
 
@@ -43,7 +44,7 @@ WHAT = {
     "strong": "deformations up to ±2.4",
     "large": "three times the size",
 }
-PAGES = ("results.md", "report.md", "proof.md", "viewer.md", "elements.md")
+PAGES = ("results.md", "report.md", "proof.md", "viewer.md", "elements.md", "fit.md")
 EXPERIMENTS = ("overfit", "compare", "table2", "table3", "table4", "losses", "seeds")
 
 
@@ -260,6 +261,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "rivals": rivals,
     "shadows": shadows,
     **costs.BLOCKS,
+    **fits.BLOCKS,
     **reported.BLOCKS,
     **sizes.BLOCKS,
     "all": smallest_run,

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from PIL import Image as pillow
+from PIL import ImageDraw, ImageFilter
 
 import scenelang
 from scenelang.cli.main import cli
@@ -167,3 +169,19 @@ def test_the_command_writes_scene_and_pictures(tmp_path: Path) -> None:
     assert (tmp_path / "c.png").exists()
     for wrong in (["--params", "z"], ["--crop", "3x3"], ["--background", "red"]):
         assert CliRunner().invoke(cli, [*arguments, *wrong]).exit_code == 2
+
+
+def test_a_noisy_picture_by_another_program() -> None:
+    """A square that Pillow draws, blurred and with noise, as a photograph would be."""
+    text = SCENE.replace("star { scale(0.4)", "square { scale(s); rotate(turn)").replace(
+        "// here", "param s = 0.3 in 0.2..0.6; param turn = 0deg in -45deg..45deg;"
+    )
+    angles = np.pi / 4 + np.pi / 2 * np.arange(4) + np.radians(20.0)
+    corners = [(320 + 400 * (0.3 + 0.5 * np.cos(a)), 400 - 400 * (-0.2 + 0.5 * np.sin(a))) for a in angles]
+    sheet = pillow.new("RGB", (800, 800), "white")
+    ImageDraw.Draw(sheet).polygon([(x + 80, y) for x, y in corners], fill="#d33333")
+    small = sheet.resize((80, 80), pillow.Resampling.BOX).filter(ImageFilter.GaussianBlur(0.7))
+    noise = np.random.default_rng(5).normal(0.0, 0.03, (80, 80, 3))
+    found = fitted(text, np.clip(np.asarray(small) / 255 + noise, 0, 1).astype(np.float32).view(Image))
+    for name, value in (("x", 0.3), ("y", -0.2), ("s", 0.5), ("turn", np.radians(20.0))):
+        assert near(found, name, value, 0.02), found.told()
