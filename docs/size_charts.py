@@ -40,6 +40,8 @@ def numbers_chart() -> bytes:
         rows = read(f"codes-{what}")["rows"]
         for kind, colour, mark in (("codes", LINE, "o-"), ("forms", WARN, "o-"), ("elements", OURS, "s-")):
             own = [row for row in rows if row["kind"] == kind and row.get("seed", 1) == 1]
+            if not own:
+                continue
             x, y, spread = zip(
                 *((r["d"], r["psnr"]["mean"], r["psnr"]["interval"]) for r in own), strict=True
             )

@@ -47,12 +47,12 @@ def table(what: str) -> str:
         for row in found["rows"]
         if row["kind"] == "codes" and row["seed"] > 1
     ]
+    other = f"; another seed of theirs gives {', '.join(again)}" if again else ""
     shared = next(row["shared"] for row in found["rows"] if row["kind"] == "codes")
     said = (
         f"`{found['command']}`: {found['scenes']} scenes of `{found['set']}` at {found['canvas'][0]}² "
         f"(LPIPS {found['scenes_lpips']}), seed {found['seed']}, ± 95 %; decoders of {shared:,} numbers and "
-        f"more, {found['seconds']:g} s each; another seed of theirs gives {', '.join(again)}; "
-        f"revision `{found['revision'][:8]}`"
+        f"more, {found['seconds']:g} s each{other}; revision `{found['revision'][:8]}`"
     )
     return f"{markdown((*HEADS, 'paper: PSNR', 'SSIM', 'LPIPS', 'FLIP'), lines)}\n\n{said}"
 
