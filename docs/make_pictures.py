@@ -28,6 +28,7 @@ from pathlib import Path
 
 import numpy as np
 import size_charts
+import solid_rivals
 from blocks import pictured
 from PIL import Image as pillow
 from PIL import ImageDraw, ImageFilter, ImageFont
@@ -309,6 +310,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
     for model, name in (("shapes2d", "frontier"), ("solids3d", "frontier-solids")):
         if frontier_path(model).exists():
             made[f"{name}.png"] = lambda model=model: frontier(model)
+    made["solid-rivals.png"] = lambda: _few_colours(solid_rivals.chart())
     made |= experiments()
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
     made["shadows.png"] = shadows

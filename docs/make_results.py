@@ -20,6 +20,7 @@ import costs
 import fits
 import reported
 import sizes
+import solid_rivals
 
 from scenelang.lab.experiments.runs import EXPERIMENTS as RUNNABLE
 from scenelang.lab.experiments.tables import markdown, table_of
@@ -206,34 +207,6 @@ def shadows() -> str:
     return f"{markdown(heads, rows)}\n\n{said}"
 
 
-def rivals() -> str:
-    """What frames of solids cost, drawn by us and by others, with what `python -m benchmarks.solids` says."""
-    path = HERE / "results" / "solid-rivals.json"
-    if not path.exists():
-        return "*Not measured yet.*"
-    rows, said = [], []
-    for name, found in json.loads(path.read_text())["scenes"].items():
-        ours = found["ways"]["network, numpy"]["seconds"]
-        for way, row in found["ways"].items():
-            times = [
-                f"{1e3 * row['seconds']:,.0f}",
-                f"{row['seconds'] / ours:.2f}",
-                f"{1e3 * row['start_s']:,.0f}",
-            ]
-            rows.append([name, way, *times, f"{row['flip']:.4f}", row["options"]])
-        floor, shares = found["floor"], found["shares"].items()
-        parts = [f"`{part}` {share:.0%}" for part, share in shares if share > 0.005]
-        products = (
-            f"{1e3 * floor['products_s']:.1f} ms ({floor['products_s'] / ours:.0%} of the frame by numpy)"
-        )
-        said.append(
-            f"Of {name}: {floor['evaluations']:,} evaluations; their products alone take {products}, all of "
-            f"them {1e3 * floor['whole_s']:.1f} ms. By module: {', '.join(parts)}."
-        )
-    heads = ("scene", "drawn by", "ms", "× the network", "start, ms", "FLIP", "with")
-    return "\n\n".join([markdown(heads, rows), *said])
-
-
 def smallest_run() -> str:
     """What everything took at its smallest, and most of it."""
     path = HERE / "results" / "all.json"
@@ -258,7 +231,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "solid-stability": partial(stability, 3),
     "blends": blends,
     "texels": texels,
-    "rivals": rivals,
+    "rivals": solid_rivals.table,
     "shadows": shadows,
     **costs.BLOCKS,
     **fits.BLOCKS,
