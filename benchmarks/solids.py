@@ -56,7 +56,7 @@ OUT = Path("docs/results/solid-rivals.json")
 DENSE = 5  # samples along each side of a pixel in the converged pictures of the exact field and of POV-Ray
 GRIDS = ["-A", *(f"+AM1 +A{limit} +R3" for limit in (0.3, 0.1, 0.03))]
 GRIDS += [f"+AM2 +A{limit} +R{depth}" for limit, depth in ((0.3, 2), (0.1, 3), (0.03, 3), (0.01, 4))]
-LADDERS = {3: GRIDS[:3], 10: GRIDS, 40: GRIDS[:1] + GRIDS[2:7]}
+LADDERS = {3: GRIDS[:3], 10: GRIDS, 40: GRIDS[:6:5] + GRIDS[2:3]}
 """Ways in which POV-Ray samples pixels, by its samples along a ray in a medium."""
 MOST = max(LADDERS)  # the converged picture's
 SPP = 1, 4, 16, 64, 256  # samples of Mitsuba's pixels
