@@ -294,7 +294,8 @@ def main() -> None:
         name: measured(renderers, name, given.scenes or count, given.side, given.kept)
         for name, count in SETS.items()
     }
-    record = {"side": given.side, "seed": SEED, **about(), **others, "machine": machine(), "sets": sets}
+    drawn = {"set": ", ".join(sets), "scenes": sum(found["scenes"] for found in sets.values()), "seed": SEED}
+    record = {**drawn, "side": given.side, **about(), **others, "machine": machine(), "sets": sets}
     given.out.write_text(json.dumps(record, indent=1) + "\n")
     for name, found in sets.items():
         print(name)
