@@ -139,7 +139,7 @@ def _panel(axis: Any, ways: Ways) -> None:
         some = of(ways, name)
         best = on_front(some)
         _line(axis, name, some, best, "-")
-        ends = best if name == "Mitsuba" else [best[0], as_near(ways, name), best[-1]]
+        ends = best if name == "Mitsuba" else [best[0], as_near(ways, name)]
         _labels(axis, name, {way: some[way] for way in ends})
     widths = of(ways, "width")
     for way, row in widths.items():

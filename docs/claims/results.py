@@ -89,8 +89,8 @@ PAPER = [
     f"lifting) after 40 s and {compared('streaming+learned', 120):.1f} dB after 120 s",
 ]
 RIVALS = [
-    f"as near as our default takes {rival('diffuse', 'POV-Ray'):.1f} times as long, Mitsuba's "
-    f"{rival('diffuse', 'Mitsuba'):.1f} times",
+    f"setting that is as near as our default takes {rival('diffuse', 'POV-Ray'):.1f} times as long, "
+    f"Mitsuba's {rival('diffuse', 'Mitsuba'):.1f} times",
     f"POV-Ray takes {rival('solids3d', 'POV-Ray'):.1f} times as long, and Mitsuba "
     f"{rival('solids3d', 'Mitsuba'):.1f}: its",
 ]
