@@ -251,7 +251,9 @@ def experiments() -> dict[str, Callable[[], bytes]]:
             name = f"experiments/{path.stem}-strips.png"
             made[name] = lambda found=found: png(experiment_strips(found, folder).to_pil().quantize(128))
     for path in sorted(folder.parent.glob("codes-*.png")):
-        made[f"experiments/{path.stem}-strips.png"] = lambda path=path: _few_colours(path.read_bytes())
+        made[f"experiments/{path.stem}-strips.png"] = lambda path=path: png(
+            pillow.open(path).convert("RGB").quantize(256)
+        )
     for name, chart in size_charts.CHARTS.items():
         if all((folder.parent / f"{record}.json").exists() for record in chart.records):
             made[f"{name}.png"] = lambda chart=chart: _few_colours(chart.draw())
