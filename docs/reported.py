@@ -66,7 +66,20 @@ COMMANDS = (
     ("6.6", "experiments/compare"),
     ("2, 5", "passes", "proof"),
 )
-UNSAID = {"passes": "python -m tests.passes.prove --scenes 1000"}
+UNSAID = {
+    "textures2d/textures2d": "scenelang lab eval textures2d --set textures2d --scenes {scenes}",
+    "solids3d-256/solids3d": "scenelang lab eval solids3d --set solids3d --scenes {scenes} --side 256",
+    "solids3d/meshes3d": "scenelang lab eval solids3d --set meshes3d --originals FOLDER --scenes {scenes}",
+    "solids3d/shadows": "scenelang lab shadows solids3d --scenes {scenes} --side {canvas[0]}",
+    "models/shapes2d/frontier": "scenelang lab frontier shapes2d --scenes {scenes}",
+    "models/solids3d/frontier": "scenelang lab frontier solids3d --scenes {scenes}",
+    "solid-rivals": "python -m benchmarks.solids",
+    "stability": "scenelang lab stability shapes2d --scenes {scenes}",
+    "stability-textures2d": "scenelang lab stability textures2d --only texels --scenes {scenes}",
+    "experiments/compare": "scenelang lab experiment compare --budget 2",
+    "passes": "python -m tests.passes.prove --scenes {scenes}",
+}
+"""Commands of records that were made before records said theirs."""
 
 
 def plus_minus(found: Mapping[str, float], digits: int) -> str:
@@ -154,7 +167,7 @@ def commands() -> str:
         for name in names:
             if name.startswith("models/") or (RESULTS / f"{name}.json").exists():
                 record = read(name)
-                said = record.get("command") or UNSAID.get(name, "")
+                said = record.get("command") or UNSAID.get(name, "").format(**record)
                 rest = [record.get("seed"), record.get("scenes"), record.get("revision", "")[:8]]
                 rows.append([section, f"`{name}.json`", f"`{said}`" if said else "", *rest])
     shown = [[str(cell) if isinstance(cell, str | int) else "" for cell in row] for row in rows]
