@@ -61,7 +61,7 @@ STABILITY = (
 COMMANDS = (
     ("6.1", "shapes2d", "textures2d/textures2d", "solids3d-256/solids3d", "solids3d/meshes3d"),
     ("6.1, shadows", "solids3d/shadows"),
-    ("6.3, 6.4", "models/shapes2d/frontier", "models/solids3d/frontier", "solid-rivals"),
+    ("6.3, 6.4", "models/shapes2d/frontier", "models/solids3d/frontier", "unions-rivals", "solid-rivals"),
     ("6.5", "stability", "stability-textures2d", "stability-solids3d"),
     ("6.6", "experiments/compare"),
     ("2, 5", "passes", "proof"),
@@ -127,6 +127,19 @@ def front(base: str, names: tuple[str, ...]) -> str:
     return markdown(("way to draw", "ms", "FLIP", "PSNR, dB", "n"), rows)
 
 
+def unions() -> str:
+    """A rasteriser of polygons beside ours, where all is unions."""
+    if not (RESULTS / "unions-rivals.json").exists():
+        return "*Not measured yet.*"
+    found = read("unions-rivals")
+    rows = [
+        [name, f"{way['ms']:.3g}", plus_minus(way["flip"], 4), plus_minus(way["flip64"], 4)]
+        for name, way in found["ways"].items()
+    ]
+    heads = ("unions drawn by", "ms", "FLIP, 4 samples", "FLIP, 64 samples", "n")
+    return markdown(heads, [[*row, str(found["scenes"])] for row in rows])
+
+
 def rivals() -> str:
     """The cheapest way of each renderer whose picture is as near to its own converged one as ours is."""
     record, rows = read(solid_rivals.NAME), []
@@ -178,6 +191,7 @@ BLOCKS = {
     "report-accuracy": accuracy,
     "report-plane": lambda: front("shapes2d", PLANE),
     "report-space": lambda: front("solids3d", SPACE),
+    "report-unions": unions,
     "report-rivals": rivals,
     "report-stability": stability,
     "report-commands": commands,
