@@ -4,8 +4,8 @@
 
 Each file, a mesh or a picture as `scenelang learn` takes them, is given in every form at many sizes. A mesh's
 error is the mean distance, in radii, of 20,000 points of its true surface from what is given; a picture's is
-the PSNR of its 256 x 256 texels. For each number of bytes the record has the best that a form reaches with as
-many or fewer, mean over all files. Every form of bytes without a coder of its own is deflated.
+the PSNR of its 256 x 256 texels, at most 50 dB. For each number of bytes the record has the best that a form
+reaches with as many or fewer, mean over all files. What has no coder of its own is deflated.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from scenelang.fitting.parts import shape_in
 from scenelang.fitting.settle import settled
 from scenelang.lab.about import about
 from scenelang.lab.commands.common import write_json
+from scenelang.measure.metrics import MOST_DB
 from scenelang.measure.scenes import interval
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.grid import GridShape
@@ -82,14 +83,19 @@ def surface_error(grid: Grid, points: Points) -> float:
     return float(abs(off).mean())
 
 
+def decibels(error: float) -> float:
+    """PSNR of a root mean square of channels in [0, 1], at most `MOST_DB`."""
+    return min(MOST_DB, -20 * math.log10(max(error, 1e-9)))
+
+
 def picture_forms(true: np.ndarray) -> Found:
     def found(form: str, size: int, given: Image.Image) -> tuple[str, int, float]:
         off = np.asarray(given.convert("RGB"), np.float64) - true
-        return form, size, -20 * math.log10(max(math.sqrt((off**2).mean()) / 255, 1e-5))
+        return form, size, decibels(math.sqrt((off**2).mean()) / 255)
 
     image = Image.fromarray(true)
     for coded in pictures.fit_picture(pictures.Picture(true), "it", max_error=1e-9)[1][:1]:
-        yield "element", coded.bytes, -20 * math.log10(max(coded.error, 1e-5))  # without loss
+        yield "element", coded.bytes, decibels(coded.error)  # without loss
     for quality in QUALITIES:
         element = pictures._still("it", true, quality)
         given = (pictures.texels(element) * 255).round().astype(np.uint8)
