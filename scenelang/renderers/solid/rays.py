@@ -159,6 +159,9 @@ class Rays:
         rows[T] = xp.least(self._drawn(passes.slots, xp.select(at <= end, at, self.never)))
         going = rows[T] < INF
         if solids.media:
+            if not solids.draws:  # in a medium steps end where something may cut it
+                cuts = within & going & (passes.slots[OBJECT] < 0) & (begin > t)
+                rows[T] = xp.minimum(rows[T], xp.least(xp.select(cuts, begin, self.never)))
             ended = xp.where(within & ~going)
             if len(ended):
                 row = xp.take(rows, ended)

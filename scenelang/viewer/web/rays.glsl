@@ -138,6 +138,11 @@ void march(ivec2 list, vec3 from, vec3 way, float limit) {
           if (within && slot.z > t) at = min(at, slot.z);
           if (slot.x >= 0.0 && at <= slot.z) to = min(to, at);
         }
+#if defined(MEDIA) && defined(OTHERS)
+        if (within && to < NEVER) { // in a medium steps end where something may cut it
+          for (int i = zero; i < slotCount; i++) if (slots[i].x < 0.0 && slots[i].y > t) to = min(to, slots[i].y);
+        }
+#endif
         if (to >= NEVER || to > sure) break;
         if (to > next) {
           past = to * (1.0 - 1e-6);
