@@ -46,6 +46,14 @@ CORNERS = {
         sphere { scale(0.25); translate(0.4, 0.2, 0.3); material diffuse { color(#4d4); } }
         sphere { scale(0.5); translate(-0.9, -0.5, 0.5); material volumetric zoo.bark; }
         """,
+    "cut": """
+        canvas(64, 48);
+        chain {
+            sphere { material volumetric { color(#6a8); } }
+            subtract sphere { scale(1.2, 0.9, 0.6); translate(-0.2, 0.3, 0.5); }
+            subtract sphere { scale(0.7, 0.8, 1.05); translate(0.8, 0.3, -0.6); }
+        }
+        """,
     "inside": """
         canvas(48, 48); camera(eye = [0.1, 0.2, 0.6], target = [0, 0, -1], fov = 70deg);
         light(position = [0.3, 0.5, 0.2], power = 2);
