@@ -16,13 +16,14 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import read_scene
+from scenelang.evaluate.ranges import literals_of, rewritten
 from scenelang.fitting.mesh import FitError
 from scenelang.image import Image
 from scenelang.inverse import search
 from scenelang.inverse.fitted import Fit, felt, hindrances, numbers_of, ties
 from scenelang.inverse.problem import LEVELS, Problem, Source
 from scenelang.inverse.search import Found
-from scenelang.inverse.space import Point, Space, literals_of, rewritten, space_of
+from scenelang.inverse.space import Point, Space, space_of
 from scenelang.inverse.target import WHITE, target_of
 from scenelang.measure.metrics import UNCAPPED_DB
 from scenelang.models.manifest import load_manifest

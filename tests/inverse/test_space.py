@@ -9,10 +9,11 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.ranges import rewritten
 from scenelang.evaluate.values.value import Vec, unpack
 from scenelang.fitting.mesh import FitError
 from scenelang.inverse.problem import Source
-from scenelang.inverse.space import Space, rewritten, space_of
+from scenelang.inverse.space import Space, space_of
 from scenelang.syntax import parse
 
 TEXT = """\
