@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from scenelang.image import Image
-from scenelang.inverse.problem import Problem
 from scenelang.inverse.search import Matrix, Residuals
 from scenelang.inverse.space import Point, Space
+from scenelang.scene.schema import Scene
 
 TIED: Final = 0.9  # correlation from which two numbers explain each other
 LEVEL: Final = 1 / 255
@@ -54,7 +54,8 @@ class Fit:
         tied: pairs of their labels and how far they are correlated, from `TIED` on.
         others: values of other places whose pictures are about as near.
         frames: pictures that were drawn.
-        before, after, target: pictures (H, W, 3) of that size.
+        before, after, target: pictures (H, W, 3) of that size, of several targets one below the other.
+        way: scenes from the start to what was found, as `scenelang.animate` takes them.
     """
 
     text: str = field(repr=False)
@@ -71,6 +72,7 @@ class Fit:
     before: Image = field(repr=False)
     after: Image = field(repr=False)
     target: Image = field(repr=False)
+    way: tuple[Scene, ...] = field(repr=False)
 
     def told(self) -> list[str]:
         """The report, line by line."""
@@ -145,9 +147,13 @@ def ties(space: Space, slopes: Matrix | None) -> tuple[tuple[str, str, float], .
 
 
 def hindrances(
-    space: Space, u: Point, numbers: Sequence[Number], psnr: float, done: bool, problem: Problem, picture: Any
+    space: Space, u: Point, numbers: Sequence[Number], psnr: float, done: bool, worst: tuple[str, Matrix]
 ) -> tuple[str, ...]:
-    """Why the picture is no nearer, as far as can be told."""
+    """Why the picture is no nearer, as far as can be told.
+
+    Args:
+        worst: which picture of several is farthest off, and the errors (H, W) of its pixels.
+    """
     notes = []
     if not done:
         notes.append("not converged: the last rounds still found nearer pictures, or time was out")
@@ -157,13 +163,13 @@ def hindrances(
     if unseen:
         notes.append(f"the picture does not show {', '.join(unseen)} here, so any value would do")
     if psnr < GOOD_DB:
-        gap = np.square((picture - problem.colours) * problem.root).sum(2)
+        name, gap = worst
         rows, columns = (np.arange(length) for length in gap.shape)
         y, x = (gap.sum(1) @ rows / gap.sum(), gap.sum(0) @ columns / gap.sum())
-        worst = np.unravel_index(int(gap.argmax()), gap.shape)
+        top, left = divmod(int(gap.argmax()), gap.shape[1])
         notes.append(
             f"no values that were tried come nearer: the scene differs from the target most at pixel "
-            f"{int(worst[1])}, {int(worst[0])} of {gap.shape[1]} × {gap.shape[0]}, on average around "
+            f"{left}, {top} of {gap.shape[1]} × {gap.shape[0]}{name}, on average around "
             f"{x:.0f}, {y:.0f}"
         )
     return tuple(notes)

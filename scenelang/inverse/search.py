@@ -46,12 +46,16 @@ class Found(Record):
     Args:
         point: where it is.
         cost: sum of squares of the residuals there.
-        steady: whether nothing near it was better, rather than that time was out.
+        way: places that the search came through, each nearer than the one before in pictures of its size.
     """
 
     point: Point
     cost: float
-    steady: bool = True
+    way: tuple[Point, ...] = ()
+
+    def after(self, before: Found) -> Found:
+        """The same, where the search went on from another."""
+        return Found(self.point, self.cost, before.way + self.way)
 
 
 def spread(space: Space, count: int, seed: int) -> Iterator[Point]:
@@ -100,15 +104,16 @@ def descend(residuals: Residuals, space: Space, u: Point, *, step: float, most: 
     if at is None:
         return None
     cost, damping = float(at @ at), 1e-2
+    way: list[Point] = []
     for _ in range(most):
         if cost < _GRAIN or not space.smooth.any():
-            return Found(u, cost)
+            break
         j = slopes(residuals, space, u, at, step, space.smooth)
         pull = j.T @ at
         ends = ~space.wraps & (((u <= 0.0) & (pull > 0)) | ((u >= 1.0) & (pull < 0)))
         free = np.flatnonzero(space.smooth & ~ends & (np.square(j).sum(0) > 1e-12))
         if not len(free):
-            return Found(u, cost)
+            break
         square = j[:, free].T @ j[:, free]
         before = cost
         for _ in range(_TRIES):
@@ -119,12 +124,13 @@ def descend(residuals: Residuals, space: Space, u: Point, *, step: float, most: 
             moved = space.inside(u + move)
             there = residuals(moved)
             if there is not None and (lower := float(there @ there)) < cost:
+                way.append(u)
                 u, at, cost, damping = moved, there, lower, max(1e-6, damping / 5)
                 break
             damping = min(1e6, damping * 6)
         if before - cost < _ENOUGH * before:
-            return Found(u, cost)
-    return Found(u, cost, False)
+            break
+    return Found(u, cost, tuple(way))
 
 
 def stepped(residuals: Residuals, space: Space, start: Found, *, step: float) -> Found:
@@ -140,7 +146,7 @@ def stepped(residuals: Residuals, space: Space, start: Found, *, step: float) ->
                     continue
                 found = descend(residuals, space, u, step=step, most=4)
                 if found is not None and found.cost < best.cost * (1 - _ENOUGH):
-                    best, better = found, True
+                    best, better = found.after(best), True
     return best
 
 
@@ -203,7 +209,8 @@ def solve(
         for at, one in enumerate(fresh):
             for problem, step in zip(problems[1:], STEPS[1:], strict=False):
                 report("looking closer", at, len(fresh))
-                one = descend(problem, space, one.point, step=step, most=8) or one
+                if (nearer := descend(problem, space, one.point, step=step, most=8)) is not None:
+                    one = nearer.after(one)
             ended.append(one)
         ended = apart(space, ended, KEPT)
         was, best = best, min((one.cost for one in ended), default=math.inf)

@@ -17,6 +17,8 @@ from scenelang.image import decoded, encoded
 from scenelang.records import Record
 
 Picture = npt.NDArray[np.float64]
+Given = npt.NDArray[np.floating] | str | os.PathLike[str]
+"""A picture as callers have it."""
 MOST_BYTES: Final = 64 << 20
 _ASPECT: Final = 0.02  # by which shares of sides may differ before a picture is another part of the world
 WHITE: Final = (1.0, 1.0, 1.0)
@@ -60,10 +62,10 @@ def over(picture: npt.NDArray[np.floating], under: tuple[float, float, float]) -
 
 
 def target_of(
-    picture: npt.NDArray[np.floating] | str | os.PathLike[str],
+    picture: Given,
     canvas: tuple[int, int],
     *,
-    mask: npt.NDArray[np.floating] | str | os.PathLike[str] | None = None,
+    mask: Given | None = None,
     crop: tuple[int, int, int, int] | None = None,
     under: tuple[float, float, float] = WHITE,
 ) -> Target:
@@ -99,7 +101,7 @@ def target_of(
     return Target(found, weights, under)
 
 
-def _read(picture: npt.NDArray[np.floating] | str | os.PathLike[str]) -> npt.NDArray[np.floating]:
+def _read(picture: Given) -> npt.NDArray[np.floating]:
     if isinstance(picture, str | os.PathLike):
         data = read_regular(picture, MOST_BYTES)
         try:

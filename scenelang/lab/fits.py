@@ -171,8 +171,8 @@ def _case(manifest: Manifest, rng: Rng, index: int, count: int, side: int) -> Ca
         start_db = psnr(exact(small, {}), goal)
         if start_db > FAR_DB:
             return None
-        for name in values:
-            others = {other: value for other, value in values.items() if other != name}
+        for param in values:
+            others = {other: value for other, value in values.items() if other != param}
             if psnr(exact(small, others), goal) > FELT_DB:
                 return None
         target = exact(side, values)

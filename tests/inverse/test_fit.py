@@ -142,6 +142,50 @@ def test_a_solid_and_its_light() -> None:
     assert near(found, "power", 35.0, 0.03)
 
 
+SWING = """\
+canvas(32, 32); background(#ffffff); animate(seconds = 1s, fps = 12);
+param wide = 20deg in 10deg..80deg; param lag = 0 in -0.2..0.2;
+let swing = wide * sin((u + lag) * 1turn);
+star { scale(0.4); translate(0, -0.5); rotate(swing); material flat { color(#d33333); } }
+"""
+
+
+def frames_of(text: str, *frames: int, **values: object) -> dict[int, Image]:
+    return {
+        frame: scenelang.render(scenelang.loads(text, params=values, frame=frame), backend="reference")
+        for frame in frames
+    }
+
+
+def test_two_frames_tell_what_one_does_not() -> None:
+    """How far a pendulum swings and where it is in its swing: one picture shows only both."""
+    targets = frames_of(SWING, 0, 3, wide="60deg", lag=0.1)
+    one, two = fitted(SWING, targets[3], frame=3), fitted(SWING, targets)
+    assert one.tied or one.others
+    assert not two.tied
+    assert not two.others
+    assert near(two, "wide", np.radians(60.0), 0.02)
+    assert near(two, "lag", 0.1, 0.02)
+    assert two.target.shape == (64, 32, 3)
+    assert np.abs(two.target[32:] - targets[3]).max() < 1e-6
+
+
+def test_the_frame_that_does_not_fit_is_named() -> None:
+    targets = frames_of(SWING, 0, 3, wide="60deg", lag=0.1)
+    targets[3] = targets[3].copy()
+    targets[3][1:9, 1:9] = (0.0, 0.0, 1.0)
+    assert any("32 × 32 of frame 3" in note for note in fitted(SWING, targets).notes)
+
+
+def test_the_way_leads_from_the_start_to_what_was_found() -> None:
+    target = drawn(SCENE, x=0.3, y=-0.4)
+    found = fitted(SCENE, target)
+    pictures = [scenelang.render(scene) for scene in found.way]
+    assert np.array_equal(pictures[0], scenelang.render(scenelang.loads(SCENE)))
+    assert psnr(pictures[-1], target, 100.0) == pytest.approx(found.psnr, abs=0.2)
+    assert len(pictures) > 2
+
+
 @pytest.mark.parametrize(
     ("options", "fact"),
     [
@@ -167,8 +211,29 @@ def test_the_command_writes_scene_and_pictures(tmp_path: Path) -> None:
     assert "dB from the target" in run.output
     assert abs(float(out.read_text().split("x = ")[1].split()[0]) - 0.3) < 0.016
     assert (tmp_path / "c.png").exists()
-    for wrong in (["--params", "z"], ["--crop", "3x3"], ["--background", "red"]):
+    for wrong in (["--params", "z"], ["--crop", "3x3"], ["--background", "red"], ["--to", "b.png"]):
         assert CliRunner().invoke(cli, [*arguments, *wrong]).exit_code == 2
+
+
+def test_the_command_takes_frames_and_shows_the_way(tmp_path: Path) -> None:
+    scene, out, way = (tmp_path / name for name in ("a.nsg", "b.nsg", "way.gif"))
+    scene.write_text(SWING)
+    for frame, picture in frames_of(SWING, 0, 3, wide="60deg", lag=0.1).items():
+        picture.save(tmp_path / f"f{frame:02}.png")
+    given = [
+        ["--to", f"{tmp_path}/f%02d.png"],
+        ["--to", f"0={tmp_path}/f00.png", "--to", f"3={tmp_path}/f03.png"],
+    ]
+    texts = []
+    for to in given:
+        arguments = ["fit", str(scene), *to, "-o", str(out), "--animate", str(way)]
+        run = CliRunner().invoke(cli, arguments)
+        assert run.exit_code == 0, run.output
+        texts.append(out.read_text())
+    assert texts[0] == texts[1] != SWING
+    with pillow.open(way) as film:
+        assert film.n_frames > 2  # type: ignore[attr-defined]
+        assert film.size == (32, 32)
 
 
 def test_a_noisy_picture_by_another_program() -> None:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from scenelang.evaluate.session import Defines
 
 NOT_CONVERGED = 1
+MOST_FRAMES = 10_000  # whose pictures are looked for
 
 
 def _crop(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int, int, int] | None:
@@ -34,10 +35,38 @@ def _colour(ctx: click.Context, param: click.Parameter, value: str) -> tuple[flo
     return int(found[1], 16) / 255, int(found[2], 16) / 255, int(found[3], 16) / 255
 
 
+def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Path | dict[int, Path]:
+    """One picture, or several by frames."""
+    from scenelang.animation.targets import Target, is_pattern
+
+    found: dict[int, Path] = {}
+    for value in values:
+        number, _, name = value.partition("=")
+        if number.isdecimal():
+            found[int(number)] = Path(name)
+        elif is_pattern(value):
+            numbered = Target("sequence", Path(value).parent, Path(value).name)
+            files = ((frame, numbered.file(frame)) for frame in range(MOST_FRAMES))
+            found |= {frame: file for frame, file in files if file.exists()}
+        elif len(values) == 1:
+            return Path(value)
+        else:
+            raise click.BadParameter(f"`{value}` is one of several; say its frame, 12={value}", ctx, param)
+    if not found:
+        raise click.BadParameter(f"there is no picture `{values[0]}`", ctx, param)
+    return found
+
+
 @click.command("fit")
 @click.argument("scene", metavar="SCENE", type=click.Path(path_type=Path))
 @click.option(
-    "--to", "target", required=True, type=click.Path(path_type=Path), metavar="PICTURE", help="PNG or JPEG."
+    "--to",
+    "target",
+    required=True,
+    multiple=True,
+    callback=_to,
+    metavar="PICTURE",
+    help="PNG or JPEG; FRAME=PICTURE, several times, or frame-%04d.png for frames of an animation.",
 )
 @click.option("-o", "--out", metavar="OUT", help="The scene with what was found as defaults; - prints it.")
 @click.option(
@@ -68,6 +97,7 @@ def _colour(ctx: click.Context, param: click.Parameter, value: str) -> tuple[flo
     help="Behind what is transparent.",
 )
 @click.option("--compare", metavar="OUT.png", help="A picture: before, after, target.")
+@click.option("--animate", metavar="OUT.gif", help="An animation of the way to what was found.")
 @click.option("--seed", default=0, type=click.IntRange(0, 2**31 - 1), help="Of where to look.")
 @click.option(
     "--budget",
@@ -84,7 +114,7 @@ def _colour(ctx: click.Context, param: click.Parameter, value: str) -> tuple[flo
 def command(
     ctx: click.Context,
     scene: Path,
-    target: Path,
+    target: Path | dict[int, Path],
     out: str | None,
     names: tuple[str, ...],
     start: dict[str, str],
@@ -93,6 +123,7 @@ def command(
     crop: tuple[int, int, int, int] | None,
     background: tuple[float, float, float],
     compare: str | None,
+    animate: str | None,
     seed: int,
     budget: float,
     frame: int,
@@ -105,12 +136,16 @@ def command(
     SCENE with other defaults, all else as it was. The report says how near the picture is and how far each
     param is known. The exit code is 1 where the search did not come to an end.
     """
+    from scenelang.animation.api import animate as render
+    from scenelang.animation.targets import is_animation
     from scenelang.diagnostics.error import SceneError
     from scenelang.fitting.mesh import FitError
     from scenelang.inverse.api import fit
 
     if compare is not None:
         targets(["compare"], compare)
+    if animate is not None and not is_animation(animate):
+        raise click.UsageError(f"`{animate}` names no animation, such as way.gif.")
     wanted = [name for listed in names for name in re.split(r"[,\s]+", listed) if name]
     try:
         with Bar() as bar:
@@ -129,6 +164,9 @@ def command(
         put_out(found.text, out)
     if compare is not None:
         found.sheet().save(compare)
+    if animate is not None:
+        still = [found.way[0]] * 4, [found.way[-1]] * 8  # long enough to be looked at
+        render(still[0] + list(found.way) + still[1], animate, fps=8, model=model)
     for line in found.told():
         click.echo(line, err=out == "-")
     if not found.done:

@@ -1,0 +1,65 @@
+"""Several targets at once: pictures of frames of an animation, whose params are the same."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scenelang.inverse.problem import Problem
+from scenelang.inverse.space import Point
+from scenelang.inverse.target import Picture
+from scenelang.program.program import Program
+
+
+class Together:
+    """How far the pictures of some frames are from their targets.
+
+    Args:
+        parts: a frame each, of one size.
+    """
+
+    def __init__(self, parts: Sequence[Problem]) -> None:
+        self.parts, self.canvas = tuple(parts), parts[0].canvas
+
+    def __call__(self, u: Point) -> Point | None:
+        """Residuals (R,), whose squares add up to the mean of what those of the frames add up to."""
+        found = self.pictures(u)
+        return None if found is None else self.residuals(found, self.parts[0].levels)
+
+    def pixels(self, u: Point) -> Point | None:
+        """Residuals of pixels alone."""
+        found = self.pictures(u)
+        return None if found is None else self.residuals(found)
+
+    def pictures(self, u: Point) -> list[Picture] | None:
+        """Of each frame, None where values give no scene."""
+        return _known([part.picture(u) for part in self.parts])
+
+    def drawn(self, programs: Sequence[Program | None]) -> list[Picture] | None:
+        """The pictures of a Program for each frame."""
+        return _known([part.drawn(one) for part, one in zip(self.parts, programs, strict=True)])
+
+    def residuals(self, pictures: Sequence[Picture], levels: int = 1) -> Point:
+        """Residuals of pictures, at so many levels of the pyramid."""
+        gaps = [part.residuals(one, levels) for part, one in zip(self.parts, pictures, strict=True)]
+        return np.asarray(np.concatenate(gaps) / np.sqrt(len(gaps)))
+
+    def worst(self, pictures: Sequence[Picture]) -> tuple[str, Picture]:
+        """Errors (H, W) of the picture that is farthest off, and which frame it is of several."""
+        gaps = [
+            np.square((one - part.colours) * part.root).sum(2)
+            for part, one in zip(self.parts, pictures, strict=True)
+        ]
+        at = int(np.argmax([gap.sum() for gap in gaps]))
+        return f" of frame {self.parts[at].source.frame}" * (len(gaps) > 1), gaps[at]
+
+    @property
+    def frames(self) -> int:
+        """Pictures that were drawn so far."""
+        return sum(part.frames for part in self.parts)
+
+
+def _known(pictures: Sequence[Picture | None]) -> list[Picture] | None:
+    known = [one for one in pictures if one is not None]
+    return known if len(known) == len(pictures) else None
