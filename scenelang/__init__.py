@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from scenelang.scene.schema import Twirl as Twirl
     from scenelang.scene.schema import Twist as Twist
     from scenelang.scene.schema import load_elements as load_elements
+    from scenelang.sweep.api import render_many as render_many
     from scenelang.viewer.export import export as export
 
 # Module -> public names it defines. A new public name is added here and above.
@@ -97,6 +98,7 @@ _HOME: Final = {
         "Animation Bend Boolean Camera Chain Color Displace Elements Flip Grayscale Ground Group Hue Light "
         "Link Material Matrix Object Rotate Scale Scene Shear Translate Twirl Twist load_elements"
     ),
+    "scenelang.sweep.api": "render_many",
     "scenelang.viewer.export": "export",
 }
 _MODULE: Final = {name: module for module, names in _HOME.items() for name in names.split()}

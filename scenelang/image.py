@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,28 +94,30 @@ def output_file(path: Path, name: Output) -> Path:
     return path if suffix == ".exr" else path.with_name(f"{path.stem}.{name}{path.suffix}")
 
 
-def save_outputs(
-    image: Image, outputs: Outputs, path: Path, write: Callable[[Path, bytes], None] = write_output
-) -> list[Path]:
-    """Write a picture and its outputs, each file whole or not at all; the files of the outputs.
+def packed(image: Image, outputs: Outputs, path: Path) -> dict[Path, bytes]:
+    """What the files of a picture and of its outputs hold, the picture's first.
 
-    Args:
-        write: the picture; `write_whole` where no user wrote its name.
+    Raises:
+        ValueError: their format cannot hold them.
+    """
+    files = [output_file(path, name) for name in outputs.names]
+    if path in files:
+        facts = [outputs.facts(name) for name in outputs.names]
+        return {path: exr({**image.layers(), **outputs.layers()}, facts)}
+    pictures = {file: outputs.png(name) for file, name in zip(files, outputs.names, strict=True)}
+    return {path: image.encode(image_format(path)), **pictures}
+
+
+def save_outputs(image: Image, outputs: Outputs, path: Path) -> list[Path]:
+    """Write a picture and its outputs, each file whole or not at all; the files of the outputs.
 
     Raises:
         ValueError: their format cannot hold them.
         OSError: a file cannot be written.
     """
-    files = [output_file(path, name) for name in outputs.names]
-    if path in files:
-        facts = [outputs.facts(name) for name in outputs.names]
-        write(path, exr({**image.layers(), **outputs.layers()}, facts))
-        return files
-    pictures = [outputs.png(name) for name in outputs.names]
-    write(path, image.encode(image_format(path)))
-    for file, data in zip(files, pictures, strict=True):
-        write_whole(file, data)
-    return files
+    for file, data in packed(image, outputs, path).items():
+        (write_output if file == path else write_whole)(file, data)
+    return [output_file(path, name) for name in outputs.names]
 
 
 def image_format(path: str | os.PathLike[str]) -> str:

@@ -87,6 +87,7 @@ def animate(
     device: Device = "auto",
     threads: int | None = None,
     jobs: int | None = None,
+    cluster: str | None = None,
     palette: Palette = "auto",
     dither: bool = False,
     progress: Callable[[Progress], None] = lambda _: None,
@@ -99,6 +100,7 @@ def animate(
             pictures (``frame-%04d.png``), or a folder that ends in a slash or is there.
         frames, fps, size, params, model, root, backend, device, threads: as for `render_frames`.
         jobs: processes that draw; by default this one, and others where they pay.
+        cluster: address of a dask scheduler whose workers draw, or ``"local"``; needs the extra ``dask``.
         palette: of a GIF: ``"global"``, ``"frame"``, or the one that is exact if one is (``"auto"``).
         dither: dither what a GIF's palette lacks.
         progress: called with how far it is, from any thread.
@@ -117,7 +119,14 @@ def animate(
         _ = clip.animation  # what is wrong with it is said before anything is drawn
     painter = Painter(clip, backend, device, threads)
     return make(
-        painter, target, _numbers(clip, frames), jobs=jobs, palette=palette, dither=dither, progress=progress
+        painter,
+        target,
+        _numbers(clip, frames),
+        jobs=jobs,
+        cluster=cluster,
+        palette=palette,
+        dither=dither,
+        progress=progress,
     )
 
 

@@ -83,7 +83,7 @@ class Clip:
 
     def __init__(
         self,
-        source: SourceFile | tuple[Scene, ...],
+        source: SourceFile | tuple[Scene, ...] | Evaluation,
         *,
         path: Path | None = None,
         diagnostics: Diagnostics | None = None,
@@ -98,7 +98,9 @@ class Clip:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
         self.model, self.size, self.reuse = model, size, reuse
         self._evaluation: Evaluation | Given = (
-            Given(source, fps)
+            source
+            if isinstance(source, Evaluation)
+            else Given(source, fps)
             if isinstance(source, tuple)
             else Evaluation(
                 parse(source, self.diagnostics),
@@ -126,6 +128,12 @@ class Clip:
     def animates(self) -> bool:
         """Whether the scene has ``animate(…)``."""
         return self._evaluation.animates
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """What its files hold."""
+        given = self._evaluation
+        return () if isinstance(given, Given) else tuple(source.text for source in given.sources)
 
     @property
     def animation(self) -> Animation:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from scenelang.animation.clip import Clip, Shot
 from scenelang.animation.store import frame_key
@@ -15,7 +16,7 @@ from scenelang.animation.store import frame_key
 if TYPE_CHECKING:
     from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
-    from scenelang.outputs import Output, Outputs
+    from scenelang.outputs import Output
     from scenelang.program.program import Program
     from scenelang.renderers.draw import Kept
 
@@ -45,13 +46,26 @@ class Painter:
     threads: int | None = None  # tiles drawn at the same time; by default as for `scenelang.render`
     # the picture before, of which what is the same is taken over
     kept: Kept | None = field(default=None, repr=False)
+    outputs: tuple[Output, ...] = ()  # beside each picture
+    single: bool = False  # draw each as it is drawn by itself: small ones by numpy
     load_s: float = 0.0  # what loading torch took
 
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
-        """Compile a frame and say what its picture depends on; raises as `Clip.program`, or `RenderError`.
+        """Compile a frame and say what its files depend on; raises as `Clip.program`, or `RenderError`.
 
         Torch draws animations; numpy draws solids, and a small picture by itself (``single``).
         """
+        found = self._picture(shot, single or self.single)
+        if not self.outputs:
+            return found
+        # they tell of each object which it is and where it was written
+        program = found.program
+        places: tuple[object, ...] = (self.clip.texts,)
+        if program is not None:
+            places = program.numbers, program.objects, program.places
+        return replace(found, key=frame_key(found.key, self.outputs, *places))
+
+    def _picture(self, shot: Shot, single: bool) -> Drawable:
         if self.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})
             key = frame_key("reference", _version("scenelang"), self.clip.model, scene.to_json())
@@ -112,13 +126,40 @@ class Painter:
         coarse = replace(program, canvas=(-(-width // DRAFT), -(-height // DRAFT)))
         return enlarged(draw_small(coarse, samples="one", threads=self.threads).image, program.canvas)
 
-    def outputs(self, frame: Drawable, wanted: Sequence[Output]) -> Outputs:
-        """What is known of a frame beside its picture; raises as `scenelang.render_outputs`."""
+    def files(self, frame: Drawable, file: Path, progress: Progress | None = None) -> dict[Path, bytes]:
+        """What the picture's file holds and those of its outputs; raises as `scenelang.render_outputs`."""
         from scenelang.backend.outputs import exact_outputs, neural_outputs
+        from scenelang.image import packed
+        from scenelang.outputs import Outputs
 
-        if frame.program is not None:
-            return neural_outputs(frame.program, wanted, self.threads)
-        return exact_outputs(frame.shot.scene, wanted, spans=frame.shot.spans, model=self.clip.model)
+        found = Outputs()
+        if self.outputs and frame.program is not None:
+            found = neural_outputs(frame.program, self.outputs, self.threads)
+        elif self.outputs:
+            shot, model = frame.shot, self.clip.model
+            found = exact_outputs(shot.scene, self.outputs, spans=shot.spans, model=model)
+        return packed(self.draw(frame, progress), found, file)
+
+
+class Errand(NamedTuple):
+    """A frame that another process draws, by one thread; its fields are what JSON holds."""
+
+    file: str  # where its picture goes, which names the format
+    place: str | None  # torch device, or None for numpy
+    split: int  # threads that the picture is split for
+    outputs: tuple[Output, ...]  # beside it
+
+    def run(self, program: bytes, kept: Kept) -> dict[Path, bytes]:
+        """What the files of a Program's bytes hold; raises as `scenelang.render_outputs`."""
+        from scenelang.backend.outputs import neural_outputs
+        from scenelang.image import packed
+        from scenelang.outputs import Outputs
+        from scenelang.program.reading import parse_program
+
+        read = parse_program(program)
+        found = neural_outputs(read, self.outputs, 1) if self.outputs else Outputs()
+        image = paint(read, self.place, threads=1, split=self.split, kept=kept)
+        return packed(image, found, Path(self.file))
 
 
 def paint(

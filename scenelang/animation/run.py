@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 from scenelang.animation.apng import write_apng
 from scenelang.animation.gif import write_gif
-from scenelang.animation.painting import Drawable, Painter
+from scenelang.animation.painting import Drawable, Errand, Painter
 from scenelang.animation.store import Encoder, Film, Store, deliver, put_frame
 from scenelang.animation.targets import Target
 from scenelang.animation.video import find_codec, write_video
@@ -20,12 +20,16 @@ from scenelang.animation.webp import write_webp
 from scenelang.backend.options import RenderError, usable_cores
 from scenelang.diagnostics.error import SceneError
 from scenelang.files import output_place, write_whole
-from scenelang.image import save_outputs
+from scenelang.image import output_file
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
-    from scenelang.animation.workers import Workers
-    from scenelang.outputs import Output
+    from scenelang.program.program import Program
+
+Beside = Callable[[Drawable, Store], Mapping[str, bytes]]
+"""What is to lie beside a frame's picture, by suffixes; it may raise what ends the run."""
+Failed = Callable[[int, SceneError], None]
+"""Is told the number of a frame and what is wrong with it."""
 
 WORTH_S: Final = 12.0  # drawing left that repays starting other processes, each of which loads torch
 _TRIED: Final = 3  # frames drawn here before it is decided
@@ -64,6 +68,7 @@ class RenderResult:
         draw_s: time to draw, encode pictures and wait for other processes.
         encode_s: time to encode the film.
         jobs: processes that drew.
+        keys: digest of all that decides a frame, of each; empty for one that was left out.
     """
 
     files: list[Path]
@@ -74,6 +79,7 @@ class RenderResult:
     draw_s: float = 0.0
     encode_s: float = 0.0
     jobs: int = 1
+    keys: list[str] = field(default_factory=list)
 
     def lines(self) -> list[str]:
         """What there is to say about it."""
@@ -86,16 +92,39 @@ class RenderResult:
         ]
 
 
+class Helpers(Protocol):
+    """Other processes that draw frames, here or on other machines."""
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+
+    @property
+    def waiting(self) -> int:
+        """Frames that are asked for and not known to be done."""
+
+    def submit(self, program: Program, errand: Errand) -> None:
+        """Have a Program drawn to files; waits while many are under way. Raises as `take`."""
+
+    def take(self) -> None:
+        """Wait until more is done; raises the `RenderError` or `OSError` by which something failed."""
+
+    def close(self) -> None:
+        """End them, whatever they are doing."""
+
+
 def make(
     painter: Painter,
     target: Target,
     numbers: range,
     *,
     jobs: int | None = None,
+    cluster: str | None = None,
     palette: Palette = "auto",
     dither: bool = False,
     strict: bool = False,
-    outputs: Sequence[Output] = (),
+    beside: Beside | None = None,
+    failed: Failed | None = None,
     progress: Callable[[Progress], None] = lambda _: None,
 ) -> RenderResult:
     """Draw frames and write them whole: nothing is put in place before all of it is there.
@@ -105,9 +134,11 @@ def make(
 
     Args:
         jobs: processes that draw; by default this one, and others as soon as they would pay.
+        cluster: address of a dask scheduler whose workers draw instead, or ``"local"``.
         palette, dither: of a GIF, see `write_gif`.
         strict: count warnings as errors.
-        outputs: beside each of numbered pictures; such frames are drawn one by one and not kept.
+        beside: is shown each frame before it is drawn, and says what further files of a sequence hold.
+        failed: is told of a frame with errors, which is left out; by default it ends the run.
         progress: called from any thread.
 
     Raises:
@@ -116,19 +147,20 @@ def make(
         OSError: a file cannot be written.
     """
     ready(target)
-    if outputs:
-        return _with_outputs(painter, target, numbers, outputs, strict, progress)
+    if cluster is not None and painter.backend == "reference":
+        raise RenderError("a cluster draws by the network, and the reference is asked for")
     suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
     made = RenderResult([], len(numbers))
     with Store(target.work, suffix) as store:
-        keys, alpha = _drawn(painter, store, numbers, jobs, strict, progress, made)
+        run = _Run(painter, store, jobs, cluster, strict, beside, failed, progress, made)
+        run.draw(numbers)
         started = time.perf_counter()
         if target.kind == "sequence":
-            made.files = _numbered(store, target, numbers, keys)
+            made.files = _numbered(store, target, numbers, run)
         else:
             animation = painter.clip.animation
-            files = [store.file(key) for key in keys]
-            film = Film(files, animation.fps, animation.loop, painter.clip.first.scene.canvas, alpha)
+            files = [store.file(key) for key in made.keys]
+            film = Film(files, animation.fps, animation.loop, painter.clip.first.scene.canvas, run.alpha)
             part = store.folder / f"film{target.path.suffix}"
             encoders: dict[str, Encoder] = {
                 "gif": partial(write_gif, palette=palette, dither=dither),
@@ -144,113 +176,138 @@ def make(
     return made
 
 
-def _with_outputs(
-    painter: Painter,
-    target: Target,
-    numbers: range,
-    outputs: Sequence[Output],
-    strict: bool,
-    progress: Callable[[Progress], None],
-) -> RenderResult:
-    target.path.mkdir(parents=True, exist_ok=True)
-    made, started = RenderResult([], len(numbers), drawn=len(numbers)), time.perf_counter()
-    for index, number in enumerate(numbers):
-        frame, file = painter.prepare(painter.clip.shot(number)), target.file(number)
-        if strict and painter.clip.diagnostics.items:
-            raise SceneError(painter.clip.diagnostics)
-        found = painter.outputs(frame, outputs)
-        image = painter.draw(frame, partial(_part, progress, index, len(numbers)))
-        made.files += sorted({file, *save_outputs(image, found, file, write_whole)})
-    made.draw_s = time.perf_counter() - started
-    return made
+@dataclass(slots=True)
+class _Run:
+    """Frames on their way into a store."""
 
+    painter: Painter
+    store: Store
+    jobs: int | None
+    cluster: str | None
+    strict: bool
+    beside: Beside | None
+    failed: Failed | None
+    progress: Callable[[Progress], None]
+    made: RenderResult
+    alpha: bool = False  # whether any frame has
+    suffixes: tuple[str, ...] = ()  # of files beside each picture, by its number
+    others: Helpers | None = None  # who draws besides this process
+    spent_s: float = 0.0  # drawing here
 
-def _drawn(
-    painter: Painter,
-    store: Store,
-    numbers: range,
-    jobs: int | None,
-    strict: bool,
-    progress: Callable[[Progress], None],
-    made: RenderResult,
-) -> tuple[list[str], bool]:
-    """Have every frame in the store; the key of each, and whether any has alpha."""
-    keys: list[str] = []
-    asked: set[str] = set()
-    alpha = False
-    workers: Workers | None = None
-    spent_s = 0.0
-    try:
-        for index, number in enumerate(numbers):
-            started = time.perf_counter() - painter.load_s  # loading torch is not part of a frame
-            frame = painter.prepare(painter.clip.shot(number))
-            if strict and painter.clip.diagnostics.items:
-                raise SceneError(painter.clip.diagnostics)
-            made.compile_s += time.perf_counter() - painter.load_s - started
-            keys.append(frame.key)
-            alpha |= frame.shot.scene.background is None
-            started = time.perf_counter()
-            if frame.key not in asked:
-                asked.add(frame.key)
-                if store.has(frame.key, frame.shot.scene.canvas):
-                    made.resumed += 1
-                else:
-                    if workers is None:
-                        workers = _helpers(painter, frame, jobs, made.drawn, spent_s, len(numbers) - index)
-                    if workers is not None and frame.program is not None:
-                        workers.submit(frame.program, store.file(frame.key), None if frame.small else "cpu")
+    def draw(self, numbers: range) -> None:
+        """Have every frame in the store, and the key of each in the result."""
+        made, total = self.made, len(numbers)
+        asked: set[str] = set()
+        try:
+            for index, number in enumerate(numbers):
+                frame = self._prepared(number)
+                made.keys.append(frame.key if frame else "")
+                if frame is not None and frame.key not in asked:
+                    asked.add(frame.key)
+                    started = time.perf_counter()
+                    if self.store.has(frame.key, frame.shot.scene.canvas):
+                        made.resumed += 1
                     else:
-                        say = partial(_part, progress, index, len(numbers))
-                        put_frame(store.file(frame.key), painter.draw(frame, say))
-                        spent_s += time.perf_counter() - started
-                    made.drawn += 1
-            made.draw_s += time.perf_counter() - started
-            progress(Progress("drawing", index + 1 - (workers.waiting if workers else 0), len(numbers)))
-        if workers is not None:
-            made.jobs = workers.count
+                        self._one(frame, index, total)
+                    made.draw_s += time.perf_counter() - started
+                self._say(index + 1, total)
             started = time.perf_counter()
-            while workers.waiting:
-                workers.take()
-                progress(Progress("drawing", len(numbers) - workers.waiting, len(numbers)))
+            if self.others is not None:
+                made.jobs = self.others.count
+                while self.others.waiting:
+                    self.others.take()
+                    self._say(total, total)
             made.draw_s += time.perf_counter() - started
-    finally:
-        if workers is not None:
-            workers.close()
-    return keys, alpha
+        finally:
+            if self.others is not None:
+                self.others.close()
+
+    def _prepared(self, number: int) -> Drawable | None:
+        """A frame, compiled; None of one with errors that is left out."""
+        painter = self.painter
+        started = time.perf_counter() - painter.load_s  # loading torch is not part of a frame
+        try:
+            frame = painter.prepare(painter.clip.shot(number))
+            if self.strict and painter.clip.diagnostics.items:
+                raise SceneError(painter.clip.diagnostics)
+        except SceneError as error:
+            if self.failed is None:
+                raise
+            self.failed(number, error)
+            return None
+        self.made.compile_s += time.perf_counter() - painter.load_s - started
+        self.alpha |= frame.shot.scene.background is None
+        if self.beside is not None:
+            files = self.beside(frame, self.store)
+            self.suffixes = tuple(files)
+            for suffix, data in files.items():
+                write_whole(self.store.beside(frame.key, number, suffix), data)
+        return frame
+
+    def _one(self, frame: Drawable, index: int, total: int) -> None:
+        """Draw a frame here, or have it drawn."""
+        painter, file, started = self.painter, self.store.file(frame.key), time.perf_counter()
+        if self.others is None:
+            self.others = self._helpers(frame, total - index)
+        if self.others is not None and frame.program is not None:
+            place = None if frame.small else painter.place
+            errand = Errand(str(file), place, painter.split(frame.program), painter.outputs)
+            self.others.submit(frame.program, errand)
+        else:
+            share = partial(_part, self.progress, index, total)
+            put_frame(painter.files(frame, file, share))
+            self.spent_s += time.perf_counter() - started
+        self.made.drawn += 1
+
+    def _helpers(self, frame: Drawable, left: int) -> Helpers | None:
+        """Who draws from here on: a cluster that is named, or other processes, if they pay."""
+        if self.cluster is not None:
+            from scenelang.animation.cluster import Cluster
+
+            return Cluster(self.cluster)
+        painter, jobs = self.painter, self.jobs
+        if frame.program is None or jobs == 1 or not (frame.small or painter.place == "cpu"):
+            return None
+        from scenelang.animation.workers import Workers
+
+        if jobs is None:
+            drawn = self.made.drawn
+            if painter.threads is not None or usable_cores() < 2 or drawn < _TRIED:
+                return None
+            if self.spent_s / drawn * left <= WORTH_S:
+                return None
+        return Workers(jobs or usable_cores())
+
+    def _say(self, done: int, total: int) -> None:
+        waiting = self.others.waiting if self.others is not None else 0
+        self.progress(Progress("drawing", done - waiting, total))
 
 
 def _part(progress: Callable[[Progress], None], index: int, total: int, share: float) -> None:
     progress(Progress("drawing", index + share, total))
 
 
-def _helpers(
-    painter: Painter, frame: Drawable, jobs: int | None, drawn: int, spent_s: float, left: int
-) -> Workers | None:
-    """Other processes to draw in from here on, if they pay."""
-    if frame.program is None or jobs == 1 or not (frame.small or painter.place == "cpu"):
-        return None
-    from scenelang.animation.workers import Workers
-
-    if jobs is None:
-        if painter.threads is not None or usable_cores() < 2 or drawn < _TRIED:
-            return None
-        if spent_s / drawn * left <= WORTH_S:
-            return None
-    return Workers(jobs or usable_cores(), painter.split(frame.program))
-
-
-def _numbered(store: Store, target: Target, numbers: range, keys: Sequence[str]) -> list[Path]:
-    """Move frames to where they belong; of equal ones all but the last are copies."""
+def _numbered(store: Store, target: Target, numbers: range, run: _Run) -> list[Path]:
+    """Move the files of frames to where they belong; of equal ones all but the last are copies."""
     target.path.mkdir(parents=True, exist_ok=True)
+    keys = run.made.keys
     last = {key: index for index, key in enumerate(keys)}
-    files = []
+    files: list[Path] = []
     for index, (number, key) in enumerate(zip(numbers, keys, strict=True)):
-        file = target.file(number)
-        if last[key] == index:
-            os.replace(store.file(key), file)
-        else:
-            write_whole(file, store.file(key).read_bytes())
-        files.append(file)
+        if not key:
+            continue
+        file, kept = target.file(number), store.file(key)
+        pairs = {output_file(file, name): output_file(kept, name) for name in run.painter.outputs}
+        pairs[file] = kept
+        for name, frame in pairs.items():
+            if last[key] == index:
+                os.replace(frame, name)
+            else:
+                write_whole(name, frame.read_bytes())
+        for suffix in run.suffixes:
+            pairs[file.with_suffix(suffix)] = file
+            os.replace(store.beside(key, number, suffix), file.with_suffix(suffix))
+        files += sorted(pairs)
     return files
 
 

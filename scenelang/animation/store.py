@@ -11,7 +11,7 @@ import contextlib
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -23,11 +23,11 @@ from PIL import Image as pillow
 from scenelang.animation.timing import runs
 from scenelang.backend.options import RenderError
 from scenelang.files import lock, open_own, output_place, write_whole
-from scenelang.image import Image, image_format
+from scenelang.image import image_format
 
 _LOCK: Final = "lock"
-_FRAME: Final = re.compile(r"[0-9a-f]{40}\.\w+")
-_PASSING: Final = re.compile(r"film\.\w+|\.[0-9a-f]{40}\.\w+\.[0-9a-z]+\.part")
+_FRAME: Final = re.compile(r"[0-9a-f]{40}(\.\w+){1,3}")
+_PASSING: Final = re.compile(r"film\.\w+|\.[0-9a-f]{40}(\.\w+){1,3}\.[0-9a-z]+\.part")
 """What was half-written when a run was killed."""
 Pixels = npt.NDArray[np.uint8]
 Box = tuple[int, int, int, int]
@@ -80,6 +80,18 @@ class Store:
         """Where the frame of a key lies, or will lie."""
         return self.folder / f"{key}{self.suffix}"
 
+    def beside(self, key: str, number: int, suffix: str) -> Path:
+        """Where a file beside the frame of a key lies, of one number."""
+        return self.folder / f"{key}.{number}{suffix}"
+
+    def adopt(self, frame: Path, file: Path) -> None:
+        """Take a file that lies elsewhere, and stays there, for one of a frame."""
+        if not frame.exists() and not file.is_symlink():
+            try:
+                os.link(file, frame)
+            except OSError:  # the file system has no such links
+                write_whole(frame, file.read_bytes())
+
     def has(self, key: str, size: tuple[int, int]) -> bool:
         """Whether a frame is there, whole and of a size (width, height)."""
         file = self.file(key)
@@ -108,9 +120,10 @@ class Store:
         return []
 
 
-def put_frame(file: Path, image: Image) -> None:
-    """Write a picture in the format that its file's suffix names; a link in its place is replaced."""
-    write_whole(file, image.encode(image_format(file)))
+def put_frame(files: Mapping[Path, bytes]) -> None:
+    """Write the files of a frame, the first last: where that one is, the others are; links are replaced."""
+    for file, data in reversed(files.items()):
+        write_whole(file, data)
 
 
 def deliver(part: Path, target: Path) -> None:

@@ -34,6 +34,13 @@ class Target:
         filled = [_NUMBER.sub(lambda found: f"{frame:{found[1] or 'd'}}", part) for part in parts]
         return self.path / "%".join(filled)
 
+    def there(self) -> list[Path]:
+        """Files of a sequence, of any number, that are there."""
+        number = 1_234_567_890
+        head, tail = self.file(number).name.split(str(number))
+        named = re.compile(rf"{re.escape(head)}\d+{re.escape(tail)}")
+        return [path for path in self.path.iterdir() if named.fullmatch(path.name)]
+
     @property
     def work(self) -> Path:
         """The folder beside it where frames are kept while it is made."""

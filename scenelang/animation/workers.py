@@ -13,25 +13,23 @@ import subprocess
 import sys
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
-from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from scenelang.animation.painting import paint
+from scenelang.animation.painting import Errand
 from scenelang.animation.store import put_frame
 from scenelang.backend.options import RenderError
 from scenelang.program.program import Program, program_bytes
-from scenelang.program.reading import parse_program
 from scenelang.renderers.draw import Kept
 
 AHEAD = 2  # frames that wait for each process, so that none is idle and few are held
 
 
 class Workers:
-    """Processes that draw Programs into files, each with one thread and the pixels of ``split`` threads."""
+    """Processes that draw Programs into files, each with one thread."""
 
-    def __init__(self, count: int, split: int) -> None:
-        self.count, self.split = count, split
+    def __init__(self, count: int) -> None:
+        self.count = count
         self._free: SimpleQueue[subprocess.Popen[bytes]] = SimpleQueue()
         # in sessions of their own: Ctrl-C reaches this process alone, which ends the others
         command, pipe = [sys.executable, "-m", "scenelang.animation.workers"], subprocess.PIPE
@@ -50,23 +48,22 @@ class Workers:
             self.take()
         return len(self._waiting)
 
-    def submit(self, program: Program, file: Path, place: str | None) -> None:
-        """Have a Program drawn to a picture file; waits while many are under way. Raises as `take`."""
+    def submit(self, program: Program, errand: Errand) -> None:
+        """Have a Program drawn to files; waits while many are under way. Raises as `take`."""
         while len(self._waiting) >= AHEAD * self.count:
             self.take()
-        self._waiting.append(self._pool.submit(self._draw, program_bytes(program), file, place))
+        self._waiting.append(self._pool.submit(self._draw, program_bytes(program), errand))
 
     def take(self) -> None:
         """Wait for the first of those asked for; raises the `RenderError` or `OSError` by which it failed."""
         self._waiting.popleft().result()
 
-    def _draw(self, program: bytes, file: Path, place: str | None) -> None:
+    def _draw(self, program: bytes, errand: Errand) -> None:
         process = self._free.get()
         try:
             assert process.stdin is not None
             assert process.stdout is not None
-            head = {"file": str(file.absolute()), "split": self.split, "place": place}
-            head["bytes"] = len(program)
+            head = {"errand": errand._replace(file=os.path.abspath(errand.file)), "bytes": len(program)}
             try:
                 process.stdin.write(json.dumps(head).encode() + b"\n" + program)
                 process.stdin.flush()
@@ -113,15 +110,14 @@ def main() -> None:
             os._exit(0)
 
 
-def _answer(head: dict[str, Any], data: bytes, kept: Kept) -> dict[str, Any]:
-    file = Path(head["file"])
+def _answer(head: dict[str, Any], program: bytes, kept: Kept) -> dict[str, Any]:
+    errand = Errand(*head["errand"])
     try:
-        program, place = parse_program(data), head["place"]
-        put_frame(file, paint(program, place, threads=1, split=head["split"], kept=kept))
+        put_frame(errand.run(program, kept))
     except RenderError as error:
         return {"error": str(error)}
     except OSError as error:
-        return {"error": error.strerror or str(error), "errno": error.errno or 5, "file": str(file)}
+        return {"error": error.strerror or str(error), "errno": error.errno or 5, "file": errand.file}
     return {}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from contextlib import suppress
 from dataclasses import dataclass
@@ -39,6 +38,7 @@ class Requested:
     range: str | None  # `--frames`; None for all
     fps: float | None  # frames a second instead of the scene's
     jobs: int | None = None  # processes that draw
+    cluster: str | None = None  # whose workers draw
     # of a GIF
     palette: Palette = "auto"
     dither: bool = False
@@ -152,7 +152,7 @@ def animate(name: str, out: str, target: Target, request: Request, wanted: Reque
         raise click.UsageError(f"{what}.")
     check_outputs([target.file(number) for number in numbers], wanted.outputs)
     ready(target)
-    painter = Painter(clip, wanted.backend, wanted.device, wanted.threads)
+    painter = Painter(clip, wanted.backend, wanted.device, wanted.threads, outputs=wanted.outputs)
     try:
         with Bar() as bar:
             made = make(
@@ -160,10 +160,10 @@ def animate(name: str, out: str, target: Target, request: Request, wanted: Reque
                 target,
                 numbers,
                 jobs=wanted.jobs,
+                cluster=wanted.cluster,
                 palette=wanted.palette,
                 dither=wanted.dither,
                 strict=wanted.strict,
-                outputs=wanted.outputs,
                 progress=lambda now: bar(now.told, now.done, now.total),
             )
     except SceneError:
@@ -202,10 +202,7 @@ def strays(target: Target, made: RenderResult) -> str | None:
     """A line about files of a sequence that this run did not write."""
     if target.kind != "sequence":
         return None
-    number = 1_234_567_890
-    head, tail = target.file(number).name.split(str(number))
-    named = re.compile(rf"{re.escape(head)}\d+{re.escape(tail)}")
-    others = {path.name for path in target.path.iterdir() if named.fullmatch(path.name)}
+    others = {path.name for path in target.there()}
     others -= {file.name for file in made.files}
     if not others:
         return None

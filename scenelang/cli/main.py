@@ -20,6 +20,7 @@ from scenelang.files import NotWritten, inputs_kept
 # of a Python keyword ends in an underscore, and a dash is one.
 COMMANDS: Final = {
     "render": "Draw scenes or compiled programs.",
+    "sweep": "Draw a scene with many values of its params.",
     "play": "Edit scenes in a browser and see them.",
     "export": "Write scenes as web pages that draw themselves.",
     "watch": "Draw a scene again whenever it is saved.",

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from scenelang.evaluate.session import Defines
 
 Backend = Literal["neural", "reference"]
+Device = Literal["auto", "cpu", "cuda"]
 Color = Literal["auto", "always", "never"]
 
 
@@ -115,6 +116,17 @@ device = choice(
     help="Where torch draws; auto is CUDA where there is any, and numpy for solids or a small picture.",
 )
 threads = click.option("--threads", type=click.IntRange(1), metavar="N", help="Threads on the CPU.")
+jobs = click.option(
+    "--jobs",
+    type=click.IntRange(1, 256),
+    metavar="N",
+    help="Processes that draw frames; by default one, and more where that is faster.",
+)
+cluster = click.option(
+    "--cluster",
+    metavar="ADDRESS",
+    help="Draw frames on the workers of a dask scheduler, or of this machine alone (local).",
+)
 verbose = click.option("-v", "--verbose", is_flag=True, help="Say what was compiled and where the time went.")
 
 

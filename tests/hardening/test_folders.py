@@ -67,7 +67,7 @@ def test_a_kept_frame_that_is_a_link(tmp_path: Path, outside: Path) -> None:
     key = "a" * 40
     with Store(tmp_path / "work") as store:
         store.file(key).symlink_to(outside / f"{key}.png")
-        put_frame(store.file(key), np.zeros((2, 3, 3), np.float32).view(Image))
+        put_frame({store.file(key): np.zeros((2, 3, 3), np.float32).view(Image).encode()})
         assert store.has(key, (3, 2))
     assert unharmed(outside)
 

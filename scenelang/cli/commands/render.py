@@ -36,12 +36,8 @@ if TYPE_CHECKING:
 @options.still
 @options.frames
 @options.fps
-@click.option(
-    "--jobs",
-    type=click.IntRange(1, 256),
-    metavar="N",
-    help="Processes that draw frames; by default one, and more where that is faster.",
-)
+@options.jobs
+@options.cluster
 @options.choice(
     "--palette", words="auto global frame", help="Colours of a GIF: 255 for all frames or for each."
 )
@@ -93,6 +89,7 @@ def command(
     frames: str | None,
     fps: float | None,
     jobs: int | None,
+    cluster: str | None,
     palette: Literal["auto", "global", "frame"],
     dither: bool,
     model: str | None,
@@ -143,7 +140,9 @@ def command(
     outputs = tuple(dict.fromkeys(outputs))
     prove = prove or redraw or "proof" in outputs
     clock = Clock()
-    wanted = Requested(frames, fps, jobs, palette, dither, backend, device, threads, strict, verbose, outputs)
+    wanted = Requested(
+        frames, fps, jobs, cluster, palette, dither, backend, device, threads, strict, verbose, outputs
+    )
     _ = wanted.frames
     if frame is not None and wanted.certain:
         raise click.UsageError("--frame asks for a picture, --frames and --fps for an animation.")

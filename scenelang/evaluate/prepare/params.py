@@ -45,9 +45,9 @@ def prepare_param(stmt: nodes.Param, place: Place) -> Action | None:
         return None
     full = file.prefix + name.text
     file.defines.known[full] = name.span
-    given = file.defines.values.get(full, VARIES)
 
     def action(env: Env, out: Builder) -> None:
+        given = file.defines.values.get(full, VARIES)  # which another run may change
         value = default.run(env)
         allowed = bounds.run(env) if bounds is not None else None
         if value is not POISON:

@@ -1,0 +1,154 @@
+"""``scenelang sweep``: one scene with many values of its params."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scenelang.cli import options
+from scenelang.cli.main import Trouble
+from scenelang.cli.progress import Bar
+from scenelang.cli.say import say_diagnostics
+
+if TYPE_CHECKING:
+    from scenelang.evaluate.session import Defines
+    from scenelang.sweep.api import Kind, Sweep
+
+BESIDE = ("depth", "normal", "object", "alpha", "scene", "program")
+
+
+def _grid(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
+    """NAME=VALUES, or NAME alone; several times."""
+    found: dict[str, str] = {}
+    for text in given:
+        name, _, values = (part.strip() for part in text.partition("="))
+        if not re.fullmatch(r"[A-Za-z_]\w*", name):
+            raise click.BadParameter(f"`{text}` is not NAME=VALUES", ctx, param)
+        if name in found:
+            raise click.BadParameter(f"`{name}` is given twice", ctx, param)
+        found[name] = values
+    return found
+
+
+def _random(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
+    """NAME or NAME=A..B, several times or between commas."""
+    return _grid(ctx, param, tuple(part for text in given for part in text.split(",") if part.strip()))
+
+
+@click.command("sweep")
+@click.argument("scene", metavar="SCENE", type=click.Path(path_type=Path))
+@click.option("-o", "--out", required=True, metavar="OUT", help="A folder, or pictures such as out/%05d.png.")
+@click.option(
+    "--grid",
+    multiple=True,
+    metavar="NAME=VALUES",
+    callback=_grid,
+    help="Values of a param: k=0..1/10 for ten, k=0.1,0.5, k=0..1 step 0.25, k=../5 of its own range, "
+    "or k alone for each choice. Of several all combinations are drawn.",
+)
+@click.option(
+    "--random",
+    multiple=True,
+    metavar="NAME,…",
+    callback=_random,
+    help="Draw these from their ranges; NAME=A..B from another.",
+)
+@click.option("--count", type=click.IntRange(1), metavar="N", help="Pictures; by default the grid once.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of what is drawn.")
+@click.option(
+    "--output",
+    "outputs",
+    multiple=True,
+    type=click.Choice(BESIDE),
+    help="Write this beside each picture too; may be given several times.",
+)
+@click.option("--sheet", metavar="FILE", help="A picture of all pictures, small.")
+@click.option("--table", metavar="FILE", help="A copy of the table, .csv or .parquet.")
+@options.define
+@options.size
+@options.frame
+@options.model
+@options.backend
+@options.device
+@options.threads
+@options.jobs
+@options.cluster
+@options.root
+@options.verbose
+@click.pass_context
+def command(
+    ctx: click.Context,
+    scene: Path,
+    out: str,
+    grid: dict[str, str],
+    random: dict[str, str],
+    count: int | None,
+    seed: int,
+    outputs: tuple[Kind, ...],
+    sheet: str | None,
+    table: str | None,
+    defines: Defines,
+    size: tuple[int, int] | None,
+    frame: int,
+    model: str | None,
+    backend: options.Backend,
+    device: options.Device,
+    threads: int | None,
+    jobs: int | None,
+    cluster: str | None,
+    root: str | None,
+    verbose: bool,
+) -> None:
+    """Draw SCENE with many values of its params.
+
+    OUT gets a picture for each row of values, STEM-000000.png and so on, and STEM.csv, a table of pictures
+    and values. Rows whose values give no scene have no picture; the table says why, and the exit code is 1.
+    A run that was interrupted goes on where it stopped, and one with a larger --count adds to what is there.
+    """
+    from scenelang.animation.targets import TargetError
+    from scenelang.diagnostics.error import SceneError
+    from scenelang.evaluate.ranges import ParamError
+    from scenelang.sweep.api import render_many
+
+    started = time.perf_counter()
+    try:
+        with Bar() as bar:
+            made = render_many(
+                scene, out, grid=grid, random=random, count=count, seed=seed, params=defines.values,
+                outputs=outputs, table=table, sheet=sheet, frame=frame, size=size, model=model, root=root,
+                backend=backend, device=device, threads=threads, jobs=jobs, cluster=cluster,
+                progress=lambda now: bar(now.told, now.done, now.total),
+            )  # fmt: skip
+    except (ParamError, TargetError) as error:
+        raise click.UsageError(f"{error}.") from None
+    except SceneError as error:
+        say_diagnostics(error.diagnostics)
+        ctx.exit(1)
+    except ValueError as error:  # of another sweep, or a format that cannot be written
+        raise Trouble(str(error)) from None
+    _say(made, time.perf_counter() - started)
+    for line in made.made.lines() if verbose else ():
+        click.echo(f"  {line}", err=True)
+    ctx.exit(1 if made.errors else 0)
+
+
+def _say(sweep: Sweep, seconds: float) -> None:
+    """What came of it."""
+    say_diagnostics(sweep.warnings)
+    for number, errors in sweep.failed.items():
+        values = zip(sweep.names, sweep.lines[number].values, strict=True)
+        click.echo(f"row {number}: {', '.join(f'{name}={value}' for name, value in values)}", err=True)
+        say_diagnostics(errors)
+    made = sweep.made
+    parts = [f"{len(sweep.lines) - sweep.errors:,} pictures"]
+    if sweep.errors:
+        parts.append(f"{sweep.errors:,} rows whose values give no scene")
+    if made.resumed:
+        parts.append(f"{made.resumed:,} kept from a run before")
+    if same := made.frames - sweep.errors - made.drawn - made.resumed:
+        parts.append(f"{same:,} the same as others")
+    click.echo(f"{sweep.table}: {', '.join(parts)}, {seconds:.1f} s", err=True)

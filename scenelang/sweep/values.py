@@ -1,0 +1,234 @@
+"""Which values params take: all of a grid, and others at random, as text of the language.
+
+A row is made when it is asked for, from its number alone, so that a longer sweep begins with the rows of a
+shorter one, and a further random param leaves the others as they are.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from numbers import Real
+from typing import Any, Final
+
+from scenelang.evaluate.evaluation import Evaluation
+from scenelang.evaluate.prepare.params import literal
+from scenelang.evaluate.ranges import Axis, Knob, ParamError, knob_of, param_named, value_at, written
+from scenelang.evaluate.values.value import UNITS, RangeValue, Vec, pack, unpack
+from scenelang.records import Record
+from scenelang.scene.text import number
+from scenelang.syntax import nodes
+
+MOST_ROWS: Final = 1_000_000
+_DIGITS: Final = 6  # of a range's width, decimal places of random values and of those of a grid
+_RANGE: Final = re.compile(r"(.*?)\.\.(<?)(.*?)(?:/\s*(\d{1,7})|\s+step\s+(.+))?", re.DOTALL)
+
+
+class Rows(Record):
+    """Values of params, a row for each picture.
+
+    Args:
+        grid: texts of each param of the grid; the last one changes fastest.
+        random: params that are drawn.
+        count: how many rows; the grid is gone through again and again.
+        seed: of what is drawn.
+        given: rows as they are, instead of all this.
+    """
+
+    grid: Mapping[str, tuple[str, ...]]
+    random: tuple[Knob, ...] = ()
+    count: int = 0
+    seed: int = 0
+    given: Sequence[Mapping[str, str]] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the params, in the order of columns."""
+        if self.given:
+            return tuple(dict.fromkeys(name for row in self.given for name in row))
+        return (*self.grid, *(knob.name for knob in self.random))
+
+    def __len__(self) -> int:
+        return len(self.given) or self.count
+
+    def __getitem__(self, index: int) -> Mapping[str, str]:
+        if self.given:
+            return self.given[index]
+        found, rest = {}, index
+        for name, texts in reversed(self.grid.items()):
+            rest, at = divmod(rest, len(texts))
+            found[name] = texts[at]
+        found = dict(reversed(found.items()))
+        for knob in self.random:
+            items = tuple(self._drawn(knob, axis, index) for axis in knob.axes)
+            found[knob.name] = _text(knob, Vec(items) if knob.inner else items[0])
+        return found
+
+    def __iter__(self) -> Iterator[Mapping[str, str]]:
+        return map(self.__getitem__, range(len(self)))
+
+    def _drawn(self, knob: Knob, axis: Axis, index: int) -> Any:
+        share = random.Random(f"{self.seed}/{axis.label}/{index}").random()
+        place = int(share * len(axis.choices)) if axis.choices else share
+        return value_at(axis, place, knob.value)
+
+
+def rows_of(
+    evaluation: Evaluation,
+    grid: Mapping[str, str | Iterable[Any]],
+    drawn: Mapping[str, str],
+    count: int | None = None,
+    seed: int = 0,
+) -> Rows:
+    """The rows that are asked for.
+
+    Args:
+        evaluation: of the scene, after a run.
+        grid: for each param values, or text: values between commas, ranges among them, as `values_of` says.
+        drawn: params that are drawn, each with a range, or empty text for its own.
+        count: how many; by default each of the grid once.
+
+    Raises:
+        ParamError: there is no such param, or no such values of it; or there are none or too many.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    for name, asked in grid.items():
+        stmt = param_named(evaluation, name)
+        texts = values_of(evaluation, stmt, asked) if isinstance(asked, str) else map(text_of, asked)
+        found[name] = tuple(texts)
+        if not found[name]:
+            raise ParamError(f"no values for `{name}`")
+    for name in drawn:
+        if name in found:
+            raise ParamError(f"param `{name}` both in the grid and drawn at random")
+    knobs = tuple(_narrowed(evaluation, param_named(evaluation, name), text) for name, text in drawn.items())
+    cells = math.prod(map(len, found.values()))
+    if not found and not knobs:
+        raise ParamError("no param to change")
+    if count is None and not found:
+        raise ParamError("a count is needed where all values are drawn at random")
+    total = cells if count is None else count
+    if found and total < cells:
+        raise ParamError(f"{total:,} pictures, where the grid has {cells:,}")
+    if total > cells and not knobs:
+        raise ParamError(f"{total:,} pictures, where the grid has {cells:,} and nothing is drawn at random")
+    if not 0 < total <= MOST_ROWS:
+        raise ParamError(f"{total:,} pictures, where 1 to {MOST_ROWS:,} can be made")
+    return Rows(found, knobs, total, seed)
+
+
+def values_of(evaluation: Evaluation, stmt: nodes.Param, text: str) -> Iterator[str]:
+    """Texts of the values that ``text`` asks for.
+
+    It has values between commas. ``a..b/n`` are n from a to b, ``a..<b/n`` n without b, ``a..b step c`` and
+    ``a..b`` what the language means by them; ends that are left out are those of the param's range. No text
+    asks for every choice, or step, of the param.
+    """
+    words = _default(evaluation, stmt).__class__ is str
+    for item in _items(text):
+        found = None if words else _RANGE.fullmatch(item)
+        if found is None and item:
+            yield item
+        elif found is None or not any(found[at] for at in (1, 3, 4, 5)):
+            knob = knob_of(stmt, evaluation.context)
+            if knob.inner or not knob.axes[0].choices:
+                name = stmt.name.text
+                raise ParamError(f"param `{name}` has no list of choices: say how many, as in {name}=../10")
+            yield from (_text(knob, choice) for choice in knob.axes[0].choices)
+        else:
+            yield from _spread(evaluation, stmt, found)
+
+
+def _spread(evaluation: Evaluation, stmt: nodes.Param, found: re.Match[str]) -> Iterator[str]:
+    """The values of a range."""
+    first, without, last, parts, step = found.groups()
+    low, high, unit = _ends(evaluation, stmt, first, last)
+    knob = Knob(
+        stmt, _default(evaluation, stmt), (Axis(stmt.name.text, min(low, high), max(low, high)),), False
+    )
+    if parts is None:
+        by = 1.0 if step is None else unpack(_number(evaluation, stmt, step))[0]
+        stepped = RangeValue(low, high, bool(without), by, unit) if by else None
+        if stepped is None or stepped.count() > MOST_ROWS:
+            raise ParamError(f"more than {MOST_ROWS:,} values in `{found[0]}`")
+        values = map(stepped.at, range(stepped.count()))
+    else:
+        count = int(parts)
+        gaps = max(1, count if without else count - 1)
+        values = (low + (high - low) * at / gaps for at in range(count))
+    return (written(knob, pack(value, unit), _DIGITS) for value in values)
+
+
+def _narrowed(evaluation: Evaluation, stmt: nodes.Param, text: str) -> Knob:
+    """A param that is drawn, from its own range or from one in ``text``."""
+    if not text:
+        return knob_of(stmt, evaluation.context)
+    found = _RANGE.fullmatch(text)
+    if found is None or found[2] or found[4] or found[5]:
+        raise ParamError(f"`{text}` is not a range such as 0..1")
+    low, high = sorted(_ends(evaluation, stmt, found[1], found[3])[:2])
+    return Knob(stmt, _default(evaluation, stmt), (Axis(stmt.name.text, low, high),), False)
+
+
+def _ends(evaluation: Evaluation, stmt: nodes.Param, first: str, last: str) -> tuple[float, float, str]:
+    """Both ends of a range in base units, and their kind."""
+    like = _default(evaluation, stmt)
+    if like.__class__ not in UNITS:
+        raise ParamError(f"a range for `{stmt.name.text}`, which is not a number")
+    ends = [unpack(_number(evaluation, stmt, text))[0] if text else None for text in (first, last)]
+    if None in ends:
+        axis = knob_of(stmt, evaluation.context).axes[0]
+        low, high = axis.low, axis.high
+        if axis.choices:
+            sides = [unpack(choice)[0] for choice in axis.choices]
+            low, high = min(sides), max(sides)
+        ends = [own if end is None else end for end, own in zip(ends, (low, high), strict=True)]
+    low, high = (end for end in ends if end is not None)
+    return low, high, unpack(like)[1]
+
+
+def _number(evaluation: Evaluation, stmt: nodes.Param, text: str) -> Any:
+    """The value of a literal of the kind of a param."""
+    value, like = literal(text.strip(), evaluation.context), _default(evaluation, stmt)
+    if value.__class__ is float and (value == 0.0 or unpack(like)[1] == "time"):
+        value = pack(value, unpack(like)[1])
+    if value.__class__ is not like.__class__:
+        raise ParamError(f"`{text.strip()}` is not a value of `{stmt.name.text}`, whose default is "
+                         f"{stmt.default.span.text}")  # fmt: skip
+    return value
+
+
+def _default(evaluation: Evaluation, stmt: nodes.Param) -> Any:
+    file = evaluation.context
+    return file.env[file.scope.names[stmt.name.text].slot]
+
+
+def _text(knob: Knob, value: Any) -> str:
+    """A value as ``-D`` takes it."""
+    return value if isinstance(value, str) else written(knob, value, _DIGITS)
+
+
+def text_of(value: Any) -> str:
+    """A value of Python as ``-D`` takes it."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Real):
+        return number(float(value))
+    if isinstance(value, Iterable):
+        return f"[{', '.join(map(text_of, value))}]"
+    raise ParamError(f"{value!r} is not a value of a param")
+
+
+def _items(text: str) -> Iterator[str]:
+    """The parts between commas, those in brackets and quotes left out."""
+    depth, start, quoted = 0, 0, False
+    for at, sign in enumerate(f"{text},"):
+        quoted ^= sign == '"'
+        depth += 0 if quoted else (sign in "([") - (sign in ")]")
+        if sign == "," and depth <= 0 and not quoted:
+            yield text[start:at].strip()
+            start = at + 1
