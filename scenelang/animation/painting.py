@@ -156,6 +156,10 @@ class Errand(NamedTuple):
         from scenelang.outputs import Outputs
         from scenelang.program.reading import parse_program
 
+        if self.place is not None:
+            from scenelang.backend.neural import choose_device
+
+            choose_device(self.place)
         read = parse_program(program)
         found = neural_outputs(read, self.outputs, 1) if self.outputs else Outputs()
         image = paint(read, self.place, threads=1, split=self.split, kept=kept)

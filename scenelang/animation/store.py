@@ -122,7 +122,7 @@ class Store:
 
 def put_frame(files: Mapping[Path, bytes]) -> None:
     """Write the files of a frame, the first last: where that one is, the others are; links are replaced."""
-    for file, data in reversed(files.items()):
+    for file, data in reversed(list(files.items())):
         write_whole(file, data)
 
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from scenelang.animation.painting import Painter
 from scenelang.animation.run import Progress, RenderResult, make
@@ -16,6 +16,7 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.evaluation import Evaluation, read_scene
 from scenelang.evaluate.ranges import ParamError, param_named
 from scenelang.image import image_format
+from scenelang.outputs import Output
 from scenelang.sweep.book import TEXTS, Book
 from scenelang.sweep.sheet import write_sheet
 from scenelang.sweep.table import Line, check_table, write_table
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from scenelang.backend.options import Backend, Device
 
 Kind = Literal["depth", "normal", "object", "alpha", "scene", "program"]
+BESIDE: Final[tuple[Output, ...]] = ("depth", "normal", "object", "alpha")
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +139,8 @@ def render_many(
         if name in fixed:
             raise ParamError(f"param `{name}` with one value for all pictures, and with others")
     clip = Variants(begin, rows=rows, fixed=fixed, frame=frame, diagnostics=found, model=model, size=size)
-    pictures = tuple(name for name in dict.fromkeys(outputs) if name not in TEXTS)
-    painter = Painter(clip, backend, device, threads, outputs=pictures, single=True)
+    beside: list[Output] = [name for name in BESIDE if name in outputs]
+    painter = Painter(clip, backend, device, threads, outputs=tuple(beside), single=True)
     book = Book(target, rows, clip, painter.outputs, [name for name in TEXTS if name in outputs], stem)
     made = make(
         painter, target, range(len(rows)), jobs=jobs, cluster=cluster,

@@ -57,10 +57,10 @@ class Rows(Record):
         if self.given:
             return self.given[index]
         found, rest = {}, index
-        for name, texts in reversed(self.grid.items()):
+        for name, texts in reversed(list(self.grid.items())):
             rest, at = divmod(rest, len(texts))
             found[name] = texts[at]
-        found = dict(reversed(found.items()))
+        found = {name: found[name] for name in self.grid}
         for knob in self.random:
             items = tuple(self._drawn(knob, axis, index) for axis in knob.axes)
             found[knob.name] = _text(knob, Vec(items) if knob.inner else items[0])
@@ -153,7 +153,7 @@ def _spread(evaluation: Evaluation, stmt: nodes.Param, found: re.Match[str]) -> 
         stepped = RangeValue(low, high, bool(without), by, unit) if by else None
         if stepped is None or stepped.count() > MOST_ROWS:
             raise ParamError(f"more than {MOST_ROWS:,} values in `{found[0]}`")
-        values = map(stepped.at, range(stepped.count()))
+        values = (stepped.at(at) for at in range(stepped.count()))
     else:
         count = int(parts)
         gaps = max(1, count if without else count - 1)

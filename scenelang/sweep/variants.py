@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from scenelang.animation.clip import Clip, Shot
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.evaluate.evaluation import Evaluation
+from scenelang.sweep.values import Rows
 
 
 class Variants(Clip):
@@ -16,7 +17,7 @@ class Variants(Clip):
 
     Args:
         begin: prepares the scene, and reports to diagnostics.
-        rows: values of params, as text or as Python has them.
+        rows: values of params.
         fixed: values that all rows share.
         frame: which one of an animation.
         diagnostics, model, size: as for `Clip`.
@@ -26,7 +27,7 @@ class Variants(Clip):
         self,
         begin: Callable[[Diagnostics], Evaluation],
         *,
-        rows: Sequence[Mapping[str, Any]],
+        rows: Rows,
         fixed: Mapping[str, Any],
         frame: int = 0,
         diagnostics: Diagnostics,

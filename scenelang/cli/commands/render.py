@@ -164,6 +164,8 @@ def command(
             source = done
     elif wanted.certain:
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
+    if cluster is not None:
+        raise click.UsageError("--cluster draws the frames of an animation; sweep draws many pictures.")
     paths = targets(files, out)
     check_outputs(paths, outputs)
 

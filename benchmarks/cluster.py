@@ -1,0 +1,218 @@
+"""What a dask cluster on this machine gives and costs: the same bytes, its overhead, what outlives it.
+
+Scheduler and two workers are processes of their own, as on other machines; they listen on loopback.
+
+    python -m benchmarks.cluster [--frames N] [--small N] [-o OUT.json]
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from scenelang.animation.cluster import Cluster
+from scenelang.animation.painting import Errand
+from scenelang.animation.run import Progress
+from scenelang.animation.store import put_frame
+from scenelang.backend.options import RenderError, usable_cores
+from scenelang.backend.small import draw_small
+from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import loads
+from scenelang.lab.about import about
+from scenelang.program.compile import compile_scene
+from scenelang.sweep.api import Sweep, render_many
+
+SCENE = """\
+canvas(768, 768);
+param k = 0 in -1..1;
+param turn = 0deg in 0deg..360deg;
+smooth(0.2) {
+  star { twirl(k); scale(0.5); rotate(turn); material flat { color(#e07a5f); } }
+  square { bend(k); scale(0.3); translate(0.3, 0.2); material flat { color(#3d405b); } }
+}
+"""
+SMALL = "canvas(8, 8); param k = 0.5 in 0..1; star { scale(0.9); rotate(90deg * k); }"
+WORKERS = 2
+
+
+@contextlib.contextmanager
+def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A scheduler and workers: its address and process."""
+    file = folder / "scheduler.json"
+    file.unlink(missing_ok=True)
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    scheduler = subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
+         "--no-dashboard", "--scheduler-file", str(file)], **quiet
+    )  # fmt: skip
+    while not file.exists() or not file.read_text():
+        time.sleep(0.05)
+    address = json.loads(file.read_text())["address"]
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--host"]
+    command += ["127.0.0.1", "--no-dashboard", "--local-directory", str(folder)]
+    workers = [subprocess.Popen(command, **quiet) for _ in range(WORKERS)]
+    try:
+        yield address, scheduler
+    finally:
+        for process in [scheduler, *workers]:
+            for child in [*psutil.Process(process.pid).children(recursive=True)]:
+                with contextlib.suppress(psutil.Error):
+                    child.kill()
+            process.kill()
+            process.wait()
+
+
+def same(one: Sweep, two: Sweep) -> bool:
+    """Whether all pictures have the same bytes."""
+    pairs = zip(one.lines, two.lines, strict=True)
+    folders = one.table.parent, two.table.parent
+    return all(
+        (folders[0] / a.picture).read_bytes() == (folders[1] / b.picture).read_bytes() for a, b in pairs
+    )
+
+
+class Killer:
+    """Kills a process when a run is so far, and says how often it did."""
+
+    def __init__(self, *shares: float) -> None:
+        self.shares, self.kills = list(shares), 0
+
+    def __call__(self, now: Progress) -> None:
+        if self.shares and now.done >= self.shares[0] * now.total:
+            self.shares.pop(0)
+            mine = psutil.Process().children(recursive=True)
+            found = [child for child in mine if "spawn_main" in " ".join(child.cmdline())]
+            if found:
+                found[0].send_signal(signal.SIGKILL)
+                self.kills += 1
+
+
+def compared(folder: Path, frames: int) -> dict[str, Any]:
+    """One process, two workers, and two workers that are killed: seconds, and whether bytes are the same."""
+    scene = folder / "scene.nsg"
+    scene.write_text(SCENE)
+    asked: dict[str, Any] = {"random": ["k", "turn"], "count": frames, "seed": 1}
+
+    def timed(name: str, **more: Any) -> tuple[float, Sweep]:
+        started = time.perf_counter()
+        made = render_many(scene, folder / name, **asked, **more)
+        return time.perf_counter() - started, made
+
+    alone_s, alone = timed("alone", jobs=1)
+    with cluster(folder) as (address, _):
+        two_s, two = timed("two", cluster=address)
+        killer = Killer(1 / 3, 2 / 3)
+        killed_s, killed = timed("killed", cluster=address, progress=killer)
+    return {
+        "frames": frames,
+        "canvas": [768, 768],
+        "workers": WORKERS,
+        "alone_s": alone_s,
+        "two_s": two_s,
+        "killed_s": killed_s,
+        "kills": killer.kills,
+        "two_same": same(alone, two),
+        "killed_same": same(alone, killed),
+    }
+
+
+def gone(folder: Path, frames: int) -> dict[str, Any]:
+    """A scheduler that is killed halfway: what was said, what was kept, and what the next run drew."""
+    scene = folder / "scene.nsg"
+    scene.write_text(SCENE)
+    asked: dict[str, Any] = {"random": ["k", "turn"], "count": frames, "seed": 1}
+    started = 0.0
+    with cluster(folder) as (address, scheduler):
+
+        def end(now: Progress) -> None:
+            nonlocal started
+            if now.done >= now.total / 2 and not started:
+                scheduler.kill()
+                started = time.perf_counter()
+
+        said = ""
+        try:
+            render_many(scene, folder / "gone", **asked, cluster=address, progress=end)
+        except RenderError as error:
+            said = str(error).replace(address, "ADDRESS")
+        told_s = time.perf_counter() - started
+    with cluster(folder) as (address, _):
+        made = render_many(scene, folder / "gone", **asked, cluster=address)
+    alone = render_many(scene, folder / "alone", **asked, jobs=1)
+    return {
+        "said": said,
+        "told_s": told_s,
+        "kept": made.made.resumed,
+        "drawn": made.made.drawn,
+        "same": same(alone, made),
+    }
+
+
+def many(folder: Path, frames: int) -> dict[str, Any]:
+    """Small frames through a cluster: what each costs beside drawing, and memory on the way (MiB)."""
+    source = SourceFile("small.nsg", SMALL)
+    programs = [compile_scene(loads(source.text, k=at / 100)) for at in range(100)]
+    put = folder / "frames"
+    put.mkdir()
+    started = time.perf_counter()
+    for at in range(frames // 10):
+        put_frame({put / f"{at}.png": draw_small(programs[at % 100]).image.encode()})
+    alone_ms = 1e3 * (time.perf_counter() - started) / (frames // 10)
+    memory = []
+    with cluster(folder) as (address, scheduler):
+        helper = Cluster(address)
+        processes = {"client": psutil.Process(), "scheduler": psutil.Process(scheduler.pid)}
+        started = time.perf_counter()
+        for at in range(frames):
+            helper.submit(programs[at % 100], Errand(str(put / f"{at}.png"), None, 1, ()))
+            if at % (frames // 10) == frames // 10 - 1:
+                mib = {name: process.memory_info().rss / 2**20 for name, process in processes.items()}
+                memory.append({"frames": at + 1, "s": time.perf_counter() - started, **mib})
+        while helper.waiting:
+            helper.take()
+        cluster_ms = 1e3 * (time.perf_counter() - started) / frames
+        helper.close()
+    return {
+        "frames": frames,
+        "canvas": [8, 8],
+        "alone_ms": alone_ms,
+        "cluster_ms": cluster_ms,
+        "memory_mib": memory,
+        "files": len(list(put.glob("*.png"))),
+    }
+
+
+def main() -> None:
+    """Measure all three, and write a record."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--frames", type=int, default=60)
+    parser.add_argument("--small", type=int, default=10_000)
+    parser.add_argument("-o", "--out", type=Path)
+    asked = parser.parse_args()
+    found: dict[str, Any] = {**about(), "cores": usable_cores()}
+    measures = {
+        "compared": (compared, asked.frames),
+        "gone": (gone, asked.frames),
+        "many": (many, asked.small),
+    }
+    for name, (measure, frames) in measures.items():
+        with tempfile.TemporaryDirectory() as folder:
+            found[name] = measure(Path(folder), frames)
+        print(json.dumps({name: found[name]}, indent=1), flush=True)
+        if asked.out is not None:
+            asked.out.write_text(json.dumps(found, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

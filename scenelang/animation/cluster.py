@@ -1,0 +1,235 @@
+"""Drawing frames on the workers of a dask cluster.
+
+Programs go out as bytes, with the elements and textures that they draw, and files come back as bytes: no file
+system is shared. Dask sends them with the names of functions below by pickle, so that whoever reaches a
+scheduler runs code on its workers; of a scene nothing but our own formats is sent.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import logging
+import platform
+import threading
+import time
+from collections.abc import Sequence
+from concurrent.futures import CancelledError
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from scenelang.animation.painting import Errand
+from scenelang.animation.store import put_frame
+from scenelang.backend.options import RenderError, usable_cores
+from scenelang.models.manifest import ROOT as MODELS
+from scenelang.program.program import Program, program_bytes
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+LOCAL: Final = "local"
+AHEAD: Final = 3  # batches under way for each worker
+BATCH_S: Final = 0.25  # of drawing in a batch, beside which a task's own milliseconds are little
+MOST_BATCH: Final = 64
+WAIT_S: Final = 20.0  # for a scheduler to answer, and for its first worker
+_HARMLESS: Final = ("python", "processor")
+"""What differs without a difference in pixels, or with one of 1/255 at most."""
+_NEEDED: Final = ("distributed", "numpy", "scenelang", "torch")
+_local = threading.local()
+
+
+class Cluster:
+    """The workers of a scheduler, as `Helpers`.
+
+    Args:
+        address: of the scheduler, such as ``tcp://host:8786``, or ``"local"``: a worker for each core of this
+            machine, which nobody else reaches; ``"local:8787"`` has dask's dashboard on that port.
+
+    Raises:
+        RenderError: there is no dask, no scheduler or no worker, or a worker would draw other pixels.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            import distributed
+        except ModuleNotFoundError:
+            raise RenderError("a cluster needs dask: pip install 'scenelang[dask]'") from None
+        for name in ("distributed", "distributed.client"):  # what matters of what they say is raised
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        self._own: Any = None
+        self.address = address
+        self._batch: list[tuple[bytes, Errand]] = []
+        self._each_s = BATCH_S  # a frame, as far as is known
+        self._under_way: dict[Future[Any], list[Errand]] = {}
+        try:
+            if address.partition(":")[0] == LOCAL:
+                self._own = _own_cluster(address)
+            self._client: Client = distributed.Client(
+                self._own or address, timeout=WAIT_S, set_as_default=False, name="scenelang"
+            )
+            self._client.wait_for_workers(1, timeout=WAIT_S)
+        except (OSError, TimeoutError, ValueError) as error:
+            self.close()
+            raise RenderError(f"no scheduler with workers at `{address}`: {_told(error)}") from None
+        try:
+            self.count = self._compare()
+        except BaseException:
+            self.close()
+            raise
+        self._done = distributed.as_completed(loop=self._client.loop)
+
+    @property
+    def waiting(self) -> int:
+        """Frames that are asked for and not known to be done."""
+        while self._under_way and self._done.has_ready():
+            self._receive()
+        return len(self._batch) + sum(map(len, self._under_way.values()))
+
+    def submit(self, program: Program, errand: Errand) -> None:
+        """Have a Program drawn to files; waits while many are under way. Raises as `take`."""
+        self._batch.append((program_bytes(program), errand))
+        if len(self._batch) >= max(1, min(MOST_BATCH, int(BATCH_S / self._each_s))):
+            while len(self._under_way) >= AHEAD * self.count:
+                self._receive()
+            self._send()
+
+    def take(self) -> None:
+        """Send what waits for others to travel with, and write what comes back next.
+
+        Raises:
+            RenderError: it cannot be drawn, several workers ended over it, or the scheduler is gone.
+            OSError: a file cannot be written.
+        """
+        self._send()
+        self._receive()
+
+    def _receive(self) -> None:
+        from distributed.comm.core import CommClosedError
+        from distributed.scheduler import KilledWorker
+
+        future = next(self._done)
+        errands = self._under_way.pop(future)
+        try:
+            seconds, found = future.result()
+        except KilledWorker as error:
+            raise RenderError(
+                f"a frame was given up: {error.allowed_failures + 1} workers ended over it"
+            ) from None
+        except (CancelledError, CommClosedError, TimeoutError):
+            raise RenderError(
+                f"the scheduler at `{self.address}` is gone; the same command goes on with what is left"
+            ) from None
+        self._each_s = 0.5 * (self._each_s + seconds / len(errands))
+        for errand, files in zip(errands, found, strict=True):
+            folder = Path(errand.file).parent
+            put_frame({folder / name: data for name, data in files.items()})
+
+    def close(self) -> None:
+        """Call off what is under way; workers of this machine end."""
+        for part in (getattr(self, "_client", None), self._own):
+            if part is not None:
+                with contextlib.suppress(Exception):
+                    part.close(timeout=2)
+
+    def _send(self) -> None:
+        if self._batch:
+            errands = [errand for _, errand in self._batch]
+            future = self._client.submit(draw_batch, self._batch, fingerprint(), pure=False)
+            self._under_way[future] = errands
+            self._done.add(future)
+            self._batch = []
+
+    def _compare(self) -> int:
+        """How many workers there are; raises `RenderError` where one would draw other pixels."""
+        found = self._client.run(look, on_error="return")
+        for address, theirs in found.items():
+            if not isinstance(theirs, dict):
+                raise RenderError(f"worker {address} cannot run scenelang: {_told(theirs)}")
+            fatal, harmless = differences(fingerprint(), theirs)
+            if fatal:
+                raise RenderError(f"worker {address} has {fatal[0]}")
+            for fact in harmless:
+                logging.getLogger("scenelang").warning("worker %s has %s", address, fact)
+        return len(found)
+
+
+def _own_cluster(address: str) -> Any:
+    """Workers on this machine, which listen to it alone."""
+    from distributed import LocalCluster
+
+    port = address.partition(":")[2]
+    return LocalCluster(
+        n_workers=usable_cores(),
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address=f"127.0.0.1:{int(port)}" if port else None,
+        silence_logs=logging.CRITICAL,
+    )
+
+
+def _told(error: object) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+# ---------------------------------------------------------------- what runs on workers
+
+
+def draw_batch(
+    batch: Sequence[tuple[bytes, Errand]], ours: dict[str, str]
+) -> tuple[float, list[dict[str, bytes]]]:
+    """Draw Programs on this machine: the seconds that it took, and the files of each by their names.
+
+    Args:
+        batch: bytes of Programs, and what is asked of them.
+        ours: the fingerprint of who asks.
+
+    Raises:
+        RenderError: one cannot be drawn, or this machine would draw other pixels.
+    """
+    from scenelang.renderers.draw import Kept
+
+    fatal, _ = differences(ours, fingerprint())
+    if fatal:
+        raise RenderError(f"a worker has {fatal[0]}")
+    kept = _local.__dict__.setdefault("kept", Kept())
+    started = time.perf_counter()
+    found = [
+        {file.name: data for file, data in errand.run(program, kept).items()} for program, errand in batch
+    ]
+    return time.perf_counter() - started, found
+
+
+@cache
+def fingerprint() -> dict[str, str]:
+    """What decides pixels on this machine: versions, digests of the code and of each model's weights."""
+    found = {"python": platform.python_version(), "processor": platform.machine()}
+    for name in _NEEDED:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "none"
+    package = MODELS.parent
+    code = hashlib.sha256()
+    for file in sorted(package.rglob("*.py")):
+        code.update(file.relative_to(package).as_posix().encode() + file.read_bytes())
+    found["scenelang's code"] = code.hexdigest()[:12]
+    for weights in sorted(MODELS.glob("*/weights.safetensors")):
+        found[f"weights of {weights.parent.name}"] = hashlib.sha256(weights.read_bytes()).hexdigest()[:12]
+    return found
+
+
+def look() -> dict[str, str]:
+    """The fingerprint of the machine where it is called."""
+    return fingerprint()
+
+
+def differences(ours: dict[str, str], theirs: dict[str, str]) -> tuple[list[str], list[str]]:
+    """What a worker has otherwise, in words: what changes pixels, and what hardly does."""
+    found: tuple[list[str], list[str]] = [], []
+    for name in sorted(ours.keys() | theirs.keys()):
+        here, there = ours.get(name, "none"), theirs.get(name, "none")
+        if here != there:
+            found[name in _HARMLESS].append(f"{name} {there}, where {here} is here")
+    return found
