@@ -42,7 +42,8 @@ COMMANDS: Final = {
     "train": "Train a model's weights.",
     "lab": "Measure models and compare designs: the laboratory.",
 }
-ELSEWHERE: Final = {"lab": "scenelang.lab.commands"}  # nothing else here knows of the laboratory
+ELSEWHERE: Final = {"sweep": "scenelang.cli.sweep", "lab": "scenelang.lab.commands"}
+"""Commands whose modules do not lie among the others; nothing else here knows of the laboratory."""
 MOVED: Final = {name: f"lab {name}" for name in ("eval", "frontier", "stability", "experiment", "chart")}
 INTERRUPTED: Final = 130  # as shells report it
 
