@@ -7,35 +7,27 @@ import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from scenelang.backend.options import Samples
-from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import read_scene
-from scenelang.evaluate.ranges import literals_of, rewritten
+from scenelang.evaluate.ranges import rewritten
 from scenelang.fitting.mesh import FitError
 from scenelang.image import Image
 from scenelang.inverse import search
-from scenelang.inverse.fitted import Fit, felt, hindrances, numbers_of, ties
-from scenelang.inverse.problem import LEVELS, Problem, Source
+from scenelang.inverse.fitted import Fit, hindrances, numbers_of, ties
+from scenelang.inverse.problem import Source
 from scenelang.inverse.search import Found
 from scenelang.inverse.several import Together
-from scenelang.inverse.space import Point, Space, space_of
-from scenelang.inverse.target import WHITE, Given, Picture, target_of
+from scenelang.inverse.space import Point, Space
+from scenelang.inverse.target import WHITE, Given, Picture
+from scenelang.inverse.task import Task, task_of
 from scenelang.measure.metrics import UNCAPPED_DB
-from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import Scene
-from scenelang.syntax import parse
 
 Progress = Callable[[str, int, int], None]
-SIDES: Final = (32, 64, 128, 256)  # of pictures from coarse to fine, pixels along the shorter side
-MOST_TARGETS: Final = 64
-MOST_SOLID: Final = 128  # of solids, which take longer
 ALIKE: Final = 1.26  # errors that differ by 1 dB
 NEAREST_DB: Final = 45.0  # pictures this near count as alike however they differ
 
@@ -82,95 +74,34 @@ def fit(
         SceneError: the scene has errors.
         OSError: a file cannot be read.
     """
-    until, found = time.monotonic() + budget_s, Diagnostics()
-    text = scene if isinstance(scene, SourceFile) else read_scene(scene, found)
-    tree = None if text is None else parse(text, found)
-    if tree is None or found.errors:
-        raise SceneError(found)
-    targets = {int(at): one for at, one in target.items()} if isinstance(target, Mapping) else {frame: target}
-    if not 0 < len(targets) <= MOST_TARGETS:
-        raise FitError(f"{len(targets):,} targets, where 1 to {MOST_TARGETS} are compared")
-    sources = [
-        Source(
-            tree, path=None if isinstance(scene, SourceFile) else Path(scene),
-            root=None if root is None else Path(root), model=model, frame=number, fixed=fixed,
-        )
-        for number in sorted(targets)
-    ]  # fmt: skip
-    source = sources[0]
-    evaluation, made = source.evaluated(start or {})
-    space = space_of(evaluation, params, fixed or {})
-    for name in start or {}:
-        if name not in space.names:
-            raise FitError(f"a start for `{name}`, which is not among the params to find")
-    first = space.point({})
-    solid = True in {_is_solid(each, space.values(first), made.canvas) for each in sources}
-    goals = [
-        target_of(targets[each.frame], made.canvas, mask=mask, crop=crop, under=background)
-        for each in sources
-    ]
-    smallest = min(min(goal.weights.shape) for goal in goals)
-    short = min(MOST_SOLID if solid else SIDES[-1], *made.canvas, smallest)
-    sides = [side for side in SIDES if side < short] + [short]
-
-    def compared(side: int, samples: Samples, levels: int, soft: bool) -> Together:
-        canvas = _sized(made.canvas, side)
-        return Together(
-            [
-                Problem(each, space, goal, canvas, light=solid, soft=soft, samples=samples, levels=levels)
-                for each, goal in zip(sources, goals, strict=True)
-            ]
-        )
-
-    problems = [
-        compared(side, "adaptive" if at else "four", max(1, LEVELS - at), True)
-        for at, side in enumerate(sides)
-    ]
-    if not solid:
-        problems.append(compared(short, "adaptive", 1, False))
-    places, done = search.solve(problems, space, first, seed=seed, until=until, report=progress)
+    until = time.monotonic() + budget_s
+    task = task_of(
+        scene, target, params=params, start=start or {}, fixed=fixed or {}, mask=mask, crop=crop,
+        background=background, model=model, root=root, frame=frame,
+    )  # fmt: skip
+    places, done = search.solve(
+        task.problems, task.space, task.first, seed=seed, until=until, report=progress
+    )
     if not places:
         raise FitError("no values that were tried give a picture")
-    return _fit(space, problems, first, places, done, literals_of(evaluation, fixed or {}))
+    return _fit(task, places, done)
 
 
-def _is_solid(source: Source, values: Mapping[str, Any], canvas: tuple[int, int]) -> bool:
-    """Whether a scene is of solids, if it has pictures that can be compared."""
-    program = source.program(values, canvas)
-    if program is None:
-        raise SceneError(source.trouble)
-    manifest = load_manifest(program.model)
-    if manifest.renderer not in ("framed", "solid"):
-        raise FitError(
-            f"model `{manifest.name}` draws pictures of one size only, and fitting needs small ones"
-        )
-    return manifest.renderer == "solid"
-
-
-def _sized(canvas: tuple[int, int], side: int) -> tuple[int, int]:
-    factor = side / min(canvas)
-    return max(1, round(canvas[0] * factor)), max(1, round(canvas[1] * factor))
-
-
-def _fit(
-    space: Space,
-    problems: list[Together],
-    first: Point,
-    places: list[Found],
-    done: bool,
-    kept: Mapping[str, str],
-) -> Fit:
-    """What there is to say of the places that a search came to; ``kept`` are literals of fixed params."""
+def _fit(task: Task, places: list[Found], done: bool) -> Fit:
+    """What there is to say of the places that a search came to."""
+    space, problems, first = task.space, task.problems, task.first
     last, best = problems[-1], places[0].point
     every = [space.literals(place.point) for place in places]
     source = last.parts[0].source
-    text = rewritten(source.tree, {**kept, **every[0]})
+    text = rewritten(source.tree, {**task.kept, **every[0]})
     after = last.drawn([part.source.reads(text).program({}, last.canvas) for part in last.parts])
     before = last.pictures(first)
     if after is None:
         raise FitError("the scene with the values that were found has no picture")
     near = _db(last, after)
-    slopes = felt(last.pixels, space, best, 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1])
+    slopes = search.central(
+        last.pixels, space, best, 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1]
+    )
     numbers = numbers_of(space, best, slopes)
     others = [
         literals

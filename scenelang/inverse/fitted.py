@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from scenelang.image import Image
-from scenelang.inverse.search import Matrix, Residuals
+from scenelang.inverse.search import Matrix
 from scenelang.inverse.space import Point, Space
 from scenelang.scene.schema import Scene
 
@@ -98,23 +98,6 @@ class Fit:
         gap = np.ones((self.target.shape[0], 4, 3), np.float32)
         parts = [np.asarray(part, np.float32) for part in (self.before, self.after, self.target)]
         return np.concatenate([parts[0], gap, parts[1], gap, parts[2]], 1).view(Image)
-
-
-def felt(residuals: Residuals, space: Space, u: Point, step: float) -> Matrix | None:
-    """Derivatives (R, n) of residuals by central differences, in shares of ranges; 0 of choices."""
-    columns = np.zeros((0, 0))
-    for axis in np.flatnonzero(space.smooth):
-        ends = [u.copy(), u.copy()]
-        ends[0][axis], ends[1][axis] = u[axis] - step, u[axis] + step
-        low, high = map(space.inside, ends)
-        width = 2 * step if space.wraps[axis] else high[axis] - low[axis]
-        one, other = residuals(low), residuals(high)
-        if one is None or other is None:
-            return None
-        if not columns.size:
-            columns = np.zeros((len(one), len(u)))
-        columns[:, axis] = (other - one) / width
-    return columns
 
 
 def numbers_of(space: Space, u: Point, slopes: Matrix | None) -> tuple[Number, ...]:

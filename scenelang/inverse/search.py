@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -19,12 +20,16 @@ from scenelang.inverse.space import Point, Space
 from scenelang.records import Record
 
 Residuals = Callable[[Point], Point | None]
+Report = Callable[[str, int, int], None]
+Look = Callable[[Residuals, Space, Sequence["Found"], int, float, Report], "list[Found]"]
 Matrix = npt.NDArray[np.float64]
 APART: Final = 0.02  # shares of a range by which two solutions differ
 LOOKS: Final = 48  # places that a round looks at, times numbers to find and one
+SCANS: Final = 16  # places along an axis
 DESCENTS: Final = 4  # of them that are followed, and one for each number
 KEPT: Final = 3  # and looked at more closely
 ROUNDS: Final = 4
+FINE: Final = 1 / 3  # of these, where nothing else helps
 STEPS: Final = (
     0.01,
     0.006,
@@ -93,12 +98,33 @@ def slopes(
     return found
 
 
-def descend(residuals: Residuals, space: Space, u: Point, *, step: float, most: int = 12) -> Found | None:
+def central(residuals: Residuals, space: Space, u: Point, step: float) -> Matrix | None:
+    """Derivatives (R, n) of residuals by central differences, in shares of ranges; 0 of choices."""
+    columns = np.zeros((0, 0))
+    for axis in np.flatnonzero(space.smooth):
+        ends = [u.copy(), u.copy()]
+        ends[0][axis], ends[1][axis] = u[axis] - step, u[axis] + step
+        low, high = map(space.inside, ends)
+        width = 2 * step if space.wraps[axis] else high[axis] - low[axis]
+        one, other = residuals(low), residuals(high)
+        if one is None or other is None:
+            return None
+        if not columns.size:
+            columns = np.zeros((len(one), len(u)))
+        columns[:, axis] = (other - one) / width
+    return columns
+
+
+def descend(
+    residuals: Residuals, space: Space, u: Point, *, step: float, most: int = 12, fine: bool = False
+) -> Found | None:
     """Follow the continuous axes down from a point; None where that has no picture.
 
     Args:
         step: of differences, in shares of a range.
         most: steps.
+        fine: whether differences are central and of a third of the step: twice the pictures, which follow a
+            narrow valley that others lose.
     """
     at = residuals(u)
     if at is None:
@@ -108,7 +134,8 @@ def descend(residuals: Residuals, space: Space, u: Point, *, step: float, most: 
     for _ in range(most):
         if cost < _GRAIN or not space.smooth.any():
             break
-        j = slopes(residuals, space, u, at, step, space.smooth)
+        j = central(residuals, space, u, step * FINE) if fine else None
+        j = slopes(residuals, space, u, at, step, space.smooth) if j is None else j
         pull = j.T @ at
         ends = ~space.wraps & (((u <= 0.0) & (pull > 0)) | ((u >= 1.0) & (pull < 0)))
         free = np.flatnonzero(space.smooth & ~ends & (np.square(j).sum(0) > 1e-12))
@@ -159,6 +186,61 @@ def apart(space: Space, found: list[Found], most: int) -> list[Found]:
     return kept[:most]
 
 
+def scanned(coarse: Residuals, space: Space, known: Found) -> list[Found]:
+    """Places that differ from a known one along one axis: of each the nearest that is a valley of its own.
+
+    Where a picture shows several things, one of them may be wrong while the others are found already.
+    """
+    found: list[Found] = []
+    for axis in range(len(space.axes)):
+        count = SCANS if space.smooth[axis] else min(SCANS, int(space.most[axis]) + 1)
+        row: list[Found] = []
+        for share in (np.arange(count) + 0.5) / count:
+            u = known.point.copy()
+            u[axis] = share if space.smooth[axis] else np.floor(share * (space.most[axis] + 1))
+            there = coarse(u)
+            row.append(Found(u, math.inf if there is None else float(there @ there)))
+        costs = [one.cost for one in row]
+        ends = [costs[-1], *costs, costs[0]] if space.wraps[axis] else [math.inf, *costs, math.inf]
+        valleys = [
+            one
+            for one, before, after in zip(row, ends, ends[2:], strict=False)
+            if one.cost <= min(before, after) and space.gap(one.point, known.point)[axis] > 1 / count
+        ]
+        found += sorted(valleys, key=lambda one: one.cost)[:1]
+    return found
+
+
+def look(
+    coarse: Residuals, space: Space, known: Sequence[Found], seed: int, until: float, report: Report
+) -> list[Found]:
+    """Places that come near in small pictures: the best of a look around, followed down.
+
+    Args:
+        known: where the search begins, of infinite cost, or what rounds before came to.
+        seed, until, report: as of `solve`.
+    """
+    places = [*(one.point for one in known), *spread(space, LOOKS * (len(space.axes) + 1), seed)]
+    seen: list[Found] = []
+    for at, u in enumerate(places):
+        if time.monotonic() > until and seen:
+            break
+        report("looking around", at, len(places))
+        if (there := coarse(u)) is not None:
+            seen.append(Found(u, float(there @ there)))
+    low: list[Found] = []
+    picked = apart(space, seen, DESCENTS + len(space.axes))
+    for one in known:
+        picked += scanned(coarse, space, one) if math.isfinite(one.cost) else []
+    for at, one in enumerate(picked):
+        if time.monotonic() > until and low:
+            break
+        report("coming near", at, len(picked))
+        if (near_it := descend(coarse, space, one.point, step=STEPS[0])) is not None:
+            low.append(near_it if space.smooth.all() else stepped(coarse, space, near_it, step=STEPS[0]))
+    return low
+
+
 def solve(
     problems: Sequence[Residuals],
     space: Space,
@@ -167,7 +249,8 @@ def solve(
     seed: int = 0,
     until: float = math.inf,
     near: float = NEAR,
-    report: Callable[[str, int, int], None] = lambda what, done, count: None,
+    report: Report = lambda what, done, count: None,
+    look: Look = look,
 ) -> tuple[list[Found], bool]:
     """Places with the nearest pictures, the best first.
 
@@ -180,6 +263,7 @@ def solve(
         until: no new descent is begun after this time, as of `time.monotonic`.
         near: sum of squares that is near enough.
         report: called with what is done, how much of it, and all.
+        look: how places are found that come near in the smallest pictures, once a round.
 
     Returns:
         Places that lie apart, and whether the search came to an end by itself; none where no place that was
@@ -189,28 +273,17 @@ def solve(
     low: list[Found] = []  # that came near in the smallest pictures
     ended: list[Found] = []
     for turn in range(ROUNDS):
-        places = [*([start] if turn == 0 else []), *spread(space, LOOKS * (len(start) + 1), seed + turn)]
-        seen: list[Found] = []
-        for at, u in enumerate(places):
-            if time.monotonic() > until and seen:
-                break
-            report("looking around", at, len(places))
-            if (there := coarse(u)) is not None:
-                seen.append(Found(u, float(there @ there)))
-        picked, before = apart(space, seen, DESCENTS + len(start)), list(low)
-        for at, one in enumerate(picked):
-            if time.monotonic() > until and low:
-                break
-            report("coming near", at, len(picked))
-            if (near_it := descend(coarse, space, one.point, step=STEPS[0])) is not None:
-                low.append(near_it if space.smooth.all() else stepped(coarse, space, near_it, step=STEPS[0]))
+        before = list(low)
+        low += look(coarse, space, ended or [Found(start, math.inf)], seed + turn, until, report)
         low = apart(space, low, KEPT)
         fresh = [one for one in low if not any(one is other for other in before)]
         for at, one in enumerate(fresh):
-            for problem, step in zip(problems[1:], STEPS[1:], strict=False):
+            for fine, (problem, step) in product((False, True), zip(problems[1:], STEPS[1:], strict=False)):
+                if fine and one.cost <= near:
+                    break
                 report("looking closer", at, len(fresh))
-                if (nearer := descend(problem, space, one.point, step=step, most=8)) is not None:
-                    one = nearer.after(one)
+                nearer = descend(problem, space, one.point, step=step, most=8, fine=fine)
+                one = one if nearer is None else nearer.after(one)
             ended.append(one)
         ended = apart(space, ended, KEPT)
         was, best = best, min((one.cost for one in ended), default=math.inf)

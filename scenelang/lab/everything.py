@@ -54,7 +54,7 @@ STEPS: Final = (
         "lab codes meshes --scenes {few} --sizes 2,16 --seconds 1 -o {out}/codes",
         ("SCENELANG_ORIGINALS", "igl", "trimesh"),
     ),
-    Step("lab fit shapes2d --scenes {few} --params 1 --side 32 -o {out}/fit", needs=("cma",)),
+    Step("lab fit shapes2d --scenes {few} --params 1 --side 32 -o {out}/fit"),
     Step("lab train shapes2d-streaming --budget {budget} -o {out}/train"),
     Step("benchmarks.floor --exact --frames {few} --scene shapes2d --scene chains"),
     Step("benchmarks.startup {few}"),
