@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from scenelang.backend.options import Samples
 from scenelang.backend.small import draw_small
@@ -14,6 +15,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import Evaluation
+from scenelang.inverse.gradient import Changes
 from scenelang.inverse.soft import softened
 from scenelang.inverse.space import Point, Space
 from scenelang.inverse.target import Picture, Target, over
@@ -23,6 +25,7 @@ from scenelang.renderers.draw import draw_objects
 from scenelang.scene.schema import Scene
 from scenelang.syntax import nodes, parse
 
+Matrix = npt.NDArray[np.float64]
 LEVELS: Final = 4  # of a pyramid: pixels, and means of 2, 4 and 8 pixels along each side
 
 
@@ -115,6 +118,8 @@ class Problem:
         self.frames = 0  # drawn so far
         self.colours, weights = target.sized(canvas, light)
         self.root = np.sqrt(weights / max(1e-9, weights.mean()))[..., None]
+        self._changes = Changes(self.program, space, target.under)
+        self._last: tuple[bytes, Program | None] = b"", None
 
     def drawn(self, program: Program | None) -> Picture | None:
         """The picture (H, W, 3) of a Program of this canvas; None of none."""
@@ -126,9 +131,15 @@ class Problem:
             return over(draw_objects(network, program, samples="one").image, self.under)
         return over(draw_small(program, samples=self.samples, threads=1).image, self.under)
 
+    def program(self, u: Point) -> Program | None:
+        """What draws the scene of a point; the last one is kept."""
+        if self._last[0] != u.tobytes():
+            self._last = u.tobytes(), self.source.program(self.space.values(u), self.canvas)
+        return self._last[1]
+
     def picture(self, u: Point) -> Picture | None:
         """The picture of a point, None where its values give no scene."""
-        return self.drawn(self.source.program(self.space.values(u), self.canvas))
+        return self.drawn(self.program(u))
 
     def __call__(self, u: Point) -> Point | None:
         """Residuals (R,), whose squares add up to a mean square error of each level of the pyramid."""
@@ -142,12 +153,28 @@ class Problem:
 
     def residuals(self, picture: Picture, levels: int = 1) -> Point:
         """Residuals of a picture, at so many levels of the pyramid."""
-        gap, parts = (picture - self.colours) * self.root, []
-        for level in range(levels):
-            if level:
-                gap = _halved(gap)
-            parts.append(gap.reshape(-1) / np.sqrt(gap.size))
-        return np.concatenate(parts)
+        return _pyramid((picture - self.colours) * self.root, levels)[:, 0]
+
+    def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
+        """Derivatives (R, n) of the residuals, and of which axes (n,) there are; None where of none."""
+        if not self.soft or (found := self._changes.at(u)) is None:
+            return None
+        self.frames += 1
+        height, width = self.canvas[::-1]
+        return _pyramid(
+            (found.slopes * self.root[..., None]).reshape(height, width, -1), self.levels
+        ), found.known
+
+
+def _pyramid(gap: Picture, levels: int) -> Matrix:
+    """Rows (R, n) of all pixels and channels of each level, of n pictures (H, W, 3 n), channels first."""
+    parts: list[Matrix] = []
+    for level in range(levels):
+        if level:
+            gap = _halved(gap)
+        rows = gap.reshape(gap.shape[0] * gap.shape[1] * 3, -1)
+        parts.append(rows / np.sqrt(len(rows)))
+    return np.concatenate(parts)
 
 
 def _halved(x: Picture) -> Picture:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
-from scenelang.inverse.problem import Problem
+from scenelang.inverse.problem import Matrix, Problem
 from scenelang.inverse.space import Point
 from scenelang.inverse.target import Picture
 from scenelang.program.program import Program
@@ -44,6 +45,15 @@ class Together:
         """Residuals of pictures, at so many levels of the pyramid."""
         gaps = [part.residuals(one, levels) for part, one in zip(self.parts, pictures, strict=True)]
         return np.asarray(np.concatenate(gaps) / np.sqrt(len(gaps)))
+
+    def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
+        """As `Problem.slopes`, of the axes that all frames have them of."""
+        found = [part.slopes(u) for part in self.parts]
+        known = [one for one in found if one is not None]
+        if len(known) < len(found):
+            return None
+        rows = np.concatenate([slopes for slopes, _ in known]) / np.sqrt(len(known))
+        return rows, np.all([axes for _, axes in known], 0)
 
     def worst(self, pictures: Sequence[Picture]) -> tuple[str, Picture]:
         """Errors (H, W) of the picture that is farthest off, and which frame it is of several."""
