@@ -6,6 +6,7 @@ GIVEN = {
     "with 1 or 16 samples it is": "what is drawn for comparison",
     "Against 64 samples": "what pictures are compared with where four are not the truth",
     "of at most 2.5 %": "how a promise is defined",
+    "fewer than 118 scenes": "how a promise is defined",
     "k = ⌈0.975 (n + 1)⌉": "how a promise is defined",
     "95 % of the scenes with 16 objects": "the share that is asked for",
     "at least 95 % of": "the share that is asked for",

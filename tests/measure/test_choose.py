@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from scenelang.backend.load import Load
 from scenelang.image import enlarged, from_samples
-from scenelang.lab.frontier.measure import promised
+from scenelang.lab.frontier.measure import FEW_MARGIN, MARGIN, margin, promised
 from scenelang.measure.choose import (
     NothingFits,
     choose,
@@ -118,6 +118,7 @@ def test_the_promise_is_a_high_order_statistic(count: int, rank: int) -> None:
 
 def test_few_scenes_promise_more_than_their_worst() -> None:
     assert promised([0.1, 0.2]) == pytest.approx(0.3)
+    assert margin(117) == FEW_MARGIN > margin(118) == MARGIN
 
 
 def test_promises_are_kept_by_new_values_of_the_same_kind() -> None:

@@ -48,6 +48,8 @@ OTHERS = 1000  # index of the first scene of the other cases
 LATE_MS = 1000.0  # ways that take longer draw nothing of these
 PROMISED = 0.975
 MARGIN = 1.25  # of 40 scenes without it, one scene in ten of another seed was worse than promised
+FEW = 118  # of fewer scenes the largest may lie under the quantile by more than 5 % (0.975^118 = 0.05)
+FEW_MARGIN = 1.5  # of 45 scenes of solids with a quarter alone, one in twenty of another seed was worse
 
 
 class Case(NamedTuple):
@@ -261,13 +263,18 @@ def promised(values: Sequence[float]) -> float:
     return 1.5 * ordered[-1]
 
 
+def margin(scenes: int) -> float:
+    """By how much more than its quantile an error is promised, of a set of which so many were drawn."""
+    return MARGIN if scenes >= FEW else FEW_MARGIN
+
+
 def _point(way: Way, record: Record, paper: Record | None) -> Point:
     errors = quality = None
     if record.flip:
         errors = Errors(
             float(np.mean(record.flip)),
             float(np.percentile(record.flip, 95)),
-            MARGIN * max(map(promised, [record.flip, *record.others])),
+            margin(len(record.flip)) * max(map(promised, [record.flip, *record.others])),
             max(record.flip),
             interval(record.flip),
         )
