@@ -75,7 +75,8 @@ def fitted(case: Case, seed: int, look: Look) -> tuple[dict[str, Any], int]:
         return look(*given)
 
     started = time.process_time()
-    places, done = search.solve(task.problems, task.space, task.first, seed=seed, look=counted)
+    noise = task.problems[-1].noise
+    places, done = search.solve(task.problems, task.space, task.first, seed=seed, noise=noise, look=counted)
     spent, best = time.process_time() - started, places[0]
     truth = np.array([case.truth[axis.label] for axis in task.space.axes])
     off = float(task.space.gap(best.point, truth).max())

@@ -24,6 +24,7 @@ import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -270,18 +271,37 @@ def frontier(model: str) -> bytes:
     return _few_colours(frontier_chart(Frontier.from_json(frontier_path(model).read_bytes())))
 
 
-def fitted() -> bytes:
-    """Before, after and target of the scene of docs/fit.md; the target is exact, blurred and has noise."""
+def fit_scene(name: str) -> SourceFile:
+    """A scene of docs/fit.md."""
     found = re.search(
-        r"^```nsg[^\n]*\n(.*?)```", (DOCS / "fit.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
+        rf'^```nsg title="{name}"\n(.*?)```', (DOCS / "fit.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
     )
-    text = SourceFile("lost.nsg", found[1] if found else "")
+    return SourceFile(name, found[1] if found else "")
+
+
+def fitted() -> bytes:
+    """Before, after and target of a scene of docs/fit.md; the target is exact, blurred and has noise."""
+    text = fit_scene("lost.nsg")
     true = {"x": -0.31, "y": 0.22, "size": 0.5, "turn": "20deg", "ink": "#dd3311", "stones": 4}
     exact = nsg.render(nsg.loads(text.text, params=true), backend="reference").to_pil()
     soft = np.asarray(exact.filter(ImageFilter.GaussianBlur(0.8)), np.float32) / 255
     photo = np.clip(soft + np.random.default_rng(7).normal(0.0, 0.04, soft.shape), 0.0, 1.0)
     names = ("x", "y", "size", "turn", "ink", "stones")
     return _few_colours(png(nsg.fit(text, photo.astype(np.float32), params=names).sheet().to_pil()))
+
+
+@lru_cache
+def fitted_solid() -> nsg.Fit:
+    """Camera and light of a scene of docs/fit.md, from an exact picture."""
+    text = fit_scene("table.nsg")
+    true = {"turn": "40deg", "height": 1.8, "sun": "-30deg", "power": 45}
+    return nsg.fit(text, nsg.render(nsg.loads(text.text, params=true), backend="reference"))
+
+
+def way_of(found: nsg.Fit) -> bytes:
+    """The way of a fit; its ends are shown for longer."""
+    frames = [over_white(nsg.render(scene)) for scene in found.way]
+    return webp([frames[0]] * 4 + frames + [frames[-1]] * 8, 150, True)
 
 
 def plan() -> dict[str, Callable[[], bytes]]:
@@ -304,6 +324,8 @@ def plan() -> dict[str, Callable[[], bytes]]:
             made[name] = lambda draw=draw, source=Source(text=text): draw(source)
     made["gallery.png"] = gallery
     made["fit.png"] = fitted
+    made["fit-solid.png"] = lambda: _few_colours(png(fitted_solid().sheet().to_pil()))
+    made["fit-solid.webp"] = lambda: way_of(fitted_solid())
     made[f"{COMPARED}-compared.png"] = compared
     made["stability.png"] = lambda: stability(2)
     made["stability-solids.png"] = lambda: stability(3)

@@ -28,7 +28,6 @@ from scenelang.measure.metrics import UNCAPPED_DB
 from scenelang.scene.schema import Scene
 
 Progress = Callable[[str, int, int], None]
-ALIKE: Final = 1.26  # errors that differ by 1 dB
 NEAREST_DB: Final = 45.0  # pictures this near count as alike however they differ
 
 
@@ -80,7 +79,13 @@ def fit(
         background=background, model=model, root=root, frame=frame,
     )  # fmt: skip
     places, done = search.solve(
-        task.problems, task.space, task.first, seed=seed, until=until, report=progress
+        task.problems,
+        task.space,
+        task.first,
+        seed=seed,
+        until=until,
+        noise=task.problems[-1].noise,
+        report=progress,
     )
     if not places:
         raise FitError("no values that were tried give a picture")
@@ -106,7 +111,7 @@ def _fit(task: Task, places: list[Found], done: bool) -> Fit:
     others = [
         literals
         for place, literals in zip(places[1:], every[1:], strict=True)
-        if place.cost <= max(ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
+        if place.cost <= max(search.ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
     ]
     return Fit(
         text=text,
@@ -115,7 +120,7 @@ def _fit(task: Task, places: list[Found], done: bool) -> Fit:
         start_psnr=_db(last, before) if before is not None else -math.inf,
         size=last.canvas,
         done=done,
-        notes=hindrances(space, best, numbers, near, done, last.worst(after)),
+        notes=hindrances(space, best, numbers, near, done, last.worst(after), last.noise(best)),
         numbers=numbers,
         tied=ties(space, slopes),
         others=tuple(others),

@@ -130,12 +130,19 @@ def ties(space: Space, slopes: Matrix | None) -> tuple[tuple[str, str, float], .
 
 
 def hindrances(
-    space: Space, u: Point, numbers: Sequence[Number], psnr: float, done: bool, worst: tuple[str, Matrix]
+    space: Space,
+    u: Point,
+    numbers: Sequence[Number],
+    psnr: float,
+    done: bool,
+    worst: tuple[str, Matrix],
+    noise: bool,
 ) -> tuple[str, ...]:
     """Why the picture is no nearer, as far as can be told.
 
     Args:
         worst: which picture of several is farthest off, and the errors (H, W) of its pixels.
+        noise: whether these are like noise.
     """
     notes = []
     if not done:
@@ -145,7 +152,9 @@ def hindrances(
     unseen = [f"`{one.label}`" for one in numbers if math.isinf(one.felt)]
     if unseen:
         notes.append(f"the picture does not show {', '.join(unseen)} here, so any value would do")
-    if psnr < GOOD_DB:
+    if psnr < GOOD_DB and noise:
+        notes.append("what differs is like noise, of which no values come nearer")
+    elif psnr < GOOD_DB:
         name, gap = worst
         rows, columns = (np.arange(length) for length in gap.shape)
         y, x = (gap.sum(1) @ rows / gap.sum(), gap.sum(0) @ columns / gap.sum())

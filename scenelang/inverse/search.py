@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from itertools import product
+from itertools import chain, product
 from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
@@ -51,6 +51,7 @@ STEPS: Final = (
     0.002,
     0.002,
 )  # of differences, shares of a range, in pictures of each size
+ALIKE: Final = 1.26  # errors that differ by 1 dB
 FAIR: Final = 1e-3  # 30 dB: farther off, a round without success is tried again
 NEAR: Final = 10**-4.6  # mean square error that is near enough: 46 dB
 AGREED: Final = 0.02  # share by which a round has to lower the error, or it agrees with those before
@@ -247,9 +248,9 @@ def look(
         if (there := coarse(u)) is not None:
             seen.append(Found(u, float(there @ there)))
     low: list[Found] = []
-    picked = apart(space, seen, DESCENTS + len(space.axes))
-    for one in known:
-        picked += scanned(coarse, space, one) if math.isfinite(one.cost) else []
+    most = DESCENTS + len(space.axes)
+    scans = (scanned(coarse, space, one) for one in known if math.isfinite(one.cost))
+    picked = apart(space, seen, most) + apart(space, list(chain(*scans)), most)
     for at, one in enumerate(picked):
         if time.monotonic() > until and low:
             break
@@ -267,19 +268,22 @@ def solve(
     seed: int = 0,
     until: float = math.inf,
     near: float = NEAR,
+    noise: Callable[[Point], bool] = lambda u: False,
     report: Report = lambda what, done, count: None,
     look: Look = look,
 ) -> tuple[list[Found], bool]:
     """Places with the nearest pictures, the best first.
 
     Each round looks around, follows the best places down in the smallest pictures, and the best of these
-    through larger ones. It ends when a picture is near enough, or when a round or two found none nearer.
+    through larger ones. It ends when a picture is near enough, when nothing but noise is left, or when a
+    round or two found none nearer.
 
     Args:
         problems: residuals at sizes from small to large, those of the last by pixels alone.
         start: a place that is looked at first.
         until: no new descent is begun after this time, as of `time.monotonic`.
         near: sum of squares that is near enough.
+        noise: whether what is left at a place of the last size is noise, so that none is nearer.
         report: called with what is done, how much of it, and all.
         look: how places are found that come near in the smallest pictures, once a round.
 
@@ -297,7 +301,7 @@ def solve(
         fresh = [one for one in low if not any(one is other for other in before)]
         for at, one in enumerate(fresh):
             for fine, (problem, step) in product((False, True), zip(problems[1:], STEPS[1:], strict=False)):
-                if fine and one.cost <= near:
+                if fine and (one.cost <= near or one.cost > ALIKE * min(one.cost for one in [one, *ended])):
                     break
                 report("looking closer", at, len(fresh))
                 nearer = descend(problem, space, one.point, step=step, most=8, fine=fine)
@@ -306,7 +310,7 @@ def solve(
         ended = apart(space, ended, KEPT)
         was, best = best, min((one.cost for one in ended), default=math.inf)
         idle = idle + 1 if best > was * (1 - AGREED) else 0
-        if best <= near or idle >= (1 if best <= FAIR else 2):
+        if best <= near or (ended and noise(ended[0].point)) or idle >= (1 if best <= FAIR else 2):
             return ended, True
         if time.monotonic() > until:
             break

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.inverse.problem import Matrix, Problem
+from scenelang.inverse.problem import LEVELS, Matrix, Problem
 from scenelang.inverse.space import Point
 from scenelang.inverse.target import Picture
 from scenelang.program.program import Program
+
+EDGE: Final = 2 ** (LEVELS - 1)  # of what the last level has means of, pixels
+GRAIN: Final = 2.0  # times the variance of means that noise has
 
 
 class Together:
@@ -63,6 +68,15 @@ class Together:
         ]
         at = int(np.argmax([gap.sum() for gap in gaps]))
         return f" of frame {self.parts[at].source.frame}" * (len(gaps) > 1), gaps[at]
+
+    def noise(self, u: Point) -> bool:
+        """Whether what is left is like noise, whose means over 8 x 8 pixels have a 64th of its variance."""
+        pixels = means = 0.0
+        for part, picture in zip(self.parts, self.pictures(u) or (), strict=False):
+            left = np.square(part.residuals(picture, LEVELS))
+            pixels += float(left[: picture.size].sum())
+            means += float(left[-3 * math.prod(-(-side // EDGE) for side in self.canvas) :].sum())
+        return means * EDGE**2 <= GRAIN * pixels
 
     @property
     def frames(self) -> int:

@@ -1,0 +1,41 @@
+"""Frames that are compared together, and noise that no values would take away."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenelang.diagnostics.span import SourceFile
+from scenelang.inverse.task import Task, task_of
+
+TEXT = """
+canvas(40, 40); background(#ffffff); animate(seconds = 1s, fps = 4); param x = 0 in -0.5..0.5;
+square { scale(0.5); translate(x, u); material flat { color(#000000); } }
+"""
+
+
+def task(targets: dict[int, np.ndarray]) -> Task:
+    return task_of(SourceFile("a.nsg", TEXT), targets)
+
+
+def flat(level: float) -> np.ndarray:
+    return np.full((40, 40, 3), level)
+
+
+def test_errors_of_frames_are_averaged() -> None:
+    u = np.array([0.5])
+    both = task({0: flat(1.0), 2: flat(0.5)}).problems[-1](u)
+    parts = [task({frame: flat(level)}).problems[-1](u) for frame, level in ((0, 1.0), (2, 0.5))]
+    assert both is not None
+    assert both @ both == pytest.approx(np.mean([part @ part for part in parts if part is not None]))
+
+
+@pytest.mark.parametrize(("blot", "noise"), [(0, True), (3, False)])
+def test_what_is_left_is_noise_or_is_not(blot: int, noise: bool) -> None:
+    """A blot of 3 x 3 pixels is enough."""
+    u, last = np.array([0.3]), task({0: flat(1.0)}).problems[-1]
+    pictures = last.pictures(u)
+    assert pictures is not None
+    target = pictures[0] + np.random.default_rng(3).normal(0.0, 0.03, (40, 40, 3))
+    target[20 : 20 + blot, 30 : 30 + blot] = 0.5
+    assert task({0: target}).problems[-1].noise(u) is noise
