@@ -104,9 +104,8 @@ def _fit(task: Task, places: list[Found], done: bool) -> Fit:
     if after is None:
         raise FitError("the scene with the values that were found has no picture")
     near = _db(last, after)
-    slopes = search.central(
-        last.pixels, space, best, 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1]
-    )
+    step = 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1]
+    slopes = search.central(last.pixels, space, best, step, space.smooth)
     numbers = numbers_of(space, best, slopes)
     others = [
         literals

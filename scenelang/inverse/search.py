@@ -95,19 +95,28 @@ def spread(space: Space, count: int, seed: int) -> Iterator[Point]:
 
 
 def slopes(
-    residuals: Residuals, space: Space, u: Point, at: Point, step: float, free: npt.NDArray[np.bool_]
+    residuals: Residuals,
+    space: Space,
+    u: Point,
+    at: Point,
+    step: float,
+    free: npt.NDArray[np.bool_],
+    fine: bool = False,
 ) -> Matrix:
     """Derivatives (R, n) of residuals by differences, columns of axes that are not free 0.
 
     Args:
         at: the residuals at u.
         step: in shares of a range; away from an end.
+        fine: whether differences are central and of `FINE` of the step.
     """
     found = np.zeros((len(at), len(u)))
     if np.count_nonzero(free) >= MANY and isinstance(residuals, Steep):
         exact = residuals.slopes(u)
         if exact is not None:
             found, free = exact[0], free & ~exact[1]
+    if fine and free.any() and (better := central(residuals, space, u, step * FINE, free)) is not None:
+        return np.where(free, better, found)
     for axis in np.flatnonzero(free):
         sign = -1.0 if u[axis] + step > 1.0 and not space.wraps[axis] else 1.0
         moved = u.copy()
@@ -117,10 +126,12 @@ def slopes(
     return found
 
 
-def central(residuals: Residuals, space: Space, u: Point, step: float) -> Matrix | None:
-    """Derivatives (R, n) of residuals by central differences, in shares of ranges; 0 of choices."""
+def central(
+    residuals: Residuals, space: Space, u: Point, step: float, free: npt.NDArray[np.bool_]
+) -> Matrix | None:
+    """Derivatives (R, n) of residuals by central differences, 0 of axes that are not free."""
     columns = np.zeros((0, 0))
-    for axis in np.flatnonzero(space.smooth):
+    for axis in np.flatnonzero(free):
         ends = [u.copy(), u.copy()]
         ends[0][axis], ends[1][axis] = u[axis] - step, u[axis] + step
         low, high = map(space.inside, ends)
@@ -153,8 +164,7 @@ def descend(
     for _ in range(most):
         if cost < _GRAIN or not space.smooth.any():
             break
-        j = central(residuals, space, u, step * FINE) if fine else None
-        j = slopes(residuals, space, u, at, step, space.smooth) if j is None else j
+        j = slopes(residuals, space, u, at, step, space.smooth, fine)
         pull = j.T @ at
         ends = ~space.wraps & (((u <= 0.0) & (pull > 0)) | ((u >= 1.0) & (pull < 0)))
         free = np.flatnonzero(space.smooth & ~ends & (np.square(j).sum(0) > 1e-12))

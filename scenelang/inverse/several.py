@@ -76,7 +76,7 @@ class Together:
             left = np.square(part.residuals(picture, LEVELS))
             pixels += float(left[: picture.size].sum())
             means += float(left[-3 * math.prod(-(-side // EDGE) for side in self.canvas) :].sum())
-        return means * EDGE**2 <= GRAIN * pixels
+        return bool(means * EDGE**2 <= GRAIN * pixels)
 
     @property
     def frames(self) -> int:

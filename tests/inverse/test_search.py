@@ -29,7 +29,9 @@ def two_things(u: np.ndarray) -> np.ndarray:
 def test_central_differences_are_those_of_a_closed_form() -> None:
     u = np.array([0.3, 0.9])
     exact = [[-60 * 0.3, 30], [0.02, 0]]
-    assert search.central(narrow, box(False, False), u, 0.05) == pytest.approx(np.array(exact), abs=1e-9)
+    assert search.central(narrow, box(False, False), u, 0.05, np.array([True, True])) == pytest.approx(
+        np.array(exact), abs=1e-9
+    )
     off = search.slopes(narrow, box(False, False), u, narrow(u), 0.05, np.array([True, True])) - exact
     assert abs(off).max() > 1
 
