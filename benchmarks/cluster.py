@@ -2,7 +2,7 @@
 
 Scheduler and two workers are processes of their own, as on other machines; they listen on loopback.
 
-    python -m benchmarks.cluster [--frames N] [--small N] [-o OUT.json]
+    python -m benchmarks.cluster [MEASURE …] [--share S] [-o OUT.json]
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from scenelang.animation.run import Progress
 from scenelang.animation.store import put_frame
 from scenelang.backend.options import RenderError, usable_cores
 from scenelang.backend.small import draw_small
-from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import loads
 from scenelang.lab.about import about
 from scenelang.program.compile import compile_scene
@@ -44,11 +43,12 @@ smooth(0.2) {
 """
 SMALL = "canvas(8, 8); param k = 0.5 in 0..1; star { scale(0.9); rotate(90deg * k); }"
 WORKERS = 2
+Process = subprocess.Popen[bytes]
 
 
 @contextlib.contextmanager
-def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """A scheduler and workers: its address and process."""
+def cluster(folder: Path) -> Iterator[tuple[str, Process, list[Process]]]:
+    """A scheduler and workers: its address and process, and those of the workers."""
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -63,7 +63,7 @@ def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     command += ["127.0.0.1", "--no-dashboard", "--local-directory", str(folder)]
     workers = [subprocess.Popen(command, **quiet) for _ in range(WORKERS)]
     try:
-        yield address, scheduler
+        yield address, scheduler, workers
     finally:
         for process in [scheduler, *workers]:
             for child in [*psutil.Process(process.pid).children(recursive=True)]:
@@ -110,7 +110,7 @@ def compared(folder: Path, frames: int) -> dict[str, Any]:
         return time.perf_counter() - started, made
 
     alone_s, alone = timed("alone", jobs=1)
-    with cluster(folder) as (address, _):
+    with cluster(folder) as (address, *_):
         two_s, two = timed("two", cluster=address)
         killer = Killer(1 / 3, 2 / 3)
         killed_s, killed = timed("killed", cluster=address, progress=killer)
@@ -133,7 +133,7 @@ def gone(folder: Path, frames: int) -> dict[str, Any]:
     scene.write_text(SCENE)
     asked: dict[str, Any] = {"random": ["k", "turn"], "count": frames, "seed": 1}
     started = 0.0
-    with cluster(folder) as (address, scheduler):
+    with cluster(folder) as (address, scheduler, _):
 
         def end(now: Progress) -> None:
             nonlocal started
@@ -147,7 +147,7 @@ def gone(folder: Path, frames: int) -> dict[str, Any]:
         except RenderError as error:
             said = str(error).replace(address, "ADDRESS")
         told_s = time.perf_counter() - started
-    with cluster(folder) as (address, _):
+    with cluster(folder) as (address, *_):
         made = render_many(scene, folder / "gone", **asked, cluster=address)
     alone = render_many(scene, folder / "alone", **asked, jobs=1)
     return {
@@ -159,59 +159,80 @@ def gone(folder: Path, frames: int) -> dict[str, Any]:
     }
 
 
+def processor_s(process: psutil.Process) -> float:
+    """Seconds of the processor that a process and those below it took so far."""
+    times = [one.cpu_times() for one in (process, *process.children(recursive=True))]
+    return sum(one.user + one.system for one in times)
+
+
 def many(folder: Path, frames: int) -> dict[str, Any]:
-    """Small frames through a cluster: what each costs beside drawing, and memory on the way (MiB)."""
-    source = SourceFile("small.nsg", SMALL)
-    programs = [compile_scene(loads(source.text, k=at / 100)) for at in range(100)]
-    put = folder / "frames"
+    """Small frames through a cluster: milliseconds of the processor for each, and memory on the way (MiB)."""
+    programs = [compile_scene(loads(SMALL, k=at / 100)) for at in range(100)]
+    put, few = folder / "frames", frames // 10
     put.mkdir()
-    started = time.perf_counter()
-    for at in range(frames // 10):
+    draw_small(programs[0])
+    started = time.process_time()
+    for at in range(few):
         put_frame({put / f"{at}.png": draw_small(programs[at % 100]).image.encode()})
-    alone_ms = 1e3 * (time.perf_counter() - started) / (frames // 10)
+    alone_ms = 1e3 * (time.process_time() - started) / few
     memory = []
-    with cluster(folder) as (address, scheduler):
+    with cluster(folder) as (address, scheduler, workers):
         helper = Cluster(address)
-        processes = {"client": psutil.Process(), "scheduler": psutil.Process(scheduler.pid)}
-        started = time.perf_counter()
-        for at in range(frames):
-            helper.submit(programs[at % 100], Errand(str(put / f"{at}.png"), None, 1, ()))
-            if at % (frames // 10) == frames // 10 - 1:
-                mib = {name: process.memory_info().rss / 2**20 for name, process in processes.items()}
-                memory.append({"frames": at + 1, "s": time.perf_counter() - started, **mib})
+        found = {"scheduler": psutil.Process(scheduler.pid)}
+        found |= {f"worker {at}": psutil.Process(worker.pid) for at, worker in enumerate(workers)}
+        mine = psutil.Process()
+        for at in range(8 * WORKERS):  # loads what drawing needs
+            helper.submit(programs[at], Errand(str(put / f"{at}.png"), None, 1, ()))
         while helper.waiting:
             helper.take()
-        cluster_ms = 1e3 * (time.perf_counter() - started) / frames
+        before = {name: processor_s(process) for name, process in found.items()}
+        client_s, started = time.process_time(), time.perf_counter()
+        for at in range(frames):
+            helper.submit(programs[at % 100], Errand(str(put / f"{at}.png"), None, 1, ()))
+            if at % few == few - 1:
+                sizes = {"client": mine.memory_info().rss, "scheduler": found["scheduler"].memory_info().rss}
+                memory.append({"frames": at + 1, **{name: size / 2**20 for name, size in sizes.items()}})
+        while helper.waiting:
+            helper.take()
+        seconds = time.perf_counter() - started
+        spent = {name: processor_s(process) - before[name] for name, process in found.items()}
+        client_s = time.process_time() - client_s
+        batches = helper.batches
         helper.close()
     return {
         "frames": frames,
         "canvas": [8, 8],
+        "seconds": seconds,
+        "batches": batches,
         "alone_ms": alone_ms,
-        "cluster_ms": cluster_ms,
+        "client_ms": 1e3 * client_s / frames,
+        "scheduler_ms": 1e3 * spent["scheduler"] / frames,
+        "workers_ms": 1e3 * sum(s for name, s in spent.items() if "worker" in name) / frames,
         "memory_mib": memory,
         "files": len(list(put.glob("*.png"))),
     }
 
 
+MEASURES = {"compared": (compared, 60), "gone": (gone, 24), "many": (many, 10_000)}
+
+
 def main() -> None:
-    """Measure all three, and write a record."""
+    """Measure, and write a record, or a part of one."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=60)
-    parser.add_argument("--small", type=int, default=10_000)
+    parser.add_argument("measure", nargs="*", choices=[*MEASURES, []])
+    parser.add_argument("--share", type=float, default=1.0, help="of the frames")
     parser.add_argument("-o", "--out", type=Path)
     asked = parser.parse_args()
-    found: dict[str, Any] = {**about(), "cores": usable_cores()}
-    measures = {
-        "compared": (compared, asked.frames),
-        "gone": (gone, asked.frames),
-        "many": (many, asked.small),
-    }
-    for name, (measure, frames) in measures.items():
+    out: Path | None = asked.out
+    found = json.loads(out.read_text()) if out is not None and out.exists() else {}
+    for name in asked.measure or MEASURES:
+        measure, frames = MEASURES[name]
         with tempfile.TemporaryDirectory() as folder:
-            found[name] = measure(Path(folder), frames)
-        print(json.dumps({name: found[name]}, indent=1), flush=True)
-        if asked.out is not None:
-            asked.out.write_text(json.dumps(found, indent=1) + "\n")
+            made = measure(Path(folder), max(10, round(frames * asked.share)))
+        found[name] = {**about(), "cores": usable_cores(), **made}
+        print(json.dumps(found[name], indent=1), flush=True)
+        if out is not None:
+            out.write_text(json.dumps(found, indent=1) + "\n")
 
 
 if __name__ == "__main__":

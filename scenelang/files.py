@@ -103,17 +103,21 @@ def note_input(name: str) -> None:
         inputs.add(name)
 
 
-def write_whole(target: str | os.PathLike[str], data: bytes) -> None:
+def write_whole(target: str | os.PathLike[str], data: bytes, *, flush: bool = True) -> None:
     """Write to a temporary file beside ``target``, flush it to the disk, then rename it over ``target``.
 
     For names that no user wrote: a link or pipe in its place is replaced, never written through. A file that
     is there keeps its permissions. What a killed process left of writing the same file is removed.
 
+    Args:
+        flush: wait until the bytes are on the disk, which for a small file takes longer than all else.
+            Without it a power cut may leave a file of zeros.
+
     Raises:
         NotWritten: nothing is left behind and an old ``target`` stays as it was.
     """
     with _naming(target):
-        _replace(Path(target), data)
+        _replace(Path(target), data, flush)
 
 
 def write_output(target: str | os.PathLike[str], data: bytes) -> None:
@@ -192,7 +196,7 @@ def _mode(look: Callable[[Any], os.stat_result], path: str | os.PathLike[str]) -
     return None
 
 
-def _replace(place: Path, data: bytes) -> None:
+def _replace(place: Path, data: bytes, flush: bool = True) -> None:
     mode = _mode(os.lstat, place)
     if mode is not None and stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
@@ -207,7 +211,8 @@ def _replace(place: Path, data: bytes) -> None:
                 os.fchmod(file.fileno(), stat.S_IMODE(mode))
             file.write(data)
             file.flush()
-            os.fsync(file.fileno())
+            if flush:
+                os.fsync(file.fileno())
             if sys.platform == "win32":
                 file.close()  # no open file is renamed there; elsewhere it stays locked until it is
             os.replace(part, place)

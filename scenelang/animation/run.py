@@ -241,7 +241,7 @@ class _Run:
             files = self.beside(frame, self.store)
             self.suffixes = tuple(files)
             for suffix, data in files.items():
-                write_whole(self.store.beside(frame.key, number, suffix), data)
+                write_whole(self.store.beside(frame.key, number, suffix), data, flush=False)
         return frame
 
     def _one(self, frame: Drawable, index: int, total: int) -> None:
@@ -303,11 +303,13 @@ def _numbered(store: Store, target: Target, numbers: range, run: _Run) -> list[P
             if last[key] == index:
                 os.replace(frame, name)
             else:
-                write_whole(name, frame.read_bytes())
+                write_whole(name, frame.read_bytes(), flush=False)
         for suffix in run.suffixes:
             pairs[file.with_suffix(suffix)] = file
             os.replace(store.beside(key, number, suffix), file.with_suffix(suffix))
         files += sorted(pairs)
+    if hasattr(os, "sync"):
+        os.sync()  # all at once: one by one waits as often as there are files
     return files
 
 

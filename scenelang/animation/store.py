@@ -121,9 +121,12 @@ class Store:
 
 
 def put_frame(files: Mapping[Path, bytes]) -> None:
-    """Write the files of a frame, the first last: where that one is, the others are; links are replaced."""
+    """Write the files of a frame, the first last: where that one is, the others are; links are replaced.
+
+    They are not flushed: a frame that a power cut damaged is drawn again.
+    """
     for file, data in reversed(list(files.items())):
-        write_whole(file, data)
+        write_whole(file, data, flush=False)
 
 
 def deliver(part: Path, target: Path) -> None:
