@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -33,7 +34,7 @@ from scenelang.program.compile import compile_scene
 from scenelang.sweep.api import Sweep, render_many
 
 SCENE = """\
-canvas(768, 768);
+canvas(512, 512);
 param k = 0 in -1..1;
 param turn = 0deg in 0deg..360deg;
 smooth(0.2) {
@@ -82,6 +83,12 @@ def same(one: Sweep, two: Sweep) -> bool:
     )
 
 
+def processor_s(process: psutil.Process) -> float:
+    """Seconds of the processor that a process and those below it took so far."""
+    times = [one.cpu_times() for one in (process, *process.children(recursive=True))]
+    return sum(one.user + one.system for one in times)
+
+
 class Killer:
     """Kills a process when a run is so far, and says how often it did."""
 
@@ -102,25 +109,29 @@ def compared(folder: Path, frames: int) -> dict[str, Any]:
     """One process, two workers, and two workers that are killed: seconds, and whether bytes are the same."""
     scene = folder / "scene.nsg"
     scene.write_text(SCENE)
-    asked: dict[str, Any] = {"random": ["k", "turn"], "count": frames, "seed": 1}
+    asked: dict[str, Any] = {"random": ["k", "turn"], "seed": 1}
 
-    def timed(name: str, **more: Any) -> tuple[float, Sweep]:
-        started = time.perf_counter()
-        made = render_many(scene, folder / name, **asked, **more)
-        return time.perf_counter() - started, made
+    def timed(name: str, count: int = frames, **more: Any) -> tuple[dict[str, float], Sweep]:
+        mine = psutil.Process()
+        started, before = time.perf_counter(), processor_s(mine)
+        made = render_many(scene, folder / name, **asked, count=count, **more)
+        seconds = time.perf_counter() - started
+        return {"seconds": seconds, "processor_s": processor_s(mine) - before}, made
 
+    timed("once", count=2, jobs=1)  # loads what drawing needs
     alone_s, alone = timed("alone", jobs=1)
     with cluster(folder) as (address, *_):
+        timed("warm", count=8, cluster=address)
         two_s, two = timed("two", cluster=address)
         killer = Killer(1 / 3, 2 / 3)
         killed_s, killed = timed("killed", cluster=address, progress=killer)
     return {
         "frames": frames,
-        "canvas": [768, 768],
+        "canvas": [512, 512],
         "workers": WORKERS,
-        "alone_s": alone_s,
-        "two_s": two_s,
-        "killed_s": killed_s,
+        "alone": alone_s,
+        "two": two_s,
+        "killed": killed_s,
         "kills": killer.kills,
         "two_same": same(alone, two),
         "killed_same": same(alone, killed),
@@ -157,12 +168,6 @@ def gone(folder: Path, frames: int) -> dict[str, Any]:
         "drawn": made.made.drawn,
         "same": same(alone, made),
     }
-
-
-def processor_s(process: psutil.Process) -> float:
-    """Seconds of the processor that a process and those below it took so far."""
-    times = [one.cpu_times() for one in (process, *process.children(recursive=True))]
-    return sum(one.user + one.system for one in times)
 
 
 def many(folder: Path, frames: int) -> dict[str, Any]:
@@ -213,7 +218,7 @@ def many(folder: Path, frames: int) -> dict[str, Any]:
     }
 
 
-MEASURES = {"compared": (compared, 60), "gone": (gone, 24), "many": (many, 10_000)}
+MEASURES = {"compared": (compared, 30), "gone": (gone, 16), "many": (many, 10_000)}
 
 
 def main() -> None:
@@ -229,7 +234,8 @@ def main() -> None:
         measure, frames = MEASURES[name]
         with tempfile.TemporaryDirectory() as folder:
             made = measure(Path(folder), max(10, round(frames * asked.share)))
-        found[name] = {**about(), "cores": usable_cores(), **made}
+        load = {"cores": usable_cores(), "load": os.getloadavg()[0]}  # of others too
+        found[name] = {**about(), **load, **made}
         print(json.dumps(found[name], indent=1), flush=True)
         if out is not None:
             out.write_text(json.dumps(found, indent=1) + "\n")

@@ -11,6 +11,8 @@ import contextlib
 import hashlib
 import logging
 import platform
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -58,7 +60,7 @@ class Cluster:
             raise RenderError("a cluster needs dask: pip install 'scenelang[dask]'") from None
         for name in ("distributed", "distributed.client"):  # what matters of what they say is raised
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        self._own: Any = None
+        self._own: _Local | None = None
         self.address = address
         self.batches = 0  # sent so far
         self._batch: list[tuple[bytes, Errand]] = []
@@ -66,9 +68,9 @@ class Cluster:
         self._under_way: dict[Future[Any], list[Errand]] = {}
         try:
             if address.partition(":")[0] == LOCAL:
-                self._own = _own_cluster(address)
+                self._own = _Local(address)
             self._client: Client = distributed.Client(
-                self._own or address, timeout=WAIT_S, set_as_default=False, name="scenelang"
+                self._own.address if self._own else address, timeout=WAIT_S, set_as_default=False
             )
             self._client.wait_for_workers(1, timeout=WAIT_S)
         except (OSError, TimeoutError, ValueError) as error:
@@ -129,10 +131,10 @@ class Cluster:
 
     def close(self) -> None:
         """Call off what is under way; workers of this machine end."""
-        for part in (getattr(self, "_client", None), self._own):
-            if part is not None:
-                with contextlib.suppress(Exception):
-                    part.close(timeout=2)
+        with contextlib.suppress(Exception):  # there may be none yet, or none any more
+            self._client.close(timeout=2)
+        if self._own is not None:
+            self._own.close()
 
     def _send(self) -> None:
         if self._batch:
@@ -156,18 +158,38 @@ class Cluster:
         return len(found)
 
 
-def _own_cluster(address: str) -> Any:
-    """Workers on this machine, which listen to it alone."""
-    from distributed import LocalCluster
+class _Local:
+    """A scheduler in this process and a worker for each core, which listen to this machine alone.
 
-    port = address.partition(":")[2]
-    return LocalCluster(
-        n_workers=usable_cores(),
-        threads_per_worker=1,
-        host="127.0.0.1",
-        dashboard_address=f"127.0.0.1:{int(port)}" if port else None,
-        silence_logs=logging.CRITICAL,
-    )
+    Workers are plain processes: those that dask starts by itself run an embedder's main module again.
+    """
+
+    def __init__(self, address: str) -> None:
+        from distributed import LocalCluster
+
+        port = address.partition(":")[2]
+        self._cluster = LocalCluster(
+            n_workers=0,
+            host="127.0.0.1",
+            dashboard_address=f"127.0.0.1:{int(port)}" if port else None,
+            silence_logs=logging.CRITICAL,
+        )
+        self.address: str = self._cluster.scheduler_address
+        command = [sys.executable, "-m", "distributed.cli.dask_worker", self.address, "--host", "127.0.0.1"]
+        command += ["--nthreads", "1", "--no-dashboard", "--death-timeout", "10"]
+        quiet = subprocess.DEVNULL
+        self._workers = [
+            subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)
+            for _ in range(usable_cores())
+        ]
+
+    def close(self) -> None:
+        """End all of it."""
+        for worker in self._workers:
+            worker.terminate()
+        for worker in self._workers:
+            worker.wait()
+        self._cluster.close()
 
 
 def _told(error: object) -> str:
