@@ -21,6 +21,7 @@ import fnmatch
 import io
 import json
 import re
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -304,6 +305,18 @@ def way_of(found: nsg.Fit) -> bytes:
     return webp([frames[0]] * 4 + frames + [frames[-1]] * 8, 150, True)
 
 
+def swept() -> bytes:
+    """The contact sheet of docs/sweep.md, of the scene and the grid that stand there."""
+    found = re.search(
+        r"^```nsg[^\n]*\n(.*?)```", (DOCS / "sweep.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        scene, sheet = Path(folder) / "flowers.nsg", Path(folder) / "sheet.png"
+        scene.write_text(found[1] if found else "", "utf-8")
+        nsg.render_many(scene, f"{folder}/out/", grid={"petals": "", "turn": "../7"}, sheet=sheet)
+        return _few_colours(sheet.read_bytes())
+
+
 def plan() -> dict[str, Callable[[], bytes]]:
     """What `docs/pictures` holds, and how each file of it is made."""
     made: dict[str, Callable[[], bytes]] = {}
@@ -326,6 +339,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
     made["fit.png"] = fitted
     made["fit-solid.png"] = lambda: _few_colours(png(fitted_solid().sheet().to_pil()))
     made["fit-solid.webp"] = lambda: way_of(fitted_solid())
+    made["sweep.png"] = swept
     made[f"{COMPARED}-compared.png"] = compared
     made["stability.png"] = lambda: stability(2)
     made["stability-solids.png"] = lambda: stability(3)

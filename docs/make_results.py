@@ -16,6 +16,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import clusters
 import costs
 import fits
 import reported
@@ -45,7 +46,7 @@ WHAT = {
     "strong": "deformations up to ±2.4",
     "large": "three times the size",
 }
-PAGES = ("results.md", "report.md", "proof.md", "viewer.md", "elements.md", "fit.md")
+PAGES = ("results.md", "report.md", "proof.md", "viewer.md", "elements.md", "fit.md", "sweep.md")
 EXPERIMENTS = ("overfit", "compare", "table2", "table3", "table4", "losses", "seeds")
 
 
@@ -233,6 +234,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "texels": texels,
     "rivals": solid_rivals.table,
     "shadows": shadows,
+    **clusters.BLOCKS,
     **costs.BLOCKS,
     **fits.BLOCKS,
     **reported.BLOCKS,

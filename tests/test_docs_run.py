@@ -31,6 +31,7 @@ PAGES = (
     "data",
     "elements",
     "proof",
+    "sweep",
     "viewer",
 )
 SLOW = ("animation",)

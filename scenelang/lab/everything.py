@@ -74,6 +74,7 @@ STEPS: Final = (
 """What is run, in this order: each command of the laboratory and each benchmark that a page cites."""
 
 ELSEWHERE: Final = {
+    "cluster": "free ports, and cores of its own",
     "device": "a GPU",
     "play": "a browser",
     "viewer": "a browser",
