@@ -337,7 +337,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
             made[name] = lambda draw=draw, source=Source(text=text): draw(source)
     made["gallery.png"] = gallery
     made["fit.png"] = fitted
-    made["fit-solid.png"] = lambda: _few_colours(png(fitted_solid().sheet().to_pil()))
+    made["fit-solid.png"] = lambda: png(fitted_solid().sheet().to_pil())
     made["fit-solid.webp"] = lambda: way_of(fitted_solid())
     made["sweep.png"] = swept
     made[f"{COMPARED}-compared.png"] = compared
