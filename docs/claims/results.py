@@ -85,8 +85,10 @@ STABILITY = [
     f"{ROWS[0]:.1f} dB for one, {ROWS[1]:.1f} for four, {ROWS[2]:.1f} for 32, {ROWS[3]:.1f} for 64",
     f"is {EDGES[0]:.4f} at 32², {EDGES[1]:.4f} at 256² and {EDGES[2]:.4f} at 1024²",
     f"it is {SAMPLED[0]:.6f}, {SAMPLED[1]:.4f} and {SAMPLED[2]:.4f}. That",
-    f"by {at(STABLE, 'invariants/flicker/mean') * 100:.1f} % more",
+    f"does not have, is {at(STABLE, 'invariants/flicker/mean') * 100:.1f} % of the change that it has",
     f"by more than {at(STABLE, 'invariants/arithmetic/skipping'):.4f}",
+    f"Flicker is {at('stability-solids3d', 'invariants/flicker/mean') * 100:.1f} % of the change that",
+    f"{at('stability-solids3d', 'invariants/flicker/worst') * 100:.1f} % in the worst scene: what changes",
     f"the mean is {probe('deep', 1):.0f} dB and the worst of {at(STABLE, 'probes/deep/scenes')} scenes "
     f"{probe('deep', 1, 'psnr/worst'):.0f}",
     f"the scale exceeds {Figure(read('models/shapes2d/manifest')['trained']['blend'][1]):.2f}",
