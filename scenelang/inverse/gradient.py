@@ -1,7 +1,7 @@
 """How soft pictures change with params: differences of Programs, then reverse passes through the picture.
 
 Differences of pictures cost a compilation and a picture for each number. Here a few compilations and one soft
-picture with its derivatives do, however many numbers there are. Elements, textures, solids and axes along
+picture with its derivatives do, however many numbers there are. Elements, textures, media and axes along
 which objects come or go are left to differences.
 """
 
@@ -54,20 +54,24 @@ class Changes:
         self.rates = Rates(program, space)
 
     def at(self, u: Point) -> Change | None:
-        """The change at a point, None where there is no picture, or one with elements or textures."""
+        """The change at a point, None where there is no picture, or one with elements, textures or media."""
         import torch
 
         from scenelang.inverse.plane import SoftPlane
+        from scenelang.inverse.solids import SoftSolids
 
         program = self.program(u)
         if program is None or not softens(program):
             return None
+        kind = SoftPlane if program.stage is None else SoftSolids
+        soft = kind(program, self.under, torch.float64 if self.exact else torch.float32)
+        if not soft.opaque:
+            return None
         rates, known = self.rates.at(u, program, self.exact)
-        soft = SoftPlane(program, self.under, torch.float64 if self.exact else torch.float32)
         picture, slopes = soft(numbers_of(program), rates)
         return Change(picture.astype(np.float64), slopes.astype(np.float64), known)
 
 
 def softens(program: Program) -> bool:
     """Whether there are derivatives of a Program's soft picture."""
-    return program.stage is None and len(program) > 0 and not program.elements and not program.palette
+    return len(program) > 0 and not program.elements and not program.palette

@@ -157,7 +157,7 @@ class Problem:
 
     def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
         """Derivatives (R, n) of the residuals, and of which axes (n,) there are; None where of none."""
-        if not self.soft or (found := self._changes.at(u)) is None:
+        if not (self.soft or self.light) or (found := self._changes.at(u)) is None:
             return None
         self.frames += 1
         height, width = self.canvas[::-1]
