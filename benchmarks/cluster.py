@@ -34,12 +34,12 @@ from scenelang.program.compile import compile_scene
 from scenelang.sweep.api import Sweep, render_many
 
 SCENE = """\
-canvas(512, 512);
-param k = 0 in -1..1;
+canvas(640, 480);
+param k = 0 in -0.8..0.8;
 param turn = 0deg in 0deg..360deg;
-smooth(0.2) {
-  star { twirl(k); scale(0.5); rotate(turn); material flat { color(#e07a5f); } }
-  square { bend(k); scale(0.3); translate(0.3, 0.2); material flat { color(#3d405b); } }
+chain {
+  torus { twist(k); rotate(turn); material diffuse { color(#c8502f); } }
+  smooth(k = 0.2) sphere { scale(0.45); material diffuse { color(#e8c060); } }
 }
 """
 SMALL = "canvas(8, 8); param k = 0.5 in 0..1; star { scale(0.9); rotate(90deg * k); }"
@@ -127,7 +127,7 @@ def compared(folder: Path, frames: int) -> dict[str, Any]:
         killed_s, killed = timed("killed", cluster=address, progress=killer)
     return {
         "frames": frames,
-        "canvas": [512, 512],
+        "canvas": [640, 480],
         "workers": WORKERS,
         "alone": alone_s,
         "two": two_s,
