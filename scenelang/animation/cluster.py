@@ -15,12 +15,12 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from scenelang.animation.painting import Errand
 from scenelang.animation.store import put_frame
@@ -35,19 +35,24 @@ LOCAL: Final = "local"
 AHEAD: Final = 3  # batches under way for each worker
 BATCH_S: Final = 0.25  # of drawing in a batch, beside which a task's own milliseconds are little
 MOST_BATCH: Final = 64
-WAIT_S: Final = 20.0  # for a scheduler to answer, and for its first worker
+WAIT_S: Final = 30.0  # for a scheduler to answer, and for workers
 _HARMLESS: Final = ("python", "processor")
 """What differs without a difference in pixels, or with one of 1/255 at most."""
 _NEEDED: Final = ("distributed", "numpy", "scenelang", "torch")
+T = TypeVar("T")
+R = TypeVar("R")
 _local = threading.local()
 
 
-class Cluster:
-    """The workers of a scheduler, as `Helpers`.
+class Link:
+    """A connection to workers that give the pixels of this machine.
 
     Args:
         address: of the scheduler, such as ``tcp://host:8786``, or ``"local"``: a worker for each core of this
             machine, which nobody else reaches; ``"local:8787"`` has dask's dashboard on that port.
+
+    Attributes:
+        count: workers that there were.
 
     Raises:
         RenderError: there is no dask, no scheduler or no worker, or a worker would draw other pixels.
@@ -60,19 +65,14 @@ class Cluster:
             raise RenderError("a cluster needs dask: pip install 'scenelang[dask]'") from None
         for name in ("distributed", "distributed.client"):  # what matters of what they say is raised
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        self._own: _Local | None = None
         self.address = address
-        self.batches = 0  # sent so far
-        self._batch: list[tuple[bytes, Errand]] = []
-        self._each_s = BATCH_S  # a frame, as far as is known
-        self._under_way: dict[Future[Any], list[Errand]] = {}
+        self._own: _Local | None = None
         try:
             if address.partition(":")[0] == LOCAL:
                 self._own = _Local(address)
-            self._client: Client = distributed.Client(
-                self._own.address if self._own else address, timeout=WAIT_S, set_as_default=False
-            )
-            self._client.wait_for_workers(1, timeout=WAIT_S)
+            where = self._own.address if self._own else address
+            self._client: Client = distributed.Client(where, timeout=WAIT_S, set_as_default=False)
+            self._client.wait_for_workers(self._own.count if self._own else 1, timeout=WAIT_S)
         except (OSError, TimeoutError, ValueError) as error:
             self.close()
             raise RenderError(f"no scheduler with workers at `{address}`: {_told(error)}") from None
@@ -84,9 +84,71 @@ class Cluster:
         self._done = distributed.as_completed(loop=self._client.loop)
 
     @property
+    def ready(self) -> bool:
+        """Whether `next` need not wait."""
+        return bool(self._done.has_ready())
+
+    def send(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Have a function of ours called by a worker, after it has compared fingerprints."""
+        future = self._client.submit(_checked, fingerprint(), function, *arguments, pure=False)
+        self._done.add(future)
+        return future
+
+    def next(self) -> tuple[Future[Any], Any]:
+        """What was sent and is done next, and what it gave; raises what it raised.
+
+        Raises:
+            RenderError: several workers ended over it, or the scheduler is gone.
+        """
+        from distributed.comm.core import CommClosedError
+        from distributed.scheduler import KilledWorker
+
+        future = next(self._done)
+        try:
+            return future, future.result()
+        except KilledWorker as error:
+            raise RenderError(f"given up: {error.allowed_failures + 1} workers ended over it") from None
+        except (CancelledError, CommClosedError, TimeoutError):
+            raise RenderError(
+                f"the scheduler at `{self.address}` is gone; the same command goes on with what is left"
+            ) from None
+
+    def close(self) -> None:
+        """Call off what is under way; workers of this machine end."""
+        with contextlib.suppress(Exception):  # there may be none yet, or none any more
+            self._client.close(timeout=2)
+        if self._own is not None:
+            self._own.close()
+
+    def _compare(self) -> int:
+        """How many workers there are; raises `RenderError` where one would draw other pixels."""
+        found = self._client.run(look, on_error="return")
+        for address, theirs in found.items():
+            if not isinstance(theirs, dict):
+                raise RenderError(f"worker {address} cannot run scenelang: {_told(theirs)}")
+            fatal, harmless = differences(fingerprint(), theirs)
+            if fatal:
+                raise RenderError(f"worker {address} has {fatal[0]}")
+            for fact in harmless:
+                logging.getLogger("scenelang").warning("worker %s has %s", address, fact)
+        return len(found)
+
+
+class Cluster:
+    """The workers of a scheduler that draw frames, as `Helpers`; arguments and errors are those of `Link`."""
+
+    def __init__(self, address: str) -> None:
+        self._link = Link(address)
+        self.count = self._link.count
+        self.batches = 0  # sent so far
+        self._batch: list[tuple[bytes, Errand]] = []
+        self._each_s = BATCH_S  # a frame, as far as is known
+        self._under_way: dict[Future[Any], list[Errand]] = {}
+
+    @property
     def waiting(self) -> int:
         """Frames that are asked for and not known to be done."""
-        while self._under_way and self._done.has_ready():
+        while self._under_way and self._link.ready:
             self._receive()
         return len(self._batch) + sum(map(len, self._under_way.values()))
 
@@ -108,54 +170,38 @@ class Cluster:
         self._send()
         self._receive()
 
-    def _receive(self) -> None:
-        from distributed.comm.core import CommClosedError
-        from distributed.scheduler import KilledWorker
+    def close(self) -> None:
+        """Call off what is under way."""
+        self._link.close()
 
-        future = next(self._done)
+    def _receive(self) -> None:
+        future, (seconds, found) = self._link.next()
         errands = self._under_way.pop(future)
-        try:
-            seconds, found = future.result()
-        except KilledWorker as error:
-            raise RenderError(
-                f"a frame was given up: {error.allowed_failures + 1} workers ended over it"
-            ) from None
-        except (CancelledError, CommClosedError, TimeoutError):
-            raise RenderError(
-                f"the scheduler at `{self.address}` is gone; the same command goes on with what is left"
-            ) from None
         self._each_s = 0.5 * (self._each_s + seconds / len(errands))
         for errand, files in zip(errands, found, strict=True):
             folder = Path(errand.file).parent
             put_frame({folder / name: data for name, data in files.items()})
 
-    def close(self) -> None:
-        """Call off what is under way; workers of this machine end."""
-        with contextlib.suppress(Exception):  # there may be none yet, or none any more
-            self._client.close(timeout=2)
-        if self._own is not None:
-            self._own.close()
-
     def _send(self) -> None:
         if self._batch:
-            errands = [errand for _, errand in self._batch]
-            future = self._client.submit(draw_batch, self._batch, fingerprint(), pure=False)
-            self._under_way[future] = errands
-            self._done.add(future)
+            self._under_way[self._link.send(draw_batch, self._batch)] = [errand for _, errand in self._batch]
             self._batch, self.batches = [], self.batches + 1
 
-    def _compare(self) -> int:
-        """How many workers there are; raises `RenderError` where one would draw other pixels."""
-        found = self._client.run(look, on_error="return")
-        for address, theirs in found.items():
-            if not isinstance(theirs, dict):
-                raise RenderError(f"worker {address} cannot run scenelang: {_told(theirs)}")
-            fatal, harmless = differences(fingerprint(), theirs)
-            if fatal:
-                raise RenderError(f"worker {address} has {fatal[0]}")
-            for fact in harmless:
-                logging.getLogger("scenelang").warning("worker %s has %s", address, fact)
-        return len(found)
+
+def by_workers(address: str, function: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
+    """A function of ours on each item, by workers, in whatever order that is done; raises as `Link`."""
+    link, waiting = Link(address), 0
+    try:
+        for item in items:
+            if waiting >= AHEAD * link.count:
+                yield link.next()[1]
+                waiting -= 1
+            link.send(function, item)
+            waiting += 1
+        for _ in range(waiting):
+            yield link.next()[1]
+    finally:
+        link.close()
 
 
 class _Local:
@@ -178,9 +224,10 @@ class _Local:
         command = [sys.executable, "-m", "distributed.cli.dask_worker", self.address, "--host", "127.0.0.1"]
         command += ["--nthreads", "1", "--no-dashboard", "--death-timeout", "10"]
         quiet = subprocess.DEVNULL
+        self.count = usable_cores()
         self._workers = [
             subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)
-            for _ in range(usable_cores())
+            for _ in range(self.count)
         ]
 
     def close(self) -> None:
@@ -199,23 +246,25 @@ def _told(error: object) -> str:
 # ---------------------------------------------------------------- what runs on workers
 
 
-def draw_batch(
-    batch: Sequence[tuple[bytes, Errand]], ours: dict[str, str]
-) -> tuple[float, list[dict[str, bytes]]]:
+def _checked(ours: dict[str, str], function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a function where the fingerprint of who asks is that of this machine."""
+    fatal, _ = differences(ours, fingerprint())
+    if fatal:
+        raise RenderError(f"a worker has {fatal[0]}")
+    return function(*arguments)
+
+
+def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[str, bytes]]]:
     """Draw Programs on this machine: the processor's seconds, and the files of each by their names.
 
     Args:
         batch: bytes of Programs, and what is asked of them.
-        ours: the fingerprint of who asks.
 
     Raises:
-        RenderError: one cannot be drawn, or this machine would draw other pixels.
+        RenderError: one cannot be drawn.
     """
     from scenelang.renderers.draw import Kept
 
-    fatal, _ = differences(ours, fingerprint())
-    if fatal:
-        raise RenderError(f"a worker has {fatal[0]}")
     kept = _local.__dict__.setdefault("kept", Kept())
     started = time.process_time()  # others on this machine do not make batches smaller
     found = [

@@ -15,8 +15,8 @@ from scenelang.training.loop import revision
 
 Report = Callable[[str, int, int], None]
 """Called with what is measured, how much of it is done, and all."""
-FOLDERS: Final = {"-o", "--out", "--kept", "--known"}
-"""Options of commands that change where things lie, and no figure."""
+FOLDERS: Final = {"-o", "--out", "--kept", "--known", "--cluster"}
+"""Options of commands that change where things lie or are done, and no figure."""
 
 
 def silent(what: str, done: int, count: int) -> None:

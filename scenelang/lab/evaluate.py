@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.backend.neural import open_model
 from scenelang.files import write_whole
 from scenelang.image import Image
 from scenelang.lab.about import Report, about, silent
@@ -83,6 +85,7 @@ def evaluate_set(
     side: int | None = None,
     kept: Path | None = None,
     threads: int = 1,
+    cluster: str | None = None,
     report: Report = silent,
 ) -> tuple[dict[str, Any], list[Case]]:
     """Draw a set and compare.
@@ -95,6 +98,8 @@ def evaluate_set(
         side: shorter side of the canvas in pixels; by default that of the set.
         kept: folder of exact pictures, which other weights and renderers do not change.
         threads: for drawing.
+        cluster: scheduler of dask whose workers draw, each with one thread, or ``"local"``; weights are those
+            that ship then, and nothing is kept.
         report: called with the set, scenes done and all.
 
     Returns:
@@ -102,15 +107,19 @@ def evaluate_set(
     """
     scene_at = scenes_of(model, name, seed, side)
     started = time.perf_counter()
+    if cluster is None:
+        found: Iterable[Case] = (_case(model, scene_at, index, kept, threads) for index in range(count))
+    else:
+        from scenelang.animation.cluster import by_workers
+
+        asked = ((model.manifest.name, name, seed, side, index) for index in range(count))
+        found = by_workers(cluster, _case_of, asked)
     cases = []
-    for index in range(count):
-        scene = scene_at(index)
-        program, picture = draw_scene(model, scene, threads)
-        exact = exact_of(scene, model.manifest, kept)
-        uncapped = psnr(over_white(picture), over_white(exact), UNCAPPED_DB)
-        figures = {**compare(picture, exact), "psnr_uncapped": uncapped}
-        cases.append(Case(index, _last_word(program.tokens), figures))
-        report(name, index + 1, count)
+    for done, case in enumerate(found, 1):
+        cases.append(case)
+        report(name, done, count)
+    cases.sort(key=lambda case: case.index)
+    scene = scene_at(count - 1)
     worst = sorted(cases, key=lambda c: c.figures["psnr_uncapped"])[:SHOWN]
     summary = {
         "set": name,
@@ -131,6 +140,23 @@ def evaluate_set(
         },
     }
     return summary, worst
+
+
+def _case(
+    model: Model, scene_at: Callable[[int], Scene], index: int, kept: Path | None, threads: int
+) -> Case:
+    scene = scene_at(index)
+    program, picture = draw_scene(model, scene, threads)
+    exact = exact_of(scene, model.manifest, kept)
+    uncapped = psnr(over_white(picture), over_white(exact), UNCAPPED_DB)
+    return Case(index, _last_word(program.tokens), {**compare(picture, exact), "psnr_uncapped": uncapped})
+
+
+def _case_of(asked: tuple[str, str, int, int | None, int]) -> Case:
+    """One scene's figures by a shipped model, where nothing is loaded yet."""
+    model, name, seed, side, index = asked
+    loaded = open_model(model)
+    return _case(loaded, scenes_of(loaded, name, seed, side), index, None, 1)
 
 
 def _last_word(tokens: npt.NDArray[np.int8]) -> str:

@@ -111,13 +111,13 @@ def test_small_frames_travel_together(tmp_path: Path, address: str, monkeypatch:
     path = tmp_path / "a.nsg"
     path.write_text("canvas(8, 8); param k = 0.5 in 0..1; star { scale(0.9); rotate(90deg * k); }")
     sent: list[int] = []
-    send = ours.Cluster._send
+    send = ours.Link.send
 
-    def counted(self: ours.Cluster) -> None:
-        sent.append(len(self._batch))
-        send(self)
+    def counted(self: ours.Link, function: Any, batch: Any) -> Any:
+        sent.append(len(batch))
+        return send(self, function, batch)
 
-    monkeypatch.setattr(ours.Cluster, "_send", counted)
+    monkeypatch.setattr(ours.Link, "send", counted)
     made = nsg.render_many(path, tmp_path / "out", random=["k"], count=60, cluster=address)
     assert sum(sent) == made.made.drawn == 60
     assert max(sent) > 1
@@ -225,3 +225,15 @@ def test_workers_of_this_machine(scene: Path, tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
     one = nsg.animate(scene, tmp_path / "one-%d.png")
     assert same(one.files, [tmp_path / f"f-{at}.png" for at in range(6)])
+
+
+def test_an_evaluation_has_the_same_figures(address: str) -> None:
+    from scenelang.lab.evaluate import evaluate_set
+    from scenelang.models.load import load_model
+
+    model, timed = load_model("solids3d"), {"seconds"}
+    one, two = (evaluate_set(model, "staged", 4, 5, side=16, cluster=where) for where in (None, address))
+    assert {k: v for k, v in one[0].items() if k not in timed} == {
+        k: v for k, v in two[0].items() if k not in timed
+    }
+    assert one[1] == two[1]

@@ -36,6 +36,7 @@ from scenelang.lab.commands import common
 @common.out
 @common.weights
 @common.threads
+@options.cluster
 def command(
     model: str,
     sets: tuple[str, ...],
@@ -47,6 +48,7 @@ def command(
     out: Path,
     weights: Path | None,
     threads: int,
+    cluster: str | None,
 ) -> None:
     """Draw random scenes with MODEL and compare them with the exact reference.
 
@@ -54,6 +56,8 @@ def command(
     SET-worst.png (network, reference, FLIP map of the worst cases) into FOLDER.
     """
     need_metrics()
+    if cluster is not None and (weights is not None or kept is not None or threads != 1):
+        raise click.UsageError("--cluster is for shipped weights, one thread each, without --kept.")
     import torch
 
     from scenelang.backend.options import keep_memory
@@ -70,7 +74,7 @@ def command(
     for name in chosen:
         with Bar() as bar:
             summary, worst = evaluate_set(
-                loaded, name, scenes, seed, side=side, kept=kept, threads=threads, report=bar
+                loaded, name, scenes, seed, side=side, kept=kept, threads=threads, cluster=cluster, report=bar
             )
         stem = Path(name).stem
         common.write_json(out / f"{stem}.json", summary)
