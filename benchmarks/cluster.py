@@ -52,7 +52,9 @@ def cluster(folder: Path) -> Iterator[tuple[str, Process, list[Process]]]:
     """A scheduler and workers: its address and process, and those of the workers."""
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    # one message each, where dask keeps a thousand that were sent
+    quiet: dict[str, Any] = {"env": {**os.environ, "DASK_DISTRIBUTED__ADMIN__LOW_LEVEL_LOG_LENGTH": "1"}}
+    quiet |= {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     scheduler = subprocess.Popen(
         [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
          "--no-dashboard", "--scheduler-file", str(file)], **quiet

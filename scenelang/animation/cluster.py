@@ -35,6 +35,8 @@ LOCAL: Final = "local"
 AHEAD: Final = 3  # batches under way for each worker
 BATCH_S: Final = 0.25  # of drawing in a batch, beside which a task's own milliseconds are little
 MOST_BATCH: Final = 64
+MOST_BYTES: Final = 4 << 20  # of Programs in a batch, where elements make them large
+LOGGED: Final = "distributed.admin.low-level-log-length"  # messages that dask keeps, and what is in them
 WAIT_S: Final = 30.0  # for a scheduler to answer, and for workers
 _HARMLESS: Final = ("python", "processor")
 """What differs without a difference in pixels, or with one of 1/255 at most."""
@@ -60,11 +62,13 @@ class Link:
 
     def __init__(self, address: str) -> None:
         try:
+            import dask
             import distributed
         except ModuleNotFoundError:
             raise RenderError("a cluster needs dask: pip install 'scenelang[dask]'") from None
         for name in ("distributed", "distributed.client"):  # what matters of what they say is raised
             logging.getLogger(name).setLevel(logging.CRITICAL)
+        dask.config.set({LOGGED: 1})  # else what was sent stays in memory
         self.address = address
         self._own: _Local | None = None
         try:
@@ -155,7 +159,8 @@ class Cluster:
     def submit(self, program: Program, errand: Errand) -> None:
         """Have a Program drawn to files; waits while many are under way. Raises as `take`."""
         self._batch.append((program_bytes(program), errand))
-        if len(self._batch) >= max(1, min(MOST_BATCH, int(BATCH_S / self._each_s))):
+        large = sum(len(data) for data, _ in self._batch) > MOST_BYTES
+        if large or len(self._batch) >= max(1, min(MOST_BATCH, int(BATCH_S / self._each_s))):
             while len(self._under_way) >= AHEAD * self.count:
                 self._receive()
             self._send()
