@@ -15,6 +15,7 @@ import io
 import json
 import statistics
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -49,6 +50,7 @@ triangle { scale(0.35); translate(0.2, -0.3); material flat { color(#3a6a8a); } 
 """
 NAMES: Final = ("x", "y", "size", "turn", "ink")
 Rng = np.random.Generator
+Draw = Callable[[dict[str, Any], Rng], Image]
 
 
 def polygons(true: dict[str, Any]) -> list[tuple[npt.NDArray[np.float64], str]]:

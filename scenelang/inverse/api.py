@@ -119,7 +119,9 @@ def _fit(task: Task, places: list[Found], done: bool) -> Fit:
         start_psnr=_db(last, before) if before is not None else -math.inf,
         size=last.canvas,
         done=done,
-        notes=hindrances(space, best, numbers, near, done, last.worst(after), last.noise(best)),
+        notes=hindrances(
+            space, best, numbers, near, done, last.worst(after), last.noise(best), last.blur(after)
+        ),
         numbers=numbers,
         tied=ties(space, slopes),
         others=tuple(others),

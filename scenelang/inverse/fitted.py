@@ -137,12 +137,14 @@ def hindrances(
     done: bool,
     worst: tuple[str, Matrix],
     noise: bool,
+    blur: float,
 ) -> tuple[str, ...]:
     """Why the picture is no nearer, as far as can be told.
 
     Args:
         worst: which picture of several is farthest off, and the errors (H, W) of its pixels.
         noise: whether these are like noise.
+        blur: by how many pixels the picture would have to be blurred to be nearer.
     """
     notes = []
     if not done:
@@ -152,6 +154,11 @@ def hindrances(
     unseen = [f"`{one.label}`" for one in numbers if math.isinf(one.felt)]
     if unseen:
         notes.append(f"the picture does not show {', '.join(unseen)} here, so any value would do")
+    if blur and psnr < GOOD_DB:
+        notes.append(
+            f"the target is out of focus: blurred by about {blur:g} pixels, the scene's picture would be "
+            "nearer; sizes and colours make up for that"
+        )
     if psnr < GOOD_DB and noise:
         notes.append("what differs is like noise, of which no values come nearer")
     elif psnr < GOOD_DB:

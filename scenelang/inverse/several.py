@@ -16,6 +16,8 @@ from scenelang.program.program import Program
 
 EDGE: Final = 2 ** (LEVELS - 1)  # of what the last level has means of, pixels
 GRAIN: Final = 2.0  # times the variance of means that noise has
+BLURS: Final = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # pixels
+SOFTER: Final = 0.98  # share of the error that is left where a target is out of focus
 
 
 class Together:
@@ -78,6 +80,16 @@ class Together:
             means += float(left[-3 * math.prod(-(-side // EDGE) for side in self.canvas) :].sum())
         return bool(means * EDGE**2 <= GRAIN * pixels)
 
+    def blur(self, pictures: Sequence[Picture]) -> float:
+        """By how many pixels (standard deviation) pictures have to be blurred to be nearer; 0 if not."""
+        best, found = SOFTER, 0.0
+        for sigma in BLURS:
+            left = self.residuals([_blurred(one, sigma) for one in pictures])
+            share = float(left @ left) / max(1e-12, float(np.square(self.residuals(pictures)).sum()))
+            if share < best:
+                best, found = share, sigma
+        return found
+
     @property
     def frames(self) -> int:
         """Pictures that were drawn so far."""
@@ -87,3 +99,14 @@ class Together:
 def _known(pictures: Sequence[Picture | None]) -> list[Picture] | None:
     known = [one for one in pictures if one is not None]
     return known if len(known) == len(pictures) else None
+
+
+def _blurred(picture: Picture, sigma: float) -> Picture:
+    """A picture (H, W, 3) under a Gaussian; beyond its edges it is as there."""
+    reach = math.ceil(3 * sigma)
+    weights = np.exp(-np.square(np.arange(-reach, reach + 1) / sigma) / 2)
+    for axis in (0, 1):
+        wide = np.pad(picture, [(reach * (at == axis),) * 2 for at in range(3)], mode="edge")
+        views = np.lib.stride_tricks.sliding_window_view(wide, len(weights), axis)
+        picture = np.asarray(views @ (weights / weights.sum()))
+    return picture

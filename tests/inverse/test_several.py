@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from scenelang.diagnostics.span import SourceFile
 from scenelang.inverse.task import Task, task_of
@@ -28,6 +29,17 @@ def test_errors_of_frames_are_averaged() -> None:
     parts = [task({frame: flat(level)}).problems[-1](u) for frame, level in ((0, 1.0), (2, 0.5))]
     assert both is not None
     assert both @ both == pytest.approx(np.mean([part @ part for part in parts if part is not None]))
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1.0, 2.0])
+def test_a_target_out_of_focus_is_told_by_how_much(sigma: float) -> None:
+    """Whose noise is as large as the blur's error."""
+    u, last = np.array([0.3]), task({0: flat(1.0)}).problems[-1]
+    pictures = last.pictures(u)
+    assert pictures is not None
+    seen = ndimage.gaussian_filter(pictures[0], (sigma, sigma, 0), mode="nearest")
+    target = seen + np.random.default_rng(3).normal(0.0, 0.05, (40, 40, 3))
+    assert task({0: target}).problems[-1].blur(pictures) == pytest.approx(sigma, abs=0.51 * sigma)
 
 
 @pytest.mark.parametrize(("blot", "noise"), [(0, True), (3, False)])
