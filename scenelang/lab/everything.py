@@ -69,6 +69,8 @@ STEPS: Final = (
     Step("benchmarks.mutations --count {few}"),
     Step("benchmarks.lsp 200"),
     Step("benchmarks.unions --scenes {scenes} -o {out}/unions-rivals.json", needs=("skia",)),
+    Step("benchmarks.fit_targets --scenes 1 -o {out}/fit-targets.json", needs=("resvg_py",)),
+    Step("benchmarks.fit_search --scenes 1 --params 2 -o {out}/fit-search.json", needs=("cma",)),
     Step("benchmarks.solids --scenes 1 --side 48 -o {out}/solid-rivals.json", needs=("mitsuba", "povray")),
 )
 """What is run, in this order: each command of the laboratory and each benchmark that a page cites."""
