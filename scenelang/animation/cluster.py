@@ -77,7 +77,7 @@ class Link:
             where = self._own.address if self._own else address
             self._client: Client = distributed.Client(where, timeout=WAIT_S, set_as_default=False)
             self._client.wait_for_workers(self._own.count if self._own else 1, timeout=WAIT_S)
-        except (OSError, TimeoutError, ValueError) as error:
+        except (OSError, TimeoutError, TypeError, ValueError) as error:  # TypeError: no certificates
             self.close()
             raise RenderError(f"no scheduler with workers at `{address}`: {_told(error)}") from None
         try:
@@ -227,7 +227,7 @@ class _Local:
         )
         self.address: str = self._cluster.scheduler_address
         command = [sys.executable, "-m", "distributed.cli.dask_worker", self.address, "--host", "127.0.0.1"]
-        command += ["--nthreads", "1", "--no-dashboard", "--death-timeout", "10"]
+        command += ["--nthreads", "1", "--dashboard-address", "127.0.0.1:0", "--death-timeout", "10"]
         quiet = subprocess.DEVNULL
         self.count = usable_cores()
         self._workers = [

@@ -11,6 +11,7 @@ from scenelang.animation.targets import Target
 from scenelang.backend.options import RenderError
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
+from scenelang.files import write_whole
 from scenelang.image import output_file
 from scenelang.outputs import Output
 from scenelang.program.program import program_bytes
@@ -67,7 +68,7 @@ class Book:
         self._old = self._before()
         target.path.mkdir(parents=True, exist_ok=True)
         if not self._old:
-            write_table(self.file, self.names, self.lines)
+            write_table(self.file, self.names, self.lines, write_whole)
 
     def _before(self) -> list[Line]:
         """The rows of a sweep that this one goes on with."""
@@ -125,4 +126,4 @@ class Book:
     def _note(self, number: int, line: Line) -> None:
         self.lines[number] = line
         if number == len(self.lines) - 1:
-            write_table(self.file, self.names, self.lines)
+            write_table(self.file, self.names, self.lines, write_whole)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +17,7 @@ from typing import Any, Final
 from scenelang.files import read_regular, write_output
 from scenelang.records import Record
 
+Writer = Callable[[Path, bytes], None]
 PARQUET: Final = ".parquet"
 _FRONT, _BACK = ("picture",), ("digest", "error")
 _MOST_BYTES: Final = 1 << 30
@@ -58,17 +59,23 @@ def check_table(path: Path) -> None:
         raise TableError(f"{PARQUET} needs pyarrow: pip install 'scenelang[parquet]'")
 
 
-def write_table(path: Path, names: Sequence[str], lines: Sequence[Line]) -> None:
-    """Write a table whole; raises `OSError`."""
+def write_table(
+    path: Path, names: Sequence[str], lines: Sequence[Line], write: Writer = write_output
+) -> None:
+    """Write a table whole; raises `OSError`.
+
+    Args:
+        write: `write_whole` where no user wrote the name.
+    """
     heads = (*_FRONT, *names, *_BACK)
     if path.suffix.lower() == PARQUET:
-        write_output(path, _parquet(heads, lines))
+        write(path, _parquet(heads, lines))
         return
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(heads)
     writer.writerows(line.cells for line in lines)
-    write_output(path, text.getvalue().encode())
+    write(path, text.getvalue().encode())
 
 
 def read_table(path: Path, names: Sequence[str]) -> list[Line]:
