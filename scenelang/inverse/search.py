@@ -102,16 +102,18 @@ def slopes(
     step: float,
     free: npt.NDArray[np.bool_],
     fine: bool = False,
+    many: int = MANY,
 ) -> Matrix:
-    """Derivatives (R, n) of residuals by differences, columns of axes that are not free 0.
+    """Derivatives (R, n) of residuals, by differences or reverse passes; columns of axes that are not free 0.
 
     Args:
         at: the residuals at u.
         step: in shares of a range; away from an end.
         fine: whether differences are central and of `FINE` of the step.
+        many: axes from which on reverse passes are taken, where there are any.
     """
     found = np.zeros((len(at), len(u)))
-    if np.count_nonzero(free) >= MANY and isinstance(residuals, Steep):
+    if np.count_nonzero(free) >= many and isinstance(residuals, Steep):
         exact = residuals.slopes(u)
         if exact is not None:
             found, free = exact[0], free & ~exact[1]
@@ -146,7 +148,14 @@ def central(
 
 
 def descend(
-    residuals: Residuals, space: Space, u: Point, *, step: float, most: int = 12, fine: bool = False
+    residuals: Residuals,
+    space: Space,
+    u: Point,
+    *,
+    step: float,
+    most: int = 12,
+    fine: bool = False,
+    many: int = MANY,
 ) -> Found | None:
     """Follow the continuous axes down from a point; None where that has no picture.
 
@@ -155,6 +164,7 @@ def descend(
         most: steps.
         fine: whether differences are central and of a third of the step: twice the pictures, which follow a
             narrow valley that others lose.
+        many: as of `slopes`.
     """
     at = residuals(u)
     if at is None:
@@ -164,7 +174,7 @@ def descend(
     for _ in range(most):
         if cost < _GRAIN or not space.smooth.any():
             break
-        j = slopes(residuals, space, u, at, step, space.smooth, fine)
+        j = slopes(residuals, space, u, at, step, space.smooth, fine, many)
         pull = j.T @ at
         ends = ~space.wraps & (((u <= 0.0) & (pull > 0)) | ((u >= 1.0) & (pull < 0)))
         free = np.flatnonzero(space.smooth & ~ends & (np.square(j).sum(0) > 1e-12))

@@ -19,15 +19,23 @@ from scenelang.lab.commands import common
     multiple=True,
     default=(1, 2, 3),
     show_default=True,
-    type=click.IntRange(1, 12),
+    type=click.IntRange(1, 24),
     help="Of a scene; may be repeated: scenes have so many in turn.",
 )
 @click.option("--side", default=256, show_default=True, type=click.IntRange(32, 1024), help="Of targets.")
+@click.option("--gradients", is_flag=True, help="Compare descents by reverse passes and by differences.")
 @click.option("--name", default="fit", show_default=True, help="Of the record.")
 @common.seed
 @common.out
 def command(
-    model: str, scenes: int, counts: tuple[int, ...], side: int, name: str, seed: int, out: Path
+    model: str,
+    scenes: int,
+    counts: tuple[int, ...],
+    side: int,
+    gradients: bool,
+    name: str,
+    seed: int,
+    out: Path,
 ) -> None:
     """Fit seeded scenes to exact pictures of values that only these know.
 
@@ -36,9 +44,18 @@ def command(
     of every range, or a picture at 45 dB.
     """
     from scenelang.lab.fits import measure
+    from scenelang.lab.gradients import measure as measure_gradients
 
     common.model_to_measure(model, None)
     with Bar() as bar:
+        if gradients:
+            found = measure_gradients(model, counts, scenes, seed, side, bar)
+            common.write_json(out / f"{name}.json", found)
+            for row in found["rows"]:
+                click.echo(
+                    f"{model}, {row['params']} params: {row['faster']} times as fast by reverse passes"
+                )
+            return
         found = measure(model, counts, scenes, seed, side, bar)
     common.write_json(out / f"{name}.json", found)
     click.echo(
