@@ -53,9 +53,6 @@ class Link:
         address: of the scheduler, such as ``tcp://host:8786``, or ``"local"``: a worker for each core of this
             machine, which nobody else reaches; ``"local:8787"`` has dask's dashboard on that port.
 
-    Attributes:
-        count: workers that there were.
-
     Raises:
         RenderError: there is no dask, no scheduler or no worker, or a worker would draw other pixels.
     """
@@ -81,11 +78,17 @@ class Link:
             self.close()
             raise RenderError(f"no scheduler with workers at `{address}`: {_told(error)}") from None
         try:
-            self.count = self._compare()
+            self._first = self._compare()
         except BaseException:
             self.close()
             raise
         self._done = distributed.as_completed(loop=self._client.loop)
+
+    @property
+    def count(self) -> int:
+        """Workers that there were a few seconds ago."""
+        known: int = self._client._scheduler_identity.get("n_workers", 0)  # asking would wait for an answer
+        return known or self._first
 
     @property
     def ready(self) -> bool:
@@ -143,11 +146,15 @@ class Cluster:
 
     def __init__(self, address: str) -> None:
         self._link = Link(address)
-        self.count = self._link.count
         self.batches = 0  # sent so far
         self._batch: list[tuple[bytes, Errand]] = []
         self._each_s = BATCH_S  # a frame, as far as is known
         self._under_way: dict[Future[Any], list[Errand]] = {}
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return self._link.count
 
     @property
     def waiting(self) -> int:

@@ -41,6 +41,8 @@ def started(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[
         command = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--host", "127.0.0.1"]
         command += ["--nthreads", "1", "--no-dashboard", "--no-nanny", "--local-directory", str(folder)]
         every += [subprocess.Popen(command, **QUIET) for _ in range(workers)]
+        with distributed.Client(address, set_as_default=False) as client:
+            client.wait_for_workers(workers, timeout=60)
         yield address, every[0]
     finally:
         for process in every:
@@ -145,7 +147,6 @@ def test_a_worker_that_is_killed(tmp_path: Path) -> None:
     asked: dict[str, Any] = {"grid": {"k": "../16"}}
     with started(tmp_path, 2) as (address, _):
         client = distributed.Client(address, set_as_default=False)
-        client.wait_for_workers(2, timeout=60)
         first, *_ = client.run(os.getpid).values()
         kill = at_half(lambda: os.kill(first, signal.SIGKILL))
         made = nsg.render_many(path, tmp_path / "out", **asked, cluster=address, progress=kill)
