@@ -15,6 +15,7 @@ GIVEN = dict.fromkeys(
         "m (32 numbers)",
         "frames of 12 numbers",
         "where it is not 0.15",
+        "all alive 15 s",
         "all objects eight times",
         "a thousand times what a blend wants",
         "736 numbers where",
