@@ -155,6 +155,11 @@ class Problem:
         """Residuals of a picture, at so many levels of the pyramid."""
         return _pyramid((picture - self.colours) * self.root, levels)[:, 0]
 
+    @property
+    def steep(self) -> bool:
+        """Whether a search gains by `slopes` where there are many params; of solids it did not reliably."""
+        return self.soft
+
     def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
         """Derivatives (R, n) of the residuals, and of which axes (n,) there are; None where of none."""
         if not (self.soft or self.light) or (found := self._changes.at(u)) is None:
