@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from distributed import Client
 
 from scenelang.animation.cluster import Cluster
 from scenelang.animation.painting import Errand
@@ -66,6 +67,8 @@ def cluster(folder: Path) -> Iterator[tuple[str, Process, list[Process]]]:
     command += ["127.0.0.1", "--no-dashboard", "--local-directory", str(folder)]
     workers = [subprocess.Popen(command, **quiet) for _ in range(WORKERS)]
     try:
+        with Client(address, set_as_default=False) as client:
+            client.wait_for_workers(WORKERS)
         yield address, scheduler, workers
     finally:
         for process in [scheduler, *workers]:
