@@ -66,6 +66,8 @@ def solid_forms(shape: Mesh) -> Found:
             yield "grid, 8 bits", deflated(byte), surface_error(byte.astype(np.float32) * reach / 127, points)
     for count in [n for n in TRIANGLES if n < len(shape.triangles)]:
         v, f, *_ = igl.qslim(shape.vertices, shape.triangles, count)
+        if not len(f):  # nothing is left of thin parts that do not hang together
+            continue
         corners, kept = np.ascontiguousarray(f, np.int64), np.rint((v + 1) * 32767.5).clip(0, 65535)
         size = deflated(kept.astype("<u2")) + deflated(np.diff(corners, axis=0, prepend=0).astype("<i2"))
         at = np.ascontiguousarray(kept / 32767.5 - 1)
@@ -152,9 +154,9 @@ def main() -> None:
         rows, better = [], (max if kind == "pictures" else min)
         for form in next(iter(files.values())):
             for budget in BUDGETS:
-                values = [best(of[form], budget, better) for of in files.values()]
-                known = [value for value in values if value is not None]
-                if len(known) == len(files):
+                having = [of[form] for of in files.values() if of.get(form)]
+                known = [v for v in (best(points, budget, better) for points in having) if v is not None]
+                if len(known) == len(having):
                     mean = sum(known) / len(known)
                     rows.append({"form": form, "bytes": budget, "mean": mean, "interval": interval(known)})
         record[kind] = {"files": len(files), "rows": rows, "points": files}
