@@ -216,8 +216,8 @@ TEXTURES = replace(
     probes={
         **PROBES,
         "texels": Probe(
-            "textures drawn small, against 64 samples a pixel", "texels to a pixel",
-            (0.5, 1, 2, 3, 4, 5, 6, 8, 16), 1, _texels, sampled=True,
+            "textures drawn large and small, against 64 samples a pixel", "texels to a pixel",
+            (0.02, 0.1, 0.5, 1, 2, 3, 4, 5, 6, 8, 16), 1, _texels, sampled=True,
         ),
     },
 )  # fmt: skip
