@@ -178,13 +178,13 @@ def blends() -> str:
 
 
 def texels() -> str:
-    """What textures lose and how they flicker where they are drawn small."""
+    """What textures lose and how they flicker where they are drawn large and small."""
     found = json.loads((HERE / "results" / "stability-textures2d.json").read_text())
     rows = []
     for row in found["probes"]["texels"]["rows"]:
-        p, flicker = row["psnr"], row["flicker"]
-        cells = [mean(p, 1), f"{p['worst']:.1f}", mean(flicker, 2), f"{flicker['worst']:.2f}"]
-        rows.append([f"{row['value']:g}", *cells])
+        p, flicker = row["psnr"], row.get("flicker")
+        shown = (mean(flicker, 2), f"{flicker['worst']:.2f}") if flicker else ("–", "–")
+        rows.append([f"{row['value']:g}", mean(p, 1), f"{p['worst']:.1f}", *shown])
     heads = ("texels to a pixel", "mean PSNR, dB", "worst", "flicker", "worst")
     said = f"`{found.get('command')}`, {found['scenes']} scenes a value, seed {found['seed']}"
     return f"{markdown(heads, rows)}\n\n{said}"

@@ -204,8 +204,8 @@ def run_probe(
                 "revision": revision(),
             }
         )
-        if probe.sampled:
-            rows[-1]["flicker"] = spread(changes, 95)
+        if moved := [change for change in changes if math.isfinite(change)]:  # within one texel nothing does
+            rows[-1]["flicker"] = spread(moved, 95)
         if fine:
             rows[-1]["per_edge_ideal"] = round(float(np.mean(ideal)), 6)
         report(name, at + 1, len(probe.values))
