@@ -138,7 +138,9 @@ def stability(dimension: int = 2) -> str:
             cells += [mean(by[least], 1), f"{least:g}", f"{by[worst]['worst']:.1f}", f"{worst:g}"]
             scenes = f"{probe.get('scenes', found['scenes'])}"
             rows.append([f"`{found['model']}`", probe["title"], scenes, *cells])
-        said.append(f"`{found.get('command')}`, seed {found['seed']}, weights `{found['weights'][:8]}…`.")
+        plain = f"scenelang lab stability {found['model']} --scenes {found['scenes']}"
+        command = found.get("command", plain)  # of an older record
+        said.append(f"`{command}`, seed {found['seed']}, weights `{found['weights'][:8]}…`.")
     heads = (
         "model",
         "what",
