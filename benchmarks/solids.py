@@ -51,7 +51,7 @@ from scenelang.scene.schema import Scene
 from tests.reference import mitsuba_scenes, povray
 
 MODEL, SIDE, SEED = "solids3d", 256, 2021
-SETS = {"diffuse": 10, "solids3d": 10}  # and how many of their scenes
+SETS = {"diffuse": 4, "solids3d": 10}  # and how many of their scenes
 OUT = Path("docs/results/solid-rivals.json")
 DENSE = 5  # samples along each side of a pixel in the converged pictures of the exact field and of POV-Ray
 GRIDS = ["-A", *(f"+AM1 +A{limit} +R3" for limit in (0.3, 0.1, 0.03))]
