@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import statistics
 import time
 from collections.abc import Sequence
@@ -24,6 +25,7 @@ import numpy as np
 from scenelang.diagnostics.span import SourceFile
 from scenelang.files import write_whole
 from scenelang.inverse import search
+from scenelang.inverse.focus import Lens
 from scenelang.inverse.search import Found, Look, Report, Residuals
 from scenelang.inverse.space import Point, Space
 from scenelang.inverse.task import task_of
@@ -75,8 +77,10 @@ def fitted(case: Case, seed: int, look: Look) -> tuple[dict[str, Any], int]:
         return look(*given)
 
     started = time.process_time()
-    noise = task.problems[-1].noise
-    places, done = search.solve(task.problems, task.space, task.first, seed=seed, noise=noise, look=counted)
+    lens = Lens(task.problems[-1], task.space, math.inf)
+    places, done = search.solve(
+        task.problems, task.space, task.first, seed=seed, noise=lens.noise, look=counted
+    )
     spent, best = time.process_time() - started, places[0]
     truth = np.array([case.truth[axis.label] for axis in task.space.axes])
     off = float(task.space.gap(best.point, truth).max())

@@ -18,6 +18,7 @@ from scenelang.fitting.mesh import FitError
 from scenelang.image import Image
 from scenelang.inverse import search
 from scenelang.inverse.fitted import Fit, hindrances, numbers_of, ties
+from scenelang.inverse.focus import Lens, blurred
 from scenelang.inverse.problem import Source
 from scenelang.inverse.search import Found
 from scenelang.inverse.several import Together
@@ -78,22 +79,23 @@ def fit(
         scene, target, params=params, start=start or {}, fixed=fixed or {}, mask=mask, crop=crop,
         background=background, model=model, root=root, frame=frame,
     )  # fmt: skip
+    lens = Lens(task.problems[-1], task.space, until)
     places, done = search.solve(
         task.problems,
         task.space,
         task.first,
         seed=seed,
         until=until,
-        noise=task.problems[-1].noise,
+        noise=lens.noise,
         report=progress,
     )
     if not places:
         raise FitError("no values that were tried give a picture")
-    return _fit(task, places, done)
+    return _fit(task, lens, *lens.ended(places), done)
 
 
-def _fit(task: Task, places: list[Found], done: bool) -> Fit:
-    """What there is to say of the places that a search came to."""
+def _fit(task: Task, lens: Lens, places: list[Found], sigma: float, done: bool) -> Fit:
+    """What there is to say of the places that a search came to, and of the target's blur."""
     space, problems, first = task.space, task.problems, task.first
     last, best = problems[-1], places[0].point
     every = [space.literals(place.point) for place in places]
@@ -104,6 +106,7 @@ def _fit(task: Task, places: list[Found], done: bool) -> Fit:
     if after is None:
         raise FitError("the scene with the values that were found has no picture")
     near = _db(last, after)
+    soft = [blurred(one, sigma) for one in after]
     step = 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1]
     slopes = search.central(last.pixels, space, best, step, space.smooth)
     numbers = numbers_of(space, best, slopes)
@@ -116,16 +119,18 @@ def _fit(task: Task, places: list[Found], done: bool) -> Fit:
         text=text,
         values=every[0],
         psnr=near,
+        blur=sigma,
+        blurred_psnr=_db(last, soft),
         start_psnr=_db(last, before) if before is not None else -math.inf,
         size=last.canvas,
         done=done,
         notes=hindrances(
-            space, best, numbers, near, done, last.worst(after), last.noise(best), last.blur(after)
+            space, best, numbers, _db(last, soft), done, last.worst(soft), last.noise(best, sigma)
         ),
         numbers=numbers,
         tied=ties(space, slopes),
         others=tuple(others),
-        frames=sum(problem.frames for problem in problems),
+        frames=sum(problem.frames for problem in (*problems, lens.finer)),
         before=_image(after if before is None else before),
         after=_image(after),
         target=_image([part.colours for part in last.parts]),

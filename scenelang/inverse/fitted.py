@@ -46,6 +46,8 @@ class Fit:
         text: the scene with what was found as defaults, comments and layout as they were.
         values: what was found, as text of the language, by param.
         psnr: how near the picture of ``text`` is to the target, dB, over pixels that count; at most 100.
+        blur: by how many pixels (standard deviation) the target is out of focus; 0 where that tells nothing.
+        blurred_psnr: how near the picture is once it is blurred as much.
         start_psnr: of the picture before.
         size: of the pictures that were compared, width and height.
         done: whether the search came to an end by itself.
@@ -61,6 +63,8 @@ class Fit:
     text: str = field(repr=False)
     values: dict[str, str]
     psnr: float
+    blur: float
+    blurred_psnr: float
     start_psnr: float
     size: tuple[int, int]
     done: bool
@@ -78,6 +82,11 @@ class Fit:
         """The report, line by line."""
         felt = {one.label: one.felt for one in self.numbers}
         lines = [f"picture {self.psnr:.1f} dB from the target, {self.start_psnr:.1f} dB before"]
+        if self.blur:
+            lines.append(
+                f"the target is out of focus: blurred by {self.blur:.2f} pixels, the picture is "
+                f"{self.blurred_psnr:.1f} dB from it"
+            )
         for name, text in self.values.items():
             shares = [share for label, share in felt.items() if label.partition(".")[0] == name]
             said = ""
@@ -137,14 +146,12 @@ def hindrances(
     done: bool,
     worst: tuple[str, Matrix],
     noise: bool,
-    blur: float,
 ) -> tuple[str, ...]:
     """Why the picture is no nearer, as far as can be told.
 
     Args:
         worst: which picture of several is farthest off, and the errors (H, W) of its pixels.
         noise: whether these are like noise.
-        blur: by how many pixels the picture would have to be blurred to be nearer.
     """
     notes = []
     if not done:
@@ -154,11 +161,6 @@ def hindrances(
     unseen = [f"`{one.label}`" for one in numbers if math.isinf(one.felt)]
     if unseen:
         notes.append(f"the picture does not show {', '.join(unseen)} here, so any value would do")
-    if blur and psnr < GOOD_DB:
-        notes.append(
-            f"the target is out of focus: blurred by about {blur:g} pixels, the scene's picture would be "
-            "nearer; sizes and colours make up for that"
-        )
     if psnr < GOOD_DB and noise:
         notes.append("what differs is like noise, of which no values come nearer")
     elif psnr < GOOD_DB:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -130,6 +131,17 @@ class Problem:
             network = softened(program.model, 2 / min(self.canvas))
             return over(draw_objects(network, program, samples="one").image, self.under)
         return over(draw_small(program, samples=self.samples, threads=1).image, self.under)
+
+    def finer(self) -> Problem:
+        """The same whose pictures, of the plane, have twice as many pixels along each side.
+
+        Pixels of the plane are means of sRGB, those of solids of light.
+        """
+        larger = copy.copy(self)
+        larger.frames = 0
+        if not self.light:
+            larger.canvas, larger._last = (2 * self.canvas[0], 2 * self.canvas[1]), (b"", None)
+        return larger
 
     def program(self, u: Point) -> Program | None:
         """What draws the scene of a point; the last one is kept."""

@@ -161,6 +161,7 @@ def descend(
     most: int = 12,
     fine: bool = False,
     many: int = MANY,
+    enough: float = _ENOUGH,
 ) -> Found | None:
     """Follow the continuous axes down from a point; None where that has no picture.
 
@@ -170,6 +171,7 @@ def descend(
         fine: whether differences are central and of a third of the step: twice the pictures, which follow a
             narrow valley that others lose.
         many: as of `slopes`.
+        enough: share of the error by which a step has to lower it, or it is the last.
     """
     at = residuals(u)
     if at is None:
@@ -199,7 +201,7 @@ def descend(
                 u, at, cost, damping = moved, there, lower, max(1e-6, damping / 5)
                 break
             damping = min(1e6, damping * 6)
-        if before - cost < _ENOUGH * before:
+        if before - cost < enough * before:
             break
     return Found(u, cost, tuple(way))
 
@@ -293,7 +295,7 @@ def solve(
     seed: int = 0,
     until: float = math.inf,
     near: float = NEAR,
-    noise: Callable[[Point], bool] = lambda u: False,
+    noise: Callable[[Found], bool] = lambda place: False,
     report: Report = lambda what, done, count: None,
     look: Look = look,
 ) -> tuple[list[Found], bool]:
@@ -335,7 +337,7 @@ def solve(
         ended = apart(space, ended, KEPT)
         was, best = best, min((one.cost for one in ended), default=math.inf)
         idle = idle + 1 if best > was * (1 - AGREED) else 0
-        if best <= near or (ended and noise(ended[0].point)) or idle >= (1 if best <= FAIR else 2):
+        if best <= near or (ended and noise(ended[0])) or idle >= (1 if best <= FAIR else 2):
             return ended, True
         if time.monotonic() > until:
             break

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.inverse.focus import blurred
 from scenelang.inverse.problem import LEVELS, Matrix, Problem
 from scenelang.inverse.space import Point
 from scenelang.inverse.target import Picture
@@ -76,20 +77,27 @@ class Together:
         at = int(np.argmax([gap.sum() for gap in gaps]))
         return f" of frame {self.parts[at].source.frame}" * (len(gaps) > 1), gaps[at]
 
-    def noise(self, u: Point) -> bool:
-        """Whether what is left is like noise, whose means over 8 x 8 pixels have a 64th of its variance."""
+    def noise(self, u: Point, sigma: float = 0.0) -> bool:
+        """Whether what is left of pictures that are blurred by so many pixels is like noise.
+
+        Means over 8 x 8 pixels of that have a 64th of its variance.
+        """
         pixels = means = 0.0
         for part, picture in zip(self.parts, self.pictures(u) or (), strict=False):
-            left = np.square(part.residuals(picture, LEVELS))
+            left = np.square(part.residuals(blurred(picture, sigma), LEVELS))
             pixels += float(left[: picture.size].sum())
             means += float(left[-3 * math.prod(-(-side // EDGE) for side in self.canvas) :].sum())
         return bool(means * EDGE**2 <= GRAIN * pixels)
+
+    def finer(self) -> Together:
+        """The same with pictures of which light can be averaged: of the plane twice as large."""
+        return Together([part.finer() for part in self.parts])
 
     def blur(self, pictures: Sequence[Picture]) -> float:
         """By how many pixels (standard deviation) pictures have to be blurred to be nearer; 0 if not."""
         best, found = SOFTER, 0.0
         for sigma in BLURS:
-            left = self.residuals([_blurred(one, sigma) for one in pictures])
+            left = self.residuals([blurred(one, sigma) for one in pictures])
             share = float(left @ left) / max(1e-12, float(np.square(self.residuals(pictures)).sum()))
             if share < best:
                 best, found = share, sigma
@@ -104,14 +112,3 @@ class Together:
 def _known(pictures: Sequence[Picture | None]) -> list[Picture] | None:
     known = [one for one in pictures if one is not None]
     return known if len(known) == len(pictures) else None
-
-
-def _blurred(picture: Picture, sigma: float) -> Picture:
-    """A picture (H, W, 3) under a Gaussian; beyond its edges it is as there."""
-    reach = math.ceil(3 * sigma)
-    weights = np.exp(-np.square(np.arange(-reach, reach + 1) / sigma) / 2)
-    for axis in (0, 1):
-        wide = np.pad(picture, [(reach * (at == axis),) * 2 for at in range(3)], mode="edge")
-        views = np.lib.stride_tricks.sliding_window_view(wide, len(weights), axis)
-        picture = np.asarray(views @ (weights / weights.sum()))
-    return picture

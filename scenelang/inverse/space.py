@@ -6,6 +6,7 @@ has an axis for each of its numbers.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
@@ -47,6 +48,14 @@ class Space:
         self.smooth = np.array([not axis.choices for axis in self.axes], bool)
         self.most = np.array([max(1, len(axis.choices) - 1) for axis in self.axes], np.float64)
         self.wraps = np.array([axis.wraps for axis in self.axes], bool)
+
+    def beside(self, axis: Axis) -> Space:
+        """The same box with a continuous axis that belongs to no param, behind the others."""
+        wide = copy.copy(self)
+        wide.axes = (*self.axes, axis)
+        wide.smooth, wide.most = np.append(self.smooth, True), np.append(self.most, 1.0)
+        wide.wraps = np.append(self.wraps, axis.wraps)
+        return wide
 
     def inside(self, u: Point) -> Point:
         """The nearest point of the box; full turns are taken off."""

@@ -7,6 +7,7 @@ import pytest
 from scipy import ndimage
 
 from scenelang.diagnostics.span import SourceFile
+from scenelang.image import decoded, encoded
 from scenelang.inverse.task import Task, task_of
 
 TEXT = """
@@ -37,7 +38,7 @@ def test_a_target_out_of_focus_is_told_by_how_much(sigma: float) -> None:
     u, last = np.array([0.3]), task({0: flat(1.0)}).problems[-1]
     pictures = last.pictures(u)
     assert pictures is not None
-    seen = ndimage.gaussian_filter(pictures[0], (sigma, sigma, 0), mode="nearest")
+    seen = encoded(ndimage.gaussian_filter(decoded(pictures[0]), (sigma, sigma, 0), mode="nearest"))
     target = seen + np.random.default_rng(3).normal(0.0, 0.05, (40, 40, 3))
     assert task({0: target}).problems[-1].blur(pictures) == pytest.approx(sigma, abs=0.51 * sigma)
 
