@@ -18,12 +18,12 @@ from scenelang.fitting.mesh import FitError
 from scenelang.image import Image
 from scenelang.inverse import search
 from scenelang.inverse.fitted import Fit, hindrances, numbers_of, ties
-from scenelang.inverse.focus import Lens, blurred
+from scenelang.inverse.focus import Lens
 from scenelang.inverse.problem import Source
 from scenelang.inverse.search import Found
 from scenelang.inverse.several import Together
 from scenelang.inverse.space import Point, Space
-from scenelang.inverse.target import WHITE, Given, Picture
+from scenelang.inverse.target import WHITE, Given, Picture, blurred
 from scenelang.inverse.task import Task, task_of
 from scenelang.measure.metrics import UNCAPPED_DB
 from scenelang.scene.schema import Scene

@@ -5,44 +5,20 @@ Otherwise sizes and colours make up for the blur, and the nearest picture is not
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from scenelang.evaluate.ranges import Axis
-from scenelang.image import decoded, encoded
 from scenelang.inverse.search import ALIKE, NEAR, STEPS, Found, descend
+from scenelang.inverse.several import Together
 from scenelang.inverse.space import Point, Space
-from scenelang.inverse.target import Picture
-
-if TYPE_CHECKING:
-    from scenelang.inverse.several import Together
+from scenelang.inverse.target import blurred
 
 WIDEST: Final = 4.0  # standard deviation, pixels
 ENOUGH: Final = 1e-6  # share of the error by which a step has to lower it: most of it may be noise
-
-
-def blurred(picture: Picture, sigma: float, finer: int = 1) -> Picture:
-    """A picture (H, W, 3) whose linear light went through a lens out of focus, and to a sensor's pixels.
-
-    Args:
-        picture: of ``finer`` times as many pixels along each side.
-        sigma: standard deviation of a Gaussian, pixels. Beyond its edges a picture is as there.
-    """
-    sigma *= finer
-    if sigma <= 0.0 and finer == 1:
-        return picture
-    light, reach = decoded(picture), math.ceil(3 * sigma)
-    weights = np.exp(-np.square(np.arange(-reach, reach + 1) / max(sigma, 1e-9)) / 2)
-    for axis in (0, 1):
-        wide = np.pad(light, [(reach * (at == axis),) * 2 for at in range(3)], mode="edge")
-        views = np.lib.stride_tricks.sliding_window_view(wide, len(weights), axis)
-        light = np.asarray(views @ (weights / weights.sum()))
-    height, width = light.shape[0] // finer, light.shape[1] // finer
-    return encoded(light.reshape(height, finer, width, finer, 3).mean((1, 3)))
 
 
 class Lens:

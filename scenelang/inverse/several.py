@@ -9,10 +9,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.inverse.focus import blurred
 from scenelang.inverse.problem import LEVELS, Matrix, Problem
 from scenelang.inverse.space import Point
-from scenelang.inverse.target import Picture
+from scenelang.inverse.target import Picture, blurred
 from scenelang.program.program import Program
 
 EDGE: Final = 2 ** (LEVELS - 1)  # of what the last level has means of, pixels

@@ -9,7 +9,7 @@ from scipy import ndimage
 import scenelang
 from scenelang.diagnostics.span import SourceFile
 from scenelang.image import decoded, encoded
-from scenelang.inverse.focus import blurred
+from scenelang.inverse.target import blurred
 
 TEXT = """
 canvas(64, 64); background(#ffffff); param size = 0.3 in 0.2..0.8;
