@@ -33,10 +33,11 @@ import size_charts
 import solid_rivals
 from blocks import pictured
 from PIL import Image as pillow
-from PIL import ImageDraw, ImageFilter, ImageFont
+from PIL import ImageDraw, ImageFont
 
 import scenelang as nsg
 from scenelang.diagnostics.span import SourceFile
+from scenelang.inverse.target import blurred
 from scenelang.lab.charts import stability_chart
 from scenelang.lab.evaluate import Case, sheet
 from scenelang.lab.experiments.charts import experiment_chart
@@ -281,14 +282,25 @@ def fit_scene(name: str) -> SourceFile:
 
 
 def fitted() -> bytes:
-    """Before, after and target of a scene of docs/fit.md; the target is exact, blurred and has noise."""
+    """Before, after and target of a scene of docs/fit.md; the target is exact, out of focus and has noise."""
     text = fit_scene("lost.nsg")
     true = {"x": -0.31, "y": 0.22, "size": 0.5, "turn": "20deg", "ink": "#dd3311", "stones": 4}
-    exact = nsg.render(nsg.loads(text.text, params=true), backend="reference").to_pil()
-    soft = np.asarray(exact.filter(ImageFilter.GaussianBlur(0.8)), np.float32) / 255
+    exact = nsg.render(nsg.loads(text.text, params=true), backend="reference")
+    soft = blurred(np.asarray(exact, np.float64), 1.2)
     photo = np.clip(soft + np.random.default_rng(7).normal(0.0, 0.04, soft.shape), 0.0, 1.0)
     names = ("x", "y", "size", "turn", "ink", "stones")
-    return _few_colours(png(nsg.fit(text, photo.astype(np.float32), params=names).sheet().to_pil()))
+    found = nsg.fit(text, photo.astype(np.float32), params=names)
+    return png(
+        found.sheet().to_pil().quantize(256, pillow.Quantize.MEDIANCUT, kmeans=2)
+    )  # noise keeps its own
+
+
+def fitted_frames() -> bytes:
+    """The same of a scene of docs/fit.md with two frames."""
+    text = fit_scene("swing.nsg")
+    true = {"wide": "50deg", "lag": 0.15, "long": 0.8}
+    frames = {n: nsg.render(nsg.loads(text.text, params=true, frame=n), backend="reference") for n in (0, 6)}
+    return _few_colours(png(nsg.fit(text, frames).sheet().to_pil()))
 
 
 @lru_cache
@@ -337,6 +349,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
             made[name] = lambda draw=draw, source=Source(text=text): draw(source)
     made["gallery.png"] = gallery
     made["fit.png"] = fitted
+    made["fit-frames.png"] = fitted_frames
     made["fit-solid.png"] = lambda: png(fitted_solid().sheet().to_pil())
     made["fit-solid.webp"] = lambda: way_of(fitted_solid())
     made["sweep.png"] = swept
