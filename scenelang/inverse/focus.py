@@ -17,7 +17,7 @@ from scenelang.inverse.several import Together
 from scenelang.inverse.space import Point, Space
 from scenelang.inverse.target import blurred
 
-WIDEST: Final = 4.0  # standard deviation, pixels
+WIDEST: Final = 8.0  # standard deviation, pixels
 ENOUGH: Final = 1e-6  # share of the error by which a step has to lower it: most of it may be noise
 
 

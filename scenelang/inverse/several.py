@@ -16,7 +16,7 @@ from scenelang.program.program import Program
 
 EDGE: Final = 2 ** (LEVELS - 1)  # of what the last level has means of, pixels
 GRAIN: Final = 2.0  # times the variance of means that noise has
-BLURS: Final = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # pixels
+BLURS: Final = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)  # pixels
 SOFTER: Final = 0.98  # share of the error that is left where a target is out of focus
 
 
