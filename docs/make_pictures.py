@@ -37,7 +37,7 @@ from PIL import ImageDraw, ImageFont
 
 import scenelang as nsg
 from scenelang.diagnostics.span import SourceFile
-from scenelang.inverse.target import blurred
+from scenelang.inverse.target import Blur, blurred
 from scenelang.lab.charts import stability_chart
 from scenelang.lab.evaluate import Case, sheet
 from scenelang.lab.experiments.charts import experiment_chart
@@ -286,7 +286,7 @@ def fitted() -> bytes:
     text = fit_scene("lost.nsg")
     true = {"x": -0.31, "y": 0.22, "size": 0.5, "turn": "20deg", "ink": "#dd3311", "stones": 4}
     exact = nsg.render(nsg.loads(text.text, params=true), backend="reference")
-    soft = blurred(np.asarray(exact, np.float64), 1.2)
+    soft = blurred(np.asarray(exact, np.float64), Blur(1.2))
     photo = np.clip(soft + np.random.default_rng(7).normal(0.0, 0.04, soft.shape), 0.0, 1.0)
     names = ("x", "y", "size", "turn", "ink", "stones")
     found = nsg.fit(text, photo.astype(np.float32), params=names)

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from PIL import ExifTags, Image, ImageCms, ImageOps, features
+from PIL import ExifTags, Image, ImageCms, ImageOps, UnidentifiedImageError, features
 
 from scenelang.elements.element import TEXELS, Element
 from scenelang.elements.picture import painted, texels
@@ -70,6 +70,8 @@ def opened(data: bytes, most: int = MOST_PIXELS) -> Iterator[Image.Image]:
                 yield found
     except FitError:
         raise
+    except UnidentifiedImageError:
+        raise FitError("neither a PNG nor a JPEG") from None
     except Exception as error:  # readers of large formats, which a stranger's file may break in many ways
         raise FitError(f"damaged or not a picture: {error}"[:200]) from error
 

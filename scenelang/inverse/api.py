@@ -23,7 +23,7 @@ from scenelang.inverse.problem import Source
 from scenelang.inverse.search import Found
 from scenelang.inverse.several import Together
 from scenelang.inverse.space import Point, Space
-from scenelang.inverse.target import WHITE, Given, Picture, blurred
+from scenelang.inverse.target import WHITE, Blur, Given, Picture, blurred
 from scenelang.inverse.task import Task, task_of
 from scenelang.measure.metrics import UNCAPPED_DB
 from scenelang.scene.schema import Scene
@@ -94,7 +94,7 @@ def fit(
     return _fit(task, lens, *lens.ended(places), done)
 
 
-def _fit(task: Task, lens: Lens, places: list[Found], sigma: float, done: bool) -> Fit:
+def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) -> Fit:
     """What there is to say of the places that a search came to, and of the target's blur."""
     space, problems, first = task.space, task.problems, task.first
     last, best = problems[-1], places[0].point
@@ -106,7 +106,7 @@ def _fit(task: Task, lens: Lens, places: list[Found], sigma: float, done: bool) 
     if after is None:
         raise FitError("the scene with the values that were found has no picture")
     near = _db(last, after)
-    soft = [blurred(one, sigma) for one in after]
+    soft = [blurred(one, blur) for one in after]
     step = 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1]
     slopes = search.central(last.pixels, space, best, step, space.smooth)
     numbers = numbers_of(space, best, slopes)
@@ -119,13 +119,13 @@ def _fit(task: Task, lens: Lens, places: list[Found], sigma: float, done: bool) 
         text=text,
         values=every[0],
         psnr=near,
-        blur=sigma,
+        blur=blur,
         blurred_psnr=_db(last, soft),
         start_psnr=_db(last, before) if before is not None else -math.inf,
         size=last.canvas,
         done=done,
         notes=hindrances(
-            space, best, numbers, _db(last, soft), done, last.worst(soft), last.noise(best, sigma)
+            space, best, numbers, _db(last, soft), done, last.worst(soft), last.noise(best, blur)
         ),
         numbers=numbers,
         tied=ties(space, slopes),

@@ -12,6 +12,7 @@ import numpy as np
 from scenelang.image import Image
 from scenelang.inverse.search import Matrix
 from scenelang.inverse.space import Point, Space
+from scenelang.inverse.target import Blur
 from scenelang.scene.schema import Scene
 
 TIED: Final = 0.9  # correlation from which two numbers explain each other
@@ -46,7 +47,7 @@ class Fit:
         text: the scene with what was found as defaults, comments and layout as they were.
         values: what was found, as text of the language, by param.
         psnr: how near the picture of ``text`` is to the target, dB, over pixels that count; at most 100.
-        blur: by how many pixels (standard deviation) the target is out of focus; 0 where that tells nothing.
+        blur: of the target, as far as it tells.
         blurred_psnr: how near the picture is once it is blurred as much.
         start_psnr: of the picture before.
         size: of the pictures that were compared, width and height.
@@ -63,7 +64,7 @@ class Fit:
     text: str = field(repr=False)
     values: dict[str, str]
     psnr: float
-    blur: float
+    blur: Blur
     blurred_psnr: float
     start_psnr: float
     size: tuple[int, int]
@@ -82,9 +83,10 @@ class Fit:
         """The report, line by line."""
         felt = {one.label: one.felt for one in self.numbers}
         lines = [f"picture {self.psnr:.1f} dB from the target, {self.start_psnr:.1f} dB before"]
-        if self.blur:
+        if self.blur.sigma:
+            seen = "out of focus" if self.blur.light else "blurred, in sRGB"
             lines.append(
-                f"the target is out of focus: blurred by {self.blur:.2f} pixels, the picture is "
+                f"the target is {seen}: after a blur of {self.blur.sigma:.2f} pixels the picture is "
                 f"{self.blurred_psnr:.1f} dB from it"
             )
         for name, text in self.values.items():

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from scenelang.inverse.problem import LEVELS, Matrix, Problem
 from scenelang.inverse.space import Point
-from scenelang.inverse.target import Picture, blurred
+from scenelang.inverse.target import Blur, Picture, blurred
 from scenelang.program.program import Program
 
 EDGE: Final = 2 ** (LEVELS - 1)  # of what the last level has means of, pixels
@@ -76,14 +76,14 @@ class Together:
         at = int(np.argmax([gap.sum() for gap in gaps]))
         return f" of frame {self.parts[at].source.frame}" * (len(gaps) > 1), gaps[at]
 
-    def noise(self, u: Point, sigma: float = 0.0) -> bool:
-        """Whether what is left of pictures that are blurred by so many pixels is like noise.
+    def noise(self, u: Point, blur: Blur = Blur()) -> bool:  # noqa: B008
+        """Whether what is left of pictures after a blur is like noise.
 
         Means over 8 x 8 pixels of that have a 64th of its variance.
         """
         pixels = means = 0.0
         for part, picture in zip(self.parts, self.pictures(u) or (), strict=False):
-            left = np.square(part.residuals(blurred(picture, sigma), LEVELS))
+            left = np.square(part.residuals(blurred(picture, blur), LEVELS))
             pixels += float(left[: picture.size].sum())
             means += float(left[-3 * math.prod(-(-side // EDGE) for side in self.canvas) :].sum())
         return bool(means * EDGE**2 <= GRAIN * pixels)
@@ -96,7 +96,7 @@ class Together:
         """By how many pixels (standard deviation) pictures have to be blurred to be nearer; 0 if not."""
         best, found = SOFTER, 0.0
         for sigma in BLURS:
-            left = self.residuals([blurred(one, sigma) for one in pictures])
+            left = self.residuals([blurred(one, Blur(sigma)) for one in pictures])
             share = float(left @ left) / max(1e-12, float(np.square(self.residuals(pictures)).sum()))
             if share < best:
                 best, found = share, sigma

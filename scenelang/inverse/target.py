@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -62,24 +62,36 @@ def over(picture: npt.NDArray[np.floating], under: tuple[float, float, float]) -
     return np.asarray(values[..., :3] * values[..., 3:] + np.array(under) * (1 - values[..., 3:]))
 
 
-def blurred(picture: Picture, sigma: float, finer: int = 1) -> Picture:
-    """A picture (H, W, 3) whose linear light went through a lens out of focus, and to a sensor's pixels.
+class Blur(NamedTuple):
+    """How a picture is blurred.
 
     Args:
-        picture: of ``finer`` times as many pixels along each side.
-        sigma: standard deviation of a Gaussian, pixels. Beyond its edges a picture is as there.
+        sigma: standard deviation of a Gaussian, pixels; 0 where it is not.
+        light: whether its light is, as by a lens out of focus, or its sRGB-encoded numbers, as by a program.
     """
-    sigma *= finer
+
+    sigma: float = 0.0
+    light: bool = True
+
+
+def blurred(picture: Picture, blur: Blur, finer: int = 1) -> Picture:
+    """A picture (H, W, 3) after a blur; beyond its edges it is as there.
+
+    Args:
+        picture: of ``finer`` times as many pixels along each side, of which means are taken.
+    """
+    sigma = blur.sigma * finer
     if sigma <= 0.0 and finer == 1:
         return picture
-    light, reach = decoded(picture), math.ceil(3 * sigma)
+    found, reach = decoded(picture) if blur.light else picture, math.ceil(3 * sigma)
     weights = np.exp(-np.square(np.arange(-reach, reach + 1) / max(sigma, 1e-9)) / 2)
     for axis in (0, 1):
-        wide = np.pad(light, [(reach * (at == axis),) * 2 for at in range(3)], mode="edge")
+        wide = np.pad(found, [(reach * (at == axis),) * 2 for at in range(3)], mode="edge")
         views = np.lib.stride_tricks.sliding_window_view(wide, len(weights), axis)
-        light = np.asarray(views @ (weights / weights.sum()))
-    height, width = light.shape[0] // finer, light.shape[1] // finer
-    return encoded(light.reshape(height, finer, width, finer, 3).mean((1, 3)))
+        found = np.asarray(views @ (weights / weights.sum()))
+    height, width = found.shape[0] // finer, found.shape[1] // finer
+    found = found.reshape(height, finer, width, finer, 3).mean((1, 3))
+    return encoded(found) if blur.light else found
 
 
 def target_of(

@@ -97,10 +97,10 @@ def test_larger_pictures_are_made_smaller() -> None:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", "damaged or not a picture"),
-        (b"no picture", "damaged or not a picture"),
+        (b"", "neither a PNG nor a JPEG"),
+        (b"no picture", "neither a PNG nor a JPEG"),
         (file(Image.fromarray(RAMP))[:-40], "damaged or not a picture"),
-        (file(Image.fromarray(RAMP), "GIF"), "damaged or not a picture"),
+        (file(Image.fromarray(RAMP), "GIF"), "neither a PNG nor a JPEG"),
         (file(Image.new("1", (9000, 9000))), "more than 50,000,000 pixels"),
         (file(Image.new("1", (20000, 20000))), "damaged or not a picture: Image size"),
     ],

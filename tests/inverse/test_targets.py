@@ -25,6 +25,4 @@ def test_a_fit_comes_as_near_as_the_true_values(draw: fit_targets.Draw, blurred:
     reach = scenelang.render(scenelang.loads(fit_targets.SCENE, params={**true, "turn": "12deg"}))
     assert psnr(scenelang.render(scenelang.loads(found.text)), reach, 100.0) > fit_targets.REACHED_DB
     assert psnr(reach, target) > 20 > found.start_psnr
-    assert (
-        blurred == (found.blurred_psnr > found.psnr) == any("out of focus" in line for line in found.told())
-    )
+    assert blurred == (found.blurred_psnr > found.psnr) == any("blur of" in line for line in found.told())
