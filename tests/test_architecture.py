@@ -50,6 +50,8 @@ ORDER = (
     "scenelang.models.framed",
     "scenelang.proof",
     "scenelang.models.load",
+    "scenelang.backend.options",
+    "scenelang.cluster",
     "scenelang.fitting",
     "scenelang.training",
     "scenelang.backend",

@@ -110,10 +110,10 @@ def evaluate_set(
     if cluster is None:
         found: Iterable[Case] = (_case(model, scene_at, index, kept, threads) for index in range(count))
     else:
-        from scenelang.animation.cluster import by_workers
+        from scenelang.cluster import by_workers
 
-        asked = ((model.manifest.name, name, seed, side, index) for index in range(count))
-        found = by_workers(cluster, _case_of, asked)
+        asked = ((index, (model.manifest.name, name, seed, side, index)) for index in range(count))
+        found = (result() for _, result in by_workers(cluster, _case_of, asked))
     cases = []
     for done, case in enumerate(found, 1):
         cases.append(case)

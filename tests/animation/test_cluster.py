@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
 import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -19,35 +16,12 @@ import pytest
 import scenelang as nsg
 from scenelang.animation import cluster as ours
 from scenelang.animation.run import Progress
+from scenelang.cluster import Link
 from tests.animation.scenes import DARK, HEAD
+from tests.cluster.machines import started
 
 distributed = pytest.importorskip("distributed")
 MOVING = HEAD + DARK + "canvas(24, 16); sphere { scale(0.6); } torus { rotate(0.2turn * u); }"
-QUIET: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-
-
-@contextlib.contextmanager
-def started(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """A scheduler's address and process; workers without who would start them again."""
-    file = folder / "scheduler.json"
-    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
-    every = [subprocess.Popen([*command, "--no-dashboard", "--scheduler-file", str(file)], **QUIET)]
-    try:
-        deadline = time.monotonic() + 60
-        while not file.exists() or not file.read_text():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        address = json.loads(file.read_text())["address"]
-        command = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--host", "127.0.0.1"]
-        command += ["--nthreads", "1", "--no-dashboard", "--no-nanny", "--local-directory", str(folder)]
-        every += [subprocess.Popen(command, **QUIET) for _ in range(workers)]
-        with distributed.Client(address, set_as_default=False) as client:
-            client.wait_for_workers(workers, timeout=60)
-        yield address, every[0]
-    finally:
-        for process in every:
-            process.kill()
-            process.wait()
 
 
 @pytest.fixture(scope="module")
@@ -113,13 +87,13 @@ def test_small_frames_travel_together(tmp_path: Path, address: str, monkeypatch:
     path = tmp_path / "a.nsg"
     path.write_text("canvas(8, 8); param k = 0.5 in 0..1; star { scale(0.9); rotate(90deg * k); }")
     sent: list[int] = []
-    send = ours.Link.send
+    send = Link.send
 
-    def counted(self: ours.Link, function: Any, batch: Any) -> Any:
+    def counted(self: Link, function: Any, batch: Any) -> Any:
         sent.append(len(batch))
         return send(self, function, batch)
 
-    monkeypatch.setattr(ours.Link, "send", counted)
+    monkeypatch.setattr(Link, "send", counted)
     made = nsg.render_many(path, tmp_path / "out", random=["k"], count=60, cluster=address)
     assert sum(sent) == made.made.drawn == 60
     assert max(sent) > 1
@@ -185,30 +159,6 @@ def test_a_frame_that_cannot_be_drawn(scene: Path, tmp_path: Path, address: str)
             helper.take()
     finally:
         helper.close()
-
-
-@pytest.mark.parametrize("what", ["numpy", "weights of shapes2d", "scenelang's code"])
-def test_workers_that_would_draw_other_pixels(
-    scene: Path, tmp_path: Path, address: str, monkeypatch: pytest.MonkeyPatch, what: str
-) -> None:
-    mine = {**ours.fingerprint(), what: "another"}
-    monkeypatch.setattr(ours, "fingerprint", lambda: mine)
-    with pytest.raises(nsg.RenderError, match=rf"worker tcp\S+ has {what} \S+, where another is here"):
-        nsg.animate(scene, tmp_path / "%d.png", cluster=address)
-    assert not list(tmp_path.glob("*.png"))
-
-
-def test_differences_that_pixels_do_not_show() -> None:
-    here = ours.fingerprint()
-    assert ours.differences(here, here) == ([], [])
-    assert ours.differences(here, {**here, "python": "3.9"})[0] == []
-    assert ours.differences(here, {**here, "python": "3.9"})[1]
-
-
-def test_nobody_there(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ours, "WAIT_S", 0.5)
-    with pytest.raises(nsg.RenderError, match=r"no scheduler with workers at `tcp://127\.0\.0\.1:9`"):
-        nsg.animate(scene, tmp_path / "%d.png", cluster="tcp://127.0.0.1:9")
 
 
 def test_the_reference_stays_here(scene: Path, tmp_path: Path) -> None:
