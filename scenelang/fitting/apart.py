@@ -57,7 +57,8 @@ class Apart:
         """What `serve` makes of a request and bytes.
 
         Args:
-            request: JSON data; its ``cpu_s`` is the processor time that this may take.
+            request: JSON data; its ``cpu_s`` is the processor time that this may take, and its ``files`` are
+                bytes by name.
             hear: called with what is told meanwhile, by the first word of the telling.
 
         Raises:
@@ -66,9 +67,11 @@ class Apart:
         process = self._begun()
         assert process.stdin is not None
         assert process.stdout is not None
+        files = request.get("files", {})
+        sizes = {"bytes": len(data), "files": {name: len(held) for name, held in files.items()}}
         with suppress(BrokenPipeError):
-            process.stdin.write(json.dumps({**request, "bytes": len(data)}).encode() + b"\n")
-            process.stdin.write(data)
+            process.stdin.write(json.dumps({**request, **sizes}).encode() + b"\n")
+            process.stdin.writelines([data, *files.values()])
             process.stdin.flush()
         while line := process.stdout.readline():
             kind, *told = json.loads(line)
@@ -114,6 +117,7 @@ def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -
     while line := sys.stdin.buffer.readline():
         request = json.loads(line)
         data = sys.stdin.buffer.read(request["bytes"])
+        request["files"] = {name: sys.stdin.buffer.read(size) for name, size in request["files"].items()}
         _bound(min(READ_S, request["cpu_s"]))
         limits = iter([request["cpu_s"]])
 

@@ -12,6 +12,7 @@ from scenelang.elements.element import Element
 from scenelang.elements.zoo import MOST_BYTES, Zoo, read_zoo, zoo_bytes
 from scenelang.files import NotWritten, output_place, read_regular, write_output
 from scenelang.fitting.apart import CPU_S, Apart, Hear
+from scenelang.fitting.beside import files_beside
 from scenelang.fitting.making import MOST_OF, Wish
 from scenelang.fitting.mesh import FitError
 from scenelang.fitting.parts import said
@@ -142,7 +143,7 @@ def _learned(
         return known
     hear["progress"](name, 0.0, 1.0)
     request = {"name": name, "suffix": suffix, "wish": asdict(wish), "about": about}
-    request["folder"] = os.path.abspath(path.parent)
+    request["files"] = files_beside(data, suffix, path.parent)
     usual_s = CPU_S * (4 if wish.parts else 1)
     limit_s = max(usual_s, 2 * wish.budget_s) if wish.budget_s < 1e6 else usual_s
     made = apart({**request, "cpu_s": limit_s}, data, hear)

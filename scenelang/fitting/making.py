@@ -109,7 +109,8 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
     """The file of what becomes of an original's bytes, in the process that is kept apart.
 
     Args:
-        request: its ``suffix``, the ``name`` of the element, what it says ``about`` itself, the ``wish``.
+        request: its ``suffix``, the ``name`` of the element, what it says ``about`` itself, the ``wish``, and
+            bytes of the ``files`` that it names.
         tell: called with ``say`` and a line, and ``progress`` and how far what is.
 
     Raises:
@@ -119,7 +120,7 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
     job = _Job(wish, request["about"], time.monotonic() + wish.budget_s, tell)
     if wish.paints(suffix):
         return zoo_bytes([_texture(data, name, job)])
-    brought = parts.brought(data, suffix, name, Path(request["folder"]), wish.sign, wish.parts)
+    brought = parts.brought(data, suffix, name, request["files"], wish.sign, wish.parts)
     job.say(f"{name}: {', '.join(brought.notes)}")
     group, made = list(brought.group), []
     for called, shape in brought.shapes.items():

@@ -5,8 +5,8 @@ Of parts that are copies of each other, turned, mirrored, larger or smaller, the
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import chain, count
-from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -39,19 +39,19 @@ class Brought(NamedTuple):
 
 
 def brought(
-    data: bytes, suffix: str, name: str, folder: Path | None, sign: Sign, apart: bool | None
+    data: bytes, suffix: str, name: str, files: Mapping[str, bytes], sign: Sign, apart: bool | None
 ) -> Brought:
     """What the bytes of a file bring.
 
     Args:
         suffix: one that `scenelang.fitting.solids` or `scenelang.fitting.outline` reads.
         name: of the whole.
-        folder: where the file lies.
+        files: those that it names, as `scenelang.fitting.beside` finds them.
         apart: whether its parts are elements of their own; if left out, those of drawings are.
     """
     if suffix in drawing.MOST_OF:
         return drawn_parts(drawing.read_outline(data, suffix), name, apart)
-    found, notes = solids.read_solids(data, suffix, folder)
+    found, notes = solids.read_solids(data, suffix, files)
     made = solid_parts(found, name, sign, bool(apart))
     return made._replace(notes=(*made.notes, *notes))
 

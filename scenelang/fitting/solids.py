@@ -7,19 +7,16 @@ import json
 import logging
 import re
 import warnings
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.files import read_regular
 from scenelang.fitting.looks import Look, joined, look_of, white
 from scenelang.fitting.mesh import MOST_TRIANGLES, FitError, Mesh, Points, Sign, mesh_of, needed
 
 MOST_OF: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
-_MOST_BESIDE: Final = 1 << 26  # bytes of a file that one names
 _UNDERSTOOD: Final = re.compile("KHR_(materials|lights|node|xmp)|EXT_texture_webp")
 _IGNORED: Final = ("animations", "cameras", "skins")
 
@@ -47,11 +44,13 @@ def whole(solids: Sequence[Solid], sign: Sign = "auto") -> Mesh:
     return mesh_of(vertices, triangles, sign, look)
 
 
-def read_solids(data: bytes, suffix: str, folder: Path | None = None) -> tuple[list[Solid], list[str]]:
+def read_solids(
+    data: bytes, suffix: str, files: Mapping[str, bytes] | None = None
+) -> tuple[list[Solid], list[str]]:
     """The solids in the bytes of a file with a suffix of `MOST_OF`, and what there is to say of it.
 
     Args:
-        folder: where the materials and textures lie that it names; without one there are none.
+        files: materials and textures by the names that it has for them; if left out, looks are not read.
 
     Raises:
         FitError: it is damaged or too large, or has what cannot be read.
@@ -59,15 +58,15 @@ def read_solids(data: bytes, suffix: str, folder: Path | None = None) -> tuple[l
     with needed("trimesh"):
         import trimesh
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    beside = _beside(folder)
+    beside = _beside(files)
     try:  # a reader of many formats, which a stranger's file may break in many ways
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             notes = _notes(data) if suffix == ".glb" else []
             objects = {"split_objects": True} if re.search(rb"^o ", data, re.M) else {"split_groups": True}
             kind = {"file_type": suffix[1:], "resolver": beside, **(objects if suffix == ".obj" else {})}
-            found = trimesh.load_scene(io.BytesIO(data), skip_materials=folder is None, **kind)
-            solids = _solids(found, suffix, folder is not None)
+            found = trimesh.load_scene(io.BytesIO(data), skip_materials=files is None, **kind)
+            solids = _solids(found, suffix, files is not None)
     except (FitError, MemoryError):
         raise
     except Exception as error:
@@ -101,8 +100,8 @@ def _notes(data: bytes) -> list[str]:
     return notes
 
 
-def _beside(folder: Path | None) -> Any:
-    """What finds files that a file names, in its folder and below."""
+def _beside(files: Mapping[str, bytes] | None) -> Any:
+    """What has the files that a file names, and notes which are missing."""
     import trimesh
 
     class Beside(trimesh.resolvers.Resolver):
@@ -110,16 +109,9 @@ def _beside(folder: Path | None) -> Any:
             self.missing: set[str] = set()
 
         def get(self, name: str) -> bytes:
-            try:
-                assert folder is not None
-                path = (folder / name.replace("\\", "/").lstrip("/")).resolve()
-                assert path.is_relative_to(folder.resolve())
-                found = read_regular(path, _MOST_BESIDE)
-                assert len(found) <= _MOST_BESIDE
-            except (OSError, ValueError, AssertionError):
-                self.missing |= {"".join(c for c in name if c.isprintable())[:80]} if folder else set()
-                raise KeyError(name) from None
-            return found
+            if files is not None and name not in files:
+                self.missing.add("".join(c for c in name if c.isprintable())[:80])
+            return (files or {})[name]
 
         def keys(self) -> tuple[str, ...]:
             return ()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -68,9 +67,9 @@ def made(kind: str) -> Any:
 @pytest.mark.parametrize(
     ("kind", "suffix"), [("vertex", ".ply"), ("vertex", ".glb"), ("face", ".ply"), ("texture", ".glb")]
 )
-def test_what_files_say_is_what_the_surface_shows(kind: str, suffix: str, tmp_path: Path) -> None:
+def test_what_files_say_is_what_the_surface_shows(kind: str, suffix: str) -> None:
     box = made(kind)
-    solids, _ = read_solids(box.export(file_type=suffix[1:]), suffix, tmp_path)
+    solids, _ = read_solids(box.export(file_type=suffix[1:]), suffix, {})
     mesh = whole(solids)
     shares = np.random.default_rng(1).dirichlet((1, 1, 1), len(box.faces))
     points = (box.triangles * shares[..., None]).sum(1)
@@ -86,29 +85,9 @@ def test_what_files_say_is_what_the_surface_shows(kind: str, suffix: str, tmp_pa
         assert colour == pytest.approx(expected, abs=0.01)
 
 
-def test_factors_of_gltf_are_linear(tmp_path: Path) -> None:
-    solids, _ = read_solids(made("factor").export(file_type="glb"), ".glb", tmp_path)
+def test_factors_of_gltf_are_linear() -> None:
+    solids, _ = read_solids(made("factor").export(file_type="glb"), ".glb", {})
     assert whole(solids).look.plain == pytest.approx(encoded(np.array([0.5, 0.25, 0])), abs=0.005)  # type: ignore[union-attr]
-
-
-def test_materials_of_obj_lie_beside_it(tmp_path: Path) -> None:
-    (tmp_path / "t").mkdir()
-    Image.fromarray(PICTURE).save(tmp_path / "t/pic.png")
-    (tmp_path / "a.mtl").write_text("newmtl red\nKd 1 0.2 0\nnewmtl tex\nKd 0.5 0.5 0.5\nmap_Kd t/pic.png\n")
-    points = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.3 0.6\n"
-    faces = "usemtl red\nf 1/1 3/1 2/1\nf 1/1 2/1 4/1\nusemtl tex\nf 2/1 3/1 4/1\nf 1/1 4/1 3/1\n"
-    text = f"mtllib a.mtl\n{points}{faces}"
-    solids, notes = read_solids(text.encode(), ".obj", tmp_path)
-    look = whole(solids).look
-    assert look is not None
-    found = {tuple(np.round(look.at(ONE + k, np.eye(3)[:1])[0], 3)) for k in range(4)}
-    assert found == {(1, 0.2, 0), tuple(np.round(by_hand(PICTURE, 0.3, 0.6), 3))}
-    assert notes == []
-    away = text.replace("a.mtl", "../a.mtl").encode()
-    (tmp_path / "below").mkdir()
-    solids, notes = read_solids(away, ".obj", tmp_path / "below")
-    assert (solids[0].look, notes) == (None, ["`../a.mtl` not found beside it"])
-    assert read_solids(text.encode(), ".obj")[0][0].look is None
 
 
 def striped(subdivisions: int = 4) -> Mesh:
@@ -145,11 +124,11 @@ def test_steps_bound_what_is_tried_and_give_the_same_bytes() -> None:
     assert late.sizes[0] == 17
 
 
-def test_textures_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_textures_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scenelang.fitting.looks.MOST_PIXELS", 10)
     with pytest.raises(ValueError, match="a texture of more than 10 pixels"):
-        read_solids(made("texture").export(file_type="glb"), ".glb", tmp_path)
+        read_solids(made("texture").export(file_type="glb"), ".glb", {})
     monkeypatch.undo()
     monkeypatch.setattr("scenelang.fitting.looks.FINEST", 2)
-    solids, _ = read_solids(made("texture").export(file_type="glb"), ".glb", tmp_path)
+    solids, _ = read_solids(made("texture").export(file_type="glb"), ".glb", {})
     assert max(solids[0].look.images[0].shape) == 3  # type: ignore[union-attr]

@@ -72,8 +72,8 @@ def lies(part: Part, p: np.ndarray) -> np.ndarray:
     return np.asarray(part.size * p @ turn.T + part.place)
 
 
-def test_parts_lie_where_they_were_and_copies_share_a_shape(car: bytes, tmp_path: Path) -> None:
-    solids, _ = read_solids(car, ".glb", tmp_path)
+def test_parts_lie_where_they_were_and_copies_share_a_shape(car: bytes) -> None:
+    solids, _ = read_solids(car, ".glb", {})
     assert {solid.name for solid in solids} == {"the body", *(f"wheel {k}" for k in range(4))}
     found = parts.solid_parts(solids, "car", "auto", True)
     wheel = next(name for name in found.shapes if "wheel" in name)
@@ -94,8 +94,8 @@ def test_parts_lie_where_they_were_and_copies_share_a_shape(car: bytes, tmp_path
     assert {part.color for part in found.group} == {(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)}
 
 
-def test_without_parts_the_whole_is_a_group_of_its_own(car: bytes, tmp_path: Path) -> None:
-    solids, _ = read_solids(car, ".glb", tmp_path)
+def test_without_parts_the_whole_is_a_group_of_its_own(car: bytes) -> None:
+    solids, _ = read_solids(car, ".glb", {})
     found = parts.solid_parts(solids, "car", "auto", False)
     assert list(found.shapes) == ["car"]
     assert found.group == (Part("car", (0, 0, 0), 1.0, (), (), "car"),)  # of two colours
@@ -103,13 +103,13 @@ def test_without_parts_the_whole_is_a_group_of_its_own(car: bytes, tmp_path: Pat
     assert plain.group == ()
 
 
-def test_copies_in_other_looks_have_elements_of_their_own(tmp_path: Path) -> None:
+def test_copies_in_other_looks_have_elements_of_their_own() -> None:
     scene = trimesh.Scene()
     for k, seed in enumerate((0, 0, 1)):
         shape = wedge()
         shape.visual.vertex_colors = np.random.default_rng(seed).integers(0, 256, (4, 3), np.uint8)
         scene.add_geometry(shape, node_name=f"w{k}", transform=moved(at=(3 * k, 0, 0)))
-    solids, _ = read_solids(scene.export(file_type="glb"), ".glb", tmp_path)
+    solids, _ = read_solids(scene.export(file_type="glb"), ".glb", {})
     found = parts.solid_parts(solids, "w", "auto", True)
     assert len(found.shapes) == 3  # two, and the whole
     assert {part.material for part in found.group} == {part.geometry for part in found.group}
@@ -136,12 +136,12 @@ def test_what_is_learned_says_which_part_it_is(car: bytes, tmp_path: Path) -> No
         parts.shape_in(car, ".glb", "auto", 9)
 
 
-def test_a_part_that_encloses_nothing_is_left_out(tmp_path: Path) -> None:
+def test_a_part_that_encloses_nothing_is_left_out() -> None:
     scene = trimesh.Scene([trimesh.creation.box()])
     sheet = trimesh.Trimesh([(2, 0, 0), (3, 0, 0), (2, 1, 0)], [(0, 1, 2)], process=False)
     scene.add_geometry(sheet, node_name="sheet")
     said: list[Any] = []
-    request: dict[str, Any] = {"suffix": ".glb", "name": "a", "about": {}, "folder": str(tmp_path)}
+    request: dict[str, Any] = {"suffix": ".glb", "name": "a", "about": {}, "files": {}}
     wish = {"steps": 1, "parts": True}
     made = making.make(
         {**request, "wish": wish}, scene.export(file_type="glb"), lambda *told: said.append(told)
