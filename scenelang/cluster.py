@@ -12,6 +12,7 @@ import logging
 import platform
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from functools import cache, partial
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
 LOCAL: Final = "local"
 AHEAD: Final = 3  # tasks under way for each worker
 LOGGED: Final = "distributed.admin.low-level-log-length"  # messages that dask keeps, and what is in them
+_LARGE: Final = "distributed.admin.large-graph-warning-threshold"  # bytes that it warns of
 WAIT_S: Final = 30.0  # for a scheduler to answer, and for workers
+_END_S: Final = 2.0  # for workers of this machine to end by themselves
 _HARMLESS: Final = ("python", "processor")
 """What differs without a difference in pixels, or with one of 1/255 at most."""
 _NEEDED: Final = ("distributed", "numpy", "scenelang", "torch")
@@ -60,7 +63,7 @@ class Link:
             raise RenderError("a cluster needs dask: pip install 'scenelang[dask]'") from None
         for name in ("distributed", "distributed.client"):  # what matters of what they say is raised
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        dask.config.set({LOGGED: 1})  # else what was sent stays in memory
+        dask.config.set({LOGGED: 1, _LARGE: 1 << 40})  # else what was sent stays in memory, and is warned of
         self.address = address
         self._libraries = libraries
         self._own: _Local | None = None
@@ -206,10 +209,14 @@ class _Local:
         ]
 
     def close(self) -> None:
-        """End all of it."""
+        """End all of it; dask would let tasks of seconds come to their end."""
         for worker in self._workers:
             worker.terminate()
+        latest = time.monotonic() + _END_S
         for worker in self._workers:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                worker.wait(max(0.0, latest - time.monotonic()))
+            worker.kill()  # what it began ends with it
             worker.wait()
         self._cluster.close()
 
