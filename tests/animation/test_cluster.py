@@ -138,7 +138,7 @@ def test_a_scheduler_that_goes_away(tmp_path: Path) -> None:
     path.write_text(LARGE)
     asked: dict[str, Any] = {"grid": {"k": "../16"}}
     with (
-        started(tmp_path, 1) as (address, scheduler),
+        started(tmp_path, 1) as (address, (scheduler, *_)),
         pytest.raises(nsg.RenderError, match="is gone; the same command goes on"),
     ):
         nsg.render_many(path, tmp_path / "out", **asked, cluster=address, progress=at_half(scheduler.kill))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import subprocess
 import sys
 import time
@@ -14,15 +15,23 @@ from typing import Any
 import pytest
 
 distributed = pytest.importorskip("distributed")
-QUIET: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 
 
 @contextlib.contextmanager
-def started(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """A scheduler's address and process; workers without who would start them again."""
+def started(
+    folder: Path, workers: int, **variables: str
+) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """A scheduler's address, its process and those of workers, without who would start them again.
+
+    Args:
+        variables: of the environment; those of certificates make a scheduler that takes nothing else.
+    """
     file = folder / "scheduler.json"
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    quiet["env"] = {**os.environ, **variables}
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
-    every = [subprocess.Popen([*command, "--no-dashboard", "--scheduler-file", str(file)], **QUIET)]
+    command += ["--protocol", "tls"] if variables else []
+    every = [subprocess.Popen([*command, "--no-dashboard", "--scheduler-file", str(file)], **quiet)]
     try:
         deadline = time.monotonic() + 60
         while not file.exists() or not file.read_text():
@@ -31,10 +40,11 @@ def started(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[
         address = json.loads(file.read_text())["address"]
         command = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--host", "127.0.0.1"]
         command += ["--nthreads", "1", "--no-dashboard", "--no-nanny", "--local-directory", str(folder)]
-        every += [subprocess.Popen(command, **QUIET) for _ in range(workers)]
-        with distributed.Client(address, set_as_default=False) as client:
-            client.wait_for_workers(workers, timeout=60)
-        yield address, every[0]
+        every += [subprocess.Popen(command, **quiet) for _ in range(workers)]
+        if not variables:
+            with distributed.Client(address, set_as_default=False) as client:
+                client.wait_for_workers(workers, timeout=60)
+        yield address, every
     finally:
         for process in every:
             process.kill()
