@@ -223,7 +223,12 @@ def loaded_by(*arguments: str) -> set[str]:
 
 def test_check_loads_neither_torch_nor_numpy() -> None:
     tables()  # made now if the grammar has changed
-    assert not loaded_by("check", str(ROOT / "examples/night.nsg")) & {"torch", "numpy", "lark"}
+    assert not loaded_by("check", str(ROOT / "examples/night.nsg")) & {
+        "torch",
+        "numpy",
+        "lark",
+        "distributed",
+    }
 
 
 def test_check_loads_no_more_for_solids(tmp_path: Path) -> None:

@@ -125,7 +125,7 @@ jobs = click.option(
 cluster = click.option(
     "--cluster",
     metavar="ADDRESS",
-    help="Draw frames on the workers of a dask scheduler, or of this machine alone (local).",
+    help="Have the work done by workers of a dask scheduler, or of this machine alone (local).",
 )
 verbose = click.option("-v", "--verbose", is_flag=True, help="Say what was compiled and where the time went.")
 

@@ -34,7 +34,10 @@ _REFUSED: Final = (
     "os.system",
     "os.exec",
 )
+LIBRARIES: Final = ("contourpy", "libigl", "pillow", "scipy", "svgelements", "trimesh")
+"""What makes elements besides ours; other versions may give other bytes."""
 Hear = Callable[..., None]
+Asked = tuple[dict[str, Any], bytes]  # a request, and the bytes that it is about
 
 
 class Apart:
@@ -99,6 +102,16 @@ class Apart:
         assert process is not None
         process.communicate()
         return process.returncode
+
+
+def made_apart(asked: Asked) -> tuple[list[str], bytes | FitError]:
+    """What `Apart` says and makes of a request, or why it makes nothing: what a worker is asked."""
+    lines: list[str] = []
+    with Apart() as apart:
+        try:
+            return lines, apart(*asked, {"say": lines.append, "progress": lambda *_: None})
+        except FitError as error:
+            return lines, error
 
 
 def _ended(status: int) -> str:

@@ -27,6 +27,7 @@ def learn(
     sign: Sign = "auto",
     pictures: Literal["texture", "outline"] = "texture",
     parts: bool | None = None,
+    cluster: str | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Elements:
     """Make files elements, as ``scenelang learn`` does: ``learn("cow.obj", "zoo.safetensors")``.
@@ -44,13 +45,16 @@ def learn(
         sign: what tells inside of a mesh.
         pictures: whether they become textures or geometries.
         parts: whether those of a file are elements of their own; if left out, those of drawings are.
-        say: is told in lines what is found and tried.
+        cluster: address of a dask scheduler whose workers make them, several at a time, or ``"local"``; needs
+            the extra ``dask``, and what makes elements on each.
+        say: is told in lines what is found and tried; by workers, of a file when it is done.
 
     Returns:
         All elements of ``out``, for a Scene.
 
     Raises:
         FitError: files cannot be made elements, a line for each; the others were.
+        RenderError: ``cluster`` has no workers, or they differ from this machine.
         OSError: ``out`` cannot be read or written.
         ValueError: names that scenes cannot say, or twice the same.
     """
@@ -59,5 +63,5 @@ def learn(
         license=license, source=source, pictures=pictures, parts=parts,
     )  # fmt: skip
     listed = [files] if isinstance(files, str | os.PathLike) else files
-    making.learn(listed, out, wish, name=name, say=say)
+    making.learn(listed, out, wish, name=name, cluster=cluster, say=say)
     return load_elements(os.fspath(out))

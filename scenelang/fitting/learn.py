@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
+from scenelang.cluster import GivenUp, by_workers
 from scenelang.elements.element import Element
 from scenelang.elements.zoo import MOST_BYTES, Zoo, read_zoo, zoo_bytes
 from scenelang.files import NotWritten, output_place, read_regular, write_output
-from scenelang.fitting.apart import CPU_S, Apart, Hear
+from scenelang.fitting.apart import CPU_S, LIBRARIES, Apart, Asked, Hear, made_apart
 from scenelang.fitting.beside import files_beside
 from scenelang.fitting.making import MOST_OF, Wish
 from scenelang.fitting.mesh import FitError
@@ -19,6 +22,8 @@ from scenelang.fitting.parts import said
 from scenelang.tensors import TensorError
 
 Progress = Callable[[str, float, float], None]
+Answers = Generator[tuple[int, Callable[[], bytes]], None, None]
+"""Files by their places, in whatever order, and what gives what was made of one or raises why nothing was."""
 
 
 def learn(
@@ -27,6 +32,7 @@ def learn(
     wish: Wish = Wish(),  # noqa: B008
     *,
     name: str | None = None,
+    cluster: str | None = None,
     say: Callable[[str], None] = lambda line: None,
     progress: Progress = lambda what, done, total: None,
 ) -> list[Element]:
@@ -36,31 +42,72 @@ def learn(
     not made again. So work that was interrupted is taken up by asking for it again.
 
     Args:
-        files, out, name, say: as for `scenelang.learn`, which raises the same.
+        files, out, name, cluster, say: as for `scenelang.learn`, which raises the same.
         progress: is told what is done, how far it is and how far that goes.
     """
     names = names_of(files, wish, name)
-    held = _writable(out)
-    made: list[Element] = []
-    troubles = []
-    hear: dict[str, Hear] = {"say": say, "progress": progress}
-    with Apart() as apart:
-        for file, called in zip(map(Path, files), names, strict=True):
-            try:
+    first = held = _writable(out)
+    made: dict[int, Zoo] = {}
+    troubles: dict[int, str] = {}
+
+    @contextmanager
+    def noted(index: int) -> Iterator[None]:
+        """An error of one file does not stop the others."""
+        try:
+            yield
+        except (FitError, GivenUp, TensorError) as error:
+            troubles[index] = f"{files[index]}: {error}"
+        except NotWritten:
+            raise
+        except OSError as error:
+            troubles[index] = f"{files[index]}: {(error.strerror or str(error)).lower()}"
+
+    def asked() -> Iterator[tuple[int, Asked]]:
+        for index, (file, called) in enumerate(zip(map(Path, files), names, strict=True)):
+            with noted(index):
                 known = _named(held).get((called, wish.paints(file.suffix)))
-                found = _learned(file, called, wish, known, apart, hear)
-                if isinstance(found, Zoo):
-                    held = _added(out, held, found, called)
-                made += found.elements if isinstance(found, Zoo) else [found]
-            except FitError as error:
-                troubles.append(f"{file}: {error}")
-            except NotWritten:
-                raise
-            except OSError as error:
-                troubles.append(f"{file}: {(error.strerror or str(error)).lower()}")
+                found = _request(file, called, wish, known)
+                if isinstance(found, Element):
+                    say(f"{called}: made before of this file")
+                    groups = {called: held.groups[called]} if called in held.groups else {}
+                    made[index] = replace(Zoo.of([found]), groups=groups)
+                else:
+                    yield index, found
+
+    hear: dict[str, Hear] = {"say": say, "progress": progress}
+    with closing(_by_workers(cluster, asked(), hear) if cluster else _here(asked(), hear)) as answers:
+        for index, answer in answers:
+            with noted(index):
+                made[index] = read_zoo(answer())
+                held = _written(out, first, [(names[at], made[at]) for at in sorted(made)])
+            if cluster:
+                progress("files", len(made) + len(troubles), len(files))
     if troubles:
-        raise FitError("\n".join(troubles))
-    return made
+        raise FitError("\n".join(troubles[index] for index in sorted(troubles)))
+    return [element for index in sorted(made) for element in made[index].elements]
+
+
+def _here(asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answers:
+    """What becomes of requests, one after another."""
+    with Apart() as apart:
+        for index, (request, data) in asked:
+            hear["progress"](request["name"], 0.0, 1.0)
+            yield index, partial(apart, request, data, hear)
+
+
+def _by_workers(cluster: str, asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answers:
+    """What becomes of requests, several at a time and in any order."""
+
+    def taken(answer: Callable[[], tuple[list[str], bytes | FitError]]) -> bytes:
+        lines, found = answer()
+        for line in lines:
+            hear["say"](line)
+        if isinstance(found, FitError):
+            raise found
+        return found
+
+    for index, answer in by_workers(cluster, made_apart, asked, LIBRARIES):
+        yield index, partial(taken, answer)
 
 
 def names_of(files: Sequence[str | os.PathLike[str]], wish: Wish, name: str | None = None) -> list[str]:
@@ -111,26 +158,27 @@ def _named(zoo: Zoo) -> dict[tuple[str, bool], Element]:
     return {(element.name, element.material): element for element in zoo.elements}
 
 
-def _added(out: str | os.PathLike[str], held: Zoo, made: Zoo, name: str) -> Zoo:
-    """Write what was held and what was made of ``name``, in place of what has its names and of its group.
+def _written(out: str | os.PathLike[str], held: Zoo, made: Iterable[tuple[str, Zoo]]) -> Zoo:
+    """Write what was held and what was made, in place of what has the same names and of their groups.
 
     Raises:
         OSError: it cannot be written, or would be more than can be read.
     """
-    groups = {other: group for other, group in held.groups.items() if other != name} | made.groups
-    data = zoo_bytes((_named(held) | _named(made)).values(), groups)
+    elements, groups = _named(held), dict(held.groups)
+    for name, zoo in made:
+        groups.pop(name, None)
+        elements, groups = elements | _named(zoo), groups | zoo.groups
+    data = zoo_bytes(elements.values(), groups)
     try:
-        zoo = read_zoo(data)
+        found = read_zoo(data)
     except TensorError as error:
         raise NotWritten(errno.EFBIG, str(error), os.fspath(out)) from None
     write_output(out, data)
-    return zoo
+    return found
 
 
-def _learned(
-    path: Path, name: str, wish: Wish, known: Element | None, apart: Apart, hear: Mapping[str, Hear]
-) -> Zoo | Element:
-    """What a file brings, or what was made of it before."""
+def _request(path: Path, name: str, wish: Wish, known: Element | None) -> Asked | Element:
+    """What `Apart` is asked of a file, with its bytes, or what was made of it before."""
     suffix = path.suffix.lower()
     if suffix not in MOST_OF:
         raise FitError(f"not one of {', '.join(MOST_OF)}")
@@ -139,12 +187,8 @@ def _learned(
         raise FitError(f"more than {MOST_OF[suffix] >> 20:,} MiB")
     about = wish.about(path, data)
     if known is not None and wish.made(known, about):
-        hear["say"](f"{name}: made before of this file")
         return known
-    hear["progress"](name, 0.0, 1.0)
-    request = {"name": name, "suffix": suffix, "wish": asdict(wish), "about": about}
-    request["files"] = files_beside(data, suffix, path.parent)
     usual_s = CPU_S * (4 if wish.parts else 1)
     limit_s = max(usual_s, 2 * wish.budget_s) if wish.budget_s < 1e6 else usual_s
-    made = apart({**request, "cpu_s": limit_s}, data, hear)
-    return read_zoo(made)
+    request = {"name": name, "suffix": suffix, "wish": asdict(wish), "about": about, "cpu_s": limit_s}
+    return {**request, "files": files_beside(data, suffix, path.parent)}, data

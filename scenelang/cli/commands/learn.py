@@ -76,6 +76,7 @@ if TYPE_CHECKING:
 )
 @click.option("--license", metavar="TEXT", help="Of the originals; kept in the file.")
 @click.option("--source", metavar="TEXT", help="Where they are from; kept in the file.")
+@options.cluster
 @click.option("--preview", metavar="OUT.png", help="A picture of the new elements.")
 def command(
     files: tuple[str, ...],
@@ -91,6 +92,7 @@ def command(
     steps: int | None,
     license: str | None,
     source: str | None,
+    cluster: str | None,
     preview: str | None,
 ) -> None:
     """Make meshes and drawings elements, which scenes import.
@@ -122,7 +124,8 @@ def command(
         raise click.UsageError(f"{error}.") from None
     try:
         with Bar() as bar:
-            made = learn(files, out, wish, name=name, say=partial(click.echo, err=True), progress=bar)
+            say = partial(click.echo, err=True)
+            made = learn(files, out, wish, name=name, cluster=cluster, say=say, progress=bar)
     except FitError as error:
         for line in str(error).split("\n"):
             say_trouble(line)
