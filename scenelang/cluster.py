@@ -71,7 +71,9 @@ class Link:
             if address.partition(":")[0] == LOCAL:
                 self._own = _Local(address)
             where = self._own.address if self._own else address
-            self._client: Client = distributed.Client(where, timeout=WAIT_S, set_as_default=False)
+            # in two steps, as one that does not come about has to be closed too: it would hold up the end
+            self._client: Client = distributed.Client.__new__(distributed.Client)
+            self._client.__init__(where, timeout=WAIT_S, set_as_default=False)  # type: ignore[misc]
             self._client.wait_for_workers(self._own.count if self._own else 1, timeout=WAIT_S)
         except (OSError, TimeoutError, TypeError, ValueError) as error:  # TypeError: no certificates
             self.close()

@@ -52,14 +52,21 @@ def test_only_who_has_the_certificate_draws(tmp_path: Path, monkeypatch: pytest.
         assert address.startswith("tls://127.0.0.1:")
         command = [sys.executable, "-m", "scenelang", "render", str(tmp_path / "a.nsg"), "--cluster", address]
 
-        done = subprocess.run(
-            [*command, "-o", str(tmp_path / "far-%d.png")],
-            env={**os.environ, **variables},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
+        def ended(out: str, **more: str) -> tuple[int, str]:
+            done = subprocess.run(
+                [*command, "-o", str(tmp_path / out)],
+                env={**os.environ, **more},
+                capture_output=True,
+                text=True,
+                timeout=30,  # a connection that fails does not hold up the end
+                check=False,
+            )
+            return done.returncode, done.stderr
+
+        assert ended("far-%d.png", **variables)[0] == 0
+        code, said = ended("none-%d.png")
+        assert (code, said.count("\n")) == (2, 1)
+        assert said.startswith(f"Error: no scheduler with workers at `{address}`: TLS expects")
         near = nsg.animate(tmp_path / "a.nsg", tmp_path / "near-%d.png").files
         assert len(near) == 2
         for path in near:
