@@ -1,4 +1,4 @@
-"""A dask scheduler and workers on loopback, as on other machines."""
+"""A dask scheduler and workers, on loopback or beyond a wire."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,17 +19,24 @@ distributed = pytest.importorskip("distributed")
 
 @contextlib.contextmanager
 def started(
-    folder: Path, workers: int, **variables: str
+    folder: Path,
+    workers: int,
+    *,
+    hosts: tuple[str, str] = ("127.0.0.1", "127.0.0.1"),
+    within: Sequence[str] = (),
+    **variables: str,
 ) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     """A scheduler's address, its process and those of workers, without who would start them again.
 
     Args:
+        hosts: addresses of the scheduler and of the workers.
+        within: a command that runs a worker's.
         variables: of the environment; those of certificates make a scheduler that takes nothing else.
     """
     file = folder / "scheduler.json"
     quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     quiet["env"] = {**os.environ, **variables}
-    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", hosts[0], "--port", "0"]
     command += ["--protocol", "tls"] if variables else []
     every = [subprocess.Popen([*command, "--no-dashboard", "--scheduler-file", str(file)], **quiet)]
     try:
@@ -38,7 +45,7 @@ def started(
             assert time.monotonic() < deadline
             time.sleep(0.05)
         address = json.loads(file.read_text())["address"]
-        command = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--host", "127.0.0.1"]
+        command = [*within, sys.executable, "-m", "distributed.cli.dask_worker", address, "--host", hosts[1]]
         command += ["--nthreads", "1", "--no-dashboard", "--no-nanny", "--local-directory", str(folder)]
         every += [subprocess.Popen(command, **quiet) for _ in range(workers)]
         if not variables:
