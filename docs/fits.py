@@ -96,6 +96,28 @@ def targets() -> str:
     return f"{markdown(heads, rows)}\n\n{record['scenes']} scenes each. {_made(record)}."
 
 
+def photographs() -> str:
+    """Photographs that are ever worse."""
+    record = read("fit-stability")
+    parts = []
+    for name, head in (("blur", "blur, pixels"), ("noise", "noise, % of white")):
+        heads = (head, "at 40 dB", "mean, dB", "lowest, dB", "blur found, pixels", "median seconds")
+        rows = [
+            [
+                f"{row['value'] if name == 'blur' else 100 * row['value']:g}",
+                f"{row['reached']} of {record['scenes']}",
+                f"{row['mean_db']:.1f} ± {row['interval_db']:.1f}",
+                f"{row['lowest_db']:.1f}",
+                f"{row['blur']:.2f}",
+                f"{row['seconds']:.0f}",
+            ]
+            for row in record[name]
+        ]
+        parts.append(markdown(heads, rows))
+    told = "PSNR is against what can be reached; noise has a blur of one pixel beside it, blur noise of 2 %. "
+    return "\n\n".join([*parts, told + _made(record) + "."])
+
+
 def gradients() -> str:
     """Descents by reverse passes beside those by differences."""
     heads = (
@@ -129,5 +151,6 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "fits": fits,
     "fit-searches": searches,
     "fit-targets": targets,
+    "fit-stability": photographs,
     "fit-gradients": gradients,
 }

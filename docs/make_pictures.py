@@ -291,7 +291,7 @@ def fitted() -> bytes:
     names = ("x", "y", "size", "turn", "ink", "stones")
     found = nsg.fit(text, photo.astype(np.float32), params=names)
     return png(
-        found.sheet().to_pil().quantize(256, pillow.Quantize.MEDIANCUT, kmeans=2)
+        found.sheet().to_pil().quantize(100, pillow.Quantize.MEDIANCUT, kmeans=2)
     )  # noise keeps its own
 
 

@@ -17,6 +17,7 @@ Report = Callable[[str, int, int], None]
 """Called with what is measured, how much of it is done, and all."""
 FOLDERS: Final = {"-o", "--out", "--kept", "--known", "--cluster"}
 """Options of commands that change where things lie or are done, and no figure."""
+ORIGINALS: Final = "--originals"  # which figures need, wherever they lie
 
 
 def silent(what: str, done: int, count: int) -> None:
@@ -57,5 +58,8 @@ def _figures(arguments: Sequence[str]) -> Iterator[str]:
     for argument in left:
         if argument in FOLDERS:
             next(left, None)
+        elif argument == ORIGINALS:
+            next(left, None)
+            yield from (ORIGINALS, "FOLDER")
         elif argument.partition("=")[0] not in FOLDERS:
             yield argument

@@ -20,6 +20,7 @@ from scenelang.lab.about import command_line
             "lab eval shapes2d --set chains --scenes 300",
         ),
         ("lab eval solids3d --kept=/tmp/k --side 256 --out /tmp/x", "lab eval solids3d --side 256"),
+        ("lab eval solids3d --originals /tmp/x -o y", "lab eval solids3d --originals FOLDER"),
         ("lab stability solids3d -o", "lab stability solids3d"),
         ("lab eval 'a b.safetensors'", "lab eval 'a b.safetensors'"),
     ],
