@@ -92,7 +92,7 @@ class Apart:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+                env=_environment(),
                 start_new_session=True,  # an interruption is ours to tell it
             )
         return self._process
@@ -102,6 +102,18 @@ class Apart:
         assert process is not None
         process.communicate()
         return process.returncode
+
+
+def _environment() -> dict[str, str]:
+    """Variables of the process: libigl takes as many threads as others may, and memory is kept.
+
+    Workers of dask have glibc give back every 64 KB, which costs meshes a fault for each page of each array.
+    """
+    found = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    found.pop("MALLOC_TRIM_THRESHOLD_", None)
+    if "OMP_NUM_THREADS" in found:
+        found.setdefault("IGL_NUM_THREADS", found["OMP_NUM_THREADS"])
+    return found
 
 
 def made_apart(asked: Asked) -> tuple[list[str], bytes | FitError]:

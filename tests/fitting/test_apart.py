@@ -69,3 +69,11 @@ def test_it_ends_with_ours(made: Any) -> None:
     pid = int(made("return str(os.getpid()).encode()")[0])
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
+
+
+def test_what_workers_of_dask_set_does_not_slow_it_down(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("MALLOC_TRIM_THRESHOLD_", "65536"), ("OMP_NUM_THREADS", "1")):
+        monkeypatch.setenv(name, value)
+    names = "'MALLOC_TRIM_THRESHOLD_', 'IGL_NUM_THREADS', 'OPENBLAS_NUM_THREADS'"
+    found, _ = made(f"return repr([os.environ.get(name) for name in ({names})]).encode()")
+    assert found == b"[None, '1', '1']"
