@@ -120,7 +120,7 @@ def test_what_becomes_of_a_drawing_is_small() -> None:
             b'<svg><path d="M0 0h9" fill="none" stroke="red" stroke-width="1e-9"/></svg>',
             "nowhere thicker",
         ),
-        (".png", b"no picture", "damaged"),
+        (".png", b"no picture", "neither a PNG nor a JPEG"),
     ],
 )
 def test_what_is_no_outline(suffix: str, data: bytes, words: str) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from PIL import Image
 
 from scenelang.cli.main import cli
 from scenelang.elements.pyramid import unpacked
+from scenelang.lab.codes import decoder
 from scenelang.lab.codes.decoder import decoded
 from scenelang.lab.codes.forms import Array, balls, best_form, cosines, nodes, off
 from scenelang.lab.codes.study import drawn, random_pictures
@@ -57,12 +60,14 @@ def test_a_ball_is_one_number_or_four(d: int, true: Array) -> None:
     assert best_form(true, d)[0] == "balls"
 
 
-def test_a_shared_decoder_tells_its_things_apart_by_one_number() -> None:
-    """Three flat pictures: what is learned is nearer to each than their mean is."""
+def test_a_shared_decoder_tells_its_things_apart_by_one_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three flat pictures, 200 steps: what is learned is nearer to each than their mean is."""
+    clock = count(step=0.01)
+    monkeypatch.setattr(decoder, "time", SimpleNamespace(process_time=lambda: next(clock)))
     true = np.stack([np.full((8, 8, 3), grey, np.float32) for grey in (0.1, 0.5, 0.9)])
     found, said = decoded(true, 1, 1, 2.0, pitch=1.0)
     assert [off(a, b) < 0.1 for a, b in zip(found, true, strict=True)] == [True] * 3
-    assert said["steps"] > 0
+    assert 190 < said["steps"] <= 200
 
 
 def test_distances_are_drawn_as_they_are() -> None:
