@@ -36,12 +36,17 @@ def wire() -> Iterator[str]:
         pytest.skip(f"no hosts can be made here: {error}")
     try:
         ip(f"link add {name} type veth peer name far netns {name}")
+    except OSError:
+        ip(f"netns delete {name}")
+        raise
+    try:
         ip(f"address add {HERE}/24 dev {name}")
         ip(f"link set {name} up")
         for words in (f"address add {THERE}/24 dev far", "link set far up", "link set lo up"):
             ip(f"-n {name} {words}")
         yield name
     finally:
+        ip(f"link delete {name}")  # with its other end, which would take its time
         ip(f"netns delete {name}")
 
 
