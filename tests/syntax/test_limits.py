@@ -68,6 +68,29 @@ def test_deep_and_unclosed(opening: str) -> None:
     assert depth(tree) <= 3 * MAX_DEPTH + 10
 
 
+@pytest.mark.parametrize("head", ["nsg 1;\n", "let x = 1;\nlet y = 1;\n"])
+@pytest.mark.parametrize("brace", ["{", "}", "a {"])
+def test_braces_of_one_line_beside_others(head: str, brace: str) -> None:
+    """They are not mended one by one, each by looking at its whole line."""
+
+    def work(count: int) -> int:
+        return lines_run(lambda: read(head + brace * count))
+
+    work(1)
+    assert work(2000) < 6 * work(400)
+
+
+def test_the_cause_of_many_mistakes_is_not_looked_for_far_away() -> None:
+    """The first hundred are told in detail; what comes behind costs less, and the rest of 100 KB nothing."""
+
+    def work(count: int) -> int:
+        return lines_run(lambda: read("..\n(1,2)\n" * count))
+
+    work(1)
+    first = work(40)  # mistakes, at least
+    assert work(10_000) < 10 * first
+
+
 def test_index_chains_are_bounded() -> None:
     tree, _ = read("let a = b" + "[0]" * MANY + ";")
     assert depth(tree) <= 3 * MAX_DEPTH + 10

@@ -31,6 +31,8 @@ def balance(tokens: Tokens, report: Report) -> None:
         return
     mender.mend_plain()
     for slip in reversed(find_slips(tokens)):  # from the last on, so that indices hold
+        if report.full:
+            break
         mender.mend(slip)
     mender.match_the_rest()
 

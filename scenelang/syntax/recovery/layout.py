@@ -47,7 +47,7 @@ def find_slips(tokens: Tokens) -> list[Slip]:
         # Without indentation, where lines each close what they open: the one that does not.
         pairs = [(line, after, after.depth - line.depth) for line, after in pairwise(lines)]
         wrong = [Slip(line.first, after.first, -more, line.depth) for line, after, more in pairs if more]
-        if len(wrong) == 1:
+        if len(wrong) == 1 and abs(wrong[0].shift) <= _WIDEST:
             return wrong
     wanted = -lines[-1].depth
     if abs(wanted) > _WIDEST or min(line.depth for line in lines) < -_WIDEST:

@@ -17,7 +17,7 @@ from scenelang.syntax.recovery import mistakes
 from scenelang.syntax.recovery.foreign import HEADS, keywords_near
 from scenelang.syntax.recovery.habits import Habits
 from scenelang.syntax.recovery.patterns import closing
-from scenelang.syntax.recovery.repairs import FOLLOWED, MAX_REPLAY, Repair, Search
+from scenelang.syntax.recovery.repairs import FOLLOWED, MAX_REPLAY, THOROUGH, WINDOW, Repair, Search
 from scenelang.syntax.tables import tables
 from scenelang.words import DECLARING, NODES
 
@@ -62,7 +62,8 @@ class Recovery(Habits):
         if known or self._spaced_unit(at) or self._unseparated(states, at):
             return at
         search = Search(self.tokens, first, at)
-        repair = search.run(states[: depth + 1], states)
+        window = WINDOW if len(self.report.found) < THOROUGH else 0
+        repair = search.run(states[: depth + 1], states, window)
         if repair is None:
             del states[depth + 1 :], values[depth:]
             return self._skip(first, at)

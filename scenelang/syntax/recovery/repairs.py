@@ -24,6 +24,9 @@ FOLLOWED = 80
 WINDOW = 24
 """How many tokens before the mistake the cause is looked for."""
 
+THOROUGH = 100
+"""After so many mistakes in a file the cause is looked for at the mistake alone."""
+
 MAX_REPLAY = 400
 """A statement with more tokens before the mistake is not tried again from its start."""
 
@@ -116,12 +119,13 @@ class Search:
         self.name = tables().kind("NAME")
         self.keywords = {kind for text, kind in literals.items() if text.isalpha()}
 
-    def run(self, base: list[int], stack: list[int]) -> Repair | None:
+    def run(self, base: list[int], stack: list[int], window: int = WINDOW) -> Repair | None:
         """The best repair, or None where none helps.
 
         Args:
             base: the states before the statement.
             stack: those at the mistake; used where it is too far from there.
+            window: how many tokens before the mistake are looked at.
         """
         if self.at - self.first > MAX_REPLAY:
             return self._settle(self._try_all(stack, self.at))[1]
@@ -129,7 +133,7 @@ class Search:
         prefixes = []
         prefix = base.copy()
         for at in range(self.first, self.at):
-            if at >= self.at - WINDOW:
+            if at >= self.at - window:
                 prefixes.append((at, prefix.copy()))
             advance(prefix, self.kinds[at])
         found = self._try_all(prefix, self.at)
