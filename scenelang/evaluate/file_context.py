@@ -32,6 +32,7 @@ class FileContext:
         weight: half evaluation steps of what has been prepared of the block at hand.
         damage: what syntax mistakes leave unknown of it.
         materials: what a Scene calls those of a file of elements.
+        has_params: whether it, or a file that it imports, has params.
     """
 
     source: SourceFile
@@ -47,6 +48,7 @@ class FileContext:
     first: nodes.Stmt | None = None
     damage: Damage = NONE
     materials: dict[str, str] = field(default_factory=dict)
+    has_params: bool = False
 
     def __post_init__(self) -> None:
         self.scope = Scope(Slots(root=self.env))

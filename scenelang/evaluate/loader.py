@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path, PureWindowsPath
-from typing import Final
+from typing import Any, Final
 
 from scenelang.diagnostics.diagnostic import Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
@@ -74,6 +74,10 @@ class Loader(Record, frozen=False):
     sites: list[Span] = field(default_factory=list)
     """Where the imports of that chain are written."""
     parsed: dict[Path, nodes.File] = field(default_factory=dict)
+    prepared: dict[Path, Any] = field(default_factory=dict)
+    """The `FileContext` of each file that has been prepared, under its last name."""
+    repeated: int = 0
+    """Characters of files that were prepared again, as params of theirs have another name each time."""
     zoos: dict[Path, Zoo] = field(default_factory=dict)
     wanted: dict[Path, None] = field(default_factory=dict)
     """All files that were asked for inside the root, there or not, as written and resolved."""

@@ -8,11 +8,14 @@ from typing import Any
 
 import pytest
 
+import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import evaluate, load_scene
+from scenelang.evaluate.prepare import settings
 from scenelang.syntax import parse
-from tests.evaluate.cases import MODELS, Outcome, transform
+from tests.evaluate.cases import MODELS, Outcome, run_text, transform
+from tests.work import lines_run
 
 
 def write(folder: Path, **files: str) -> None:
@@ -124,7 +127,34 @@ def test_diamonds_do_not_explode(tmp_path: Path) -> None:
     for i in range(30):
         write(tmp_path, **{f"f{i}": f'import "f{i + 1}.nsg" as a; import "f{i + 1}.nsg" as b; let x = 1;'})
     write(tmp_path, f30="let x = 1;")
+    load(tmp_path / "f0.nsg").good()
+    write(tmp_path, f30="param x = 1;")  # of which each way there makes another one
     assert load(tmp_path / "f0.nsg").codes == ["E0324"]
+
+
+def test_a_file_without_params_is_prepared_once(tmp_path: Path) -> None:
+    """Under any number of names, with the values of its functions and modules, and in every frame."""
+
+    def work(count: int) -> int:
+        imports = "".join(f'import "std/shapes" as a{n};\n' for n in range(count))
+        return lines_run(lambda: run_text(imports + f"a{count - 1}.disc(0.3);").good())
+
+    work(1)
+    assert work(200) < 5 * work(20)
+    write(tmp_path, lib='import "deep.nsg" as d; param k = 1; fn f() = k * d.size;', deep="let size = 2;")
+    main = 'animate(1, 2); import "lib.nsg" as a; import "lib.nsg" as b; import "deep.nsg" as d;'
+    write(tmp_path, main=f"{main} square {{ scale(a.f(), b.f() + d.size); rotate(1turn * u); }}")
+    for frame in (0, 1):
+        outcome = load(tmp_path / "main.nsg", frame=frame, defines={"b.k": "3"})
+        assert outcome.good().nodes[0].transforms[0] == nsg.Scale(x=2.0, y=8.0)  # type: ignore[union-attr]
+
+
+def test_files_that_are_prepared_again_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(settings, "MAX_BYTES", 100)
+    write(tmp_path, lib=f"param k = 1; // {'x' * 40}")
+    for count, codes in ((2, []), (4, ["E0324"])):
+        write(tmp_path, main="".join(f'import "lib.nsg" as a{n};' for n in range(count)))
+        assert load(tmp_path / "main.nsg").codes == codes
 
 
 def test_mistakes_in_an_imported_file_are_shown_there(tmp_path: Path) -> None:

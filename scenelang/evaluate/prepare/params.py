@@ -44,6 +44,7 @@ def prepare_param(stmt: nodes.Param, place: Place) -> Action | None:
     if not define(name, Binding("param", name.span, slots, slot, needs=session.needs), place):
         return None
     full = file.prefix + name.text
+    file.has_params = True
     file.defines.known[full] = name.span
 
     def action(env: Env, out: Builder) -> None:

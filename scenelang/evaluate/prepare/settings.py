@@ -13,6 +13,7 @@ from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.elements.zoo import Zoo
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.file_context import Action, FileContext, Place
+from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.evaluate.names import Binding, Env
 from scenelang.evaluate.prepare.blocks import Body, define, misplaced, prepare_block
 from scenelang.evaluate.prepare.calls import bind
@@ -244,6 +245,15 @@ def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
     if isinstance(file, Zoo):
         binding.value = _elements(path, file, stmt, context)
         return None
+    known = loader.prepared.get(path)
+    if known is not None and not known.has_params:  # it means the same wherever it is imported
+        binding.value = known
+        return None
+    if known is not None:
+        loader.repeated += len(file.span.source.text)
+        if loader.repeated > MAX_BYTES:
+            message = f"files with params that are imported again come to more than {MAX_BYTES:,} characters"
+            raise context.session.halt("E0324", message, stmt.path.span)
     prefix = f"{context.prefix}{alias.text}."
     brought = FileContext(file.span.source, context.session, loader, context.defines, path, prefix)
     loader.chain.append(path)
@@ -254,6 +264,8 @@ def prepare_import(stmt: nodes.Import, place: Place) -> Action | None:
         loader.chain.pop()
         loader.sites.pop()
     binding.value = brought
+    loader.prepared[path] = brought
+    context.has_params |= brought.has_params
 
     def action(_: Env, out: Builder) -> None:
         for act in body.actions:
