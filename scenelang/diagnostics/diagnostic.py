@@ -15,6 +15,8 @@ MOST: Final = 1000
 MOST_EDITS: Final = 10_000
 """A fix that would take more is left out."""
 _BEYOND: Final = {"E": ("E0121", "mistakes"), "W": ("W0102", "warnings")}
+BEYOND: Final = tuple(code for code, _ in _BEYOND.values())
+"""Codes that say that there are more than are kept."""
 
 
 class Label(Record):

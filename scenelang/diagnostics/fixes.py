@@ -10,12 +10,16 @@ from bisect import bisect_left, insort_left
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from typing import Final, Generic, TypeVar
 
-from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix
+from scenelang.diagnostics.diagnostic import BEYOND, Diagnostic, Edit, Fix
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.records import Record
 
 MAX_ROUNDS: Final = 50
 """A fix may uncover the next mistake; a text that still changes after so many rounds is left there."""
+MAX_CROWDED: Final = 2
+"""Texts with more mistakes than are kept are left after so many rounds, as looking for so many takes long."""
+SPENT: Final = "E0322"
+"""More steps than an evaluation may have: texts that take so long are not checked again."""
 
 Key = TypeVar("Key", bound=Hashable)
 
@@ -121,7 +125,12 @@ def settle(
     applied: dict[Key, tuple[Diagnostic, ...]] = dict.fromkeys(now, ())
     left = tuple(check(now))
     seen = {tuple(now.values())}
+    crowded = 0
     for _ in range(MAX_ROUNDS):
+        codes = {d.code for _, d in left}
+        crowded += not codes.isdisjoint(BEYOND)
+        if crowded > MAX_CROWDED or SPENT in codes:
+            return Settled(now, applied, left, True)
         after, fixed = dict(now), dict(applied)
         for key in now:
             after[key], done = apply_fixes(now[key], [d for k, d in left if k == key])

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix
-from scenelang.diagnostics.fixes import apply_fixes, removal, settle
+from scenelang.diagnostics.fixes import MAX_CROWDED, apply_fixes, removal, settle
 from scenelang.diagnostics.span import SourceFile, Span
 
 TEXT = "abcdef"
@@ -159,3 +159,21 @@ def test_files_that_may_not_change() -> None:
 
     done = settle({"one": TEXT}, check)
     assert (done.texts, done.stable, len(done.left)) == ({"one": TEXT}, True, 1)
+
+
+@pytest.mark.parametrize(("code", "most"), [("E0121", 1 + MAX_CROWDED), ("E0322", 1)])
+def test_texts_that_take_long_are_not_checked_on_and_on(code: str, most: int) -> None:
+    """More mistakes than are kept, and more steps than may be: what is left stays for the next run."""
+    rounds = 0
+
+    def check(texts: Mapping[str, str]) -> list[tuple[str, Diagnostic]]:
+        nonlocal rounds
+        rounds += 1
+        source = SourceFile("a.nsg", texts["one"])
+        found = [fix((at, at + 1, "b"), source=source) for at in range(99) if source.text[at] == "a"][:1]
+        return [("one", d) for d in (*found, *[Diagnostic(code, "m", None)] * (100 - len(found)))]
+
+    done = settle({"one": "a" * 99}, check)
+    assert (rounds, done.stable) == (most, True)
+    assert done.texts["one"].count("b") == most - 1
+    assert len(done.left) == 100
