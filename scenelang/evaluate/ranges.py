@@ -99,7 +99,16 @@ def knob_of(stmt: nodes.Param, file: FileContext) -> Knob:
     return Knob(stmt, value, (_axis(name, allowed),), False)
 
 
+def check_width(name: str, low: float, high: float) -> None:
+    """Raise `ParamError` for a range without values between its ends that can be computed and written."""
+    if not math.isfinite((high - low) * max(_UNITS.values())):
+        raise ParamError(f"the range of param `{name}` is too wide: from {low:.6g} to {high:.6g}")
+
+
 def _axis(label: str, allowed: RangeValue) -> Axis:
+    check_width(label, allowed.start, allowed.stop)
+    if allowed.step is not None and math.isinf((allowed.stop - allowed.start) / allowed.step):
+        raise ParamError(f"param `{label}` has more than {MOST_CHOICES:,} steps")
     if allowed.step is not None:
         if allowed.count() > MOST_CHOICES:
             raise ParamError(f"param `{label}` has more than {MOST_CHOICES:,} steps")

@@ -10,18 +10,29 @@ import math
 import random
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from numbers import Real
 from typing import Any, Final
 
 from scenelang.evaluate.evaluation import Evaluation
 from scenelang.evaluate.prepare.params import literal
-from scenelang.evaluate.ranges import Axis, Knob, ParamError, knob_of, param_named, value_at, written
+from scenelang.evaluate.ranges import (
+    Axis,
+    Knob,
+    ParamError,
+    check_width,
+    knob_of,
+    param_named,
+    value_at,
+    written,
+)
 from scenelang.evaluate.values.value import UNITS, RangeValue, Vec, pack, unpack
 from scenelang.records import Record
 from scenelang.scene.text import number
 from scenelang.syntax import nodes
 
 MOST_ROWS: Final = 1_000_000
+MOST_LISTED: Final = 10_000  # values of a param that are written out; each is a picture
 _DIGITS: Final = 6  # of a range's width, decimal places of random values and of those of a grid
 _RANGE: Final = re.compile(r"(.*?)\.\.(<?)(.*?)(?:/\s*(\d{1,7})|\s+step\s+(.+))?", re.DOTALL)
 
@@ -97,7 +108,9 @@ def rows_of(
     for name, asked in grid.items():
         stmt = param_named(evaluation, name)
         texts = values_of(evaluation, stmt, asked) if isinstance(asked, str) else map(text_of, asked)
-        found[name] = tuple(texts)
+        found[name] = tuple(islice(texts, MOST_ROWS + 1))
+        if len(found[name]) > MOST_ROWS:
+            raise ParamError(f"more than {MOST_ROWS:,} values of `{name}`")
         if not found[name]:
             raise ParamError(f"no values for `{name}`")
     for name in drawn:
@@ -127,7 +140,11 @@ def values_of(evaluation: Evaluation, stmt: nodes.Param, text: str) -> Iterator[
     asks for every choice, or step, of the param.
     """
     words = _default(evaluation, stmt).__class__ is str
-    for item in _items(text):
+    for place, item in enumerate(_items(text)):
+        if place == MOST_LISTED:
+            raise ParamError(
+                f"more than {MOST_LISTED:,} values or ranges of `{stmt.name.text}` between commas"
+            )
         found = None if words else _RANGE.fullmatch(item)
         if found is None and item:
             yield item
@@ -150,12 +167,14 @@ def _spread(evaluation: Evaluation, stmt: nodes.Param, found: re.Match[str]) -> 
     )
     if parts is None:
         by = 1.0 if step is None else unpack(_number(evaluation, stmt, step))[0]
-        stepped = RangeValue(low, high, bool(without), by, unit) if by else None
-        if stepped is None or stepped.count() > MOST_ROWS:
+        stepped = RangeValue(low, high, bool(without), by, unit)
+        if not by or not abs((high - low) / by) <= MOST_ROWS or stepped.count() > MOST_ROWS:
             raise ParamError(f"more than {MOST_ROWS:,} values in `{found[0]}`")
         values = (stepped.at(at) for at in range(stepped.count()))
     else:
         count = int(parts)
+        if count > MOST_ROWS:
+            raise ParamError(f"more than {MOST_ROWS:,} values in `{found[0]}`")
         gaps = max(1, count if without else count - 1)
         values = (low + (high - low) * at / gaps for at in range(count))
     return (written(knob, pack(value, unit), _DIGITS) for value in values)
@@ -186,6 +205,7 @@ def _ends(evaluation: Evaluation, stmt: nodes.Param, first: str, last: str) -> t
             low, high = min(sides), max(sides)
         ends = [own if end is None else end for end, own in zip(ends, (low, high), strict=True)]
     low, high = (end for end in ends if end is not None)
+    check_width(stmt.name.text, low, high)
     return low, high, unpack(like)[1]
 
 

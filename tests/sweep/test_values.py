@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 
 import pytest
@@ -23,6 +24,8 @@ param fine = true;
 param word = "a" in ["a", "b, c"];
 param side = [0.1, 0.2] in 0..0.5;
 param free = 7;
+param wide = 0 in -1.7e308..1.7e308;
+param fine_steps = 0 in 0..1 step 5e-324;
 star;
 """
 
@@ -72,6 +75,18 @@ def test_values(scene: Evaluation, name: str, text: str, expected: list[str]) ->
         ({"k": "0..1/0"}, {}, None, "no values"),
         ({"k": "0..1 step 0"}, {}, None, "more than"),
         ({"k": "0..1 step 1e-9"}, {}, None, "more than"),
+        ({"k": "0..1 step 5e-324"}, {}, None, "more than"),
+        ({"k": "0..1 step -5e-324"}, {}, None, "more than"),
+        ({"k": "0..1/1000001"}, {}, None, "more than"),
+        ({"k": "0..1/600000,0..1/600000"}, {}, None, "more than"),
+        ({"k": ",".join(["0"] * 10_001)}, {}, None, "more than 10,000 values"),
+        ({"free": "-1.7e308..1.7e308/3"}, {}, None, "too wide"),
+        ({"free": "0..1e308/3"}, {}, None, "too wide"),
+        ({"turn": "0deg..1e306turn/3"}, {}, None, "too wide"),
+        ({}, {"free": "-1.7e308..1.7e308"}, 3, "too wide"),
+        ({}, {"wide": ""}, 3, "too wide"),
+        ({"wide": "../3"}, {}, None, "too wide"),
+        ({"fine_steps": ""}, {}, None, "more than 1,000 steps"),
         ({"k": "0deg..1/3"}, {}, None, "`0deg` is not a value of `k`"),
         ({"ink": "#000..#fff/3"}, {}, None, "not a number"),
         ({"k": "0..1/3"}, {"k": ""}, None, "both"),
@@ -131,6 +146,11 @@ def test_a_grid_and_random_values(scene: Evaluation) -> None:
     rows = list(rows_of(scene, {"n": "1,3"}, {"k": ""}, 6))
     assert [row["n"] for row in rows] == ["1", "3"] * 3
     assert len({row["k"] for row in rows}) == 6
+
+
+def test_values_without_end(scene: Evaluation) -> None:
+    with pytest.raises(ParamError, match="more than 1,000,000 values of `k`"):
+        rows_of(scene, {"k": itertools.count()}, {})
 
 
 def test_values_of_python() -> None:
