@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable
@@ -58,6 +59,16 @@ def choice(*names: str, words: str, help: str | None = None) -> Callable[..., An
     return click.option(*names, type=click.Choice(known), default=known[0], show_default=True, help=help)
 
 
+class Real(click.FloatRange):
+    """A number in a range, within whose bounds `nan` would be too."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = float(super().convert(value, param, ctx))
+        if math.isnan(number):
+            self.fail(f"`{value}` is not a number.", param, ctx)
+        return number
+
+
 define = click.option(
     "-D",
     "defines",
@@ -88,7 +99,7 @@ still = click.option(
 )
 fps = click.option(
     "--fps",
-    type=click.FloatRange(0, 1000, min_open=True),
+    type=Real(0, 1000, min_open=True),
     metavar="N",
     help="Frames a second instead of the scene's; its seconds stay.",
 )

@@ -25,6 +25,30 @@ def test_help_lists_every_command(folder: Folder) -> None:
         assert folder.run(name, "--help").exit_code == 0
 
 
+def test_no_option_takes_what_is_not_a_number() -> None:
+    """Whose bounds `nan` would pass, as it is neither below nor above them."""
+    import click
+
+    from scenelang.cli.main import cli
+    from scenelang.cli.options import Real
+    from scenelang.lab.commands import command as lab
+
+    found = 0
+    for group in (cli, lab):
+        assert isinstance(group, click.Group)
+        context = click.Context(group)
+        for name in group.list_commands(context):
+            command = group.get_command(context, name)
+            assert command is not None
+            for option in command.params:
+                if isinstance(option.type, click.types.FloatParamType):
+                    found += 1
+                    assert isinstance(option.type, Real), (name, option.name)
+                    with pytest.raises(click.BadParameter, match="not a number"):
+                        option.type.convert("nan", option, context)
+    assert found > 8
+
+
 def test_version(folder: Folder) -> None:
     assert folder.run("--version").stdout.startswith("scenelang ")
 

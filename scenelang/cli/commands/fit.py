@@ -102,7 +102,7 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
 @click.option(
     "--budget",
     default=300.0,
-    type=click.FloatRange(0, min_open=True),
+    type=options.Real(0, min_open=True),
     show_default=True,
     metavar="SECONDS",
     help="Begin nothing new after this time.",

@@ -53,20 +53,20 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--color-error",
-    type=click.FloatRange(0, min_open=True),
+    type=options.Real(0, 1, min_open=True),
     metavar="SHARE",
     help="Root mean square off of a mesh's colours: 0.025.",
 )
 @click.option(
     "--max-error",
-    type=click.FloatRange(0, min_open=True),
+    type=options.Real(0, 1, min_open=True),
     metavar="SHARE",
     help="Mean distance off at the surface, in radii of the shape: 0.0003 of solids, 0.0001 of flat shapes; "
     "root mean square off of a texture's colours: 0.01.",
 )
 @click.option(
     "--budget",
-    type=click.FloatRange(0, min_open=True),
+    type=options.Real(0, min_open=True),
     default=math.inf,
     metavar="SECONDS",
     help="Begin nothing new after this time, for each file.",

@@ -62,13 +62,13 @@ if TYPE_CHECKING:
 @click.option("--redraw", is_flag=True, help="With a proof: draw again what is not proved right to 1/255.")
 @click.option(
     "--max-ms",
-    type=click.FloatRange(0, min_open=True),
+    type=options.Real(0, min_open=True),
     metavar="N",
     help="Choose the most exact way to draw that takes at most so long on one thread.",
 )
 @click.option(
     "--max-flip",
-    type=click.FloatRange(0, 1),
+    type=options.Real(0, 1),
     metavar="E",
     help="Choose the fastest way to draw whose promised FLIP error is at most so large.",
 )

@@ -19,7 +19,7 @@ def training(made: Callable[..., None]) -> Callable[..., None]:
     for option in (
         click.option(
             "--save-every",
-            type=click.FloatRange(0),
+            type=options.Real(0),
             default=60.0,
             show_default=True,
             metavar="SECONDS",
@@ -33,7 +33,7 @@ def training(made: Callable[..., None]) -> Callable[..., None]:
         click.option(
             "--budget",
             "budget_s",
-            type=click.FloatRange(0, min_open=True),
+            type=options.Real(0, min_open=True),
             callback=lambda ctx, param, minutes: math.inf if minutes is None else 60 * minutes,
             metavar="MINUTES",
             help="Stop after this time, with a checkpoint.",

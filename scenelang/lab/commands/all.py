@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from scenelang.cli import options
 from scenelang.lab.commands import common
 
 
@@ -16,7 +17,7 @@ from scenelang.lab.commands import common
     "--budget",
     default=0.01,
     show_default=True,
-    type=click.FloatRange(0, min_open=True),
+    type=options.Real(0, min_open=True),
     metavar="MINUTES",
     help="Processor time of each training.",
 )

@@ -19,7 +19,7 @@ SECONDS = {"textures": 30.0, "meshes": 20.0}
 @click.option("--scenes", default=200, show_default=True, type=click.IntRange(1, 10_000))
 @click.option(
     "--seconds",
-    type=click.FloatRange(0, min_open=True),
+    type=options.Real(0, min_open=True),
     help="Processor time of training a decoder. Default: 30 of textures, 20 of meshes.",
 )
 @click.option(

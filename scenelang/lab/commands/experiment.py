@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @click.option(
     "--budget",
     required=True,
-    type=click.FloatRange(0, min_open=True),
+    type=options.Real(0, min_open=True),
     metavar="MINUTES",
     help="Processor time of each training.",
 )
