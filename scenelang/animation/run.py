@@ -32,6 +32,7 @@ Failed = Callable[[int, SceneError], None]
 """Is told the number of a frame and what is wrong with it."""
 
 WORTH_S: Final = 12.0  # drawing left that repays starting other processes, each of which loads torch
+_FPS: Final = 1e-4, 1e6  # of films: beyond, formats cannot say how long a frame is shown
 _TRIED: Final = 3  # frames drawn here before it is decided
 
 
@@ -68,6 +69,7 @@ class RenderResult:
         draw_s: time to draw, encode pictures and wait for other processes.
         encode_s: time to encode the film.
         jobs: processes that drew.
+        asked: processes that were asked for, where that is more than there are frames or cores.
         keys: digest of all that decides a frame, of each; empty for one that was left out.
     """
 
@@ -79,13 +81,15 @@ class RenderResult:
     draw_s: float = 0.0
     encode_s: float = 0.0
     jobs: int = 1
+    asked: int | None = None
     keys: list[str] = field(default_factory=list)
 
     def lines(self) -> list[str]:
         """What there is to say about it."""
         each = 1000 / max(1, self.frames)
+        asked = f" ({self.asked} asked for; more than frames or cores do not help)" if self.asked else ""
         return [
-            f"{self.drawn} pictures drawn by {self.jobs} process{'es' * (self.jobs > 1)}, "
+            f"{self.drawn} pictures drawn by {self.jobs} process{'es' * (self.jobs > 1)}{asked}, "
             f"{self.resumed} kept from a run before",
             f"a frame (ms): compile {self.compile_s * each:.1f}, draw {self.draw_s * each:.1f}, "
             f"encode {self.encode_s * each:.1f}",
@@ -147,6 +151,9 @@ def make(
         OSError: a file cannot be written.
     """
     ready(target)
+    if target.kind != "sequence" and not _FPS[0] <= (fps := painter.clip.animation.fps) <= _FPS[1]:
+        least, most = _FPS
+        raise RenderError(f"a film of {fps:g} frames a second, where {least:g} to {most:,.0f} can be written")
     if cluster is not None and painter.backend == "reference":
         raise RenderError("a cluster draws by the network, and the reference is asked for")
     suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
@@ -268,15 +275,21 @@ class _Run:
         painter, jobs = self.painter, self.jobs
         if frame.program is None or jobs == 1 or not (frame.small or painter.place == "cpu"):
             return None
-        from scenelang.animation.workers import Workers
-
         if jobs is None:
             drawn = self.made.drawn
             if painter.threads is not None or usable_cores() < 2 or drawn < _TRIED:
                 return None
             if self.spent_s / drawn * left <= WORTH_S:
                 return None
-        return Workers(jobs or usable_cores())
+        count = min(jobs or left, max(2, usable_cores()), left)
+        if jobs is not None and jobs > count:
+            self.made.asked = jobs
+        if count < 2:
+            self.jobs = 1
+            return None
+        from scenelang.animation.workers import Workers
+
+        return Workers(count)
 
     def _say(self, done: int, total: int) -> None:
         waiting = self.others.waiting if self.others is not None else 0

@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
+from scenelang.animation import run, workers
 from scenelang.animation.clip import open_clip
 from scenelang.animation.painting import Painter
 from scenelang.animation.run import Progress, make
@@ -131,6 +132,21 @@ def test_other_processes_draw_the_same(tmp_path: Path) -> None:
     for a, b in zip(one.files, two.files, strict=True):
         assert a.read_bytes() == b.read_bytes()
     assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
+
+
+@pytest.mark.parametrize(("cores", "taken"), [(1, 2), (3, 3), (64, 4)])
+def test_no_more_processes_than_frames_or_cores(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cores: int, taken: int
+) -> None:
+    def start(count: int) -> None:
+        raise Enough(count)
+
+    monkeypatch.setattr(run, "usable_cores", lambda: cores)
+    monkeypatch.setattr(workers, "Workers", start)
+    with pytest.raises(Enough, match=f"^{taken}$"):
+        nsg.animate(write(tmp_path), tmp_path / "a-%d.png", frames=range(4), size=SMALL, jobs=256)
+    one = nsg.animate(write(tmp_path), tmp_path / "b-%d.png", frames=range(1), size=SMALL, jobs=256)
+    assert "drawn by 1 process (256 asked for" in one.lines()[0]
 
 
 def test_other_processes_that_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
