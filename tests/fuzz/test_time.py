@@ -1,4 +1,4 @@
-"""No text of 100 KB takes more than 2 s of processor time, whatever reads it: the hunt for those that do."""
+"""No text of 100 KB takes `check`, `check --fix` or `fmt` more than 2 s: the hunt for those that do."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no timer of pro
 MOST_S = 2.0
 MARGIN = 2.0
 """Machines are slower, and cores that others work on too."""
-MODES = ("check", "fix", "fmt", "edit")
+MODES = ("check", "fix", "fmt")
 TOKENS = (
     *sorted(tables().literals),
     *(
