@@ -139,9 +139,9 @@ def _advice(stmt: nodes.Call, place: Place) -> Advice:
         fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
     meant = foreign_words.WORDS.get(text, "")
     if help is None and place.kind == "object" and meant in words.material_ops - words.transforms:
-        from scenelang.evaluate.report.habits import in_material  # only mistakes need it
+        from scenelang.evaluate.report.habits import in_material, material_advice  # only mistakes need it
 
-        help = f"it is called `{meant}` here and stands in a material: material flat {{ {meant}(…); }}"
+        help = f"it is called `{meant}` here and stands in a material: {material_advice(place, meant)}"
         fix = in_material(stmt, place.session, meant)
     help = help or foreign_words.STATEMENTS.get(text.lower())
     if help is None and place.kind in ("file", "group", "chain") and words.geometries:

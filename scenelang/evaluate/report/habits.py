@@ -14,6 +14,7 @@ from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.value import COMPONENTS, Problem
+from scenelang.models.manifest import Manifest
 from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.syntax import nodes
@@ -155,12 +156,26 @@ def _colour(text: str) -> str | None:
     return plain[0] if plain else foreign_words.COLOURS.get(text.strip().lower())
 
 
-def _material(session: Session, source: SourceFile) -> str | None:
-    """The only material that there is for what a text draws; None where there are several."""
-    drawn = session.report.uses(source)
-    models = [m for m in session.vocabulary.in_use if any(geometry in drawn for geometry in m.geometries)]
-    materials = {material for model in models for material in model.materials}
+def likely_models(session: Session, source: SourceFile) -> list[Manifest]:
+    """The models in use of the dimension of what a text draws, of all where nobody can tell."""
+    words, models = session.report.uses(source), session.vocabulary.in_use
+    dimensions = {m.dimension for m in models if any(geometry in words for geometry in m.geometries)}
+    dimensions |= {3} if not words.keys().isdisjoint(STAGE) else set()
+    dimensions |= {2} if f'"{library.SHAPES}"' in source.text else set()
+    dimensions |= {3} if f'"{library.MESHES}"' in source.text else set()
+    return [m for m in models if m.dimension in dimensions] if len(dimensions) == 1 else [*models]
+
+
+def likely_material(session: Session, source: SourceFile) -> str | None:
+    """The material that what a text draws has without one; None where nobody can tell."""
+    materials = {model.default_material for model in likely_models(session, source)}
     return materials.pop() if len(materials) == 1 else None
+
+
+def material_advice(place: Place, name: str) -> str:
+    """How an operation on a colour is written, in the material of what a text draws if that is known."""
+    material = likely_material(place.session, place.file.source)
+    return f"material {material or 'flat'} {{ {name}(…); }}" + ("" if material else ", in space material diffuse")
 
 
 def _beside(text: str, start: int, end: int) -> str | None:
@@ -184,9 +199,9 @@ def _level(letters: Iterable[str], deeper: str, higher: str) -> str | None:
 
 
 def in_material(stmt: nodes.Call, session: Session, name: str) -> Fix | None:
-    """`square { color(#d33); }`: into the material, where there is but one for what the text draws."""
+    """`square { color(#d33); }`: into the material that it has without one."""
     source, span = stmt.span.source, stmt.span
-    material = _material(session, source)
+    material = likely_material(session, source)
     beside = _beside(source.text, span.start, span.end)
     if material is None or stmt.body is not None or beside is None or "material" in beside:
         return None
@@ -203,7 +218,7 @@ def as_group(stmt: nodes.Call, session: Session) -> Fix | None:
     last = body.statements[-1].span.end if body.statements else body.span.start + 1
     moved = f"{head.text.rstrip()};"
     if stmt.name.text not in TRANSFORMS:
-        material = _material(session, source)
+        material = likely_material(session, source)
         if material is None or any(isinstance(one, nodes.MaterialUse) for one in body.statements):
             return None
         moved = f"material {material} {{ {moved} }}"
