@@ -115,7 +115,9 @@ def _no_model(
     spaces = [{m.dimension for m in manifests if not lacking(m, [use])} for use in pair]
     if spaces in ([{2}, {3}], [{3}, {2}]):
         kinds = ["solid" if space == {3} else "flat" for space in spaces]
-        one, other = (f"`{place.text if place else shown(use)}`" for place, use in zip(places, pair, strict=True))
+        one, other = (
+            f"`{place.text if place else shown(use)}`" for place, use in zip(places, pair, strict=True)
+        )
         fact = f"{one} belongs to {kinds[0]} scenes, {other} to {kinds[1]} ones: a scene is flat or solid"
         labels = [Label(label.span, f"of {kinds[0]} scenes") for label in labels]
         help = f"leave out {other}" + (f" or {one}" if pair[1][1] in ("geometries", "elements") else "")

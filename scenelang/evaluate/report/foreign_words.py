@@ -11,7 +11,7 @@ def _each_word(meanings: Mapping[str, str]) -> dict[str, str]:
     return {word: meaning for words, meaning in meanings.items() for word in words.split()}
 
 
-FUNCTIONS: Final = _each_word(
+FUNCTIONS: Final[dict[str, str]] = _each_word(
     {
         "pow": "a b -> a ^ b",
         "mod": "a b -> a % b",
@@ -59,6 +59,23 @@ FUNCTIONS: Final = _each_word(
     }
 )
 """Functions, and what to write: advice, or `parameters -> what stands for a call` for each number of them."""
+
+_NO_GRADIENTS: Final = "an object has one colour; for a gradient draw stripes whose colours are mix(a, b, t)"
+FUNCTIONS |= _each_word(
+    {"gradient linear_gradient lineargradient radial_gradient radialgradient": _NO_GRADIENTS}
+)
+
+MATERIALS: Final = _each_word(
+    {
+        "lambert lambertian matte plastic standard basic phong pbr": "diffuse",
+        "fog mist smoke cloud volume medium gas": "volumetric",
+        "plain solid unlit constant": "flat",
+        "glossy metal metallic mirror chrome shiny glass specular": "nothing reflects: in space there is "
+        "diffuse, which is matte, and volumetric, which is mist; in the plane flat",
+        "gradient linear radial linear_gradient lineargradient": _NO_GRADIENTS,
+    }
+)
+"""Materials under another name, and what there is instead of others."""
 
 LIBRARIES: Final = ("Math", "math", "np", "numpy")
 """What stands before the names of functions and constants."""
@@ -134,6 +151,7 @@ STATEMENTS: Final = _each_word(
     {
         "children": "what is called has no children: put what it draws into its block",
         "blend smooth_union opsmoothunion smin": "it is called `smooth` here, as in smooth(k = 0.3) { … }",
+        "plane": "in space the plane below is there without a word; ground(y = -1); moves it",
         "hull": "there is no hull; smooth { … } blends objects into each other",
         "minkowski": "there is no Minkowski sum; smooth { … } blends objects into each other",
         "linear_extrude rotate_extrude": "a 2D scene is not extruded",

@@ -12,13 +12,13 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice
+from scenelang.evaluate.report.spaces import likely_material, likely_models
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.value import COMPONENTS, Problem
-from scenelang.models.manifest import Manifest
 from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import STAGE, TRANSFORMS
+from scenelang.words import TRANSFORMS
 
 _GLUED: Final = "give it a unit: deg, rad or turn"
 _RADIANS: Final = "a multiple of PI or TAU is in radians: multiply by 1rad"
@@ -156,26 +156,13 @@ def _colour(text: str) -> str | None:
     return plain[0] if plain else foreign_words.COLOURS.get(text.strip().lower())
 
 
-def likely_models(session: Session, source: SourceFile) -> list[Manifest]:
-    """The models in use of the dimension of what a text draws, of all where nobody can tell."""
-    words, models = session.report.uses(source), session.vocabulary.in_use
-    dimensions = {m.dimension for m in models if any(geometry in words for geometry in m.geometries)}
-    dimensions |= {3} if not words.keys().isdisjoint(STAGE) else set()
-    dimensions |= {2} if f'"{library.SHAPES}"' in source.text else set()
-    dimensions |= {3} if f'"{library.MESHES}"' in source.text else set()
-    return [m for m in models if m.dimension in dimensions] if len(dimensions) == 1 else [*models]
-
-
-def likely_material(session: Session, source: SourceFile) -> str | None:
-    """The material that what a text draws has without one; None where nobody can tell."""
-    materials = {model.default_material for model in likely_models(session, source)}
-    return materials.pop() if len(materials) == 1 else None
-
-
-def material_advice(place: Place, name: str) -> str:
-    """How an operation on a colour is written, in the material of what a text draws if that is known."""
-    material = likely_material(place.session, place.file.source)
-    return f"material {material or 'flat'} {{ {name}(…); }}" + ("" if material else ", in space material diffuse")
+def called_boolean(stmt: nodes.Call, here: str) -> Advice:
+    """`difference(square, star);`: the boolean word with its block."""
+    parts = [arg.value.span.text for arg in stmt.args or ()]
+    plain = all(isinstance(arg.value, nodes.NameRef) and not arg.name for arg in stmt.args or ())
+    text = f"{here} {{ {' '.join(f'{part};' for part in parts)} }}"
+    fix = write(stmt.span, text) if plain and stmt.body is None else None
+    return f"it is called `{here}` here and has a block: {here} {{ square; star; }}", fix
 
 
 def _beside(text: str, start: int, end: int) -> str | None:
@@ -274,7 +261,8 @@ def in_library(stmt: nodes.Call, place: Place) -> tuple[str | None, Fix | None]:
     """Help and fix for a statement whose name is that of a shape of the library; both None for any other."""
     shape = SHAPES.get(stmt.name.text.lower())
     session = place.session
-    if shape is None or not session.vocabulary.geometries >= _LEAVES or session.settings.given.keys() & STAGE:
+    likely = {model.dimension for model in likely_models(session, stmt.span.source)}
+    if shape is None or not session.vocabulary.geometries >= _LEAVES or likely == {3}:
         return None, None
     imported = next(
         (n for n, b in place.scope.visible() if b.kind == "import" and _is_library(b.value)), None
