@@ -74,6 +74,13 @@ def exact(request: Request, clock: Clock) -> Draw:
     return draw
 
 
+def is_blank(job: Job, image: Image) -> bool:
+    """Whether a picture of something has one colour throughout, and no warning has said so."""
+    drawn = job.program is None or len(job.program.tokens) > 0
+    told = any(d.code == "W0402" for d in job.diagnostics)
+    return drawn and not told and bool((abs(image - image[:1, :1]) < 0.5 / 255).all())
+
+
 def job_outputs(
     job: Job, wanted: tuple[Output, ...], model: str | None, threads: int | None, *, exactly: bool
 ) -> Outputs:

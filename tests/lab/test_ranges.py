@@ -23,7 +23,7 @@ def test_a_range_ends_where_the_error_begins_to_show() -> None:
 
 
 def test_what_loses_nothing_has_no_range() -> None:
-    """More objects, or thinner ones, than the suite looked at are no reason to warn where all were drawn well."""
+    """More objects, or thinner ones, than the suite looked at are no reason to warn."""
     found = {
         "probes": {"objects": probe(4, v1=50, v4=50, v64=49.6), "thin": probe(3, v1=50, v3=50, v300=45.7)}
     }

@@ -80,7 +80,11 @@ MATERIALS: Final = _each_word(
 LIBRARIES: Final = ("Math", "math", "np", "numpy")
 """What stands before the names of functions and constants."""
 
-VALUES: Final = {"e": "write exp(1)", "phi": "write (1 + sqrt(5)) / 2"}
+VALUES: Final = {
+    "e": "write exp(1)",
+    "phi": "write (1 + sqrt(5)) / 2",
+    "scene": "objects are drawn where they stand: sphere { scale(0.5); }",
+}
 """Constants, in small letters, and what to write."""
 
 NAMES: Final = _each_word(
@@ -136,7 +140,7 @@ WORDS: Final = _each_word(
         "merge add join": "union",
         "blend smooth_union opsmoothunion smin": "smooth",
         "texture": "material",
-        "size_px resolution viewport": "canvas",
+        "size_px resolution viewport createcanvas size": "canvas",
         "animation": "animate",
         "light_source pointlight point_light spotlight sun lamp": "light",
         "perspectivecamera perspective look_at lookat": "camera",
@@ -157,7 +161,14 @@ STATEMENTS: Final = _each_word(
         "linear_extrude rotate_extrude": "a 2D scene is not extruded",
         "mirror": "write scale(-1, 1);",
         "offset": "a move is translate(x, y); outlines are not offset",
-        "size resize": "write scale(sx, sy), in factors",
+        "size resize r radius diameter width height": "write scale(s) or scale(sx, sy), in factors",
+        "x y cx cy left top": "write translate(x, y)",
+        "stroke outline border strokewidth stroke_width nostroke": "objects have no outlines: a "
+        "larger one behind makes one",
+        "fill nofill": "colours stand in the block of an object: star { material flat { color(#d33); } }",
+        "shadow shadows castshadow": "whatever is lit throws a shadow",
+        "fog mist smoke": "mist is an object: sphere { material volumetric; }",
+        "repeat loop times": "loops run over a range or a vector: for (i in 0..<n) { … }",
         "transform": "write matrix([[…4], […4], […4], […4]]), in rows",
         "text": "no model draws text",
         "echo print": "nothing is printed while a scene is made",
@@ -186,5 +197,6 @@ ARGUMENTS: Final = {
     "light": _COLOUR
     | _each_word({"location pos at from": "position", "intensity strength energy brightness": "power"}),
     "ground": _COLOUR | _each_word({"height level": "y"}),
+    "animate": _each_word({"duration length time": "seconds", "rate framerate frame_rate": "fps"}),
 }
 """Arguments of statements, under another name."""

@@ -55,6 +55,7 @@ _BLOCKS: Final = "write camera(eye = [0, 1, 6]); light(position = [2, 4, 3]); sp
 _COMMAS: Final = "`,` between statements"
 _JOINED: Final = "objects are joined by words"
 _ARGUED: Final = "`<node>` takes no objects as arguments"
+_NEW: Final = "objects are drawn where they stand"
 _STANDS: Final = "objects stand in its block: <node> { square; star; }"
 _VALUE: Final = "objects are not values"
 _MODULE: Final = "a piece of scene to use again is module <n>() { … }, and is drawn by <n>();"
@@ -62,6 +63,8 @@ _ARGUMENTS: Final = "a material takes no arguments"
 _COLOUR: Final = "its colour stands in its block: material <n> { color(#d33); }"
 _CONSTANT: Final = "a colour is no material"
 _UNNAMED: Final = "a scene in 2D has `flat`, one in 3D `diffuse` and `volumetric`"
+_PATH: Final = "files are imported by their path"
+_IMPORTED: Final = 'write import "std/shapes" as s; and what it has as s.disc(0.3);'
 _IMPORT: Final = "functions are there without an import"
 
 HABITS: Final = (
@@ -81,6 +84,7 @@ HABITS: Final = (
     # functions and modules
     Habit("<fn> <f>(<PARAMS?>) { return <E> <;?> }", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     Habit("<fn> <f>(<PARAMS?>): return <LINE> <;?>", "fn <f>(<PARAMS>) = <LINE>;", _FUNCTION),
+    _unsafe("def <f>(<P?>): <BODY>", "BAD_STATEMENT", _BRACES, "write module <f>() { … }"),
     Habit("<fn> <f>(<PARAMS?>) <=|-> > <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     _unsafe("<fn> <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, "write fn <f>(x) = x ^ 2;"),
     _unsafe(
@@ -121,6 +125,8 @@ HABITS: Final = (
     _unsafe("<n>--;", "let <n> = BAD_EXPRESSION;", ONCE, ONCE_HELP),
     _unsafe("<n>[<I>] = <E>;", "let <n> = BAD_EXPRESSION;", ONCE, ONCE_HELP),
     # blocks
+    _unsafe("new <LINE> <;?>", "BAD_STATEMENT", _NEW, "write sphere { scale(0.5); }"),
+    _unsafe("<let> <n> = new <LINE> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <object> <BLOCK> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <node>(<P?>) <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
     Habit("<n> - <o>;", "subtract { <n>; <o>; }", _JOINED),
@@ -164,9 +170,13 @@ HABITS: Final = (
     Habit("(<A>, <B>, <C>)", "[<A>, <B>, <C>]", _BRACKETS),
     Habit("<rgb|srgb> < <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
     Habit("< <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
-    # imports
+    # settings and imports
+    Habit("canvas(<A> x <B>);", "canvas(<A>, <B>);", "sides are separated by a comma"),
     Habit("import <library> <LINE?> <;?>", "", _IMPORT),
     Habit("from <library> import <LINE> <;?>", "", _IMPORT),
+    _unsafe("import <n>;", "BAD_STATEMENT", _PATH, _IMPORTED),
+    _unsafe("from <n> import <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
+    _unsafe("import <A>;", "import <A> as s;", "missing `as` and a name", _IMPORTED, "E0126"),
 )
 """Habits that do not parse. The first that fits, and after which more of the text reads, is taken.
 
