@@ -42,6 +42,8 @@ CASES = (
     ("let s = sphere; s;", "module part() { sphere; }", "module part() { sphere; } part();"),
     ("let b = square { scale(0.5); }; b;", "module b() { … }", "module b() { square { scale(0.5); } } b();"),
     ("sphere { rotate(45, 0, 0); }", "rotate(45deg, axis = X)", "sphere { rotate(45deg, axis = X); }"),
+    ("square.translate(0.5, 0);", "square { translate(0.5, 0); }", "square { translate(0.5, 0); }"),
+    ("square { pos(0.5, 0.5); }", "`translate`", "square { translate(0.5, 0.5); }"),
     ("size(80, 60); star;", "`canvas`", "canvas(80, 60); star;"),
     ("canvas(80 x 60); star;", None, "canvas(80, 60); star;"),
     ("animate(duration = 2, fps = 4); star;", "`seconds`", "animate(seconds = 2, fps = 4); star;"),

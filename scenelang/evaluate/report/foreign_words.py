@@ -125,7 +125,7 @@ WORDS: Final = _each_word(
     {
         "ball": "sphere",
         "donut doughnut": "torus",
-        "move shift position": "translate",
+        "move shift position pos": "translate",
         "turn spin rotation": "rotate",
         "zoom": "scale",
         "skew": "shear",

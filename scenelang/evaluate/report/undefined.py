@@ -199,6 +199,8 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
         return call_advice(text, call)
     words = place.session.vocabulary
     if text in words.materials | words.geometries:
+        if span.source.text[span.end : span.end + 1] == "." and text in words.geometries:
+            return f"what moves it stands in its block: {text} {{ translate(0.5, 0); }}", None
         if text in words.geometries and not call:
             return f"objects are not values; one to use again is module part() {{ {text}; }}", None
         colour = call.args[0].value.span.text if call and len(call.args) == 1 else None

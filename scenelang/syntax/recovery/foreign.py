@@ -56,11 +56,13 @@ _COMMAS: Final = "`,` between statements"
 _JOINED: Final = "objects are joined by words"
 _ARGUED: Final = "`<node>` takes no objects as arguments"
 _NEW: Final = "objects are drawn where they stand"
+_METHOD: Final = "transforms stand in the block of what they move"
 _STANDS: Final = "objects stand in its block: <node> { square; star; }"
 _VALUE: Final = "objects are not values"
 _MODULE: Final = "a piece of scene to use again is module <n>() { … }, and is drawn by <n>();"
 _ARGUMENTS: Final = "a material takes no arguments"
 _COLOUR: Final = "its colour stands in its block: material <n> { color(#d33); }"
+_OPERATIONS: Final = "a material's colour stands in its block"
 _CONSTANT: Final = "a colour is no material"
 _UNNAMED: Final = "a scene in 2D has `flat`, one in 3D `diffuse` and `volumetric`"
 _PATH: Final = "files are imported by their path"
@@ -129,6 +131,9 @@ HABITS: Final = (
     _unsafe("<let> <n> = new <LINE> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <object> <BLOCK> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <node>(<P?>) <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
+    Habit("<object>().<call>(<P?>);", "<object> { <call>(<P>); }", _METHOD),
+    _unsafe("<object>().<LINE> <;?>", "BAD_STATEMENT", _METHOD, "square { scale(0.5); translate(1, 0); }"),
+    Habit("<n> <o> }", "<n>; <o>; }", "missing `;`", code="E0102"),
     Habit("<n> - <o>;", "subtract { <n>; <o>; }", _JOINED),
     Habit("<n> + <o>;", "union { <n>; <o>; }", _JOINED),
     Habit("<n>, <o> }", "<n>; <o>; }", _COMMAS),
@@ -155,6 +160,7 @@ HABITS: Final = (
     _unsafe("material <n>(<A>, <P>);", "material <n>;", _ARGUMENTS, _COLOUR),
     Habit("material <n>(color = <E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
     Habit("material <n>(<E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
+    Habit("material <n> <,?> color(<E>);", "material <n> { color(<E>); }", _OPERATIONS),
     Habit("<let> <m> = material <n>();", "let <m> = material <n>;", _ARGUMENTS),
     _unsafe("<let> <m> = material <n>(<A>, <P>);", "let <m> = material <n>;", _ARGUMENTS, _COLOUR),
     Habit("<let> <m> = material <n>(color = <E>);", "let <m> = material <n> { color(<E>); };", _ARGUMENTS),
