@@ -11,7 +11,9 @@ def _each_word(meanings: Mapping[str, str]) -> dict[str, str]:
     return {word: meaning for words, meaning in meanings.items() for word in words.split()}
 
 
-FUNCTIONS: Final[dict[str, str]] = _each_word(
+_NO_GRADIENTS: Final = "an object has one colour; for a gradient draw stripes whose colours are mix(a, b, t)"
+
+FUNCTIONS: Final = _each_word(
     {
         "pow": "a b -> a ^ b",
         "mod": "a b -> a % b",
@@ -54,16 +56,12 @@ FUNCTIONS: Final[dict[str, str]] = _each_word(
         "hsl": "write hsv(h, s, v)",
         "rad radians": "glue the unit to the number: 30deg; what is computed is multiplied by 1deg",
         "degrees": "divide by 1deg for a number of degrees",
+        "gradient linear_gradient lineargradient radial_gradient radialgradient": _NO_GRADIENTS,
         "concat": "vectors are not joined; write all items into one",
         "str": "strings are not put together",
     }
 )
 """Functions, and what to write: advice, or `parameters -> what stands for a call` for each number of them."""
-
-_NO_GRADIENTS: Final = "an object has one colour; for a gradient draw stripes whose colours are mix(a, b, t)"
-FUNCTIONS |= _each_word(
-    {"gradient linear_gradient lineargradient radial_gradient radialgradient": _NO_GRADIENTS}
-)
 
 MATERIALS: Final = _each_word(
     {
