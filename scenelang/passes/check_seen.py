@@ -86,7 +86,7 @@ def _in_sight(box: Box, graph: Graph) -> bool:
         return False
     side, reach = min(graph.canvas), tan(stage.camera.fov_rad / 2)
     wide, high = (reach * pixels / side for pixels in graph.canvas)
-    planes = [forward]
+    planes: list[Sequence[float]] = [forward]
     for axis, half in ((right, wide), (up, high)):
         planes += [_plus(forward, axis, half, sign) for sign in (1.0, -1.0)]
     corners = [*product((box[0], box[2]), (box[1], box[3]), (box[4], box[5]))]

@@ -56,7 +56,7 @@ FUNCTIONS: Final = _each_word(
         "hsl": "write hsv(h, s, v)",
         "rad radians": "glue the unit to the number: 30deg; what is computed is multiplied by 1deg",
         "degrees": "divide by 1deg for a number of degrees",
-        "gradient linear_gradient lineargradient radial_gradient radialgradient": _NO_GRADIENTS,
+        "gradient linear_gradient linearGradient radial_gradient radialGradient": _NO_GRADIENTS,
         "concat": "vectors are not joined; write all items into one",
         "str": "strings are not put together",
     }
