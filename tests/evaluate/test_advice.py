@@ -40,6 +40,7 @@ CASES = (
     ("background(linear_gradient(#fff, #000)); star;", "mix(a, b, t)",
         "background(mix(#fff, #000, 0.3)); star;"),
     ("let s = sphere; s;", "module part() { sphere; }", "module part() { sphere; } part();"),
+    ("let s = torus(0.5); s;", "module part() { torus; }", "module part() { torus; } part();"),
     ("let b = square { scale(0.5); }; b;", "module b() { … }", "module b() { square { scale(0.5); } } b();"),
     ("sphere { rotate(45, 0, 0); }", "rotate(45deg, axis = X)", "sphere { rotate(45deg, axis = X); }"),
     ("square.translate(0.5, 0);", "square { translate(0.5, 0); }", "square { translate(0.5, 0); }"),

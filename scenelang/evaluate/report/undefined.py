@@ -201,12 +201,12 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
     if text in words.materials | words.geometries:
         if span.source.text[span.end : span.end + 1] == "." and text in words.geometries:
             return f"what moves it stands in its block: {text} {{ translate(0.5, 0); }}", None
-        if text in words.geometries and not call:
+        if text in words.geometries:
             return f"objects are not values; one to use again is module part() {{ {text}; }}", None
         colour = call.args[0].value.span.text if call and len(call.args) == 1 else None
         written = f"material {text}" + (f" {{ color({colour or '…'}); }}" if call else "")
-        fix = Fix(f"write `{written}`", (Edit(call.span if call else span, written),))
-        return f"a material is written {written}", fix if colour or not call else None
+        whole = Fix(f"write `{written}`", (Edit(call.span if call else span, written),))
+        return f"a material is written {written}", whole if colour or not call else None
     if not call and lower in foreign_words.VALUES:
         return foreign_words.VALUES[lower], None
     own = FUNCTIONS if call else (*CONSTANTS, *ANIMATED, "true", "false")
