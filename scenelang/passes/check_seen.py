@@ -18,7 +18,6 @@ _FAR: Final = 8.0
 """Coordinates and sizes beyond so many units were most likely meant as pixels."""
 _TESTS: Final = 20_000
 """Boxes that are compared before nothing is said, so that no scene takes long."""
-_TURNED: Final = "the objects, or turn the camera by `target`"
 
 
 def check_seen(graph: Graph, context: Context) -> Graph:
@@ -33,7 +32,7 @@ def check_seen(graph: Graph, context: Context) -> Graph:
     if boxes is None:
         return graph
     seen = [box for box in boxes if _in_sight(box, graph)]
-    if context.moves and (seen or not all(_is_far(box) for box in boxes)):
+    if context.moves and (seen or not boxes or not all(_is_far(box) for box in boxes)):
         return graph  # it may be in sight in another frame
     op, last = rows[-1]
     if not boxes and cut is not None:
@@ -113,11 +112,8 @@ def _unseen(graph: Graph, leaf: Leaf) -> tuple[str, Span | None, str]:
     eye, target = (
         ", ".join(f"{v:g}" for v in p) for p in (graph.stage.camera.eye, graph.stage.camera.target)
     )
-    return (
-        "no object is in sight",
-        leaf.span,
-        f"the camera at [{eye}] looks at [{target}], and the ground hides what is below it; move {_TURNED}",
-    )
+    help = f"the camera at [{eye}] looks at [{target}], and the ground hides what is below it; "
+    return "no object is in sight", leaf.span, f"{help}move the objects, or turn the camera by `target`"
 
 
 def _units(graph: Graph, pixels: bool) -> str:
@@ -129,4 +125,4 @@ def _units(graph: Graph, pixels: bool) -> str:
     if not pixels:
         return shown
     group = f"group {{ … translate({-width / 2:g}, {-height / 2:g}); scale({2 / side:.6g}); }}"
-    return f"{shown}, which are no pixels; to write in pixels from the lower left corner put all into {group}"
+    return f"{shown}, in units that are not pixels; to write in pixels put all objects into {group}"

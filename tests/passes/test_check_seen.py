@@ -62,7 +62,7 @@ def test_the_help_for_pixels_leads_to_a_picture(text: str) -> None:
     (only,) = nsg.check_text(text)
     assert only.code == "W0402"
     assert only.help is not None
-    group = only.help.partition("put all into ")[2]
+    group = only.help.partition("put all objects into ")[2]
     at = text.index("square {") if "square {" in text else text.index("s.disc")
     mended = text[:at] + group.replace("…", text[at:])
     assert [*nsg.check_text(mended)] == []
@@ -76,7 +76,8 @@ def test_the_help_for_pixels_leads_to_a_picture(text: str) -> None:
 def test_frames_with_nothing_in_sight_are_no_mistake() -> None:
     comes = "animate(seconds = 1, fps = 4); star { scale(0.3); translate(4 * u - 3, 0); }"
     far = "animate(seconds = 1, fps = 4); star { scale(30); translate(100 + 40 * u, 100); }"
-    assert [*nsg.check_text(comes)] == []
+    meets = "animate(seconds = 1, fps = 4); intersect { square; star { translate(3 - 3 * u, 0); } }"
+    assert [*nsg.check_text(comes), *nsg.check_text(meets)] == []
     assert {d.code for d in nsg.check_text(far)} == {"W0402"}
 
 
