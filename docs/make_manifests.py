@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from scenelang.lab.stability.ranges import measured_ranges
+from scenelang.lab.stability.ranges import UNBOUNDED, measured_ranges
 from scenelang.measure.metrics import MOST_DB
 from scenelang.measure.scenes import sets_of
 from scenelang.models.manifest import ROOT, Manifest, available, load_manifest
@@ -49,7 +49,8 @@ def manifest(name: str) -> dict[str, Any]:
     suite = RESULTS / ("stability.json" if name == BASE else f"stability-{name}.json")
     if suite.exists():
         ranges, lines = measured_ranges(json.loads(suite.read_text("utf-8")), data["dimension"])
-        data["trained"] |= ranges  # a suite may be of few probes
+        bounded = {name: v for name, v in data["trained"].items() if name in ranges or name not in UNBOUNDED}
+        data["trained"] = bounded | ranges  # a suite may be of few probes
         data["measured"]["stability"] = lines
     return data
 

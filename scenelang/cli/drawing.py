@@ -74,6 +74,13 @@ def exact(request: Request, clock: Clock) -> Draw:
     return draw
 
 
+def is_blank(job: Job, image: Image) -> bool:
+    """Whether a picture of something has one colour throughout, and no warning has said so."""
+    drawn = job.program is None or len(job.program.tokens) > 0
+    told = any(d.code == "W0402" for d in job.diagnostics)
+    return drawn and not told and all(bool((abs(row - image[0, 0]) < 0.5 / 255).all()) for row in image)
+
+
 def job_outputs(
     job: Job, wanted: tuple[Output, ...], model: str | None, threads: int | None, *, exactly: bool
 ) -> Outputs:

@@ -53,6 +53,7 @@ class Session(Record, frozen=False):
         needs: collects what the statement being prepared depends on.
         elements: files of elements that were imported, by their places.
         zeros: where an angle was a 0 without a unit that frames may change.
+        still: it has been said that there is no animation for time to run in.
         watch: called with the place of each name and its value, and of each statement and its node.
     """
 
@@ -75,6 +76,7 @@ class Session(Record, frozen=False):
     needs: Needs = field(default_factory=Needs)
     elements: dict[Path, Elements] = field(default_factory=dict)
     zeros: dict[tuple[SourceFile, Span], Span] = field(default_factory=dict)
+    still: bool = False
     watch: Watch | None = None
 
     def restart(self, frame: int) -> None:

@@ -112,7 +112,11 @@ def lower(
         stated = getattr(scene, word)
         if stated != "default" and (refusal := manifest.refusal(word)):
             place = None if spans is None else spans.span(stated) or spans.span(scene)
-            diagnostics.add(*refusal, place, help="leave it out, or draw with another model")
+            diagnostics.add(
+                *refusal,
+                place,
+                help="leave it out; flat scenes have none" if manifest.dimension == 2 else "leave it out",
+            )
     space = replace(SPACES[manifest.dimension], outlines=manifest.outlines)
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
     brought = Brought.of(scene.elements)

@@ -16,6 +16,7 @@ from scenelang.graph.nodes import Graph
 from scenelang.graph.verify import Invariant, Sound, verify
 from scenelang.models.manifest import Manifest
 from scenelang.passes.check_eye import check_eye
+from scenelang.passes.check_seen import check_seen
 from scenelang.passes.checks import check_levels, check_trained
 from scenelang.passes.context import Context
 from scenelang.passes.drop import drop_empty, drop_hidden, drop_unseen
@@ -44,6 +45,7 @@ PASSES: tuple[Pass, ...] = (
     Pass(check_levels),
     Pass(linearise, frozenset({Invariant.STREAM})),
     Pass(check_eye),
+    Pass(check_seen),
     Pass(drop_unseen),
     Pass(drop_hidden),
     Pass(check_trained),
@@ -85,7 +87,8 @@ def check_scene(
     before, holds, sound = len(diagnostics.errors), frozenset[Invariant](), Sound()
     with deep_stack():
         graph = verify(lower(scene, manifest, spans, diagnostics, memory), "lower", sound=sound)
-        context = Context(manifest, diagnostics, whole=len(diagnostics.errors) == before)
+        whole, moves = len(diagnostics.errors) == before, scene.animation is not None
+        context = Context(manifest, diagnostics, whole, moves)
         after("lower", graph)
         for step in PASSES:
             if step.name in without:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import cos, hypot, inf, sin
+from math import cos, exp, hypot, inf, sin
 from typing import Final
 
 from scenelang.graph.affine import composed, inverted
 from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.stage import EXTINCTION
 from scenelang.graph.steps import Affine, Displace, Step, Twist
 from scenelang.passes.context import Context
 
@@ -18,9 +19,12 @@ _DISTANCES: Final[dict[str, Callable[[float, float, float], float]]] = {
     "torus": lambda x, y, z: hypot(hypot(x, z) - 0.7, y) - 0.3,
 }
 
+_DIM: Final = 0.1
+"""A medium around the eye that lets less of the light through, in any direction, hides the scene."""
+
 
 def check_eye(graph: Graph, context: Context) -> Graph:
-    """Report an eye inside an opaque object; in a medium it sees.
+    """Report an eye inside an opaque object, and warn of one deep in a medium.
 
     The exact fold at that one point, by its definition. Geometries that are not known by a formula are taken
     as far away, and as leaving nothing where they cut.
@@ -53,6 +57,11 @@ def check_eye(graph: Graph, context: Context) -> Graph:
         x, y, z = eye
         fact = f"the eye at [{x:g}, {y:g}, {z:g}] is inside this `{holder.geometry}`"
         context.diagnostics.add("E0408", fact, holder.span, help="move the camera or the object")
+    elif holder is not None and (through := exp(EXTINCTION * depth)) < _DIM:
+        x, y, z = eye
+        fact = f"the eye at [{x:g}, {y:g}, {z:g}] is deep inside this `{holder.geometry}`, a medium"
+        help = f"it lets {through:.2g} of the light through at most: move the camera or the object"
+        context.diagnostics.add("W0403", fact, holder.span, help=help)
     return graph
 
 

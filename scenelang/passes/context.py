@@ -13,8 +13,10 @@ class Context(Record):
     Args:
         diagnostics: receives E04xx, E05xx and warnings.
         whole: False after an earlier error, when leaves may lack moves and no bound means anything.
+        moves: the scene is a frame of an animation, where nothing may be in sight for a while.
     """
 
     manifest: Manifest
     diagnostics: Diagnostics
     whole: bool = True
+    moves: bool = False

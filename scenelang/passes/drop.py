@@ -119,24 +119,25 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
     keep = [True] * len(links)
     covers: list[Cover] = []
     drawn: set[tuple[str, tuple[Step, ...]]] = set()
-    cover_of = partial(_cover, space=space)
+    cover = partial(cover_of, space=space)
     for index, (op, leaf) in reversed(list(enumerate(graph.rows()))):
         if op == "smooth":
             break
         if op == "intersect":
             continue
         key = leaf.geometry, leaf.steps
-        if key in drawn or (covers and _covered(leaf_box(leaf, 0.0, space), covers)):
+        if key in drawn or (covers and covered(leaf_box(leaf, 0.0, space), covers)):
             keep[index] = False
         elif op == "union":
             drawn.add(key)
-            cover = leaf.noted("cover", cover_of)
-            if cover is not None and (len(covers) < _MOST or cover > covers[-1]):
-                covers = sorted([*covers, cover], reverse=True)[:_MOST]
+            disc = leaf.noted("cover", cover)
+            if disc is not None and (len(covers) < _MOST or disc > covers[-1]):
+                covers = sorted([*covers, disc], reverse=True)[:_MOST]
     return graph.rooted(begun(links, keep))
 
 
-def _cover(leaf: Leaf, space: Space) -> Cover | None:
+def cover_of(leaf: Leaf, space: Space) -> Cover | None:
+    """The disc or ball that a leaf certainly fills, where one is known."""
     disc = space.disc(leaf.geometry, leaf.steps)
     if disc is None:
         return None
@@ -144,7 +145,8 @@ def _cover(leaf: Leaf, space: Space) -> Cover | None:
     return radius * space.stretches(composed(leaf.steps))[0], inward, radius * _INSIDE
 
 
-def _covered(box: Box, covers: list[Cover]) -> bool:
+def covered(box: Box, covers: list[Cover]) -> bool:
+    """Whether a box lies inside one of some covers."""
     left, bottom, right, top, near, far = box
     depths = (near,) if near == far else (near, far)
     corners = [(x, y, z) for x in (left, right) for y in (bottom, top) for z in depths]

@@ -112,6 +112,18 @@ def _no_model(
     labels = [Label(places[0], f"in {known[0] or 'no model'}")] if places[0] is not None else []
     one, other = (f"`{shown(use)}`" for use in pair)
     fact = f"no model has both {one} and {other}, which is in {known[1] or 'no model'}"
+    spaces = [{m.dimension for m in manifests if not lacking(m, [use])} for use in pair]
+    if spaces in ([{2}, {3}], [{3}, {2}]):
+        kinds = ["solid" if space == {3} else "flat" for space in spaces]
+        one, other = (
+            f"`{place.text if place else shown(use)}`" for place, use in zip(places, pair, strict=True)
+        )
+        fact = f"{one} belongs to {kinds[0]} scenes, {other} to {kinds[1]} ones: a scene is flat or solid"
+        labels = [Label(label.span, f"of {kinds[0]} scenes") for label in labels]
+        help = f"leave out {other}" + (f" or {one}" if pair[1][1] in ("geometries", "elements") else "")
+        if pair[1][1] == "looks":
+            materials = {name for m in manifests if {m.dimension} == spaces[0] for name in m.materials}
+            help = f"write material {' or '.join(sorted(materials))} in its place"
     diagnostics.add("E0508", fact, places[1], labels=labels, help=help)
 
 

@@ -14,6 +14,7 @@ from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import SourceFile, Span
 
 SHAPES: Final = "std/shapes"
+MESHES: Final = "std/meshes"
 _FOLDER: Final = Path(__file__).resolve().parents[1] / "std"
 _RESERVED: Final = re.compile(r"std/[A-Za-z0-9_]+")
 

@@ -236,6 +236,10 @@ class _Slips:
             handler(start, end, text)
             return
         kind, code, message, help = _SAID[name]
+        if name == "colour" and re.fullmatch("#(?:[0-9a-fA-F]{4}){1,2}", text):
+            help = f"colours have no alpha: write {text[: 1 + (len(text) - 1) * 3 // 4]}"
+        elif text == "$t":
+            help = "the share of an animation that has run is `u`, after animate(seconds = 2, fps = 24);"
         if kind:
             self._keep(kind, start, end)
         self.tokens.cut |= name == "open_comment"

@@ -186,7 +186,7 @@ def test_a_scene_of_any_characters_on_a_terminal_of_few(folder: Folder) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
 def test_interrupted(folder: Folder) -> None:
-    name = folder.write("a.nsg", "for (i in 0..<400) { star { scale(0.9); rotate(1turn * rand(i)); } }")
+    name = folder.write("a.nsg", "for (i in 0..<400) { star { scale(4.5, 0.9); rotate(1turn * rand(i)); } }")
     with process("render", name, "-o", "a.png", "--size", "4096x4096", "-v") as run:
         assert run.stderr is not None
         for line in run.stderr:

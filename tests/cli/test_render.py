@@ -227,3 +227,16 @@ def test_without_torch_what_it_draws_is_refused(folder: Folder, options: tuple[s
     assert done.returncode == 2
     assert "torch, which is not installed" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_picture_of_one_colour_is_told(folder: Folder) -> None:
+    """White on white, which no warning of the compiler tells; once where one does."""
+    result = folder.run(
+        "render", folder.write("a.nsg", "square { scale(0.5); }"), "-o", "a.png", "--size", "16x16"
+    )
+    assert result.exit_code == 0
+    assert result.stderr.startswith("a.png: one colour throughout")
+    away = folder.write("b.nsg", "square { scale(0.5); translate(4, 0); }")
+    result = folder.run("render", away, "-o", "b.png", "--size", "16x16")
+    assert "W0402" in result.stderr
+    assert "throughout" not in result.stderr

@@ -127,10 +127,10 @@ def test_a_scene_for_two_models_is_shown_where_they_part() -> None:
     assert scene is not None
     assert check_compiles(scene, spans, found) is None
     (only,) = found
-    assert only.message == "no model has both `square` and `sphere`, which is in `solids3d`"
+    assert only.message == "`square` belongs to flat scenes, `sphere` to solid ones: a scene is flat or solid"
     assert only.span is not None
     assert (only.span.text, only.labels[0].span.text) == ("sphere", "square")
-    assert only.labels[0].message == "in `shapes2d` and `textures2d`"
+    assert only.labels[0].message == "of flat scenes"
 
 
 def test_pages_state_the_lists_and_limits_of_the_code() -> None:

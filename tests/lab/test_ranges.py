@@ -22,6 +22,18 @@ def test_a_range_ends_where_the_error_begins_to_show() -> None:
     assert lines == {"objects": "32: 39.9 dB (worst 38.9), 64: 50.0 dB (worst 49.0)"}
 
 
+def test_what_loses_nothing_has_no_range() -> None:
+    """More objects, or thinner ones, than the suite looked at are no reason to warn."""
+    found = {
+        "probes": {"objects": probe(4, v1=50, v4=50, v64=49.6), "thin": probe(3, v1=50, v3=50, v300=45.7)}
+    }
+    assert measured_ranges(found) == ({}, {})
+    found = {"probes": {"blends": probe(4, v1=50, v4=47, v64=41.2)}}
+    assert measured_ranges(found) == ({"smooth": [0, 64]}, {})
+    found = {"probes": {"size": probe(1, v0_1=50, v1=50, v4=50)}}
+    assert measured_ranges(found) == ({"scale": [0, 2.2]}, {})
+
+
 def test_a_model_of_larger_error_is_compared_with_itself() -> None:
     found = {"probes": {"blends": probe(2, v1=20.5, v2=20, v4=19.2, v8=18.9)}}
     ranges, lines = measured_ranges(found)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 import scenelang as nsg
+from scenelang.backend.render import draw_exact
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import load_source
+from scenelang.measure.metrics import psnr
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.passes import check_scene
 
@@ -119,3 +122,20 @@ def test_bounds_of_solids(inside: str, outside: str, words: str) -> None:
     assert warned(f"chain {{ torus {{ {inside} }} }}", SOLIDS) == []
     (found,) = warned(f"chain {{ torus {{ {outside} }} }}", SOLIDS)
     assert found.startswith(words)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "for (i in 0..<150) { star { scale(0.05); translate(2 * rand(i) - 1, 2 * rand(i + 0.5) - 1); } }",
+        "for (i in 0..20) { square { scale(1.5, 0.002); translate(0, i / 10 - 1); } }",
+    ],
+)
+def test_crowds_and_hairlines_are_drawn_well_and_not_warned_of(text: str) -> None:
+    """What the shipped model was measured to draw well; against the exact picture."""
+    text = f"canvas(96, 96); background(#000); {text}"
+    assert [*nsg.check_text(text)] == []
+    scene = nsg.loads(text)
+    picture, exact = (np.asarray(p, np.float64) for p in (nsg.render(nsg.compile(scene)), draw_exact(scene)))
+    assert exact.std() > 0.05
+    assert psnr(picture, exact) > 45

@@ -14,7 +14,7 @@ from tests.passes.random_scenes import blob_scene, random_scene
 from tests.passes.tree_oracle import assert_same_picture, graph_picture, stream_picture, tree_picture
 
 MANIFEST = load_manifest("shapes2d")
-CHECKS = {"check_eye", "check_levels", "check_trained"}
+CHECKS = {"check_eye", "check_levels", "check_seen", "check_trained"}
 
 
 def compiled(scene):

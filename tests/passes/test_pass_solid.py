@@ -25,7 +25,7 @@ from scenelang.scene import schema
 from scenelang.words import COMBINE
 
 SOLIDS = load_manifest("solids3d")
-CHECKS = {"check_eye", "check_levels", "check_trained"}
+CHECKS = {"check_eye", "check_levels", "check_seen", "check_trained"}
 
 
 def random_transform(rng: random.Random) -> schema.Transform:

@@ -218,7 +218,7 @@ def test_dumps_tell_of_textures() -> None:
     assert program_data(program)["rows"][0]["texture"]["steps"] == [("grayscale", 0.5)]
 
 
-def test_an_error_names_the_model_that_comes_nearest() -> None:
+def test_an_error_says_that_a_scene_is_flat_or_solid() -> None:
     ball = nsg.Object("sphere", (), nsg.Material("zoo.bark"))
     found = Diagnostics()
     hide = nsg.Object("square", (), nsg.Material("zoo.hide"))
@@ -226,8 +226,8 @@ def test_an_error_names_the_model_that_comes_nearest() -> None:
         compile_scene(nsg.Scene(elements=ZOO, nodes=[ball, hide]), diagnostics=found)
     (only,) = found
     assert only.code == "E0508"
-    assert only.message.startswith("no model has both `sphere` and `square`, which is in `shapes2d`")
-    assert only.help == "`solids3d` comes nearest; it lacks square"
+    assert only.message.startswith("`sphere` belongs to solid scenes, `square` to flat ones")
+    assert only.help == "leave out `square` or `sphere`"
 
 
 def test_models_of_the_paper_draw_no_textures() -> None:

@@ -131,7 +131,16 @@ def command(
     says which, why, and what was next.
     """
     from scenelang.cli.animation import Requested, animate, wanted_target
-    from scenelang.cli.drawing import check_options, check_proof, chosen, exact, job_outputs, neural, proved
+    from scenelang.cli.drawing import (
+        check_options,
+        check_proof,
+        chosen,
+        exact,
+        is_blank,
+        job_outputs,
+        neural,
+        proved,
+    )
     from scenelang.cli.inputs import Request
     from scenelang.cli.jobs import PROGRAM, prepare_all
     from scenelang.cli.outputs import check_outputs, targets
@@ -206,6 +215,8 @@ def command(
                 with clock("outputs"):
                     found = job_outputs(job, outputs, request.model, threads, exactly=backend == "reference")
             image = draw(job, partial(_part, bar, index, len(ready)))
+            if is_blank(job, image):
+                told.append(f"{path}: {_BLANK}")
             if proofs:
                 told.append(f"{path}: {proofs[-1].told()}")
             if "proof" in outputs:
@@ -223,6 +234,9 @@ def command(
     if verbose:
         click.echo(clock.report(), err=True)
     ctx.exit(code)
+
+
+_BLANK = "one colour throughout; flat objects are white without a colour, and so is the background"
 
 
 def _saved(image: Image, outputs: Outputs, path: Path) -> list[str]:

@@ -59,6 +59,8 @@ def prepare_block(statements: Sequence[nodes.Stmt], place: Place, span: Span) ->
     for stmt in statements:
         if isinstance(stmt, nodes.Let | nodes.Param):
             scope.later.setdefault(stmt.name.text, stmt.name.span)
+        elif isinstance(stmt, nodes.Import):
+            scope.later.setdefault(stmt.alias.text, stmt.alias.span)
     prepared = [_collected(stmt, place) for stmt in statements]
     scope.later.clear()
     actions = [action for action in prepared if action is not None]

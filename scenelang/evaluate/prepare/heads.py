@@ -26,7 +26,7 @@ from scenelang.evaluate.report.undefined import (
     within_effort,
 )
 from scenelang.syntax import nodes
-from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, LANGUAGE, NODES, SETTINGS
+from scenelang.words import ANIMATED, COMBINE, CONSTANTS, FUNCTIONS, LANGUAGE, NODES, SETTINGS
 
 
 def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
@@ -40,7 +40,8 @@ def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
         if name in place.session.vocabulary.geometries:
             return prepare_object(stmt, place)
         if not _lacks_module(stmt, place):
-            _skim(stmt, place)
+            if _boolean(stmt) is None:
+                _skim(stmt, place)
             _unknown(stmt, place)
         return None
     if binding.kind == "module":
@@ -60,6 +61,12 @@ def hides(binding: Binding | None, stmt: nodes.Call) -> bool:
     return binding is not None and (
         binding.kind in ("module", "poison") or (binding.kind in VALUES and stmt.args is None)
     )
+
+
+def _boolean(stmt: nodes.Call) -> str | None:
+    """The boolean word that a call with objects as arguments stands for."""
+    here = foreign_words.WORDS.get(stmt.name.text.lower())
+    return here if here in COMBINE and stmt.args and stmt.body is None else None
 
 
 def _skim(stmt: nodes.Call, place: Place) -> None:
@@ -99,7 +106,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         if alias is None:
             unknown(name, place)
         elif alias.kind == "import":
-            unknown_member(name, place, alias.value)
+            unknown_member(name, place, alias.value, kinds=("module", "element"))
         else:
             wrong_kind(name, alias, place, "an imported file")
         return
@@ -128,8 +135,10 @@ def _advice(stmt: nodes.Call, place: Place) -> Advice:
     candidates = _candidates(stmt, place)
     help, fix = did_you_mean(text, candidates, name.span, effort=place.report.effort)
     if help is None and place.kind in HOLDERS:
-        from scenelang.evaluate.report.habits import in_library  # only mistakes need it
+        from scenelang.evaluate.report.habits import called_boolean, in_library  # only mistakes need it
 
+        if (here := _boolean(stmt)) is not None:
+            return called_boolean(stmt, here)
         help, fix = in_library(stmt, place)
     if fix is None:
         known, fix = instead(text, foreign_words.WORDS, candidates, name.span)
@@ -140,12 +149,15 @@ def _advice(stmt: nodes.Call, place: Place) -> Advice:
     meant = foreign_words.WORDS.get(text, "")
     if help is None and place.kind == "object" and meant in words.material_ops - words.transforms:
         from scenelang.evaluate.report.habits import in_material  # only mistakes need it
+        from scenelang.evaluate.report.spaces import material_advice
 
-        help = f"it is called `{meant}` here and stands in a material: material flat {{ {meant}(…); }}"
+        help = f"it is called `{meant}` here and stands in a material: {material_advice(place, meant)}"
         fix = in_material(stmt, place.session, meant)
     help = help or foreign_words.STATEMENTS.get(text.lower())
     if help is None and place.kind in ("file", "group", "chain") and words.geometries:
-        help = f"the model draws {listing(words.geometries)}"
+        from scenelang.evaluate.report.spaces import drawn  # only mistakes need it
+
+        help = drawn(place, words.geometries)
     return help, fix
 
 

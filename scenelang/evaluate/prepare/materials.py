@@ -7,7 +7,7 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.diagnostics.suggest import did_you_mean, listing
+from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.costs import MATERIAL_VALUE
 from scenelang.evaluate.file_context import Action, FileContext, Place
@@ -148,14 +148,22 @@ def _unknown(name: nodes.Name, place: Place, known: set[str]) -> None:
     elif name.text in words.geometries:
         report.error("E0213", f"`{name.text}` is a geometry, not a material", span)
     else:
-        hint, fix = did_you_mean(name.text, known, span)
-        help = hint or f"there is {listing(known)}"
-        report.error("E0208", f"unknown material `{name.text}`", span, help=help, fix=fix)
+        from scenelang.evaluate.report.spaces import unknown_material  # only mistakes need it
+
+        hint, fix = unknown_material(name, place, known)
+        report.error("E0208", f"unknown material `{name.text}`", span, help=hint, fix=fix)
 
 
 def _is_value(name: nodes.Name, place: Place) -> None:
-    """Report `material mist` where `mist` is a material value."""
-    span = name.span
+    """Report `material mist` where `mist` is a material value, or `material red` where `red` is a colour."""
+    span, binding = name.span, place.scope.find(name.text)
+    if binding is not None and binding.known and binding.value is not POISON:
+        from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
+
+        message = f"expected a material, found {describe(binding.value)}"
+        help = f"for a colour write {material_advice(place, 'color', name.text)}"
+        place.report.error("E0301", message, span, help=help, labels=binding.labels())
+        return
     start = span.source.text.rfind("material", 0, span.start)
     away = Fix("remove `material`", (Edit(Span(span.source, start, span.start), ""),))
     help = f"to use the value write {name.text}; without `material`"
@@ -181,7 +189,9 @@ def prepare_value_use(stmt: nodes.Call, binding: Binding, place: Place) -> Actio
         session.report.error("E0308", f"`{name}` is a value and takes no arguments", stmt.args[0].span)
         return None
     help = "materials stand in the block of an object or a group"
-    if not _stands(place, span, "value `{}`", help, help, name):
+    if (binding.known and binding.value is POISON) or not _stands(
+        place, span, "value `{}`", help, help, name
+    ):
         return None
     place.file.weight += MATERIAL_VALUE
     where = Written(span, stmt.span)
@@ -192,7 +202,10 @@ def prepare_value_use(stmt: nodes.Call, binding: Binding, place: Place) -> Actio
             return
         if value.__class__ is not MaterialValue:
             message = f"expected a material, found {describe(value)}"
-            session.report.error("E0301", message, span, labels=binding.labels())
+            from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
+
+            help = f"for a colour write {material_advice(place, 'color', name)}"
+            session.report.error("E0301", message, span, labels=binding.labels(), help=help)
             return
         material = value.material
         if stmt.body is not None:

@@ -73,7 +73,14 @@ def prepare_object(stmt: nodes.Call, place: Place, geometry: str | None = None) 
             help = f"size it in its block: {name} {{ scale(0.5); }}"
             if name == "square":
                 help += f'; its sides are sqrt(2) long, those of rect(w, h) in "{library.SHAPES}" as written'
-            session.report.error("E0308", f"`{name}` takes no arguments", stmt.args[0].span, help=help)
+            fix = None
+            if name == "sphere" and len(stmt.args) == 1 and stmt.body is None:
+                rest = Span(where.name.source, where.name.end, stmt.span.end)
+                fix = Fix(
+                    "put it into its block", (Edit(rest, f" {{ scale({stmt.args[0].value.span.text}); }}"),)
+                )
+            message = f"`{name}` takes no arguments"
+            session.report.error("E0308", message, stmt.args[0].span, help=help, fix=fix)
         return None
     if not fits:
         return None

@@ -96,6 +96,10 @@ def _own_name(name: nodes.Name, place: Place) -> Code:
     index = [*ANIMATED].index(text)
     session.needs.frame |= text != "frames"
     if session.animated[index] is not UNBOUND:
+        if text != "frames" and not session.still and not place.file.prefix:
+            session.still = True
+            help = "make time run: animate(seconds = 2, fps = 24);"
+            place.report.warn("W0304", f"`{text}` is 0 in a scene without animate(…)", name.span, help)
         return constant(session.animated[index])
 
     def run(env: Env) -> Any:

@@ -48,7 +48,9 @@ def _once(session: Session, what: str, span: Span) -> bool:
     first = session.settings.given.setdefault(what, span)
     if first is not span:
         labels = (Label(first, "first given here"),)
-        session.report.error("E0333", f"`{what}` is given twice", span, labels=labels)
+        more = "; there is one light, and its power says how bright" if what == "light" else ""
+        help = f"leave one of them out{more}"
+        session.report.error("E0333", f"`{what}` is given twice", span, labels=labels, help=help)
     return first is span
 
 

@@ -55,9 +55,10 @@ def _spec(stmt: nodes.Call, place: Place) -> Spec | None:
             misplaced(place, span, "`{}` does not move textures", name, "put it into the object's block")
         return TEXTURE.get(name)
     if name not in GEOMETRY and place.kind != "unknown":
-        help = f"put it into a material's block, as in material flat {{ {name}(…); }}"
         from scenelang.evaluate.report.habits import in_material  # only mistakes need it
+        from scenelang.evaluate.report.spaces import material_advice
 
+        help = f"put it into a material's block, as in {material_advice(place, name)}"
         fix = _grouped(stmt, place) or in_material(stmt, place.session, name)
         misplaced(place, span, "`{}` stands outside a material", name, help, fix)
         return None

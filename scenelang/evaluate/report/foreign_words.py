@@ -11,6 +11,8 @@ def _each_word(meanings: Mapping[str, str]) -> dict[str, str]:
     return {word: meaning for words, meaning in meanings.items() for word in words.split()}
 
 
+_NO_GRADIENTS: Final = "an object has one colour; for a gradient draw stripes whose colours are mix(a, b, t)"
+
 FUNCTIONS: Final = _each_word(
     {
         "pow": "a b -> a ^ b",
@@ -54,16 +56,33 @@ FUNCTIONS: Final = _each_word(
         "hsl": "write hsv(h, s, v)",
         "rad radians": "glue the unit to the number: 30deg; what is computed is multiplied by 1deg",
         "degrees": "divide by 1deg for a number of degrees",
+        "gradient linear_gradient linearGradient radial_gradient radialGradient": _NO_GRADIENTS,
         "concat": "vectors are not joined; write all items into one",
         "str": "strings are not put together",
     }
 )
 """Functions, and what to write: advice, or `parameters -> what stands for a call` for each number of them."""
 
+MATERIALS: Final = _each_word(
+    {
+        "lambert lambertian matte plastic standard basic phong pbr": "diffuse",
+        "fog mist smoke cloud volume medium gas": "volumetric",
+        "plain solid unlit constant": "flat",
+        "glossy metal metallic mirror chrome shiny glass specular": "nothing reflects: in space there is "
+        "diffuse, which is matte, and volumetric, which is mist; in the plane flat",
+        "gradient linear radial linear_gradient lineargradient": _NO_GRADIENTS,
+    }
+)
+"""Materials under another name, and what there is instead of others."""
+
 LIBRARIES: Final = ("Math", "math", "np", "numpy")
 """What stands before the names of functions and constants."""
 
-VALUES: Final = {"e": "write exp(1)", "phi": "write (1 + sqrt(5)) / 2"}
+VALUES: Final = {
+    "e": "write exp(1)",
+    "phi": "write (1 + sqrt(5)) / 2",
+    "scene": "objects are drawn where they stand: sphere { scale(0.5); }",
+}
 """Constants, in small letters, and what to write."""
 
 NAMES: Final = _each_word(
@@ -104,7 +123,7 @@ WORDS: Final = _each_word(
     {
         "ball": "sphere",
         "donut doughnut": "torus",
-        "move shift position": "translate",
+        "move shift position pos": "translate",
         "turn spin rotation": "rotate",
         "zoom": "scale",
         "skew": "shear",
@@ -119,7 +138,7 @@ WORDS: Final = _each_word(
         "merge add join": "union",
         "blend smooth_union opsmoothunion smin": "smooth",
         "texture": "material",
-        "size_px resolution viewport": "canvas",
+        "size_px resolution viewport createcanvas size": "canvas",
         "animation": "animate",
         "light_source pointlight point_light spotlight sun lamp": "light",
         "perspectivecamera perspective look_at lookat": "camera",
@@ -134,12 +153,20 @@ STATEMENTS: Final = _each_word(
     {
         "children": "what is called has no children: put what it draws into its block",
         "blend smooth_union opsmoothunion smin": "it is called `smooth` here, as in smooth(k = 0.3) { … }",
+        "plane": "in space the plane below is there without a word; ground(y = -1); moves it",
         "hull": "there is no hull; smooth { … } blends objects into each other",
         "minkowski": "there is no Minkowski sum; smooth { … } blends objects into each other",
         "linear_extrude rotate_extrude": "a 2D scene is not extruded",
         "mirror": "write scale(-1, 1);",
         "offset": "a move is translate(x, y); outlines are not offset",
-        "size resize": "write scale(sx, sy), in factors",
+        "size resize r radius diameter width height": "write scale(s) or scale(sx, sy), in factors",
+        "x y cx cy left top": "write translate(x, y)",
+        "stroke outline border strokewidth stroke_width nostroke": "objects have no outlines: a "
+        "larger one behind makes one",
+        "fill nofill": "colours stand in the block of an object: star { material flat { color(#d33); } }",
+        "shadow shadows castshadow": "whatever is lit throws a shadow",
+        "fog mist smoke": "mist is an object: sphere { material volumetric; }",
+        "repeat loop times": "loops run over a range or a vector: for (i in 0..<n) { … }",
         "transform": "write matrix([[…4], […4], […4], […4]]), in rows",
         "text": "no model draws text",
         "echo print": "nothing is printed while a scene is made",
@@ -168,5 +195,6 @@ ARGUMENTS: Final = {
     "light": _COLOUR
     | _each_word({"location pos at from": "position", "intensity strength energy brightness": "power"}),
     "ground": _COLOUR | _each_word({"height level": "y"}),
+    "animate": _each_word({"duration length time": "seconds", "rate framerate frame_rate": "fps"}),
 }
 """Arguments of statements, under another name."""

@@ -12,12 +12,13 @@ from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice
+from scenelang.evaluate.report.spaces import likely_material, likely_models
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.value import COMPONENTS, Problem
 from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import STAGE, TRANSFORMS
+from scenelang.words import TRANSFORMS
 
 _GLUED: Final = "give it a unit: deg, rad or turn"
 _RADIANS: Final = "a multiple of PI or TAU is in radians: multiply by 1rad"
@@ -155,12 +156,13 @@ def _colour(text: str) -> str | None:
     return plain[0] if plain else foreign_words.COLOURS.get(text.strip().lower())
 
 
-def _material(session: Session, source: SourceFile) -> str | None:
-    """The only material that there is for what a text draws; None where there are several."""
-    drawn = session.report.uses(source)
-    models = [m for m in session.vocabulary.in_use if any(geometry in drawn for geometry in m.geometries)]
-    materials = {material for model in models for material in model.materials}
-    return materials.pop() if len(materials) == 1 else None
+def called_boolean(stmt: nodes.Call, here: str) -> Advice:
+    """`difference(square, star);`: the boolean word with its block."""
+    parts = [arg.value.span.text for arg in stmt.args or ()]
+    plain = all(isinstance(arg.value, nodes.NameRef) and not arg.name for arg in stmt.args or ())
+    text = f"{here} {{ {' '.join(f'{part};' for part in parts)} }}"
+    fix = write(stmt.span, text) if plain and stmt.body is None else None
+    return f"it is called `{here}` here and has a block: {here} {{ square; star; }}", fix
 
 
 def _beside(text: str, start: int, end: int) -> str | None:
@@ -184,9 +186,9 @@ def _level(letters: Iterable[str], deeper: str, higher: str) -> str | None:
 
 
 def in_material(stmt: nodes.Call, session: Session, name: str) -> Fix | None:
-    """`square { color(#d33); }`: into the material, where there is but one for what the text draws."""
+    """`square { color(#d33); }`: into the material that it has without one."""
     source, span = stmt.span.source, stmt.span
-    material = _material(session, source)
+    material = likely_material(session, source)
     beside = _beside(source.text, span.start, span.end)
     if material is None or stmt.body is not None or beside is None or "material" in beside:
         return None
@@ -203,7 +205,7 @@ def as_group(stmt: nodes.Call, session: Session) -> Fix | None:
     last = body.statements[-1].span.end if body.statements else body.span.start + 1
     moved = f"{head.text.rstrip()};"
     if stmt.name.text not in TRANSFORMS:
-        material = _material(session, source)
+        material = likely_material(session, source)
         if material is None or any(isinstance(one, nodes.MaterialUse) for one in body.statements):
             return None
         moved = f"material {material} {{ {moved} }}"
@@ -259,7 +261,8 @@ def in_library(stmt: nodes.Call, place: Place) -> tuple[str | None, Fix | None]:
     """Help and fix for a statement whose name is that of a shape of the library; both None for any other."""
     shape = SHAPES.get(stmt.name.text.lower())
     session = place.session
-    if shape is None or not session.vocabulary.geometries >= _LEAVES or session.settings.given.keys() & STAGE:
+    likely = {model.dimension for model in likely_models(session, stmt.span.source)}
+    if shape is None or not session.vocabulary.geometries >= _LEAVES or likely == {3}:
         return None, None
     imported = next(
         (n for n, b in place.scope.visible() if b.kind == "import" and _is_library(b.value)), None

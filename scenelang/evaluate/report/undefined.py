@@ -13,6 +13,7 @@ from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.names import Binding, Scope
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice, Reporter, Shared, shown_places
+from scenelang.scene import library
 from scenelang.syntax import nodes
 from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS
 
@@ -116,9 +117,16 @@ def within_effort(place: Place, kinds: Sequence[str]) -> list[tuple[str, Binding
 
 
 def unknown_member(
-    name: nodes.Name, place: Place, exported: FileContext | None, what: Literal["name", "material"] = "name"
+    name: nodes.Name,
+    place: Place,
+    exported: FileContext | None,
+    what: Literal["name", "material"] = "name",
+    kinds: Sequence[str] = (),
 ) -> None:
-    """Report that an imported file has no such name; nothing is known of one that cannot be read."""
+    """Report that an imported file has no such name; nothing is known of one that cannot be read.
+
+    ``kinds`` are those of bindings that may stand here, if it has any of them.
+    """
     alias, _, rest = name.text.partition(".")
     if exported is None or (exported.damage and exported.damage.loses(rest)):
         return
@@ -130,11 +138,22 @@ def unknown_member(
         place.report.error("E0213", f"`{name.text}` is the name of a material", name.span, help=help)
         return
     else:
-        known = [n for n, b in exported.scope.names.items() if b.kind != "import"]
+        names = exported.scope.names
+        known = [n for n, b in names.items() if b.kind in kinds] or [
+            n for n, b in names.items() if b.kind != "import"
+        ]
     missing = f"`{alias}` has no {'material ' if what == 'material' else ''}`{rest}`"
 
     def advise() -> Advice:
         help, fix = did_you_mean(rest, known, last, effort=place.report.effort)
+        if help is None and library.holds(exported.source):
+            from scenelang.evaluate.report.habits import SHAPES  # only mistakes need it
+
+            shape = SHAPES.get(rest.lower())
+            if shape is not None and shape.module in known:
+                return f"it is called {alias}.{shape.call} here", Fix(
+                    f"write `{shape.module}`", (Edit(last, shape.module),)
+                )
         return help or (f"it has {listing(known)}" if known else f"it defines no {what}"), fix
 
     nowhere = place._replace(scope=Scope(place.file.scope.slots))
@@ -178,6 +197,16 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
         from scenelang.evaluate.report.habits import call_advice  # only mistakes need it
 
         return call_advice(text, call)
+    words = place.session.vocabulary
+    if text in words.materials | words.geometries:
+        if span.source.text[span.end : span.end + 1] == "." and text in words.geometries:
+            return f"what moves it stands in its block: {text} {{ translate(0.5, 0); }}", None
+        if text in words.geometries:
+            return f"objects are not values; one to use again is module part() {{ {text}; }}", None
+        colour = call.args[0].value.span.text if call and len(call.args) == 1 else None
+        written = f"material {text}" + (f" {{ color({colour or '…'}); }}" if call else "")
+        whole = Fix(f"write `{written}`", (Edit(call.span if call else span, written),))
+        return f"a material is written {written}", whole if colour or not call else None
     if not call and lower in foreign_words.VALUES:
         return foreign_words.VALUES[lower], None
     own = FUNCTIONS if call else (*CONSTANTS, *ANIMATED, "true", "false")

@@ -60,6 +60,9 @@ def color(value: Any, operand: int = 0) -> tuple[float, float, float]:
     return r, g, b
 
 
+_ONE_AXIS: Final = "it turns by one angle about one axis: rotate(45deg), or rotate(45deg, axis = X)"
+
+
 def _translate(x: Any, y: Any, z: Any) -> Translate:
     third = 0.0 if z is None else number(z, 2)
     return make(Translate, {"kind": "translate", "x": number(x, 0), "y": number(y, 1), "z": third})
@@ -67,8 +70,7 @@ def _translate(x: Any, y: Any, z: Any) -> Translate:
 
 def _rotate(turn: Any, axis: Any) -> Rotate:
     if turn.__class__ is Vec:
-        help = "it turns by one angle about one axis: rotate(45deg), or rotate(45deg, axis = X)"
-        raise unexpected("an angle", turn, help, 0, fix="turns")
+        raise unexpected("an angle", turn, _ONE_AXIS, 0, fix="turns")
     rad = angle(turn, 0)
     direction = (0.0, 0.0, 1.0) if axis is None else vector(axis, 3, 1, "an axis")
     if not any(direction):
@@ -141,6 +143,7 @@ _BUILDS: Final[dict[str, Callable[..., Any]]] = {
 }
 _SPREAD: Final = ("translate", "scale")
 _HELP: Final = {
+    "rotate": _ONE_AXIS,
     "shear": "name the term, as in shear(xy = 0.5)",
     "color": "it is called color(c), with c as #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)",
     **{name: f"it is called {TRANSFORMS[name].head}" for name in ("scale", "matrix")},

@@ -43,6 +43,11 @@ def quantities(dimension: int) -> dict[str, tuple[str, float, float]]:
 
 SOLID = {"displace": "amount", "frequency": "frequency", "thickness": "thickness", "width": "width"}
 FROM_NOTHING = {"smooth", "blend", "displace", "frequency", "width", "texels"}  # the probe starts later
+UNBOUNDED = {"objects", "thin"}
+"""Of these a model has no range where nothing was lost up to the last value: a warning would not say why.
+
+Nor has a scale a lower end where nothing was lost down to the first: thin objects are as small one way.
+"""
 BOTH_WAYS = {"twirl", "bend", "twist"}  # the range is the same on either side of 0
 
 
@@ -67,8 +72,10 @@ def measured_ranges(
             continue
         rows = probe["rows"]
         first, last = _healthy(rows, probe["healthy"])
+        if quantity in UNBOUNDED and last == len(rows) - 1:
+            continue
         low, high = rows[first]["value"] * low_unit, rows[last]["value"] * high_unit
-        low = 0.0 if quantity in FROM_NOTHING else low
+        low = 0.0 if quantity in FROM_NOTHING or (quantity == "scale" and first == 0) else low
         if quantity in BOTH_WAYS:
             low = -high
         ranges[quantity] = [int(v) if v == int(v) else round(v, 4) for v in (low, high)]

@@ -52,6 +52,21 @@ ONCE_HELP: Final = "names keep their values; bind another one with let, or count
 _BRACKETS: Final = "vectors stand in brackets"
 _WIDTH: Final = "of boolean words only `smooth` has one, the width of its blend: smooth(k = 0.3) { … }"
 _BLOCKS: Final = "write camera(eye = [0, 1, 6]); light(position = [2, 4, 3]); sphere { translate(0, 1, 0); }"
+_COMMAS: Final = "`,` between statements"
+_JOINED: Final = "objects are joined by words"
+_ARGUED: Final = "`<node>` takes no objects as arguments"
+_NEW: Final = "objects are drawn where they stand"
+_METHOD: Final = "transforms stand in the block of what they move"
+_STANDS: Final = "objects stand in its block: <node> { square; star; }"
+_VALUE: Final = "objects are not values"
+_MODULE: Final = "a piece of scene to use again is module <n>() { … }, and is drawn by <n>();"
+_ARGUMENTS: Final = "a material takes no arguments"
+_COLOUR: Final = "its colour stands in its block: material <n> { color(#d33); }"
+_OPERATIONS: Final = "a material's colour stands in its block"
+_CONSTANT: Final = "a colour is not a material"
+_UNNAMED: Final = "a scene in 2D has `flat`, one in 3D `diffuse` and `volumetric`"
+_PATH: Final = "files are imported by their path"
+_IMPORTED: Final = 'write import "std/shapes" as s; and what it has as s.disc(0.3);'
 _IMPORT: Final = "functions are there without an import"
 
 HABITS: Final = (
@@ -65,10 +80,13 @@ HABITS: Final = (
     Habit("for <i> in <E>: <BODY>", "for (<i> in <E>) { <BODY> }", _BRACES),
     Habit("if <E>: <BODY>", "if (<E>) { <BODY> }", _BRACES),
     Habit("<control> <E> {", "<control> (<E>) {", _PARENTHESES, code="E0107"),
+    Habit("<elif> <E>: <BODY>", "<elif> (<E>) { <BODY> }", _BRACES),
+    Habit("<elif> <E> {", "<elif> (<E>) {", _PARENTHESES, "it is `else if (…) { … }` here", "E0107"),
     Habit("<A> if <C> else <B>", "<C> ? <A> : <B>", "`if` does not choose between values"),
     # functions and modules
     Habit("<fn> <f>(<PARAMS?>) { return <E> <;?> }", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     Habit("<fn> <f>(<PARAMS?>): return <LINE> <;?>", "fn <f>(<PARAMS>) = <LINE>;", _FUNCTION),
+    _unsafe("def <f>(<P?>): <BODY>", "BAD_STATEMENT", _BRACES, "write module <f>() { … }"),
     Habit("<fn> <f>(<PARAMS?>) <=|-> > <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     _unsafe("<fn> <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, "write fn <f>(x) = x ^ 2;"),
     _unsafe(
@@ -101,6 +119,7 @@ HABITS: Final = (
     Habit("param <n> = <E> in (<A>, <B>);", "param <n> = <E> in <A>..<B>;", _RANGE),
     Habit("<call> <=|:> (<E>);", "<call>(<E>);", "`<call>` is called, not set"),
     Habit("<call> <=|:> <E>;", "<call>(<E>);", "`<call>` is called, not set"),
+    Habit("<n>: <E>;", "<n>(<E>);", "`<n>` is called, not set"),
     Habit("<n> = <LINE> <;?>", "let <n> = <LINE>;", "missing `let` before `<n>`", code="E0126"),
     Habit("<n> = <E>;", "let <n> = <E>;", "missing `let` before `<n>`", code="E0126"),
     _unsafe("<n> <+|-|*|/|%> = <E>;", "let <n> = BAD_EXPRESSION;", ONCE, ONCE_HELP),
@@ -108,7 +127,21 @@ HABITS: Final = (
     _unsafe("<n>--;", "let <n> = BAD_EXPRESSION;", ONCE, ONCE_HELP),
     _unsafe("<n>[<I>] = <E>;", "let <n> = BAD_EXPRESSION;", ONCE, ONCE_HELP),
     # blocks
+    _unsafe("new <LINE> <;?>", "BAD_STATEMENT", _NEW, "write sphere { scale(0.5); }"),
+    _unsafe("<let> <n> = new <LINE> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
+    _unsafe("<let> <n> = <object> <BLOCK> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
+    _unsafe("<let> <n> = <node>(<P?>) <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
+    Habit("<object>().<call>(<P?>);", "<object> { <call>(<P>); }", _METHOD),
+    _unsafe("<object>().<LINE> <;?>", "BAD_STATEMENT", _METHOD, "square { scale(0.5); translate(1, 0); }"),
+    Habit("<n> <o> }", "<n>; <o>; }", "missing `;`", code="E0102"),
+    Habit("<n> - <o>;", "subtract { <n>; <o>; }", _JOINED),
+    Habit("<n> + <o>;", "union { <n>; <o>; }", _JOINED),
+    Habit("<n>, <o> }", "<n>; <o>; }", _COMMAS),
+    _unsafe("<n>, <LINE> }", "BAD_STATEMENT }", _COMMAS, "every statement ends with `;`"),
     Habit("<n> <VALUES>;", "<n>(<VALUES>);", _PARENTHESES, code="E0107"),
+    Habit("<node>(<A>, <B>);", "<node> { <A>; <B>; }", _ARGUED, _STANDS),
+    Habit("<node>(<A>, <B>, <C>);", "<node> { <A>; <B>; <C>; }", _ARGUED, _STANDS),
+    _unsafe("<node>(<P>);", "BAD_STATEMENT", _ARGUED, _STANDS),
     Habit("<node>()", "<node>", "`<node>` takes no arguments"),
     _unsafe("<node>(<P>) {", "<node> {", "`<node>` takes no arguments", _WIDTH),
     _unsafe("< <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
@@ -119,8 +152,19 @@ HABITS: Final = (
         "material { <call>(",
         "material <material> { <call>(",
         "material without a name",
-        "a scene in 2D has `flat`, one in 3D `diffuse` and `volumetric`",
+        _UNNAMED,
     ),
+    Habit("material <=|:?> <VALUES>;", "material <material> { color(<VALUES>); }", _CONSTANT, _UNNAMED),
+    Habit("material(<VALUES>);", "material <material> { color(<VALUES>); }", _CONSTANT, _UNNAMED),
+    Habit("material <n>();", "material <n>;", _ARGUMENTS),
+    _unsafe("material <n>(<A>, <P>);", "material <n>;", _ARGUMENTS, _COLOUR),
+    Habit("material <n>(color = <E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
+    Habit("material <n>(<E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
+    Habit("material <n> <,?> color(<E>);", "material <n> { color(<E>); }", _OPERATIONS),
+    Habit("<let> <m> = material <n>();", "let <m> = material <n>;", _ARGUMENTS),
+    _unsafe("<let> <m> = material <n>(<A>, <P>);", "let <m> = material <n>;", _ARGUMENTS, _COLOUR),
+    Habit("<let> <m> = material <n>(color = <E>);", "let <m> = material <n> { color(<E>); };", _ARGUMENTS),
+    Habit("<let> <m> = material <n>(<E>);", "let <m> = material <n> { color(<E>); };", _ARGUMENTS, _COLOUR),
     Habit("material = <n>;", "material <n>;", "`material` is not set"),
     Habit("material(<n>)", "material <n>", "a material's name stands without parentheses"),
     # expressions
@@ -132,9 +176,13 @@ HABITS: Final = (
     Habit("(<A>, <B>, <C>)", "[<A>, <B>, <C>]", _BRACKETS),
     Habit("<rgb|srgb> < <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
     Habit("< <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
-    # imports
+    # settings and imports
+    Habit("canvas(<A> x <B>);", "canvas(<A>, <B>);", "sides are separated by a comma"),
     Habit("import <library> <LINE?> <;?>", "", _IMPORT),
     Habit("from <library> import <LINE> <;?>", "", _IMPORT),
+    _unsafe("import <n>;", "BAD_STATEMENT", _PATH, _IMPORTED),
+    _unsafe("from <n> import <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
+    _unsafe("import <A>;", "import <A> as s;", "missing `as` and a name", _IMPORTED, "E0126"),
 )
 """Habits that do not parse. The first that fits, and after which more of the text reads, is taken.
 

@@ -27,7 +27,7 @@ from typing import Final
 from scenelang.records import Record
 from scenelang.syntax.lexer import Token, Tokens
 from scenelang.syntax.tables import END, tables
-from scenelang.words import NODES, OPERATIONS, TRANSFORMS
+from scenelang.words import GEOMETRIES, NODES, OPERATIONS, TRANSFORMS
 
 MOST: Final = 200
 """A hole takes no more tokens; a block twenty times as many."""
@@ -38,6 +38,8 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "fn": ("fn", "function", "func", "fun", "def", *TYPES),
     "let": ("let", "var", "const", *TYPES),
     "node": tuple(NODES),
+    "object": (*NODES, *GEOMETRIES),
+    "elif": ("elif", "elsif", "elseif"),
     "call": (*(TRANSFORMS | OPERATIONS), "canvas", "background"),
     "control": ("for", "if"),
     "library": ("math", "numpy", "random", "sys", "os", "Math"),
@@ -237,7 +239,9 @@ def change(match: Match, replacement: str, extra: Mapping[str, str]) -> Change |
     if gone and not middle and behind and not wanted[-behind].spaced:
         end = tokens.starts[stop]
     text, new = _written(match, middle, first, stop)
-    if not gone and behind and wanted[-behind].spaced:
+    if middle and middle[0].spaced and before and start == tokens.ends[first - 1]:
+        text = f" {text}"
+    if behind and wanted[-behind].spaced and (not gone or (middle and end == tokens.starts[stop])):
         text += " "
     shown_end = tokens.ends[stop - 1] if gone else end
     name = match.parts[before - 1] if before and gone and not touching else ("", first, first)

@@ -1,0 +1,87 @@
+"""Advice leads to a scene without mistakes: what is said of one mistake, and the text that follows it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import scenelang as nsg
+from scenelang.diagnostics.pages import CODES
+
+SHAPES = 'import "std/shapes" as s;'
+CAMERA = "camera(eye = [0, 1, 5]);"
+CASES = (
+    ("sphere { color(#f00); }", "material diffuse {", "sphere { material diffuse { color(#f00); } }"),
+    (f"{SHAPES} s.disc(0.3) {{ fill(#f00); }}", "material flat {",
+        f"{SHAPES} s.disc(0.3) {{ material flat {{ color(#f00); }} }}"),
+    ("sphere; square { translate(1, 0); }", "leave out `square` or `sphere`", "sphere;"),
+    (f"{SHAPES} s.disc(0.3); sphere;", "leave out `sphere` or `s.disc`", f"{SHAPES} s.disc(0.3);"),
+    ("sphere { material flat; }", "write material diffuse or volumetric", "sphere { material volumetric; }"),
+    ("square { twist(1); }", "leave out `twist`", "square { }"),
+    (f"{CAMERA} square;", "leave it out; flat scenes have none", "square;"),
+    (f"{SHAPES} s.circle(0.3);", "s.disc(r)", f"{SHAPES} s.disc(0.3);"),
+    (f"{CAMERA} box {{ scale(0.5); }}", "there is sphere, torus, and what is learned", f"{CAMERA} torus;"),
+    ("cylinder(h = 1);", "flat scenes draw pentagon, square, star, triangle, solid ones sphere", "torus;"),
+    (f"{CAMERA} sphere {{ material glossy; }}", "diffuse, which is matte", "sphere { material diffuse; }"),
+    (f"{CAMERA} sphere {{ material ice; }}", "there is diffuse, volumetric", "sphere { material diffuse; }"),
+    ("sphere { material lambert; }", "`diffuse`", "sphere { material diffuse; }"),
+    ("sphere { material red; }", "material diffuse { color(#f00); }",
+        "sphere { material diffuse { color(#f00); } }"),
+    ("let m = #f00; square { material m; }", "material flat { color(m); }",
+        "let m = #f00; square { material flat { color(m); } }"),
+    ("let m = #f00; square { m; }", "material flat { color(m); }",
+        "let m = #f00; square { material flat { color(m); } }"),
+    (f"s.disc(0.3); {SHAPES}", "move the definition of `s` above", f"{SHAPES} s.disc(0.3);"),
+    ("square { material flat { color(#ff000080); } }", "write #ff0000",
+        "square { material flat { color(#ff0000); } }"),
+    ("square { material flat { color(#f008); } }", "write #f00", "square { material flat { color(#f00); } }"),
+    ("light(power = 3); light(power = 5); sphere;", "there is one light", "light(power = 5); sphere;"),
+    ("background(linear_gradient(#fff, #000)); star;", "mix(a, b, t)",
+        "background(mix(#fff, #000, 0.3)); star;"),
+    ("let s = sphere; s;", "module part() { sphere; }", "module part() { sphere; } part();"),
+    ("let s = torus(0.5); s;", "module part() { torus; }", "module part() { torus; } part();"),
+    ("let b = square { scale(0.5); }; b;", "module b() { … }", "module b() { square { scale(0.5); } } b();"),
+    ("sphere { rotate(45, 0, 0); }", "rotate(45deg, axis = X)", "sphere { rotate(45deg, axis = X); }"),
+    ("square.translate(0.5, 0);", "square { translate(0.5, 0); }", "square { translate(0.5, 0); }"),
+    ("square { pos(0.5, 0.5); }", "`translate`", "square { translate(0.5, 0.5); }"),
+    ("size(80, 60); star;", "`canvas`", "canvas(80, 60); star;"),
+    ("canvas(80 x 60); star;", None, "canvas(80, 60); star;"),
+    ("animate(duration = 2, fps = 4); star;", "`seconds`", "animate(seconds = 2, fps = 4); star;"),
+    ('import "std/shapes"; s.disc(0.3);', 'import "std/shapes" as s;', f"{SHAPES} s.disc(0.3);"),
+    ("import shapes; star;", 'import "std/shapes" as s;', f"{SHAPES} s.disc(0.3);"),
+    ("new Sphere(0.5);", "sphere { scale(0.5); }", "sphere { scale(0.5); }"),
+    ("fog(0.1); torus;", "sphere { material volumetric; }", "sphere { material volumetric; } torus;"),
+    ("loop(5) { star; }", "for (i in 0..<n)", "for (i in 0..<5) { star; }"),
+    ("star { rotate(360deg * t); }", "animate(seconds = 2, fps = 24);",
+        "animate(seconds = 2, fps = 24); star { rotate(360deg * t); }"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "said", "meant"), CASES, ids=[text for text, *_ in CASES])
+def test_advice_leads_to_a_scene(text: str, said: str | None, meant: str) -> None:
+    (only,) = nsg.check_text(text)
+    assert only.code in CODES
+    assert said is None or said in (only.help or "")
+    assert [*nsg.check_text(meant)] == []
+    if only.fix is not None:
+        after, left = nsg.fix_text(text)
+        assert " ".join(after.split()) == meant
+        assert [*left] == []
+
+
+def test_lists_name_what_can_stand_there() -> None:
+    """Not what a library is made of inside: a statement is no place for a function."""
+    (only,) = nsg.check_text(f"{SHAPES} s.blob(0.3);")
+    assert only.help is not None
+    assert only.help.startswith("it has arc, arrow, capsule, corners, disc")
+    (only,) = nsg.check_text(f"{SHAPES} square {{ scale(s.sizze([1, 0])); }}")
+    assert only.help == "did you mean `size`?"
+
+
+def test_time_in_an_imported_file_is_for_the_scene_to_run(tmp_path: Path) -> None:
+    (tmp_path / "lib.nsg").write_text("module hand() { star { rotate(360deg * t); } }", "utf-8")
+    (tmp_path / "a.nsg").write_text('import "lib.nsg" as lib; lib.hand();', "utf-8")
+    assert [*nsg.check(tmp_path / "a.nsg")] == []
+    (tmp_path / "a.nsg").write_text("star { rotate(360deg * t + 1deg * frame); }", "utf-8")
+    assert [d.code for d in nsg.check(tmp_path / "a.nsg")] == ["W0304"]
