@@ -47,6 +47,22 @@ from scenelang.words import STAGE
 class Scene(SceneData):
     """A whole scene: settings and top-level nodes, which form a union in file order."""
 
+    def __repr__(self) -> str:
+        """In short; `to_python` has the code that makes it."""
+        waiting, count = list(self.nodes), 0
+        while waiting:
+            node = waiting.pop()
+            if isinstance(node, Object):
+                count += 1
+            else:
+                waiting += [child.node if isinstance(child, Link) else child for child in node.children]
+        width, height = self.canvas
+        model = f", {self.model}" if self.model else ""
+        frame = f", a frame of {self.animation.frames:,}" if self.animation else ""
+        return f"Scene({count:,} object{'s' * (count != 1)}, {width} x {height}{model}{frame})"
+
+    __str__ = __repr__
+
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
         count = len(self.nodes)
         from scenelang.notebook import bundle
