@@ -20,7 +20,7 @@ from scenelang.animation.webp import write_webp
 from scenelang.backend.options import RenderError, usable_cores
 from scenelang.diagnostics.error import SceneError
 from scenelang.files import output_place, write_whole
-from scenelang.image import output_file
+from scenelang.outputs import output_file
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
