@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, get_args
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def render_outputs(
-    program_or_scene: Program | Scene,
+    program_or_scene: Program | Scene | str | os.PathLike[str],
     outputs: Sequence[Output],
     *,
     size: tuple[int, int] | None = None,
@@ -26,7 +27,7 @@ def render_outputs(
     """Depth, normals, objects and alpha of a picture, for compositing; numpy computes them.
 
     Args:
-        program_or_scene: what to look at.
+        program_or_scene: what to look at, or its file, as for `render`.
         outputs: which of ``"depth"``, ``"normal"``, ``"object"`` and ``"alpha"``; 2D has the last two.
         size: canvas in pixels instead of the Scene's.
         backend: ``"neural"`` asks the trained network, ``"reference"`` of a Scene the exact definition.
@@ -39,15 +40,16 @@ def render_outputs(
         SceneError: the Scene cannot be compiled.
         RenderError: the model or the scene has no such output, the weights are missing or others, or the
             reference was given a Program.
-        ValueError: an argument is none of the above.
+        ProgramError, OSError: as for `render`.
+        ValueError, TypeError: an argument is none of the above.
     """
     known = get_args(Output)[:-1]  # a proof is of a picture, and `scenelang.prove` has it
     for name in outputs:
         if name not in known:
             raise ValueError(f"unknown output `{name}`; there are {', '.join(known)}")
-    found = given(program_or_scene, size, backend)
+    found, spans = given(program_or_scene, size, backend)
     if isinstance(found, Scene):
-        return exact_outputs(found, outputs)
+        return exact_outputs(found, outputs, spans=spans)
     return neural_outputs(found, outputs, threads)
 
 
