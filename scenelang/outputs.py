@@ -22,7 +22,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.diagnostics.suggest import listing
+from scenelang.diagnostics.suggest import listing, plural
 from scenelang.files import write_output, write_whole
 
 Output = Literal["depth", "normal", "object", "alpha", "proof"]
@@ -146,7 +146,7 @@ class Outputs:
     def told(self, name: Output) -> str:
         """What to say about the file of an output."""
         if name != "depth":
-            seen = f"{len(self.objects or ())} objects seen"
+            seen = f"{plural(len(self.objects or ()), 'object')} seen"
             known = {"normal": "normals in world axes", "object": seen, "proof": "bounds of pixels"}
             return known.get(name, "coverage by objects")
         near, far = self.range()

@@ -19,6 +19,7 @@ from scenelang.animation.video import find_codec, write_video
 from scenelang.animation.webp import write_webp
 from scenelang.backend.options import RenderError, usable_cores
 from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.suggest import plural
 from scenelang.files import output_place, write_whole
 from scenelang.outputs import output_file
 
@@ -85,7 +86,7 @@ class RenderResult:
         """What there is to say about it."""
         each = 1000 / max(1, self.frames)
         return [
-            f"{self.drawn} pictures drawn by {self.jobs} process{'es' * (self.jobs > 1)}, "
+            f"{plural(self.drawn, 'picture')} drawn by {self.jobs} process{'es' * (self.jobs > 1)}, "
             f"{self.resumed} kept from a run before",
             f"a frame (ms): compile {self.compile_s * each:.1f}, draw {self.draw_s * each:.1f}, "
             f"encode {self.encode_s * each:.1f}",

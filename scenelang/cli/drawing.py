@@ -13,6 +13,7 @@ from scenelang.cli.jobs import Job, program_notes
 from scenelang.cli.progress import Clock
 from scenelang.cli.say import say_trouble
 from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.suggest import plural
 
 if TYPE_CHECKING:
     from scenelang.backend.options import Device, Samples
@@ -36,7 +37,7 @@ def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) 
         library, why = choose_drawer(job.program, device, samples)
         if library == "numpy":
             cores = threads or threads_for(job.program.canvas) if job.program.stage else 1
-            place = "one core" if cores == 1 else f"{cores} cores"
+            place = plural(cores, "core")
             with clock("draw"):
                 drawing = draw_small(job.program, samples=samples, progress=progress, threads=threads)
         else:
@@ -52,8 +53,8 @@ def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) 
         job.notes.append(f"drawn by {library} on {place}: {why}")
         width, height = job.program.canvas
         once = width * height - drawing.refined
-        job.notes.append(f"drew {once:,} pixels by one sample and {drawing.refined:,} by four")
-        job.notes.append(f"{drawing.pairs:,} meetings of a sample and an object")
+        job.notes.append(f"drew {plural(once, 'pixel')} by one sample and {drawing.refined:,} by four")
+        job.notes.append(f"{plural(drawing.pairs, 'meeting')} of a sample and an object")
         return drawing.image
 
     return draw

@@ -13,6 +13,7 @@ from scenelang.cli import options
 from scenelang.cli.main import Trouble
 from scenelang.cli.progress import Bar
 from scenelang.cli.say import say_diagnostics
+from scenelang.diagnostics.suggest import plural
 
 if TYPE_CHECKING:
     from scenelang.evaluate.session import Defines
@@ -144,9 +145,9 @@ def _say(sweep: Sweep, seconds: float) -> None:
         click.echo(f"row {number}: {', '.join(f'{name}={value}' for name, value in values)}", err=True)
         say_diagnostics(errors)
     made = sweep.made
-    parts = [f"{len(sweep.lines) - sweep.errors:,} pictures"]
+    parts = [plural(len(sweep.lines) - sweep.errors, "picture")]
     if sweep.errors:
-        parts.append(f"{sweep.errors:,} rows whose values give no scene")
+        parts.append(f"{plural(sweep.errors, 'row')} whose values give no scene")
     if made.resumed:
         parts.append(f"{made.resumed:,} kept from a run before")
     if same := made.frames - sweep.errors - made.drawn - made.resumed:

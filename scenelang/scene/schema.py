@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from scenelang.diagnostics.suggest import plural
 from scenelang.scene.data import SceneData
 from scenelang.scene.elements import Elements as Elements
 from scenelang.scene.elements import load_elements as load_elements
@@ -59,7 +60,7 @@ class Scene(SceneData):
         width, height = self.canvas
         model = f", {self.model}" if self.model else ""
         frame = f", a frame of {self.animation.frames:,}" if self.animation else ""
-        return f"Scene({count:,} object{'s' * (count != 1)}, {width} x {height}{model}{frame})"
+        return f"Scene({plural(count, 'object')}, {width} x {height}{model}{frame})"
 
     __str__ = __repr__
 
@@ -67,7 +68,7 @@ class Scene(SceneData):
         count = len(self.nodes)
         from scenelang.notebook import bundle
 
-        return bundle(self, self.canvas, f"Scene of {count:,} node{'s' * (count != 1)}")
+        return bundle(self, self.canvas, f"Scene of {plural(count, 'node')}")
 
     def to_nsg(self) -> str:
         """Canonical text that evaluates back to an equal Scene."""

@@ -56,7 +56,7 @@ def test_short_forms(short: object, long: object) -> None:
         (lambda: nsg.Translate(1), "Translate: `y` is missing"),  # type: ignore[call-arg]
         (lambda: nsg.Translate(1, 2, x=1), "`x` is given twice"),  # type: ignore[misc]
         (lambda: nsg.Translate(1, 2, 3, 4), "4 arguments, where it takes at most 3: x, y, z"),  # type: ignore[call-arg]
-        (lambda: nsg.Flip(1), "1 arguments, where it takes none"),  # type: ignore[call-arg, arg-type]
+        (lambda: nsg.Flip(1), "1 argument, where it takes none"),  # type: ignore[call-arg, arg-type]
         (lambda: nsg.Object("star", transfroms=()), "did you mean `transforms`?"),  # type: ignore[call-arg]
         (lambda: nsg.Object("star", nsg.Flip()), "`transforms[0]` is a Flip"),  # type: ignore[arg-type]
         (lambda: nsg.Object("two words"), "`geometry`: not a possible name"),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from scenelang.cli import options
+from scenelang.diagnostics.suggest import plural
 from scenelang.words import COMBINE
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def _text(plan: dict[str, Any]) -> str:
         flip = "" if cost["flip"] is None else f", FLIP {cost['flip']:.4f},"
         error = f"{cost['psnr']:.2f} dB PSNR (50 at most){flip} against the exact picture"
     lines += [
-        f"stream     {plan['rows']:,} row{'s' * (plan['rows'] != 1)} of 64 numbers ({tokens or 'empty'})",
+        f"stream     {plural(plan['rows'], 'row')} of 64 numbers ({tokens or 'empty'})",
         *(_rays(cost, plan["rows"]) if "rays" in cost else _meetings(cost)),
         f"frame      {cost['ms']:.1f} ms",
         f"error      {error}",
