@@ -169,7 +169,7 @@ def test_mistakes_of_a_file_that_is_drawn_have_their_places(tmp_path: Path) -> N
     ],
 )
 def test_what_is_neither_a_scene_nor_a_path(call: Callable[[Any], object]) -> None:
-    with pytest.raises(TypeError, match="^list where .* path"):
+    with pytest.raises(TypeError, match=r"^list where .* path"):
         call([STAR])
 
 

@@ -160,4 +160,4 @@ def listing(known: Iterable[str], limit: int = 12) -> str:
 
 def plural(count: int, noun: str) -> str:
     """`1 error`, `2 errors`."""
-    return f"{count:,} {noun}{'s' * (count != 1)}"
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
