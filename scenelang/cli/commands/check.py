@@ -50,15 +50,15 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
 @options.define
 @options.model
 @options.strict
+@click.option("--select", multiple=True, metavar="CODES", callback=_codes, help="Report only these warnings.")
+@click.option("--ignore", multiple=True, metavar="CODES", callback=_codes, help="Leave out these warnings.")
+@options.choice("--format", "kind", words="human json sarif github concise", help="Format of diagnostics.")
 @click.option(
-    "--select", multiple=True, metavar="CODES", callback=_codes, help="Of warnings report only these."
-)
-@click.option("--ignore", multiple=True, metavar="CODES", callback=_codes, help="Leave these warnings out.")
-@options.choice(
-    "--format", "kind", words="human json sarif github concise", help="How diagnostics are written."
-)
-@click.option(
-    "--max-diagnostics", "most", type=click.IntRange(0), metavar="N", help="Write so many; count them all."
+    "--max-diagnostics",
+    "most",
+    type=click.IntRange(0),
+    metavar="N",
+    help="Largest number to write; all are counted.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Write diagnostics and no summary.")
 @options.color

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 @click.command("compare")
 @click.argument("scene", metavar="SCENE")
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="Picture; by default SCENE-compare.png.")
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path), help="Picture to write; by default SCENE-compare.png."
+)
 @options.request
 @options.originals
 @options.device

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @click.command("export")
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
-@click.option("-o", "--out", required=True, metavar="OUT", help="A page (.html), or a folder.")
+@click.option("-o", "--out", required=True, metavar="OUT", help="Page (.html) or folder to write.")
 @options.size
 @options.define
 @options.model

@@ -13,8 +13,18 @@ _PARTS = ("starlette", "uvicorn", "websockets", "watchfiles", "pygls", "lsprotoc
 
 @click.command("play")
 @click.argument("path", default=".", metavar="[SCENE | FOLDER]", type=click.Path(path_type=Path))
-@click.option("--port", type=click.IntRange(1, 65535), metavar="N", help="By default 8766 or a free one.")
-@click.option("--host", default="127.0.0.1", metavar="H", help="Address to listen on; others can reach some.")
+@click.option(
+    "--port",
+    type=click.IntRange(1, 65535),
+    metavar="N",
+    help="Port to listen on; by default 8766 or a free one.",
+)
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    metavar="H",
+    help="Address to listen on; by default one that only this machine reaches.",
+)
 @click.option("--no-browser", is_flag=True, help="Only print the address.")
 @click.option(
     "--root",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import click
 
@@ -22,14 +22,21 @@ if TYPE_CHECKING:
     from scenelang.outputs import Output, Outputs, Proof
 
 
-@click.command("render")
+_SECTIONS: Final = {
+    "Animations": "--frame --frames --fps --jobs --cluster --palette --dither",
+    "How it is drawn": "--model --backend --samples --max-ms --max-flip --originals --device --threads",
+    "More than a picture": "--output --prove --redraw --verbose",
+}
+
+
+@click.command("render", cls=options.Sectioned, sections=_SECTIONS)
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
 @click.option(
     "-o",
     "--out",
     required=True,
     metavar="OUT",
-    help="A picture, an animation, numbered pictures or a folder.",
+    help="Picture, animation, numbered pictures or folder to write.",
 )
 @options.size
 @options.define
@@ -41,7 +48,7 @@ if TYPE_CHECKING:
 @options.choice(
     "--palette", words="auto global frame", help="Colours of a GIF: 255 for all frames or for each."
 )
-@click.option("--dither", is_flag=True, help="Dither what a GIF's palette lacks.")
+@click.option("--dither", is_flag=True, help="Dither colours that a GIF's palette lacks.")
 @options.model
 @options.backend
 @options.choice(
@@ -55,7 +62,7 @@ if TYPE_CHECKING:
     "outputs",
     multiple=True,
     type=click.Choice(("depth", "normal", "object", "alpha", "proof")),
-    help="Write this beside the picture too, to OUT's STEM.depth.png and so on, or into an .exr; may be "
+    help="Output to write beside the picture, to STEM.depth.png and so on, or into an .exr; may be "
     "given several times.",
 )
 @click.option("--prove", is_flag=True, help="Prove how far pixels are from the exact picture at most (2D).")
@@ -64,13 +71,13 @@ if TYPE_CHECKING:
     "--max-ms",
     type=click.FloatRange(0, min_open=True),
     metavar="N",
-    help="Choose the most exact way to draw that takes at most so long on one thread.",
+    help="Choose the most exact way to draw that takes at most N milliseconds on one thread.",
 )
 @click.option(
     "--max-flip",
     type=click.FloatRange(0, 1),
     metavar="E",
-    help="Choose the fastest way to draw whose promised FLIP error is at most so large.",
+    help="Choose the fastest way to draw whose promised FLIP error is at most E.",
 )
 @options.originals
 @options.device

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @click.command("watch")
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
-@click.option("-o", "--out", metavar="OUT", help="The picture, or an animation; by default STEM.png.")
+@click.option("-o", "--out", metavar="OUT", help="Picture or animation to write; by default STEM.png.")
 @options.size
 @options.define
 @options.still
