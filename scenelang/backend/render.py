@@ -43,11 +43,18 @@ def exact_graph(
         raise RenderError(str(error)) from None
 
 
-def draw_exact(scene: Scene, *, spans: Spans | None = None, model: str | None = None) -> Image:
+def draw_exact(
+    scene: Scene,
+    *,
+    spans: Spans | None = None,
+    model: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Image:
     """Draw a scene by the exact definition, from its graph as written, before any pass.
 
     Args:
         model: take names from this model instead of the one the scene names.
+        progress: called with the share done, in [0, 1].
 
     Raises:
         SceneError: the scene uses what its model does not have.
@@ -57,7 +64,7 @@ def draw_exact(scene: Scene, *, spans: Spans | None = None, model: str | None = 
 
     graph, brought = exact_graph(scene, spans, model)
     try:
-        return reference_image(graph, brought=brought)
+        return reference_image(graph, brought=brought, progress=progress or (lambda _: None))
     except ValueError as error:
         raise RenderError(str(error)) from None
 
@@ -117,7 +124,7 @@ def render(
         raise RenderError("the reference always takes four samples a pixel")
     program, spans = given(program_or_scene, size, backend)
     if isinstance(program, Scene):
-        return draw_exact(program, spans=spans)
+        return draw_exact(program, spans=spans, progress=progress)
     from scenelang.backend.small import choose_drawer, draw_small
 
     if choose_drawer(program, device, samples).library == "numpy":
@@ -145,7 +152,7 @@ def given(
     if isinstance(found, str | os.PathLike) and Path(found).suffix == ".safetensors":
         from scenelang.program.reading import load_program
 
-        found = load_program(found)
+        found = load_program(Path(found))
     if isinstance(found, Program):
         if size is not None:
             raise ValueError("a size for a program, which is compiled for its canvas: give it with the scene")

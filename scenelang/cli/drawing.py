@@ -37,7 +37,7 @@ def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) 
         library, why = choose_drawer(job.program, device, samples)
         if library == "numpy":
             cores = threads or threads_for(job.program.canvas) if job.program.stage else 1
-            place = plural(cores, "core")
+            place = "one core" if cores == 1 else f"{cores} cores"
             with clock("draw"):
                 drawing = draw_small(job.program, samples=samples, progress=progress, threads=threads)
         else:
@@ -68,7 +68,9 @@ def exact(request: Request, clock: Clock) -> Draw:
         assert job.source is not None
         assert job.source.scene is not None
         with clock("draw"):
-            image = draw_exact(job.source.scene, spans=job.source.spans, model=request.model)
+            image = draw_exact(
+                job.source.scene, spans=job.source.spans, model=request.model, progress=progress
+            )
         job.notes.append("drew the exact picture, four samples a pixel")
         return image
 

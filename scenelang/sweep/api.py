@@ -113,7 +113,8 @@ def render_many(
         SceneError: the scene has errors whatever the values are.
         RenderError, OSError, ValueError, TypeError: as for `scenelang.animate`.
     """
-    if not isinstance(path, str | os.PathLike):
+    given: object = path
+    if not isinstance(given, str | os.PathLike):
         fact = f"{type(path).__name__} where the path of a scene is needed, whose text has the params"
         raise TypeError(f"{fact}; several Scenes are drawn by `animate` and `render_frames`")
     stem = Path(path).stem
