@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, get_args
 
-from scenelang.backend.options import Backend, RenderError, keep_memory, threads_for
+from scenelang.backend.options import RenderError, Still, keep_memory, threads_for
 from scenelang.backend.render import exact_graph, given
 from scenelang.outputs import PLANE, Output, Outputs, Source
 from scenelang.scene.schema import Scene
@@ -21,7 +21,7 @@ def render_outputs(
     outputs: Sequence[Output],
     *,
     size: tuple[int, int] | None = None,
-    backend: Backend = "neural",
+    backend: Still = "neural",
     threads: int | None = None,
 ) -> Outputs:
     """Depth, normals, objects and alpha of a picture, for compositing; numpy computes them.
@@ -30,7 +30,8 @@ def render_outputs(
         program_or_scene: what to look at, or its file, as for `render`.
         outputs: which of ``"depth"``, ``"normal"``, ``"object"`` and ``"alpha"``; 2D has the last two.
         size: canvas in pixels instead of the Scene's.
-        backend: ``"neural"`` asks the trained network, ``"reference"`` of a Scene the exact definition.
+        backend: ``"neural"`` asks the trained network, ``"exact"`` formulas in its place, and ``"reference"``
+            of a Scene the exact definition.
         threads: of solids, by default as for `render`.
 
     Returns:
@@ -50,12 +51,14 @@ def render_outputs(
     found, spans = given(program_or_scene, size, backend)
     if isinstance(found, Scene):
         return exact_outputs(found, outputs, spans=spans)
-    return neural_outputs(found, outputs, threads)
+    return neural_outputs(found, outputs, threads, exact=backend == "exact")
 
 
-def neural_outputs(program: Program, wanted: Sequence[Output], threads: int | None = None) -> Outputs:
-    """Outputs of a Program by its network; raises as `render_outputs`."""
-    from scenelang.models.framed import load_arrays
+def neural_outputs(
+    program: Program, wanted: Sequence[Output], threads: int | None = None, *, exact: bool = False
+) -> Outputs:
+    """Outputs of a Program by its network, or by formulas in its place; raises as `render_outputs`."""
+    from scenelang.backend.closed import field_of
     from scenelang.models.manifest import load_manifest
     from scenelang.models.weights import ModelError
     from scenelang.program.program import ProgramError
@@ -66,9 +69,9 @@ def neural_outputs(program: Program, wanted: Sequence[Output], threads: int | No
         if load_manifest(program.model).renderer not in ("framed", "solid"):
             raise RenderError(f"model `{program.model}` draws colours only")
         keep_memory()
-        network, digest = load_arrays(program.model)
-        program.check_weights(digest)
-        found = program_outputs(network, program, threads=threads or threads_for(program.canvas))
+        found = program_outputs(
+            field_of(program, exact), program, threads=threads or threads_for(program.canvas)
+        )
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
     except (ModelError, ProgramError) as error:

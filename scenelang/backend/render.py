@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from scenelang.backend.options import Backend, Device, RenderError, Samples
+from scenelang.backend.options import Device, RenderError, Samples, Still
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.scene.schema import Scene
@@ -73,7 +73,7 @@ def render(
     program_or_scene: Program | Scene | str | os.PathLike[str],
     *,
     size: tuple[int, int] | None = None,
-    backend: Backend = "neural",
+    backend: Still = "neural",
     device: Device = "auto",
     threads: int | None = None,
     samples: Samples = "adaptive",
@@ -90,8 +90,9 @@ def render(
         program_or_scene: what to draw; a scene's file is read as by `scenelang.load`, a Program's ends in
             ``.safetensors``.
         size: canvas in pixels instead of the Scene's; a Program is compiled for its own.
-        backend: ``"neural"`` draws with the trained network, ``"reference"`` a Scene by the exact
-            definition, which knows no boolean rule and none of a model's limits.
+        backend: ``"neural"`` draws with the trained network, ``"exact"`` with formulas of the shapes in its
+            place, all else alike, and ``"reference"`` a Scene by the exact definition, which knows no boolean
+            rule and none of a model's limits.
         device: where torch runs the network, whatever the picture's size; with ``"auto"`` numpy draws small
             pictures, and torch others on CUDA where there is any.
         threads: tiles drawn at the same time; by default one for each 131,072 pixels, but no more than there
@@ -127,8 +128,11 @@ def render(
         return draw_exact(program, spans=spans, progress=progress)
     from scenelang.backend.small import choose_drawer, draw_small
 
-    if choose_drawer(program, device, samples).library == "numpy":
-        return draw_small(program, samples=samples, progress=progress, threads=threads).image
+    if backend == "exact" and device == "cuda":
+        raise RenderError("formulas are computed by numpy, not by device cuda")
+    exact, library = backend == "exact", choose_drawer(program, device, samples).library
+    if exact or library == "numpy":
+        return draw_small(program, samples=samples, progress=progress, threads=threads, exact=exact).image
     from scenelang.backend.neural import choose_device, draw_program, open_model
 
     model = open_model(program.model, choose_device(device))
@@ -138,7 +142,7 @@ def render(
 def given(
     program_or_scene: Program | Scene | str | os.PathLike[str],
     size: tuple[int, int] | None,
-    backend: Backend,
+    backend: Still,
 ) -> tuple[Program | Scene, Spans | None]:
     """What a backend draws: the reference a Scene, the network a Program; raises as `render`.
 
@@ -146,8 +150,8 @@ def given(
     """
     from scenelang.program.program import Program
 
-    if backend not in get_args(Backend):
-        raise ValueError(f"unknown backend `{backend}`; there are `neural` and `reference`")
+    if backend not in get_args(Still):
+        raise ValueError(f"unknown backend `{backend}`; there are `neural`, `exact` and `reference`")
     found = program_or_scene
     if isinstance(found, str | os.PathLike) and Path(found).suffix == ".safetensors":
         from scenelang.program.reading import load_program

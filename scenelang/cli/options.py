@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from scenelang.evaluate.session import Defines
 
 Backend = Literal["neural", "reference"]
+Still = Literal["neural", "exact", "reference"]
 Device = Literal["auto", "cpu", "cuda"]
 Color = Literal["auto", "always", "never"]
 

@@ -50,7 +50,12 @@ _SECTIONS: Final = {
 )
 @click.option("--dither", is_flag=True, help="Dither colours that a GIF's palette lacks.")
 @options.model
-@options.backend
+@options.choice(
+    "--backend",
+    words="neural exact reference",
+    help="Draw with the trained network, with formulas of the shapes in its place (exact), or by the exact "
+    "definition, which is slow (reference).",
+)
 @options.choice(
     "--samples",
     words="adaptive four quick one draft",
@@ -100,7 +105,7 @@ def command(
     palette: Literal["auto", "global", "frame"],
     dither: bool,
     model: str | None,
-    backend: options.Backend,
+    backend: options.Still,
     samples: Samples,
     outputs: tuple[Output, ...],
     prove: bool,
@@ -147,8 +152,11 @@ def command(
     outputs = tuple(dict.fromkeys(outputs))
     prove = prove or redraw or "proof" in outputs
     clock = Clock()
+    if backend == "exact" and device == "cuda":
+        raise click.UsageError("--backend exact draws on processors only; leave out --device cuda.")
+    moving: options.Backend = "neural" if backend == "exact" else backend  # which animations refuse below
     wanted = Requested(
-        frames, fps, jobs, cluster, palette, dither, backend, device, threads, strict, verbose, outputs
+        frames, fps, jobs, cluster, palette, dither, moving, device, threads, strict, verbose, outputs
     )
     _ = wanted.frames
     if frame is not None and wanted.certain:
@@ -164,7 +172,7 @@ def command(
     if len(files) == 1 and frame is None and not files[0].endswith(PROGRAM):
         target = wanted_target(files[0], out, wanted)
         if target is not None:
-            _only_stills(limits, samples, prove)
+            _only_stills(limits, samples, prove, backend)
             done = animate(files[0], out, target, request, wanted)
             if isinstance(done, int):
                 ctx.exit(done)
@@ -187,7 +195,7 @@ def command(
         request,
         clock,
         strict=strict,
-        compiled=backend == "neural",
+        compiled=backend != "reference",
         verbose=verbose or prove,
         source=source,
         refusal=refusal,
@@ -202,7 +210,7 @@ def command(
             raise click.UsageError("--samples is for the network, not for the reference.")
         draw = exact(request, clock)
     else:
-        draw = neural(clock, device, threads, samples)
+        draw = neural(clock, device, threads, samples, exactly=backend == "exact")
     proofs: list[Proof] = []
     if prove:
         draw = proved(draw, clock, redraw, proofs)
@@ -211,7 +219,7 @@ def command(
         for index, (job, path) in enumerate(ready):
             if outputs:  # before the picture: what it lacks is said at once
                 with clock("outputs"):
-                    found = job_outputs(job, outputs, request.model, threads, exactly=backend == "reference")
+                    found = job_outputs(job, outputs, request.model, threads, backend)
             image = draw(job, partial(_part, bar, index, len(ready)))
             if proofs:
                 told.append(f"{path}: {proofs[-1].told()}")
@@ -247,8 +255,9 @@ def _part(bar: Bar, index: int, count: int, share: float) -> None:
     bar("drawing", index + share, count)
 
 
-def _only_stills(limits: Limits, samples: str, prove: bool) -> None:
+def _only_stills(limits: Limits, samples: str, prove: bool, backend: str) -> None:
     """Refuse for animations what chooses or changes how one picture is drawn."""
-    if limits or samples != "adaptive" or prove:
+    if limits or samples != "adaptive" or prove or backend == "exact":
         what = "--max-ms and --max-flip are" if limits else "a proof is" if prove else "--samples is"
+        what = "--backend exact is" if backend == "exact" else what
         raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")
