@@ -68,7 +68,7 @@ def within(
         q, spread = _carried(steps, centre, radius)
         low = float(leaf_distance(node.geometry, q, brought)[0] - spread) * distance_scale(steps)
         return (-inf if isnan(low) else low), node
-    last = max((index for index, link in enumerate(node.links) if link.op == "smooth"), default=-1)
+    last = max((index for index, link in enumerate(node.links) if link.width), default=-1)
     low = inf
     kept: list[Link] = []
     for index, link in enumerate(node.links):
@@ -81,7 +81,7 @@ def within(
         if link.op == "intersect":
             low = max(low, own)
         elif link.op != "subtract":
-            low = min(low, own) - (link.k / 4 if link.op == "smooth" else 0.0)
+            low = min(low, own) - link.width / 4  # what a blend adds at most
     return low, Fold(node.kind, tuple(kept), node.moves, node.span)
 
 
