@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 PROGRAM: Final = ".safetensors"
 STILL_SIDE: Final = {2: 960, 3: 480}
 """Pixels along the longer side of a still picture; solids take longer."""
-_QUALITY: Final = 80  # of WebP
+_QUALITIES: Final = (80, 60, 40, 20)  # of WebP, until it has few enough bytes
+_MOST_STILL: Final = 40_000  # bytes
 _FRAME_PX: Final = (360, 640)  # width of a frame in a notebook, at least and at most
 _MOST_TEXT: Final = 20_000  # of a Scene, whose text nobody wrote
 
@@ -165,8 +166,11 @@ def frame(value: Scene | Program, picture: Image) -> str:
 
 
 def _packed(picture: PIL.Image.Image) -> bytes:
-    data = io.BytesIO()
-    picture.save(data, "WEBP", quality=_QUALITY, method=6)
+    for quality in _QUALITIES:
+        data = io.BytesIO()
+        picture.save(data, "WEBP", quality=quality, method=6)
+        if data.tell() <= _MOST_STILL:
+            break
     return data.getvalue()
 
 
