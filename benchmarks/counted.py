@@ -163,7 +163,7 @@ def counting() -> Iterator[list[Call]]:
     modules = [
         module
         for name, module in sys.modules.items()
-        if name.startswith(("scenelang.renderers.", "scenelang.lab.frontier.closed"))
+        if name.startswith(("scenelang.renderers.", "scenelang.backend.closed"))
     ]
     numpy = _Numpy()
     patches = [patch.object(module, "np", numpy) for module in modules if hasattr(module, "np")]

@@ -136,7 +136,7 @@ def network(library: str, model: str) -> Any:
     """What draws, on one core."""
     keep_memory()
     if library == "exact":
-        from scenelang.lab.frontier.closed import closed_forms
+        from scenelang.backend.closed import closed_forms
 
         return closed_forms(model)
     if library == "numpy":

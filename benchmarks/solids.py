@@ -29,6 +29,7 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
+from scenelang.backend.closed import closed_forms
 from scenelang.backend.neural import open_model
 from scenelang.backend.options import Samples, keep_memory
 from scenelang.diagnostics.diagnostic import Diagnostics
@@ -36,7 +37,6 @@ from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Fold, Graph
 from scenelang.image import encoded
 from scenelang.lab.about import about
-from scenelang.lab.frontier.closed import closed_forms
 from scenelang.lab.frontier.measure import machine
 from scenelang.measure.metrics import UNCAPPED_DB, flip, over_white, psnr
 from scenelang.measure.scenes import interval, scenes_of

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.files import write_output, write_whole
-from scenelang.outputs import Floats, Output, Outputs, can_exr, exr
+from scenelang.outputs import Floats, Outputs, check_exr, exr, output_file
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -82,18 +82,6 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         return self.encode()
 
 
-def output_file(path: Path, name: Output) -> Path:
-    """Where an output of a picture goes: ``STEM.depth.png``, or into the picture if that is an EXR.
-
-    Raises:
-        ValueError: the picture is neither.
-    """
-    suffix = path.suffix.lower()
-    if suffix not in (".png", ".exr"):
-        raise ValueError(f"outputs go with .png or .exr pictures, not `{path.name}`")
-    return path if suffix == ".exr" else path.with_name(f"{path.stem}.{name}{path.suffix}")
-
-
 def packed(image: Image, outputs: Outputs, path: Path) -> dict[Path, bytes]:
     """What the files of a picture and of its outputs hold, the picture's first.
 
@@ -128,8 +116,7 @@ def image_format(path: str | os.PathLike[str]) -> str:
     """
     suffix = Path(path).suffix.lower()
     if suffix == ".exr":
-        if not can_exr():
-            raise ValueError("writing `.exr` needs OpenEXR: pip install 'scenelang[exr]'")
+        check_exr()
         return "EXR"
     from PIL import Image as pillow
 

@@ -9,6 +9,7 @@ Source: W3C, Portable Network Graphics (PNG) Specification, third edition, 2025,
 from __future__ import annotations
 
 import json
+import os
 import struct
 import tempfile
 import zlib
@@ -21,7 +22,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.diagnostics.suggest import listing
+from scenelang.diagnostics.suggest import listing, plural
+from scenelang.files import write_output, write_whole
 
 Output = Literal["depth", "normal", "object", "alpha", "proof"]
 PLANE: tuple[Output, ...] = ("object", "alpha")
@@ -144,7 +146,7 @@ class Outputs:
     def told(self, name: Output) -> str:
         """What to say about the file of an output."""
         if name != "depth":
-            seen = f"{len(self.objects or ())} objects seen"
+            seen = f"{plural(len(self.objects or ()), 'object')} seen"
             known = {"normal": "normals in world axes", "object": seen, "proof": "bounds of pixels"}
             return known.get(name, "coverage by objects")
         near, far = self.range()
@@ -177,6 +179,26 @@ class Outputs:
             raise ValueError("objects numbered beyond 65535, which only .exr holds")
         return png16(np.floor(values + 0.5).astype(np.uint16), json.dumps(facts))
 
+    def save(self, path: str | os.PathLike[str]) -> list[Path]:
+        """Write each output, to ``STEM.depth.png`` and so on, or all into an .exr; the files.
+
+        Args:
+            path: of the picture, ``STEM.png``, which is not written, or of the EXR.
+
+        Raises:
+            ValueError: a format that cannot hold them, or what writes it is not installed.
+            OSError: a file cannot be written.
+        """
+        path, facts = Path(path), [self.facts(name) for name in self.names]
+        files = [output_file(path, name) for name in self.names]
+        if path in files:
+            write_output(path, exr(self.layers(), facts))
+            return [path]
+        pictures = [self.png(name) for name in self.names]  # all, before any is written
+        for file, data in zip(files, pictures, strict=True):
+            write_whole(file, data)
+        return files
+
     def layers(self) -> dict[str, Floats]:
         """The channels of an EXR."""
         single = {"depth.Z": self.depth, "object.id": self.object, "alpha.A": self.alpha}
@@ -202,13 +224,27 @@ def png16(values: npt.NDArray[np.uint16], text: str) -> bytes:
     return SIGNATURE + body + chunk(b"IDAT", zlib.compress(filtered.tobytes())) + chunk(b"IEND", b"")
 
 
-def can_exr() -> bool:
-    """Whether what writes EXR is installed."""
-    return find_spec("OpenEXR") is not None
+def output_file(path: Path, name: Output) -> Path:
+    """Where an output of a picture goes: ``STEM.depth.png``, or into the picture if that is an EXR.
+
+    Raises:
+        ValueError: the picture is neither.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in (".png", ".exr"):
+        raise ValueError(f"outputs go with .png or .exr pictures, not `{path.name}`")
+    return path if suffix == ".exr" else path.with_name(f"{path.stem}.{name}{path.suffix}")
+
+
+def check_exr() -> None:
+    """Raise `ValueError` where what writes EXR is not installed."""
+    if find_spec("OpenEXR") is None:
+        raise ValueError("writing `.exr` needs OpenEXR: pip install 'scenelang[exr]'")
 
 
 def exr(layers: Mapping[str, Floats], facts: object = None) -> bytes:
-    """An EXR of float channels (H, W) by their names; needs the extra ``exr``."""
+    """An EXR of float channels (H, W) by their names; raises as `check_exr`."""
+    check_exr()
     import OpenEXR
 
     head = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}

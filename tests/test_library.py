@@ -132,3 +132,51 @@ def test_notebooks_show_mistakes_as_text(monkeypatch: pytest.MonkeyPatch) -> Non
     assert "too large" in huge["text/plain"]
     monkeypatch.setattr("scenelang.render", None)
     assert "text/plain" in notebook.bundle(STAR, SMALL, "Scene")
+
+
+def test_files_stand_for_what_is_in_them(tmp_path: Path) -> None:
+    file, program = tmp_path / "a.nsg", tmp_path / "a.safetensors"
+    file.write_text("canvas(24, 16);\nstar { scale(0.9); }\n")
+    scene = nsg.load(file)
+    nsg.compile(file).save(program)
+    assert nsg.load_program(program).digest() == nsg.compile(scene).digest()
+    for source in (str(file), file, program):
+        assert np.array_equal(nsg.render(source), nsg.render(scene))
+        alpha = nsg.render_outputs(source, ("alpha",)).alpha
+        assert np.array_equal(alpha, nsg.render_outputs(scene, ("alpha",)).alpha)
+    assert np.array_equal(nsg.render(file, backend="reference"), nsg.render(scene, backend="reference"))
+    assert nsg.render(file, size=(8, 9)).shape == (9, 8, 3)
+    assert nsg.render_outputs(file, ("object",)).objects == {
+        1: {"geometry": "star", "file": str(file), "line": 2, "column": 1}
+    }
+    assert np.array_equal(nsg.prove(file)[1].bound, nsg.prove(scene)[1].bound)
+
+
+def test_mistakes_of_a_file_that_is_drawn_have_their_places(tmp_path: Path) -> None:
+    file = tmp_path / "a.nsg"
+    file.write_text("square {}\nsubtract { square {} intersect { star {} pentagon {} } }\n")
+    with pytest.raises(nsg.SceneError, match=r"a.nsg:2:"):
+        nsg.render(file)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        nsg.compile,
+        nsg.render,
+        lambda x: nsg.render(x, backend="reference"),
+        lambda x: nsg.render_outputs(x, ("alpha",)),
+        nsg.prove,
+        lambda x: nsg.render_many(x, "never"),
+    ],
+)
+def test_what_is_neither_a_scene_nor_a_path(call: Callable[[Any], object]) -> None:
+    with pytest.raises(TypeError, match=r"^list where .* path"):
+        call([STAR])
+
+
+def test_a_scene_has_no_values_to_sweep(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="several Scenes are drawn by `animate`"):
+        nsg.render_many(STAR, tmp_path / "out")  # type: ignore[arg-type]
+    nsg.animate([STAR, STAR], tmp_path / "%d.png")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["0.png", "1.png"]

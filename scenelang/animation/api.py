@@ -143,7 +143,7 @@ def _opened(
     if isinstance(path, str | os.PathLike):
         folder = None if root is None else Path(root)
         return open_clip(path, defines=params, model=model, root=folder, size=size, fps=fps)
-    scenes = (path,) if isinstance(path, Scene) else tuple(path)
+    scenes = (path,) if isinstance(path, Scene) else tuple(path) if isinstance(path, Iterable) else ()
     if not scenes or not all(isinstance(scene, Scene) for scene in scenes):
         raise ValueError("neither a path nor Scenes to draw")
     if params is not None or root is not None:

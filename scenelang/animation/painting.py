@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, get_args
 
 from scenelang.animation.clip import Clip, Shot
 from scenelang.animation.store import frame_key
@@ -49,6 +49,13 @@ class Painter:
     outputs: tuple[Output, ...] = ()  # beside each picture
     single: bool = False  # draw each as it is drawn by itself: small ones by numpy
     load_s: float = 0.0  # what loading torch took
+
+    def __post_init__(self) -> None:
+        from scenelang.backend.options import Backend
+
+        if self.backend not in get_args(Backend):
+            known = " and ".join(f"`{name}`" for name in get_args(Backend))
+            raise ValueError(f"unknown backend `{self.backend}` of animations; there are {known}")
 
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
         """Compile a frame and say what its files depend on; raises as `Clip.program`, or `RenderError`.

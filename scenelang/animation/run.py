@@ -19,8 +19,9 @@ from scenelang.animation.video import find_codec, write_video
 from scenelang.animation.webp import write_webp
 from scenelang.backend.options import RenderError, usable_cores
 from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.suggest import plural
 from scenelang.files import output_place, write_whole
-from scenelang.image import output_file
+from scenelang.outputs import output_file
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
@@ -89,7 +90,7 @@ class RenderResult:
         each = 1000 / max(1, self.frames)
         asked = f" ({self.asked} asked for; more than frames or cores do not help)" if self.asked else ""
         return [
-            f"{self.drawn} pictures drawn by {self.jobs} process{'es' * (self.jobs > 1)}{asked}, "
+            f"{plural(self.drawn, 'picture')} drawn by {self.jobs} process{'es' * (self.jobs > 1)}{asked}, "
             f"{self.resumed} kept from a run before",
             f"a frame (ms): compile {self.compile_s * each:.1f}, draw {self.draw_s * each:.1f}, "
             f"encode {self.encode_s * each:.1f}",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, get_args
 
-from scenelang.backend.options import Backend, RenderError, keep_memory, threads_for
+from scenelang.backend.options import RenderError, Still, keep_memory, threads_for
 from scenelang.backend.render import exact_graph, given
 from scenelang.outputs import PLANE, Output, Outputs, Source
 from scenelang.scene.schema import Scene
@@ -16,20 +17,21 @@ if TYPE_CHECKING:
 
 
 def render_outputs(
-    program_or_scene: Program | Scene,
+    program_or_scene: Program | Scene | str | os.PathLike[str],
     outputs: Sequence[Output],
     *,
     size: tuple[int, int] | None = None,
-    backend: Backend = "neural",
+    backend: Still = "neural",
     threads: int | None = None,
 ) -> Outputs:
     """Depth, normals, objects and alpha of a picture, for compositing; numpy computes them.
 
     Args:
-        program_or_scene: what to look at.
+        program_or_scene: what to look at, or its file, as for `render`.
         outputs: which of ``"depth"``, ``"normal"``, ``"object"`` and ``"alpha"``; 2D has the last two.
         size: canvas in pixels instead of the Scene's.
-        backend: ``"neural"`` asks the trained network, ``"reference"`` of a Scene the exact definition.
+        backend: ``"neural"`` asks the trained network, ``"exact"`` formulas in its place, and ``"reference"``
+            of a Scene the exact definition.
         threads: of solids, by default as for `render`.
 
     Returns:
@@ -39,21 +41,24 @@ def render_outputs(
         SceneError: the Scene cannot be compiled.
         RenderError: the model or the scene has no such output, the weights are missing or others, or the
             reference was given a Program.
-        ValueError: an argument is none of the above.
+        ProgramError, OSError: as for `render`.
+        ValueError, TypeError: an argument is none of the above.
     """
     known = get_args(Output)[:-1]  # a proof is of a picture, and `scenelang.prove` has it
     for name in outputs:
         if name not in known:
             raise ValueError(f"unknown output `{name}`; there are {', '.join(known)}")
-    found = given(program_or_scene, size, backend)
+    found, spans = given(program_or_scene, size, backend)
     if isinstance(found, Scene):
-        return exact_outputs(found, outputs)
-    return neural_outputs(found, outputs, threads)
+        return exact_outputs(found, outputs, spans=spans)
+    return neural_outputs(found, outputs, threads, exact=backend == "exact")
 
 
-def neural_outputs(program: Program, wanted: Sequence[Output], threads: int | None = None) -> Outputs:
-    """Outputs of a Program by its network; raises as `render_outputs`."""
-    from scenelang.models.framed import load_arrays
+def neural_outputs(
+    program: Program, wanted: Sequence[Output], threads: int | None = None, *, exact: bool = False
+) -> Outputs:
+    """Outputs of a Program by its network, or by formulas in its place; raises as `render_outputs`."""
+    from scenelang.backend.closed import field_of
     from scenelang.models.manifest import load_manifest
     from scenelang.models.weights import ModelError
     from scenelang.program.program import ProgramError
@@ -64,9 +69,9 @@ def neural_outputs(program: Program, wanted: Sequence[Output], threads: int | No
         if load_manifest(program.model).renderer not in ("framed", "solid"):
             raise RenderError(f"model `{program.model}` draws colours only")
         keep_memory()
-        network, digest = load_arrays(program.model)
-        program.check_weights(digest)
-        found = program_outputs(network, program, threads=threads or threads_for(program.canvas))
+        found = program_outputs(
+            field_of(program, exact), program, threads=threads or threads_for(program.canvas)
+        )
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
     except (ModelError, ProgramError) as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def prove(
-    scene: Scene,
+    scene: Scene | str | os.PathLike[str],
     image: Image | None = None,
     *,
     redraw: bool = False,
@@ -27,7 +28,7 @@ def prove(
     """Draw a Scene of the plane, and prove how far each pixel is from the exact picture at most.
 
     Args:
-        scene: what to draw.
+        scene: what to draw, or the path of it, which is read as by `scenelang.load`.
         image: its picture, whoever drew it; by default it is drawn by the network, as `render` does.
         redraw: draw pixels again that are not proved right to 1/255. Then all are, but where an element may
             be seen, and where a sample lies on an outline to the last digits.
@@ -42,10 +43,14 @@ def prove(
             is of another size, or it cannot be drawn.
     """
     from scenelang.backend.render import render
+    from scenelang.diagnostics.diagnostic import Diagnostics
+    from scenelang.evaluate.evaluation import opened
     from scenelang.program.compile import compile_scene
 
     graphs: dict[str, Graph] = {}
-    program = compile_scene(scene if size is None else scene.sized(size), after=graphs.__setitem__)
+    found = Diagnostics()
+    scene, spans = opened(scene, found, size)
+    program = compile_scene(scene, spans=spans, diagnostics=found, after=graphs.__setitem__)
     *_, graph = graphs.values()
 
     def draw() -> Image:

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, Literal, NamedTuple
 
+from scenelang.backend.closed import field_of
 from scenelang.backend.load import load_of
 from scenelang.backend.options import Device, RenderError, Samples, keep_memory, threads_for
 from scenelang.elements.element import credit_of
-from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError
 from scenelang.program.program import Program, ProgramError
@@ -73,6 +73,7 @@ def draw_small(
     progress: Callable[[float], None] | None = None,
     threads: int | None = None,
     split: int | None = None,
+    exact: bool = False,
 ) -> Drawing:
     """Draw a Program by numpy, on one core, or solids, if they are large, on several.
 
@@ -81,14 +82,15 @@ def draw_small(
         samples: of a pixel, as in `scenelang.render`.
         kept: the picture before this one, of which tiles that show the same are taken over.
         threads, split: of solids, as for `scenelang.backend.neural.draw_program`.
+        exact: ask formulas in place of the network.
 
     Raises:
-        RenderError: its model's weights are missing, or it was compiled for others or by no compiler.
+        RenderError: its model's weights are missing, it was compiled for others or by no compiler, or there
+            are no formulas for it.
     """
     keep_memory()
     try:
-        network, digest = load_arrays(program.model)
-        program.check_weights(digest)
+        network = field_of(program, exact)
         if program.stage is None:
             threads = split = 1
         drawing = draw_objects(

@@ -22,7 +22,7 @@ from scenelang.cli.say import say_diagnostics
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.diagnostics.suggest import listing
+from scenelang.diagnostics.suggest import listing, plural
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
@@ -105,7 +105,8 @@ def frames_of(clip: Clip, wanted: Requested) -> range | None:
         return wanted.frames.among(clip.animation.frames)
     except FramesError as error:
         animation = clip.animation
-        help = f"{animation.seconds:g} s at {animation.fps:g} frames a second are {animation.frames} frames"
+        count = plural(animation.frames, "frame")
+        help = f"{animation.seconds:g} s at {animation.fps:g} frames a second make {count}"
         clip.diagnostics.add("E0337", str(error), None, help=help)
         return None
 
@@ -190,7 +191,7 @@ def summary(made: RenderResult, seconds: float) -> str:
     first, last = made.files[0], made.files[-1]
     name = f"{first} … {last.name}" if len(made.files) > 1 else str(first)
     size = decimal(sum(file.stat().st_size for file in made.files))
-    parts = [f"{made.frames} frame{'s' * (made.frames != 1)}", size]
+    parts = [plural(made.frames, "frame"), size]
     if made.resumed:
         parts.append(f"{made.resumed} kept from a run before")
     if same := made.frames - made.drawn - made.resumed:
@@ -206,4 +207,5 @@ def strays(target: Target, made: RenderResult) -> str | None:
     others -= {file.name for file in made.files}
     if not others:
         return None
-    return f"`{target.path}` also holds {len(others)} such files of another run, `{min(others)}` among them"
+    count, among = plural(len(others), "such file"), " among them" if len(others) > 1 else ""
+    return f"`{target.path}` also holds {count} of another run, `{min(others)}`{among}"

@@ -13,9 +13,10 @@ from scenelang.cli.jobs import Job, program_notes
 from scenelang.cli.progress import Clock
 from scenelang.cli.say import say_trouble
 from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.suggest import plural
 
 if TYPE_CHECKING:
-    from scenelang.backend.options import Device, Samples
+    from scenelang.backend.options import Device, Samples, Still
     from scenelang.image import Image
     from scenelang.measure.choose import Choice
     from scenelang.measure.frontier import Frontier, Limits, Point
@@ -26,19 +27,25 @@ if TYPE_CHECKING:
 Draw = Callable[[Job, Callable[[float], None]], "Image"]
 
 
-def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) -> Draw:
-    """Draw with trained networks."""
+def neural(
+    clock: Clock, device: Device, threads: int | None, samples: Samples, *, exactly: bool = False
+) -> Draw:
+    """Draw with trained networks, or with formulas in their place."""
     from scenelang.backend.options import threads_for
     from scenelang.backend.small import choose_drawer, draw_small
 
     def draw(job: Job, progress: Callable[[float], None]) -> Image:
         assert job.program is not None
         library, why = choose_drawer(job.program, device, samples)
+        if exactly:
+            library, why = "numpy", "formulas in the network's place"
         if library == "numpy":
             cores = threads or threads_for(job.program.canvas) if job.program.stage else 1
             place = "one core" if cores == 1 else f"{cores} cores"
             with clock("draw"):
-                drawing = draw_small(job.program, samples=samples, progress=progress, threads=threads)
+                drawing = draw_small(
+                    job.program, samples=samples, progress=progress, threads=threads, exact=exactly
+                )
         else:
             with clock("load torch"):
                 from scenelang.backend.neural import choose_device, draw_program, open_model
@@ -52,8 +59,8 @@ def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) 
         job.notes.append(f"drawn by {library} on {place}: {why}")
         width, height = job.program.canvas
         once = width * height - drawing.refined
-        job.notes.append(f"drew {once:,} pixels by one sample and {drawing.refined:,} by four")
-        job.notes.append(f"{drawing.pairs:,} meetings of a sample and an object")
+        job.notes.append(f"drew {plural(once, 'pixel')} by one sample and {drawing.refined:,} by four")
+        job.notes.append(f"{plural(drawing.pairs, 'meeting')} of a sample and an object")
         return drawing.image
 
     return draw
@@ -67,7 +74,9 @@ def exact(request: Request, clock: Clock) -> Draw:
         assert job.source is not None
         assert job.source.scene is not None
         with clock("draw"):
-            image = draw_exact(job.source.scene, spans=job.source.spans, model=request.model)
+            image = draw_exact(
+                job.source.scene, spans=job.source.spans, model=request.model, progress=progress
+            )
         job.notes.append("drew the exact picture, four samples a pixel")
         return image
 
@@ -82,18 +91,18 @@ def is_blank(job: Job, image: Image) -> bool:
 
 
 def job_outputs(
-    job: Job, wanted: tuple[Output, ...], model: str | None, threads: int | None, *, exactly: bool
+    job: Job, wanted: tuple[Output, ...], model: str | None, threads: int | None, backend: Still
 ) -> Outputs:
-    """What is known beside the picture, of the network or exactly, its proof aside."""
+    """What is known beside the picture by what draws it, its proof aside."""
     from scenelang.backend.outputs import exact_outputs, neural_outputs
     from scenelang.outputs import Outputs
 
     wanted = tuple([name for name in wanted if name != "proof"])
     if not wanted:
         return Outputs()
-    if not exactly:
+    if backend != "reference":
         assert job.program is not None
-        return neural_outputs(job.program, wanted, threads)
+        return neural_outputs(job.program, wanted, threads, exact=backend == "exact")
     assert job.source is not None
     assert job.source.scene is not None
     return exact_outputs(job.source.scene, wanted, spans=job.source.spans, model=model)
@@ -101,8 +110,8 @@ def job_outputs(
 
 def check_proof(limits: Limits, backend: str) -> None:
     """Raise `click.UsageError` where a proof is asked for with what it does not go with."""
-    if limits or backend == "reference":
-        other = "--max-ms and --max-flip" if limits else "--backend reference, whose pictures are exact"
+    if limits or backend != "neural":
+        other = "--max-ms and --max-flip" if limits else f"--backend {backend}, whose pictures are exact"
         raise click.UsageError(f"A proof is of what the scene's model draws; leave out {other}.")
 
 

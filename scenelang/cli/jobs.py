@@ -18,6 +18,7 @@ from scenelang.cli.say import say_diagnostics, say_trouble
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
+from scenelang.diagnostics.suggest import plural
 from scenelang.graph.nodes import Graph, Leaf, nodes
 from scenelang.models.choose import why_chosen
 from scenelang.passes import PASSES
@@ -212,6 +213,6 @@ def _pass_notes(graphs: dict[str, Graph]) -> Iterator[str]:
         objects = sum(isinstance(node, Leaf) for node in found)
         counts = (objects, len(found) - objects, sum(len(node.moves) for node in found))
         if counts != before:
-            told = f"{counts[0]} objects, {counts[1]} folds, {counts[2]} moves"
+            told = ", ".join(map(plural, counts, ("object", "fold", "move")))
             yield f"{name if before else 'as written'}: {told}"
         before = counts

@@ -42,6 +42,13 @@ COMMANDS: Final = {
     "train": "Train a model's weights.",
     "lab": "Measure models and compare designs: the laboratory.",
 }
+GROUPS: Final = {
+    "Draw": "render sweep play export watch",
+    "Write": "check fmt explain convert import learn fit",
+    "Measure": "compare explain-plan models",
+    "Develop": "compile graph schema lsp lab",
+}
+"""Commands as `--help` lists them; those for the development of scenelang itself it leaves out."""
 ELSEWHERE: Final = {"sweep": "scenelang.cli.sweep", "lab": "scenelang.lab.commands"}
 """Commands whose modules do not lie among the others; nothing else here knows of the laboratory."""
 MOVED: Final = {name: f"lab {name}" for name in ("eval", "frontier", "stability", "experiment", "chart")}
@@ -64,10 +71,12 @@ class Commands(click.Group):
         table: Mapping[str, str],  # command -> what `--help` says
         elsewhere: Mapping[str, str] = MappingProxyType({}),  # modules of commands that do not lie there
         moved: Mapping[str, str] = MappingProxyType({}),  # what commands of before are called now
+        groups: Mapping[str, str] = MappingProxyType({}),  # those that `--help` lists, by headings
         **options: Any,
     ) -> None:
         super().__init__(**options)
         self.package, self.table, self.elsewhere, self.moved = package, table, elsewhere, moved
+        self.groups = groups or {"Commands": " ".join(table)}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.table)
@@ -81,8 +90,10 @@ class Commands(click.Group):
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(self.table.items()))
+        widest = max(map(len, self.table))  # so that all groups have their words in one column
+        for title, names in self.groups.items():
+            with formatter.section(title):
+                formatter.write_dl([(name.ljust(widest), self.table[name]) for name in names.split()])
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -149,11 +160,12 @@ def describe(error: OSError) -> str:
     table=COMMANDS,
     elsewhere=ELSEWHERE,
     moved=MOVED,
+    groups=GROUPS,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(package_name="scenelang", message="%(prog)s %(version)s")
 def cli() -> None:
-    """Render 2D scenes, written as text, with a trained neural network.
+    """Draw 2D and 3D scenes, written as text, with trained neural networks.
 
     Try: scenelang render examples/chain.nsg -o chain.png
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,8 +15,31 @@ if TYPE_CHECKING:
     from scenelang.evaluate.session import Defines
 
 Backend = Literal["neural", "reference"]
+Still = Literal["neural", "exact", "reference"]
 Device = Literal["auto", "cpu", "cuda"]
 Color = Literal["auto", "always", "never"]
+
+
+class Sectioned(click.Command):
+    """A command whose help shows its options under headings.
+
+    Args:
+        sections: options by headings; the others come first.
+    """
+
+    def __init__(self, *arguments: Any, sections: Mapping[str, str], **given: Any) -> None:
+        super().__init__(*arguments, **given)
+        self.sections = sections
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        heading = {name: title for title, names in self.sections.items() for name in names.split()}
+        found: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Options", *self.sections)}
+        for param in self.get_params(ctx):
+            if isinstance(param, click.Option) and (record := param.get_help_record(ctx)) is not None:
+                found[heading.get(max(param.opts, key=len), "Options")].append(record)
+        for title, records in found.items():
+            with formatter.section(title):
+                formatter.write_dl(records)
 
 
 def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
@@ -53,7 +76,7 @@ def _originals(ctx: click.Context, param: click.Parameter, value: str | None) ->
         os.environ["SCENELANG_ORIGINALS"] = value
 
 
-def choice(*names: str, words: str, help: str | None = None) -> Callable[..., Any]:
+def choice(*names: str, words: str, help: str) -> Callable[..., Any]:
     """An option that takes one of some words, the first of them by default."""
     known = words.split()
     return click.option(*names, type=click.Choice(known), default=known[0], show_default=True, help=help)
@@ -92,18 +115,21 @@ frame = click.option(
 frames = click.option(
     "--frames",
     metavar="A..B",
-    help="Frames of an animation, where OUT is one: 0..23, 0..<24, 12.. to the end, or 7.",
+    help="Frames of an animation to draw: 0..23, 0..<24, 12.. to the end, or 7.",
 )
 still = click.option(
-    "--frame", type=click.IntRange(0), metavar="N", help="One frame of an animation, from 0, as a picture."
+    "--frame",
+    type=click.IntRange(0),
+    metavar="N",
+    help="Draw one frame of an animation, from 0, as a picture.",
 )
 fps = click.option(
     "--fps",
     type=Real(0, 1000, min_open=True),
     metavar="N",
-    help="Frames a second instead of the scene's; its seconds stay.",
+    help="Frames a second instead of the scene's; the length in seconds stays.",
 )
-out = click.option("-o", "--out", metavar="OUT", help="A file instead of standard output.")
+out = click.option("-o", "--out", metavar="OUT", help="File to write instead of standard output.")
 color = choice(
     "--color",
     words="auto always never",
@@ -119,14 +145,15 @@ originals = click.option(
     metavar="FOLDER",
     expose_value=False,
     callback=_originals,
-    help="Where the exact picture finds the files that elements were made from; by default beside these.",
+    help="Folder with the files that elements were made from, which exact pictures need; by "
+    "default that of the elements.",
 )
 device = choice(
     "--device",
     words="auto cpu cuda",
-    help="Where torch draws; auto is CUDA where there is any, and numpy for solids or a small picture.",
+    help="Device of torch; auto is CUDA where there is any, and numpy for solids or a small picture.",
 )
-threads = click.option("--threads", type=click.IntRange(1), metavar="N", help="Threads on the CPU.")
+threads = click.option("--threads", type=click.IntRange(1), metavar="N", help="Number of threads on the CPU.")
 jobs = click.option(
     "--jobs",
     type=click.IntRange(1, 256),
@@ -136,7 +163,7 @@ jobs = click.option(
 cluster = click.option(
     "--cluster",
     metavar="ADDRESS",
-    help="Have the work done by workers of a dask scheduler, or of this machine alone (local).",
+    help="Address of a dask scheduler whose workers do the work, or local for workers on this machine.",
 )
 verbose = click.option("-v", "--verbose", is_flag=True, help="Say what was compiled and where the time went.")
 

@@ -73,7 +73,7 @@ def _picture_format(path: Path) -> None:
 
 def check_outputs(paths: Sequence[Path], wanted: Sequence[Output]) -> None:
     """Raise `click.UsageError` where outputs of pictures have no place, or a link is in it."""
-    from scenelang.image import output_file
+    from scenelang.outputs import output_file
 
     try:
         for path in paths:

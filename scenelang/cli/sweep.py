@@ -13,6 +13,7 @@ from scenelang.cli import options
 from scenelang.cli.main import Trouble
 from scenelang.cli.progress import Bar
 from scenelang.cli.say import say_diagnostics
+from scenelang.diagnostics.suggest import plural
 
 if TYPE_CHECKING:
     from scenelang.evaluate.session import Defines
@@ -41,7 +42,9 @@ def _random(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) 
 
 @click.command("sweep")
 @click.argument("scene", metavar="SCENE", type=click.Path(path_type=Path))
-@click.option("-o", "--out", required=True, metavar="OUT", help="A folder, or pictures such as out/%05d.png.")
+@click.option(
+    "-o", "--out", required=True, metavar="OUT", help="Folder to write to, or pictures such as out/%05d.png."
+)
 @click.option(
     "--grid",
     multiple=True,
@@ -55,19 +58,28 @@ def _random(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) 
     multiple=True,
     metavar="NAME,…",
     callback=_random,
-    help="Draw these from their ranges; NAME=A..B from another.",
+    help="Params to draw at random from their ranges, or NAME=A..B from another range.",
 )
-@click.option("--count", type=click.IntRange(1), metavar="N", help="Pictures; by default the grid once.")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of what is drawn.")
+@click.option(
+    "--count", type=click.IntRange(1), metavar="N", help="Number of pictures; by default the grid once."
+)
+@click.option(
+    "--seed",
+    default=0,
+    show_default=True,
+    type=click.IntRange(0),
+    metavar="N",
+    help="Seed of the random values.",
+)
 @click.option(
     "--output",
     "outputs",
     multiple=True,
     type=click.Choice(BESIDE),
-    help="Write this beside each picture too; may be given several times.",
+    help="Output to write beside each picture; may be given several times.",
 )
-@click.option("--sheet", metavar="FILE", help="A picture of all pictures, small.")
-@click.option("--table", metavar="FILE", help="A copy of the table, .csv or .parquet.")
+@click.option("--sheet", metavar="FILE", help="Write a picture of all pictures, small.")
+@click.option("--table", metavar="FILE", help="Write a copy of the table, .csv or .parquet.")
 @options.define
 @options.size
 @options.frame
@@ -144,9 +156,9 @@ def _say(sweep: Sweep, seconds: float) -> None:
         click.echo(f"row {number}: {', '.join(f'{name}={value}' for name, value in values)}", err=True)
         say_diagnostics(errors)
     made = sweep.made
-    parts = [f"{len(sweep.lines) - sweep.errors:,} pictures"]
+    parts = [plural(len(sweep.lines) - sweep.errors, "picture")]
     if sweep.errors:
-        parts.append(f"{sweep.errors:,} rows whose values give no scene")
+        parts.append(f"{plural(sweep.errors, 'row')} whose values give no scene")
     if made.resumed:
         parts.append(f"{made.resumed:,} kept from a run before")
     if same := made.frames - sweep.errors - made.drawn - made.resumed:

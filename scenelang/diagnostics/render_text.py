@@ -12,6 +12,7 @@ from scenelang.diagnostics.cells import LONGEST, Canvas, in_cells, left_out, pai
 from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix
 from scenelang.diagnostics.snippet import Mark, draw
 from scenelang.diagnostics.span import SourceFile
+from scenelang.diagnostics.suggest import plural
 
 WIDTH = 140
 """Cells of a line where no terminal says otherwise."""
@@ -64,11 +65,6 @@ def render_text(
             fixable = sum(d.fix is not None for d in found)
         blocks.append(_count(found, fixer, fixable, color))
     return "\n\n".join(blocks) + "\n"
-
-
-def plural(count: int, noun: str) -> str:
-    """`1 error`, `2 errors`."""
-    return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
 
 
 def _count(found: Sequence[Diagnostic], fixer: str, fixable: int, color: bool) -> str:

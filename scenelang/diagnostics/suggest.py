@@ -1,4 +1,4 @@
-"""Did you mean: the known names nearest to a misspelt one, and words of other languages."""
+"""Did you mean: the known names nearest to a misspelt one, words of other languages, lists, plurals."""
 
 from __future__ import annotations
 
@@ -156,3 +156,8 @@ def listing(known: Iterable[str], limit: int = 12) -> str:
     names = nsmallest(limit + 1, known)
     shown = ", ".join(names[:limit])
     return shown + (", …" if len(names) > limit else "")
+
+
+def plural(count: int, noun: str) -> str:
+    """`1 error`, `2 errors`."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"

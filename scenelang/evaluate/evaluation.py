@@ -303,6 +303,24 @@ def loads(
     return _sound(scene, found, size)
 
 
+def opened(
+    given: Scene | str | os.PathLike[str], diagnostics: Diagnostics, size: tuple[int, int] | None = None
+) -> tuple[Scene, SpanMap | None]:
+    """A Scene as it is, or that of a file, and where its nodes were written.
+
+    Raises:
+        SceneError: the file has errors.
+        TypeError: neither a Scene nor a path.
+        ValueError, OSError: as `load`.
+    """
+    if isinstance(given, Scene):
+        return _sound(given, diagnostics, size), None
+    if not isinstance(given, str | os.PathLike):
+        raise TypeError(f"{type(given).__name__} where a Scene or the path of one is needed")
+    scene, spans = load_scene(given, diagnostics=diagnostics)
+    return _sound(scene, diagnostics, size), spans
+
+
 def _sound(scene: Scene | None, found: Diagnostics, size: tuple[int, int] | None) -> Scene:
     if scene is None:
         raise SceneError(found)

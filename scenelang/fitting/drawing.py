@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from scenelang.diagnostics.suggest import plural
 from scenelang.elements.groups import Painted
 from scenelang.fitting.mesh import FitError, needed
 from scenelang.fitting.outline import Layer, Outline, traced, winding
@@ -44,7 +45,7 @@ def drawn(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
     except Exception as error:
         raise FitError(f"damaged or not a drawing: {str(error) or type(error).__name__}"[:200]) from error
     strokes = sum(layer.inside is None for layer in layers)
-    counts = f"{len(layers) - strokes:,} areas, {strokes:,} strokes"
+    counts = f"{plural(len(layers) - strokes, 'area')}, {plural(strokes, 'stroke')}"
     return layers, (counts, *(f"{name} left out" for name in sorted(others)), *notes)
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
+from scenelang.diagnostics.suggest import plural
 from scenelang.elements.element import TEXELS, Element
 from scenelang.elements.zoo import is_said, zoo_bytes
 from scenelang.fitting import drawing, parts, picture, solids
@@ -164,7 +165,7 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
     if (thin := float(element.about["thin"])) > THIN:
         short += f", {100 * thin:.0f} % of the surface too thin for the grid"
     shown = f"{element.sides[-1]} distances a side, {len(element.data):,} bytes, error {off:.5f}{short}"
-    job.say(f"{name}: {shown}; {len(tried)} grids tried")
+    job.say(f"{name}: {shown}; {plural(len(tried), 'grid')} tried")
     return element
 
 
@@ -197,5 +198,5 @@ def _texture(data: bytes, name: str, job: _Job) -> Element:
     )
     height, width = element.sizes
     shown = f"{width} × {height} texels, {len(element.data):,} bytes, error {element.about['error']:.4f}"
-    job.say(f"{name}: {shown}; {len(tried)} forms tried")
+    job.say(f"{name}: {shown}; {plural(len(tried), 'form')} tried")
     return element

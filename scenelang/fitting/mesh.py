@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.diagnostics.suggest import plural
 from scenelang.fitting.looks import Look
 
 Points = npt.NDArray[np.float64]  # (M, 3)
@@ -204,11 +205,11 @@ def mesh_of(
     if not sound.any():
         raise FitError("all of its triangles are flat")
     if not sound.all():
-        notes.append(f"{(~sound).sum():,} flat triangles left out")
+        notes.append(f"{plural((~sound).sum(), 'flat triangle')} left out")
         mesh.update_faces(sound)
         look = look and look.of(sound)
     if not (once := _once(mesh.faces)).all():  # many at one place would all be asked, for each point
-        notes.append(f"{(~once).sum():,} triangles that are there twice left out")
+        notes.append(f"{plural((~once).sum(), 'repeated triangle')} left out")
         mesh.update_faces(once)
         look = look and look.of(once)
     closed = bool(mesh.is_watertight and mesh.is_winding_consistent)
@@ -221,7 +222,7 @@ def mesh_of(
         look = look and replace(look, tint=look.tint[:, ::-1], uv=look.uv[:, ::-1])
     told = "normals" if by_normals else "winding numbers"
     kind = "closed" if closed else "not closed, filled where the winding number is over a half"
-    notes = [f"{len(mesh.faces):,} triangles", kind, *notes, f"inside by {told}"]
+    notes = [plural(len(mesh.faces), "triangle"), kind, *notes, f"inside by {told}"]
     return Mesh(
         np.ascontiguousarray(mesh.vertices, float),
         np.ascontiguousarray(mesh.faces, np.int64),

@@ -15,6 +15,7 @@ from scenelang.fitting.making import MOST_OF
 from scenelang.fitting.mesh import FitError
 from scenelang.fitting.parts import shape_in
 from scenelang.graph.nodes import Graph, leaves
+from scenelang.scene import library
 from scenelang.scene.schema import Scene
 
 FOLDER: Final = "SCENELANG_ORIGINALS"
@@ -46,7 +47,11 @@ def _original(name: str, element: Element, folder: str | Path | None) -> Shape:
     path = Path(folder, file)
     made = f"`{name}` was made from `{file}`"
     if path.name != file or path.suffix.lower() not in MOST_OF or not path.is_file():
-        raise FitError(f"{made}, which is not in `{folder}`")
+        ships = library.owns(Path(folder, file).resolve())
+        means = ", which `python docs/make_meshes.py` of the repository makes" if ships else ""
+        raise FitError(
+            f"{made}, which is not in `{folder}`; `--originals FOLDER` ({FOLDER}) says where it is{means}"
+        )
     version = path.stat().st_mtime_ns, path.stat().st_size
     part = int(element.about.get("part", 0))
     shape = _shape(path, digest, element.about.get("sign") == "closed", part, *version)

@@ -81,6 +81,11 @@ class Link(Record):
     node: Node
     k: float = BLEND
 
+    @property
+    def width(self) -> float:
+        """The width of the blend; 0 for a sharp edge."""
+        return self.k if self.op == "smooth" else 0.0
+
 
 class Fold(Record):
     """Children folded from the left. Without links it is the empty set: distance +infinity.

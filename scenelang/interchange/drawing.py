@@ -5,6 +5,7 @@ Large ones are cut: nodes nearest the top come first, and a box says how many mo
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -90,14 +91,19 @@ def _children(node: schema.Group | schema.Boolean | schema.Chain) -> Iterable[tu
 
 
 def _scene_box(node: schema.SceneNode, inner: schema.Material | None, space: Space) -> Box:
-    steps = [transform(t).rstrip(";") for t in node.transforms]
-    own = [] if node.material is None else [material(node.material).rstrip(";")]
+    steps = [_rounded(transform(t)) for t in node.transforms]
+    own = [] if node.material is None else [_rounded(material(node.material))]
     if isinstance(node, schema.Object):
         ops = () if inner is None else map(space.inked, inner.ops)
         fill = None if inner is None else hex_text(space.written(coloured(colour_steps(ops))))
         return Box((node.geometry, *_short([*own, *steps])), fill, leaf=True)
     name = node.op if isinstance(node, schema.Boolean) else node.kind
     return Box((name, *_short([*own, *steps])))
+
+
+def _rounded(statement: str) -> str:
+    """A statement as a box shows it, its numbers to five digits."""
+    return re.sub(r"\d+\.\d{5,}(e-?\d+)?", lambda found: f"{float(found[0]):.5g}", statement.rstrip(";"))
 
 
 def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:

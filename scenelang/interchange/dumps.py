@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.suggest import plural
 from scenelang.elements.element import Element
 from scenelang.graph.looks import Look
 from scenelang.graph.nodes import BLEND, Fold, Graph, Leaf, Link, Move, Node
@@ -285,7 +286,7 @@ def changes(before: str, after: str, old: str, new: str) -> str:
     edit = difference(a, b)
     gone, come = edit.old_end - edit.start, edit.new_end - edit.start
     if max(gone, come) > 3000:
-        counts = f"{gone:,} lines became {come:,}"
+        counts = f"{plural(gone, 'line')} became {come:,}"
         return f"--- {old}\n+++ {new}\n@@ from line {edit.start + 1:,}: {counts} @@\n"
     lines = difflib.unified_diff(a, b, old, new, lineterm="")
     return "\n".join(lines) + "\n"

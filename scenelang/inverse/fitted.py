@@ -82,12 +82,12 @@ class Fit:
     def told(self) -> list[str]:
         """The report, line by line."""
         felt = {one.label: one.felt for one in self.numbers}
-        lines = [f"picture {self.psnr:.1f} dB from the target, {self.start_psnr:.1f} dB before"]
+        lines = [f"PSNR to the target {self.psnr:.1f} dB, before {self.start_psnr:.1f} dB (more is nearer)"]
         if self.blur.sigma:
             seen = "out of focus" if self.blur.light else "blurred, in sRGB"
             lines.append(
-                f"the target is {seen}: after a blur of {self.blur.sigma:.2f} pixels the picture is "
-                f"{self.blurred_psnr:.1f} dB from it"
+                f"the target is {seen}: after a blur of {self.blur.sigma:.2f} pixels the PSNR is "
+                f"{self.blurred_psnr:.1f} dB"
             )
         for name, text in self.values.items():
             shares = [share for label, share in felt.items() if label.partition(".")[0] == name]

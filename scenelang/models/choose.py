@@ -56,8 +56,8 @@ def _size(model: Manifest) -> tuple[int, int, int, float, str]:
 
 
 def lacking(model: Manifest, used: Iterable[Use]) -> list[str]:
-    """Those of the names that a scene uses which a model does not know, in the order of the scene."""
-    return [shown(use) for use in used if use[0] not in getattr(model, use[1])]
+    """Names that a scene uses and a model does not know, once each, in the order of the scene."""
+    return list(dict.fromkeys(shown(use) for use in used if use[0] not in getattr(model, use[1])))
 
 
 def apart(scene: Scene, models: Sequence[Manifest]) -> tuple[Use, Use] | None:

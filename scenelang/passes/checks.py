@@ -136,7 +136,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
             _, value, leaf = max(found, key=itemgetter(0))
             more = len({id(leaf) for *_, leaf in found}) - 1
             said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
-            others = f", as {more:,} more are" if more else ""
+            others = f", as {more:,} more {'are' if more > 1 else 'is'}" if more else ""
             _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf)
     widths = [(link.k, link.node) for link in graph.root.links if link.op == "smooth"]
     k, blended = max(widths, key=itemgetter(0), default=(0.0, None))

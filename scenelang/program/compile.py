@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def compile_scene(
-    scene: Scene,
+    scene: Scene | str | os.PathLike[str],
     *,
     spans: Spans | None = None,
     diagnostics: Diagnostics | None = None,
@@ -34,8 +35,8 @@ def compile_scene(
     """Compile a scene for a model.
 
     Args:
-        scene: a concrete scene.
-        spans: where its nodes were written, for diagnostics and the source map.
+        scene: a concrete scene, or the path of one, which is read as by `scenelang.load`.
+        spans: where its nodes were written, for diagnostics and the source map; those of a file are known.
         diagnostics: collects errors and warnings.
         model: draw with this model instead of the one the scene names.
         codes: lift with these instead of the model's shipped ones, for weights under trial.
@@ -50,8 +51,14 @@ def compile_scene(
     Raises:
         SceneError: the scene cannot be compiled; it carries all diagnostics.
         FileNotFoundError: the model has no weights.
+        OSError: the file cannot be opened.
+        TypeError: neither a Scene nor a path.
     """
     found = diagnostics if diagnostics is not None else Diagnostics()
+    if not isinstance(scene, Scene):
+        from scenelang.evaluate.evaluation import opened
+
+        scene, spans = opened(scene, found)
     manifest = find_model(scene, found, model=model, spans=spans)
     if manifest is not None:
         graph = check_scene(scene, spans, found, manifest, after, without, memory)

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.diagnostics.suggest import plural
 from scenelang.elements.element import Element
 from scenelang.elements.zoo import entry_of
 from scenelang.files import write_output
@@ -118,7 +119,7 @@ class Program:
         return len(self.objects)
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        said = f"Program of {len(self):,} object{'s' * (len(self) != 1)} for `{self.model}`"
+        said = f"Program of {plural(len(self), 'object')} for `{self.model}`"
         return bundle(self, self.canvas, said)
 
     def digest(self) -> str:

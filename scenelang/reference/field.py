@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import reduce
+from functools import lru_cache, reduce
 from operator import add, mul
 from typing import Any
 
@@ -168,19 +168,26 @@ def carry_back(steps: Sequence[Step], p: Array) -> Array:
     """World points (d, M) to leaf coordinates: from the last step to the first."""
     for step in reversed(steps):
         if isinstance(step, Affine):
-            inverse = np.linalg.inv(linear := _linear(step, len(p)))
-            shift = -inverse @ np.reshape(step.rows, (3, 4))[: len(linear), 3]
-            p = map_back(np.column_stack([inverse, shift]), p)
+            p = map_back(frame_back(step, len(p)), p)
         elif isinstance(step, Warp):
             p = warp_back(step.twirl, step.bend, p)
     return p
+
+
+@lru_cache(maxsize=1 << 12)
+def frame_back(step: Affine, dimension: int) -> Floats:
+    """The inverse of an affine map, as d rows of d factors and a shift."""
+    inverse = np.linalg.inv(_linear(step, dimension))
+    shift = -inverse @ np.reshape(step.rows, (3, 4))[:dimension, 3]
+    return np.column_stack([inverse, shift])
 
 
 def _linear(step: Affine, dimension: int) -> Floats:
     return np.reshape(step.rows, (3, 4))[:dimension, :dimension]
 
 
-def distance_scale(steps: Sequence[Step], dimension: int = 2) -> float:
+@lru_cache(maxsize=1 << 12)
+def distance_scale(steps: tuple[Step, ...], dimension: int = 2) -> float:
     """The smallest singular value of the linear part of the affine steps composed in order."""
     linear = np.eye(dimension)
     for step in steps:

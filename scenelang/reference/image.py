@@ -6,24 +6,32 @@ compiler too. No renderer imports it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from scenelang.graph.nodes import Graph, leaves
 from scenelang.image import Image, from_samples
 from scenelang.reference.field import Brought, evaluate
+from scenelang.reference.near import parts
 from scenelang.reference.samples import sample_points
 from scenelang.reference.solid.image import solid_image
 
-TILE = 1 << 18  # samples at a time
 
-
-def reference_image(graph: Graph, *, per_side: int = 2, brought: Brought | None = None) -> Image:
+def reference_image(
+    graph: Graph,
+    *,
+    per_side: int = 2,
+    brought: Brought | None = None,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Image:
     """Draw the exact picture of a lowered graph.
 
     Args:
         graph: from `lower`; passes keep its picture.
         per_side: samples along each side of a pixel; 2 is the definition (4 spp).
         brought: shapes of elements.
+        progress: called with the share done, in [0, 1].
 
     Returns:
         (H, W, 3), or (H, W, 4) with straight alpha where the background is none.
@@ -33,18 +41,22 @@ def reference_image(graph: Graph, *, per_side: int = 2, brought: Brought | None 
     """
     check_shapes(graph, brought)
     if graph.stage is not None:
-        return solid_image(graph.root, graph.stage, graph.canvas, per_side=per_side, brought=brought)
+        return solid_image(
+            graph.root, graph.stage, graph.canvas, per_side=per_side, brought=brought, progress=progress
+        )
     width, height = graph.canvas
-    step = max(1, TILE // (width * per_side * per_side))
     colour = np.empty((height, width, 3))
     alpha = np.empty((height, width))
-    for top in range(0, height, step):
-        rows = range(top, min(top + step, height))
-        d, c = evaluate(graph.root, sample_points(graph.canvas, rows, per_side), brought=brought)
-        inside = (d < 0).reshape(len(rows), per_side, width, per_side)
+    done = 0
+    for node, rows, columns in parts(graph.root, graph.canvas, brought):
+        d, c = evaluate(node, sample_points(graph.canvas, rows, per_side, columns), brought=brought)
+        inside = (d < 0).reshape(len(rows), per_side, len(columns), per_side)
         shown = np.where(inside[..., None], c.reshape(*inside.shape, 3), 0.0)
-        colour[top : rows.stop] = shown.mean((1, 3))
-        alpha[top : rows.stop] = inside.mean((1, 3))
+        part = slice(rows.start, rows.stop), slice(columns.start, columns.stop)
+        colour[part] = shown.mean((1, 3))
+        alpha[part] = inside.mean((1, 3))
+        done += len(rows) * len(columns)
+        progress(done / (width * height))
     if graph.background is None:
         return from_samples(colour, alpha)
     return from_samples(colour + (1 - alpha)[..., None] * np.asarray(graph.background), None)

@@ -8,11 +8,11 @@ from scenelang.graph.nodes import Graph
 from scenelang.graph.stage import EXTINCTION, Stage
 from scenelang.outputs import DEEP, Outputs
 from scenelang.reference.field import Array, Brought, evaluate
-from scenelang.reference.image import TILE, check_shapes
+from scenelang.reference.image import check_shapes
+from scenelang.reference.near import parts
 from scenelang.reference.samples import sample_points
 from scenelang.reference.solid.field import OPAQUE, Field
-from scenelang.reference.solid.image import TILE as SOLID_TILE
-from scenelang.reference.solid.image import facing, seen_along, ways
+from scenelang.reference.solid.image import TILE, facing, seen_along, ways
 
 
 def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
@@ -26,29 +26,27 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
     """
     check_shapes(graph, brought)
     width, height = graph.canvas
-    solid = graph.stage is not None
     found = np.zeros((6, height, width))  # depth, normal, object and alpha
-    step = max(1, (SOLID_TILE if solid else TILE) // (4 * width))
-    field = Field(graph.root, brought) if solid else None
+    if graph.stage is None:
+        for node, rows, columns in parts(graph.root, graph.canvas, brought):
+            part = slice(rows.start, rows.stop), slice(columns.start, columns.stop)
+            p = sample_points(graph.canvas, rows, 1, columns)
+            d, owner = evaluate(node, p, owners=True, brought=brought)
+            found[4][part] = np.where(d < 0, owner[:, 0], 0).reshape(len(rows), len(columns))
+            covered = evaluate(node, sample_points(graph.canvas, rows, 2, columns), brought=brought)[0] < 0
+            found[5][part] = covered.reshape(len(rows), 2, len(columns), 2).mean((1, 3))
+        return Outputs(object=found[4].astype(np.int32), alpha=found[5].astype(np.float32))
+    step = max(1, TILE // (4 * width))
+    field = Field(graph.root, brought)
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
-        if graph.stage is not None and field is not None:
-            centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
-            alpha = _covered(field, graph.stage, ways(graph.stage, graph.canvas, rows, 2))
-        else:
-            d, owner = evaluate(
-                graph.root, sample_points(graph.canvas, rows, 1), owners=True, brought=brought
-            )
-            centres = np.where(d < 0, owner[:, 0], 0)
-            alpha = evaluate(graph.root, sample_points(graph.canvas, rows, 2), brought=brought)[0] < 0
-        found[0 if solid else 4 : 5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
+        centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
+        alpha = _covered(field, graph.stage, ways(graph.stage, graph.canvas, rows, 2))
+        found[:5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
         found[5, rows.start : rows.stop] = alpha.reshape(len(rows), 2, width, 2).mean((1, 3))
     depth, normal, owner, alpha = found[0], np.moveaxis(found[1:4], 0, 2), found[4], found[5]
     return Outputs(
-        depth.astype(np.float32) if solid else None,
-        normal.astype(np.float32) if solid else None,
-        owner.astype(np.int32),
-        alpha.astype(np.float32),
+        depth.astype(np.float32), normal.astype(np.float32), owner.astype(np.int32), alpha.astype(np.float32)
     )
 
 

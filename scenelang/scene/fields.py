@@ -14,6 +14,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
+from scenelang.diagnostics.suggest import plural
 from scenelang.words import RESERVED
 
 _NOT_0: dict[str, Any] = {"not": {"const": 0}}
@@ -169,7 +170,7 @@ class Frozen(BaseModel):
         names = cls._names()
         if len(args) > len(names):
             takes = f"at most {len(names)}: {', '.join(names)}" if names else "none"
-            raise TypeError(f"{cls.__name__}: {len(args)} arguments, where it takes {takes}")
+            raise TypeError(f"{cls.__name__}: {plural(len(args), 'argument')}, where it takes {takes}")
         for name in names[: len(args)]:
             if name in data:
                 raise TypeError(f"{cls.__name__}: `{name}` is given twice")

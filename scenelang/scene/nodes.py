@@ -14,7 +14,7 @@ from scenelang.scene.fields import (
     Word,
     first_joins_by_union,
 )
-from scenelang.scene.modifiers import MaterialOp, Transform, Transforms
+from scenelang.scene.modifiers import Color, MaterialOp, Transform, Transforms
 from scenelang.words import BLEND, Combine
 
 MAX_FRAMES = 1_000_000
@@ -37,8 +37,16 @@ class Material(Frozen):
     if TYPE_CHECKING:
 
         def __init__(
-            self, name: str, ops: Iterable[MaterialOp] | MaterialOp = (), shading: str | None = None
+            self, name: str, ops: Iterable[MaterialOp] | MaterialOp | str = (), shading: str | None = None
         ) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        """A text such as ``#d33`` alone is the colour."""
+        given = super()._arranged(args, data)
+        if isinstance(given.get("ops"), str):
+            given["ops"] = (Color(given["ops"]),)
+        return given
 
 
 class Object(Frozen):

@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from scenelang.diagnostics.suggest import plural
 from scenelang.scene.data import SceneData
 from scenelang.scene.elements import Elements as Elements
 from scenelang.scene.elements import load_elements as load_elements
@@ -47,11 +48,27 @@ from scenelang.words import STAGE
 class Scene(SceneData):
     """A whole scene: settings and top-level nodes, which form a union in file order."""
 
+    def __repr__(self) -> str:
+        """In short; `to_python` has the code that makes it."""
+        waiting, count = list(self.nodes), 0
+        while waiting:
+            node = waiting.pop()
+            if isinstance(node, Object):
+                count += 1
+            else:
+                waiting += [child.node if isinstance(child, Link) else child for child in node.children]
+        width, height = self.canvas
+        model = f", {self.model}" if self.model else ""
+        frame = f", a frame of {self.animation.frames:,}" if self.animation else ""
+        return f"Scene({plural(count, 'object')}, {width} x {height}{model}{frame})"
+
+    __str__ = __repr__
+
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
         count = len(self.nodes)
         from scenelang.notebook import bundle
 
-        return bundle(self, self.canvas, f"Scene of {count:,} node{'s' * (count != 1)}")
+        return bundle(self, self.canvas, f"Scene of {plural(count, 'node')}")
 
     def to_nsg(self) -> str:
         """Canonical text that evaluates back to an equal Scene."""

@@ -88,7 +88,7 @@ def render_many(
     are left out and told of.
 
     Args:
-        path: the scene file.
+        path: the scene file. Scenes have no params left; `scenelang.animate` draws several.
         out: a folder, or numbered pictures (``out/%05d.png``). The table lies there too, as ``STEM.csv``.
         values: of each picture, as for `scenelang.load`; instead of the next four.
         grid: values of params, of which all combinations are drawn: a list, or text such as ``"0..1/10"``,
@@ -111,8 +111,12 @@ def render_many(
         ParamError: there is no such param, or no such values of it.
         TableError: ``out`` has the pictures of another sweep, of which nothing is changed.
         SceneError: the scene has errors whatever the values are.
-        RenderError, OSError, ValueError: as for `scenelang.animate`.
+        RenderError, OSError, ValueError, TypeError: as for `scenelang.animate`.
     """
+    given: object = path
+    if not isinstance(given, str | os.PathLike):
+        fact = f"{type(path).__name__} where the path of a scene is needed, whose text has the params"
+        raise TypeError(f"{fact}; several Scenes are drawn by `animate` and `render_frames`")
     stem = Path(path).stem
     target = _target(os.fspath(out), stem)
     if table is not None:
@@ -132,7 +136,7 @@ def render_many(
         )  # fmt: skip
 
     first = begin(found)
-    if first.run(frame)[0] is None:
+    if first.run(frame)[0] is None or found.errors:  # those of its syntax are of no row
         raise SceneError(found)
     rows = _rows(first, values, grid or {}, random, count, seed)
     for name in rows.names:

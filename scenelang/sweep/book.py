@@ -12,8 +12,7 @@ from scenelang.backend.options import RenderError
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
 from scenelang.files import write_whole
-from scenelang.image import output_file
-from scenelang.outputs import Output
+from scenelang.outputs import Output, output_file
 from scenelang.program.program import program_bytes
 from scenelang.scene.text import to_nsg
 from scenelang.sweep.table import Line, TableError, read_table, write_table

@@ -14,6 +14,7 @@ from itertools import islice
 from numbers import Real
 from typing import Any, Final
 
+from scenelang.diagnostics.suggest import plural
 from scenelang.evaluate.evaluation import Evaluation
 from scenelang.evaluate.prepare.params import literal
 from scenelang.evaluate.ranges import (
@@ -124,9 +125,10 @@ def rows_of(
         raise ParamError("a count is needed where all values are drawn at random")
     total = cells if count is None else count
     if found and total < cells:
-        raise ParamError(f"{total:,} pictures, where the grid has {cells:,}")
+        raise ParamError(f"{plural(total, 'picture')}, where the grid has {cells:,}")
     if total > cells and not knobs:
-        raise ParamError(f"{total:,} pictures, where the grid has {cells:,} and nothing is drawn at random")
+        fact = f"{plural(total, 'picture')}, where the grid has {cells:,}"
+        raise ParamError(f"{fact} and nothing is drawn at random")
     if not 0 < total <= MOST_ROWS:
         raise ParamError(f"{total:,} pictures, where 1 to {MOST_ROWS:,} can be made")
     return Rows(found, knobs, total, seed)

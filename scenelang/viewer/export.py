@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from scenelang.image import Image
 
 PROGRAM: Final = ".safetensors"
-STILL_SIDE: Final = 256
-_COLOURS: Final = 64
+STILL_SIDE: Final = {2: 960, 3: 480}
+"""Pixels along the longer side of a still picture; solids take longer."""
+_QUALITIES: Final = (80, 60, 40, 20)  # of WebP, until it has few enough bytes
+_MOST_STILL: Final = 40_000  # bytes
 _FRAME_PX: Final = (360, 640)  # width of a frame in a notebook, at least and at most
 _MOST_TEXT: Final = 20_000  # of a Scene, whose text nobody wrote
 
@@ -132,8 +134,10 @@ def scene_view(
 
 
 def still(program: Program) -> bytes:
-    """A small picture of a Program as PNG, in few colours."""
-    return _few_colours(render(replace(program, canvas=_small(program.canvas))).to_pil())
+    """A picture of a Program as WebP, large enough that what is small in it can be read."""
+    side = STILL_SIDE[2 if program.stage is None else 3] / max(program.canvas)
+    width, height = (max(1, round(side * length)) for length in program.canvas)
+    return _packed(render(replace(program, canvas=(width, height))).to_pil())
 
 
 def frame(value: Scene | Program, picture: Image) -> str:
@@ -150,10 +154,8 @@ def frame(value: Scene | Program, picture: Image) -> str:
         view = scene_view(program, scene, None)
     except ProgramError:
         return ""
-    from PIL import Image as pillow
-
-    small = picture.to_pil().resize(_small(program.canvas), pillow.Resampling.BOX)
-    text = escape(page(view, still=_few_colours(small), embedded=True))
+    small = picture.to_pil().reduce(-(-max(program.canvas) // STILL_SIDE[2]))
+    text = escape(page(view, still=_packed(small), embedded=True))
     width = max(_FRAME_PX[0], min(_FRAME_PX[1], program.canvas[0]))
     height = round(width * program.canvas[1] / program.canvas[0]) + 16 * control_rows(view)
     title = escape(plain(view.data["alt"]))
@@ -163,18 +165,12 @@ def frame(value: Scene | Program, picture: Image) -> str:
     )
 
 
-def _small(canvas: tuple[int, int]) -> tuple[int, int]:
-    shrink = min(1.0, STILL_SIDE / max(canvas))
-    width, height = (max(1, round(side * shrink)) for side in canvas)
-    return width, height
-
-
-def _few_colours(picture: PIL.Image.Image) -> bytes:
-    from PIL import Image as pillow
-
-    method = pillow.Quantize.FASTOCTREE if picture.mode == "RGBA" else pillow.Quantize.MEDIANCUT
-    data = io.BytesIO()
-    picture.quantize(_COLOURS, method, dither=pillow.Dither.NONE).save(data, "PNG", optimize=True)
+def _packed(picture: PIL.Image.Image) -> bytes:
+    for quality in _QUALITIES:
+        data = io.BytesIO()
+        picture.save(data, "WEBP", quality=quality, method=6)
+        if data.tell() <= _MOST_STILL:
+            break
     return data.getvalue()
 
 

@@ -29,7 +29,7 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
 
     Args:
         view: what it shows.
-        still: a PNG for browsers without WebGL2 or JavaScript.
+        still: a WebP for browsers without WebGL2 or JavaScript.
         embedded: leave out heading, sources and licences, for a frame in another page.
     """
     data = view.data
@@ -41,7 +41,7 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
     drawn = base64.b64encode(still).decode()
     image = '<i id="still"></i>'
     if still:
-        image = f'<img id="still" src="data:image/png;base64,{drawn}" alt="{alt}">'
+        image = f'<img id="still" src="data:image/webp;base64,{drawn}" alt="{alt}">'
     parts = {
         "policy": escape(_POLICY.format(loader=_digest(loader), code=_digest(code), style=_digest(style))),
         "version": escape(version("scenelang")),

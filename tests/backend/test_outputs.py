@@ -210,3 +210,15 @@ def test_exrs_hold_linear_light_and_every_output(tmp_path: Path) -> None:
     nsg.render(nsg.loads("square { }")).save(tmp_path / "b.exr")
     with openexr.File(str(tmp_path / "b.exr"), separate_channels=True) as file:
         assert sorted(file.channels()) == ["B", "G", "R"]
+
+
+def test_outputs_save_what_a_picture_saves_beside_it(tmp_path: Path) -> None:
+    scene = nsg.loads(MIXED)
+    found = nsg.render_outputs(scene, ALL)
+    beside = save_outputs(nsg.render(scene), found, tmp_path / "a.png")
+    files = found.save(tmp_path / "b.png")
+    assert [file.name for file in files] == [f"b.{name}.png" for name in ALL]
+    assert [file.read_bytes() for file in files] == [file.read_bytes() for file in beside]
+    assert not (tmp_path / "b.png").exists()
+    with pytest.raises(ValueError, match=r"outputs go with .png or .exr pictures, not `b.jpg`"):
+        found.save(tmp_path / "b.jpg")

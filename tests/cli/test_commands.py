@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import click
 import pytest
 
+from scenelang.cli.main import cli
+from scenelang.cli.options import Sectioned
 from scenelang.models.manifest import available
 from tests.cli.conftest import Folder
 
@@ -19,10 +24,46 @@ def test_help_lists_every_command(folder: Folder) -> None:
     from scenelang.cli.main import COMMANDS
 
     said = folder.run("--help").stdout
+    assert "Draw 2D and 3D scenes" in said
     for name, words in COMMANDS.items():
-        assert f"  {name} " in said
-        assert words in said
+        hidden = name in ("dump", "train")  # for who develops scenelang
+        assert (said.count(f"\n  {name.ljust(12)}  {words}\n") == 1) is not hidden
         assert folder.run(name, "--help").exit_code == 0
+    titles = [line for line in said.splitlines() if line.endswith(":") and not line.startswith(" ")]
+    assert titles == ["Options:", "Draw:", "Write:", "Measure:", "Develop:"]
+
+
+def options_of(command: click.Command, path: str = "") -> Iterator[tuple[str, click.Option]]:
+    """All options of all commands, with the commands' names."""
+    yield from ((f"{path} {p.opts[0]}", p) for p in command.params if isinstance(p, click.Option))
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            found = command.get_command(context, name)
+            assert found is not None
+            yield from options_of(found, f"{path} {name}")
+
+
+def test_the_words_on_an_option_stand_alone() -> None:
+    found = dict(options_of(cli))
+    assert len(found) > 200
+    opening = ("Of", "What", "How", "Where", "Which", "Those", "Whether", "Gets", "Behind", "By")
+    for name, option in found.items():
+        assert option.help is not None, name
+        assert re.match(r"[A-Z]\S", option.help), name
+        assert option.help.split()[0] not in opening, name
+
+
+def test_options_of_render_stand_under_headings_once_each(folder: Folder) -> None:
+    said = folder.run("render", "--help").stdout
+    for title in ("\nOptions:\n", "\nAnimations:\n", "\nHow it is drawn:\n", "\nMore than a picture:\n"):
+        assert said.count(title) == 1
+    render = cli.get_command(click.Context(cli), "render")
+    assert isinstance(render, Sectioned)
+    long = [max(p.opts, key=len) for p in render.params if isinstance(p, click.Option)]
+    assert {name for names in render.sections.values() for name in names.split()} < set(long)
+    for name in long:
+        assert len(re.findall(rf"^  (?:-\w, )?{name}\b", said, re.MULTILINE)) == 1
 
 
 def test_no_option_takes_what_is_not_a_number() -> None:
@@ -65,6 +106,7 @@ def test_models(folder: Folder) -> None:
     assert listed[0] == facts
     assert facts["weights"]["training"]["config"]["model"] == "shapes2d"
     assert facts["weights"]["parameters"] > 1000
+    assert not re.search(r"(?<![.\d])\d+\.(\d{6}|0\b)", said)
 
 
 def test_models_without_weights(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:

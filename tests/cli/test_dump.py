@@ -205,3 +205,13 @@ def test_the_colours_of_solids_are_those_they_are_drawn_in(folder: Folder) -> No
         for after in ((), ("--after", "lower"))
     ]
     assert fills[0] == fills[1] == ["#ba4dff"]
+
+
+def test_boxes_show_numbers_in_short(folder: Folder) -> None:
+    look = "material flat { hue(0.1234567turn); }"
+    moves = "scale(sqrt(3)); rotate(17.123456789deg); translate(1/3, -1/3e9);"
+    said = folder.run("graph", folder.write("a.nsg", f"square {{ {moves} {look} }}"), "--to", "dot").stdout
+    assert "scale(1.7321)" in said
+    assert "rotate(17.123deg)" in said
+    assert "translate(0.33333, -3.3333e-10)" in said
+    assert not re.search(r"\d\.\d{6}", said)

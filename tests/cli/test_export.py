@@ -18,6 +18,10 @@ def test_one_scene(folder: Folder) -> None:
     text = Path("a.html").read_text("utf-8")
     assert text.startswith("<!doctype html>")
     assert "<title>a</title>" in text
+    assert folder.run("export", "a.nsg", "-o", "b.html", "--title", "Sales & more").exit_code == 0
+    assert "<title>Sales &amp; more</title>" in Path("b.html").read_text("utf-8")
+    refused = folder.run("export", "a.nsg", "a.nsg", "-o", "out", "--title", "T")
+    assert (refused.exit_code, "--title is of one page" in refused.output) == (2, True)
 
 
 def test_many_scenes_programs_and_json(folder: Folder) -> None:

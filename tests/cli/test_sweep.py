@@ -61,7 +61,7 @@ def test_a_frame_of_an_animation_with_imports(folder: Path) -> None:
 def test_rows_with_mistakes(folder: Path) -> None:
     done = run("--grid", "k=0.5,7,8,9,10", "-o", "o/", "--sheet", "sheet.png")
     assert done.exit_code == 1
-    assert "1 pictures, 4 rows whose values give no scene" in done.output
+    assert "1 picture, 4 rows whose values give no scene" in done.output
     assert done.output.count("E0309") == 3  # of the first three; the table has all
     assert "row 1: k=7" in done.output
     assert [row["error"][:5] for row in rows("o/a.csv")] == ["", *["E0309"] * 4]

@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from scenelang.diagnostics.suggest import plural
+
 PACKAGE = Path(__file__).parents[2] / "scenelang"
 QUOTED = re.compile(r"(?<![\w\"])'[^'\n]*'(?!\w)")
 SHELL = re.compile(r"pip install '[^']*'")
@@ -50,3 +52,7 @@ def test_messages_quote_with_backticks() -> None:
         if quoted(text)
     ]
     assert found == []
+
+
+def test_one_of_a_thing_is_said_in_the_singular() -> None:
+    assert [plural(n, "row") for n in (0, 1, 2, 1234)] == ["0 rows", "1 row", "2 rows", "1,234 rows"]

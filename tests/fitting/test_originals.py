@@ -139,7 +139,7 @@ def test_what_an_element_was_made_from_is_looked_for(folder: Path, monkeypatch: 
     other.mkdir()
     data = (folder / "cube.obj").read_bytes()
     (folder / "cube.obj").rename(other / "cube.obj")
-    refused(rf"`zoo\.cube` was made from `cube\.obj`, which is not in `{folder}`")
+    refused(rf"`zoo\.cube` was made from `cube\.obj`, which is not in `{folder}`; `--originals FOLDER` .*is$")
     monkeypatch.setenv(FOLDER, str(other))
     nsg.render(scene(folder, "zoo.cube { }"), backend="reference")
     (other / "cube.obj").write_bytes(data + b"\n")

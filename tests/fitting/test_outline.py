@@ -168,6 +168,12 @@ def test_colours_of_drawings(body: str, colours: list[tuple[float, float, float]
     assert [colour for colour, _ in found.painted()] == [pytest.approx(c, abs=0.01) for c in colours]
 
 
+def test_areas_and_strokes_are_counted() -> None:
+    line = '<path d="M 1 1 L 9 1" fill="none" stroke="#000"/>'
+    assert drawn('<rect width="9" height="9"/>' + line).notes[0] == "1 area, 1 stroke"
+    assert drawn(2 * line).notes[0] == "0 areas, 2 strokes"
+
+
 def test_what_of_a_drawing_is_lost_is_said() -> None:
     body = '<text>a</text><clipPath id="c"><rect/></clipPath><pattern id="p"/><rect width="9" height="9"/>'
     found = read_outline(f"<svg>{body}<filter/></svg>".encode(), ".svg")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -208,7 +209,8 @@ def test_the_command_writes_scene_and_pictures(tmp_path: Path) -> None:
     arguments = ["fit", str(scene), "--to", str(target), "-o", str(out), "-D", "y=0.5"]
     run = CliRunner().invoke(cli, [*arguments, "--params", "x", "--compare", str(tmp_path / "c.png")])
     assert run.exit_code == 0, run.output
-    assert "dB from the target" in run.output
+    assert (told := re.search(r"PSNR to the target (\d+\.\d) dB, before (\d+\.\d) dB", run.output))
+    assert float(told[1]) > float(told[2])
     assert abs(float(out.read_text().split("x = ")[1].split()[0]) - 0.3) < 0.016
     assert (tmp_path / "c.png").exists()
     for wrong in (["--params", "z"], ["--crop", "3x3"], ["--background", "red"], ["--to", "b.png"]):

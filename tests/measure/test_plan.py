@@ -99,6 +99,8 @@ def test_the_choice_says_why() -> None:
     assert missing(free, load_manifest("shapes2d")) == []
     sphere = nsg.Scene(nodes=(nsg.Object("sphere", transforms=(nsg.Twist(k=0.1),)),))
     assert missing(sphere, load_manifest("shapes2d")) == ["sphere", "twist"]
+    lit = nsg.loads("camera(eye = [0, 1, 4]); sphere { material diffuse; }")
+    assert missing(lit, load_manifest("shapes2d")) == ["camera", "diffuse", "sphere"]
     small = replace(load_manifest("shapes2d"), sizes=((32, 32),), white=True)
     assert missing(nsg.loads("canvas(32, 32); star { }"), small) == []
     other = nsg.loads("canvas(64, 32); background(none); star { }")
@@ -116,6 +118,8 @@ def test_the_command(tmp_path: Path, kind: str) -> None:
         assert plan["rows"] == 3
         assert plan["tokens"] == {"union": 2, "subtract": 1}
     else:
+        first = [line.split()[0] for line in found.output.splitlines()[:5]]
+        assert first == ["stream", "pixels", "meetings", "frame", "error"]
         assert "drop_unseen" in found.output
         assert "3 rows of 64 numbers" in found.output
         assert re.search(r"pixels +[\d,]+ of 1,024 evaluated \(\d+\.\d %\)", found.output)

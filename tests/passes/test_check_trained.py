@@ -77,6 +77,7 @@ def test_the_furthest_out_is_named_and_the_others_are_counted() -> None:
     text = "star { twirl(3); } square { twirl(9); } pentagon { twirl(-4); }"
     assert warned(text)[0].startswith("W0502 a `twirl` of 9 on `square`")
     assert warned(text)[0].endswith("of model `shapes2d`, as 2 more are")
+    assert warned(text.partition("pentagon")[0])[0].endswith("of model `shapes2d`, as 1 more is")
 
 
 def test_help_says_what_was_measured() -> None:

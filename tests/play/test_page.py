@@ -62,7 +62,7 @@ def test_a_mistake_is_shown_while_the_last_picture_stays(page: Page) -> None:
     page.click_text("background")
     page.page.keyboard.insert_text("\nsquar;")
     page.page.locator(".cm-lintRange-error", has_text="squar").wait_for()
-    page.page.locator("#note", has_text="last picture without mistakes").wait_for()
+    page.page.locator("#note", has_text="The last picture: the text has mistakes").wait_for()
     assert page.picture() == before
     page.page.locator(".cm-lintRange-error", has_text="squar").hover()
     page.page.locator(".mistake", has_text="E0204").wait_for()
@@ -70,6 +70,29 @@ def test_a_mistake_is_shown_while_the_last_picture_stays(page: Page) -> None:
     page.has("square;")
     page.other_picture(before)
     page.page.locator("#problems", has_text="No mistakes").wait_for()
+
+
+def test_mistakes_are_counted_in_one_place(page: Page) -> None:
+    page.knows()
+    page.click_text("background")
+    page.page.keyboard.insert_text("\nsquare { scael(0.4) }")
+    page.page.locator("#problems", has_text="2 mistakes").wait_for()
+    page.page.locator("#note", has_text="mistakes").wait_for()
+    assert not re.search(r"\d", page.page.locator("#note").inner_text())
+
+
+def test_a_material_is_coloured_whatever_comes_behind_it(page: Page) -> None:
+    page.knows()
+    page.click_text("background")
+    page.page.keyboard.insert_text("\nlet w = material diffuse tex.grain; let v = grain;")
+    colour = (
+        "[...document.querySelectorAll('.cm-line span')].filter((e) => !e.children.length"
+        " && e.textContent === g[0]).map((e) => getComputedStyle(e).color)"
+    )
+    page.until(f"{colour}.length > 0", "diffuse")
+    look, shape, plain = (page.page.evaluate(f"(g) => {colour}", [w]) for w in ("diffuse", "square", "v"))
+    assert look == shape[:1]
+    assert plain != look
 
 
 def test_completion_hover_and_arguments_know_the_language(page: Page) -> None:

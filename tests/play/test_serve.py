@@ -14,10 +14,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+import scenelang as nsg
 from scenelang.cli.main import cli
 from scenelang.play.serve import PORT, listen
 from tests.play.client import Server, children, is_there
 from tests.play.conftest import SQUARE
+from tests.play.page import served
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
@@ -54,7 +56,7 @@ def test_a_port_in_use() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["none.nsg"], "there is neither a scene nor a folder"),
+        (["none/none.nsg"], "there is neither a scene nor a folder"),
         (["--host", "192.0.2.1"], "cannot listen on `192.0.2.1`"),
         (["--host", "no.such.host.invalid"], "cannot listen on `no.such.host.invalid`"),
         (["--port", "0"], "not in the range"),
@@ -66,6 +68,16 @@ def test_what_cannot_be_served(tmp_path: Path, arguments: list[str], message: st
     found = CliRunner().invoke(cli, ["play", "--no-browser", *arguments])
     assert found.exit_code == 2
     assert message in found.output
+
+
+def test_a_scene_that_is_not_there_is_made(tmp_path: Path) -> None:
+    new = tmp_path / "new.nsg"
+    with served(new, tmp_path / ".state") as found:
+        assert found.address
+        assert [d.severity for d in nsg.check(new)] == []
+    new.write_text("star;")
+    with served(new, tmp_path / ".state"):
+        assert new.read_text() == "star;"
 
 
 def test_others_are_warned_of(tmp_path: Path) -> None:

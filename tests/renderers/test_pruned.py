@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from scenelang.backend.closed import closed_forms
 from scenelang.elements.zoo import Zoo
-from scenelang.lab.frontier.closed import closed_forms
 from scenelang.lab.stability.probes import FLAT, rng_of
 from scenelang.measure.sets import GEOMETRIES, SETS, random_scene
 from scenelang.models.framed import load_arrays

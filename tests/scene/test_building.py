@@ -33,6 +33,7 @@ STAR = nsg.Object("star")
         (nsg.Color((1, 0, 0)), nsg.Color.hex("#ff0000")),
         (nsg.Animation(2, 24), nsg.Animation(seconds=2, fps=24, loop=True)),
         (nsg.Material("flat", nsg.Color("#fff")), nsg.Material(name="flat", ops=(nsg.Color("#fff"),))),
+        (nsg.Material("flat", "#f00"), nsg.Material("flat", nsg.Color((1, 0, 0)))),
         (nsg.Object("star", nsg.Twirl(1)), nsg.Object(geometry="star", transforms=(nsg.Twirl(1),))),
         (nsg.Boolean("smooth", [STAR, STAR]), nsg.Boolean(op="smooth", children=(STAR, STAR))),
         (
@@ -55,12 +56,13 @@ def test_short_forms(short: object, long: object) -> None:
         (lambda: nsg.Translate(1), "Translate: `y` is missing"),  # type: ignore[call-arg]
         (lambda: nsg.Translate(1, 2, x=1), "`x` is given twice"),  # type: ignore[misc]
         (lambda: nsg.Translate(1, 2, 3, 4), "4 arguments, where it takes at most 3: x, y, z"),  # type: ignore[call-arg]
-        (lambda: nsg.Flip(1), "1 arguments, where it takes none"),  # type: ignore[call-arg, arg-type]
+        (lambda: nsg.Flip(1), "1 argument, where it takes none"),  # type: ignore[call-arg, arg-type]
         (lambda: nsg.Object("star", transfroms=()), "did you mean `transforms`?"),  # type: ignore[call-arg]
         (lambda: nsg.Object("star", nsg.Flip()), "`transforms[0]` is a Flip"),  # type: ignore[arg-type]
         (lambda: nsg.Object("two words"), "`geometry`: not a possible name"),
         (lambda: nsg.Scale(0), "a scale by 0"),
         (lambda: nsg.Color("red"), "`red` is not a colour such as `#d33`"),
+        (lambda: nsg.Material("flat", "red"), "`red` is not a colour such as `#d33`"),
         (lambda: nsg.Light(color="red"), "Light: `red` is not a colour such as `#d33`"),
         (lambda: nsg.Scene(background="#12"), "Scene: `#12` is not a colour such as `#d33`"),
         (lambda: nsg.Scene(camera=nsg.Light()), "`camera` is Light(), not a Camera"),

@@ -47,8 +47,9 @@ def test_readable_json_reads_back(scene: nsg.Scene) -> None:
 
 @settings(max_examples=50)
 @given(scenes)
-def test_repr_is_code(scene: nsg.Scene) -> None:
-    assert eval(repr(scene), dict(vars(nsg)) | {name: getattr(nsg, name) for name in nsg.__all__}) == scene
+def test_repr_of_nodes_is_code(scene: nsg.Scene) -> None:
+    names = dict(vars(nsg)) | {name: getattr(nsg, name) for name in nsg.__all__}
+    assert eval(repr(scene.nodes), names) == scene.nodes
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
@@ -88,15 +89,20 @@ def test_deep_scenes_become_parts() -> None:
     code = scene.to_python()
     assert "part_1 = nsg.Chain(" in code
     assert run(code).to_json() == scene.to_json()  # Python 3.12 compares no trees as deep as these
+    assert repr(scene) == "Scene(1 object, 256 x 256)"
     with deep_stack():
-        assert "…" in repr(scene) or repr(scene)
+        assert "…" in repr(scene.nodes) or repr(scene.nodes)
 
 
 def test_repr_shows_what_was_said() -> None:
     star = nsg.Object("star", transforms=[nsg.Scale.uniform(0.5)], material=nsg.Material("flat"))
     said = "Object(geometry='star', transforms=(Scale(x=0.5, y=0.5, z=0.5),), material=Material(name='flat'))"
     assert repr(star) == said
-    assert repr(nsg.Scene()) == "Scene()"
+    assert repr(nsg.Scene()) == "Scene(0 objects, 256 x 256)"
+    pair = nsg.Group((star, nsg.Chain((star, nsg.Link("subtract", star)))))
+    animation = nsg.Animation(2, 24)
+    scene = nsg.Scene(canvas=(64, 48), model="shapes2d", animation=animation, nodes=(star, *[pair] * 500))
+    assert f"{scene}" == repr(scene) == "Scene(1,501 objects, 64 x 48, shapes2d, a frame of 48)"
     assert repr(nsg.Flip()) == "Flip()"
 
 

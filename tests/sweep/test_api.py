@@ -51,6 +51,14 @@ def test_pictures_are_those_of_the_values_in_the_table(scene: Path, tmp_path: Pa
     ]
 
 
+def test_a_scene_with_errors_of_syntax_has_no_pictures(tmp_path: Path) -> None:
+    path = tmp_path / "a.nsg"
+    path.write_text(TEXT.replace("rotate(90deg * k);", "rotate(90deg * k)"))
+    with pytest.raises(nsg.SceneError, match="E0102"):
+        render_many(path, tmp_path / "out", grid={"k": "0..1/3"})
+    assert not (tmp_path / "out").exists()
+
+
 def test_values_as_they_are_given(scene: Path, tmp_path: Path) -> None:
     made = nsg.render_many(scene, tmp_path / "%d.png", values=[{"k": 0.25}, {"n": 2}, {"k": "0.25"}])
     assert made.names == ("k", "n")

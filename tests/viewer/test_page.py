@@ -6,6 +6,7 @@ import base64
 import hashlib
 import html
 import io
+import itertools
 import json
 import re
 import zlib
@@ -102,13 +103,21 @@ def test_a_picture_in_words() -> None:
     assert alternative(moving).endswith("It moves for 4 seconds, over and over.")
 
 
-def test_stills_are_small_pictures() -> None:
-    program = nsg.compile(nsg.loads("canvas(600, 400); background(none); star { scale(0.5); }"))
-    data = still(program)
-    with Image.open(io.BytesIO(data)) as image:
-        assert (image.format, image.size) == ("PNG", (256, 171))
-        assert image.convert("RGBA").getpixel((0, 0))[3] == 0  # type: ignore[index]
-    assert len(data) < 4000
+def test_stills_are_large_enough_to_be_read_and_small_files() -> None:
+    """Whatever the canvas; lines of 0.01, five pixels of a still, are apart."""
+    bar = "square { scale(0.01, 0.3); translate(0.04 * i, 0); material flat { color(#000); } }"
+    bars = f"for (i in 0..<9) {{ {bar} }}"
+    for side in (120, 2400):
+        program = nsg.compile(nsg.loads(f"canvas({side}, {side * 2 // 3}); background(none); {bars}"))
+        data = still(program)
+        with Image.open(io.BytesIO(data)) as image:
+            assert (image.format, image.size) == ("WEBP", (960, 640))
+            alpha = image.convert("RGBA").getchannel("A")
+        row = [alpha.getpixel((x, 320)) > 128 for x in range(960)]  # type: ignore[operator]
+        assert sum(a != b for a, b in itertools.pairwise(row)) == 18
+        assert len(data) < 8000
+    with Image.open(io.BytesIO(still(nsg.compile(nsg.loads("canvas(60, 40); sphere;"))))) as image:
+        assert image.size == (480, 320)
 
 
 def test_controls_are_written_out() -> None:

@@ -89,7 +89,7 @@ def test_a_still_picture_where_it_cannot_draw(chromium: Any, tmp_path: Path, bro
         loaded(page, tmp_path / "a.html")
         assert why in page.locator("#note").text_content()
         assert page.locator("#still").is_visible()
-        assert ask(page, "still.naturalWidth") == 256
+        assert ask(page, "still.naturalWidth") == 960
 
 
 def test_values_without_a_picture_are_told_beside_their_control(chromium: Any, tmp_path: Path) -> None:
@@ -124,6 +124,28 @@ def test_a_lost_context_comes_back(chromium: Any, tmp_path: Path) -> None:
             "() => new Promise((done) => requestAnimationFrame(() => setTimeout(done, 100, true)))"
         )
         assert page.locator("canvas").screenshot() == before
+
+
+@pytest.mark.parametrize("size", [(256, 256), (640, 200), (100, 400)])
+def test_what_a_page_shows_stands_in_one_column(chromium: Any, tmp_path: Path, size: tuple[int, int]) -> None:
+    scene = tmp_path / "a.nsg"
+    scene.write_text(f"canvas({size[0]}, {size[1]}); param k = 0.5 in 0..1; star {{ scale(k); }}")
+    export(scene, tmp_path / "a.html")
+    with watched(chromium, viewport={"width": 1300, "height": 900}) as page:
+        loaded(page, tmp_path / "a.html")
+        left, right = (
+            [ask(page, f"document.querySelector('{of}').getBoundingClientRect().{end}") for of in parts]
+            for end, parts in (
+                ("left", ("h1", ".picture", "#controls", "footer")),
+                ("right", ("h1", "#controls", "footer")),
+            )
+        )
+        assert max(left) - min(left) < 1
+        assert max(right) - min(right) < 1
+        told = page.get_by_text("mean FLIP")
+        assert not told.is_visible()
+        page.get_by_text("About this page").click()
+        assert told.is_visible()
 
 
 def test_a_still_picture_without_scripts(chromium: Any, tmp_path: Path) -> None:

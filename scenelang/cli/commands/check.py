@@ -13,6 +13,7 @@ from scenelang.cli import options
 from scenelang.cli.main import describe
 from scenelang.cli.say import say_trouble, show_difference, wants_color, width_of
 from scenelang.diagnostics.cells import printable
+from scenelang.diagnostics.suggest import plural
 from scenelang.files import followed, write_whole
 
 if TYPE_CHECKING:
@@ -49,15 +50,15 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
 @options.define
 @options.model
 @options.strict
+@click.option("--select", multiple=True, metavar="CODES", callback=_codes, help="Report only these warnings.")
+@click.option("--ignore", multiple=True, metavar="CODES", callback=_codes, help="Leave out these warnings.")
+@options.choice("--format", "kind", words="human json sarif github concise", help="Format of diagnostics.")
 @click.option(
-    "--select", multiple=True, metavar="CODES", callback=_codes, help="Of warnings report only these."
-)
-@click.option("--ignore", multiple=True, metavar="CODES", callback=_codes, help="Leave these warnings out.")
-@options.choice(
-    "--format", "kind", words="human json sarif github concise", help="How diagnostics are written."
-)
-@click.option(
-    "--max-diagnostics", "most", type=click.IntRange(0), metavar="N", help="Write so many; count them all."
+    "--max-diagnostics",
+    "most",
+    type=click.IntRange(0),
+    metavar="N",
+    help="Largest number to write; all are counted.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Write diagnostics and no summary.")
 @options.color
@@ -123,7 +124,7 @@ def command(
         out.write(left)
     if all_frames and scenes.unseen:
         click.echo(
-            f"{scenes.unseen:,} frames were left out: together they exceed the limits of one.", err=True
+            f"{plural(scenes.unseen, 'frame')} left out: together they exceed the limits of one.", err=True
         )
     ctx.exit(2 if unreadable else int(_wrong(left, strict)))
 
@@ -202,13 +203,12 @@ class _Output:
                 text += f"For more, try `scenelang explain {in_order(found)[0].code}`.\n"
         else:
             count = len(self.scenes.sources) + len(self.scenes.unread)
-            scenes = "1 scene" if count == 1 else f"{count:,} scenes"
+            scenes = plural(count, "scene")
             text = f"no mistakes in {scenes}\n" if count and not self.quiet else ""
         click.echo(text, nl=False, err=self.to_stderr, color=True)
 
     def fixed(self, settled: Settled[str], done: str, lost: Collection[str] = ()) -> None:
         """Say what was fixed, file by file, but for files that could not be written."""
-        from scenelang.diagnostics.render_text import plural
 
         if self.quiet:
             return

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @click.command("compile")
 @click.argument("file", metavar="FILE")
-@click.option("-o", "--out", required=True, metavar="OUT", help="The program's file, .safetensors.")
+@click.option("-o", "--out", required=True, metavar="OUT", help="Program to write, .safetensors.")
 @options.request
 @options.strict
 @options.verbose

@@ -24,7 +24,7 @@ SUFFIXES: Final[dict[str, Kind]] = {".nsg": "nsg", ".json": "json", ".py": "pyth
     "--to",
     "kind",
     type=click.Choice(["nsg", "json", "python"]),
-    help="What to write; by default what OUT's suffix names (.nsg, .json, .py).",
+    help="Format to write; by default the one of OUT's suffix (.nsg, .json, .py).",
 )
 @options.request
 @click.pass_context

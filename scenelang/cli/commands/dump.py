@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     "stages",
     multiple=True,
     metavar="STAGE",
-    help="A stage or pass; may be given several times. Default: program, with --diff all.",
+    help="Stage or pass to show; may be given several times. By default program, with --diff all.",
 )
-@click.option("--diff", is_flag=True, help="Only what each pass changed.")
-@options.choice("--format", "kind", words="text json")
+@click.option("--diff", is_flag=True, help="Show only what each pass changed.")
+@options.choice("--format", "kind", words="text json", help="Format of what is printed.")
 @options.out
 @options.request
 @click.pass_context

@@ -23,7 +23,7 @@ _WIDEST = 96
 @click.command("explain")
 @click.argument("code", required=False)
 @click.option("--list", "listed", is_flag=True, help="List all codes, as without a CODE.")
-@options.choice("--format", "kind", words="human json", help="How pages are written.")
+@options.choice("--format", "kind", words="human json", help="Format of pages.")
 @options.color
 def command(code: str | None, listed: bool, kind: str, color: options.Color) -> None:
     """Say what CODE means, such as E0401, with an example and what to write instead.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from scenelang.cli import options
+from scenelang.diagnostics.suggest import plural
 from scenelang.words import COMBINE
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 @options.request
 @options.device
 @options.threads
-@options.choice("--format", "kind", words="text json")
+@options.choice("--format", "kind", words="text json", help="Format of what is printed.")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -59,22 +60,25 @@ def _text(plan: dict[str, Any]) -> str:
         others = f"next best {plan['runner_up']}"
     else:
         others = "no other has all the scene uses" if plan["lacking"] else "there is no other"
-    lines = [f"model {plan['model']} ({plan['why']}), {cost['parameters']:,} parameters; {others}"]
-    lines += [f"  {name} lacks {', '.join(names)}" for name, names in plan["lacking"].items()]
-    lines += ["", *_table(plan["stages"]), ""]
     tokens = ", ".join(f"{number:,} {word}" for word, number in plan["tokens"].items())
     if cost["unknown"] is not None:
         error = f"not known: {cost['unknown']}"
     else:
         flip = "" if cost["flip"] is None else f", FLIP {cost['flip']:.4f},"
         error = f"{cost['psnr']:.2f} dB PSNR (50 at most){flip} against the exact picture"
-    lines += [
-        f"stream     {plan['rows']:,} row{'s' * (plan['rows'] != 1)} of 64 numbers ({tokens or 'empty'})",
-        *(_rays(cost, plan["rows"]) if "rays" in cost else _meetings(cost)),
-        f"frame      {cost['ms']:.1f} ms",
-        f"error      {error}",
-    ]
-    return "\n".join(lines)
+    return "\n".join(
+        [
+            f"stream     {plural(plan['rows'], 'row')} of 64 numbers ({tokens or 'empty'})",
+            *(_rays(cost, plan["rows"]) if "rays" in cost else _meetings(cost)),
+            f"frame      {cost['ms']:.1f} ms",
+            f"error      {error}",
+            "",
+            f"model {plan['model']} ({plan['why']}), {cost['parameters']:,} parameters; {others}",
+            *[f"  {name} lacks {', '.join(names)}" for name, names in plan["lacking"].items()],
+            "",
+            *_table(plan["stages"]),
+        ]
+    )
 
 
 def _meetings(cost: dict[str, Any]) -> list[str]:

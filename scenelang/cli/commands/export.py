@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 @click.command("export")
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
-@click.option("-o", "--out", required=True, metavar="OUT", help="A page (.html), or a folder.")
+@click.option("-o", "--out", required=True, metavar="OUT", help="Page (.html) or folder to write.")
+@click.option("--title", metavar="TEXT", help="Title of the page; by default the name of the file.")
 @options.size
 @options.define
 @options.model
@@ -28,6 +29,7 @@ def command(
     ctx: click.Context,
     files: tuple[str, ...],
     out: str,
+    title: str | None,
     size: tuple[int, int] | None,
     defines: Defines,
     model: str | None,
@@ -53,6 +55,8 @@ def command(
     from scenelang.viewer.export import scene_view, still
     from scenelang.viewer.page import page
 
+    if title is not None and len(files) > 1:
+        raise click.UsageError("--title is of one page; several have the names of their files.")
     clock = Clock()
     paths = targets(files, out, PAGE)
     jobs, code = prepare_all(files, Request(defines, model, root, 0, size), clock, strict=strict)
@@ -63,7 +67,7 @@ def command(
         scene, evaluation = (None, None) if found is None else (found.scene, found.evaluation)
         try:
             with clock("view"):
-                view = scene_view(job.program, scene, evaluation, title=stem_of(job.name))
+                view = scene_view(job.program, scene, evaluation, title=title or stem_of(job.name))
         except ProgramError as error:
             say_trouble(f"{job.name}: {error}")
             code = 2

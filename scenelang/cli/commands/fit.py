@@ -66,9 +66,14 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
     multiple=True,
     callback=_to,
     metavar="PICTURE",
-    help="PNG or JPEG; FRAME=PICTURE, several times, or frame-%04d.png for frames of an animation.",
+    help="Target, PNG or JPEG; FRAME=PICTURE, several times, or frame-%04d.png for frames of an animation.",
 )
-@click.option("-o", "--out", metavar="OUT", help="The scene with what was found as defaults; - prints it.")
+@click.option(
+    "-o",
+    "--out",
+    metavar="OUT",
+    help="Scene to write, with the values that were found as defaults; - prints it.",
+)
 @click.option(
     "--params",
     "names",
@@ -81,31 +86,36 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
     multiple=True,
     metavar="NAME=VALUE",
     callback=options.assignments,
-    help="Begin there, instead of at the default.",
+    help="Value to begin with, instead of the param's default.",
 )
 @options.define
-@click.option("--mask", type=click.Path(path_type=Path), metavar="PICTURE", help="Bright where pixels count.")
 @click.option(
-    "--crop", metavar="WxH+X+Y", callback=_crop, help="The part of the target that shows the scene."
+    "--mask",
+    type=click.Path(path_type=Path),
+    metavar="PICTURE",
+    help="Picture that is bright where pixels count.",
 )
+@click.option("--crop", metavar="WxH+X+Y", callback=_crop, help="Part of the target that shows the scene.")
 @click.option(
     "--background",
     default="#ffffff",
     metavar="COLOR",
     callback=_colour,
     show_default=True,
-    help="Behind what is transparent.",
+    help="Colour behind what is transparent.",
 )
-@click.option("--compare", metavar="OUT.png", help="A picture: before, after, target.")
-@click.option("--animate", metavar="OUT.gif", help="An animation of the way to what was found.")
-@click.option("--seed", default=0, type=click.IntRange(0, 2**31 - 1), help="Of where to look.")
+@click.option("--compare", metavar="OUT.png", help="Write a picture of before, after and target.")
+@click.option("--animate", metavar="OUT.gif", help="Write an animation of the way to what was found.")
+@click.option(
+    "--seed", default=0, type=click.IntRange(0, 2**31 - 1), metavar="N", help="Seed of the places to look at."
+)
 @click.option(
     "--budget",
     default=300.0,
     type=options.Real(0, min_open=True),
     show_default=True,
     metavar="SECONDS",
-    help="Begin nothing new after this time.",
+    help="Time after which nothing new is begun.",
 )
 @options.frame
 @options.model

@@ -12,6 +12,7 @@ from scenelang.cli.main import describe
 from scenelang.cli.say import say_diagnostics, say_trouble, show_difference
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.suggest import plural
 from scenelang.evaluate.limits import MAX_BYTES
 from scenelang.files import followed, read_regular, write_whole
 
@@ -133,7 +134,7 @@ class _Run:
             (self.same, "left as they are" if self.same != 1 else "left as it is"),
             (self.mistaken, "with syntax errors"),
         ]
-        parts = [f"{n} scene{'s' * (n != 1)} {what}" for n, what in counts if n]
+        parts = [f"{plural(n, 'scene')} {what}" for n, what in counts if n]
         if parts:
             click.echo(", ".join(parts), err=True)
 

@@ -22,12 +22,14 @@ _SUFFIXES: Final = (".mmd", ".dot", ".svg", ".png")
 
 @click.command("graph")
 @click.argument("file", metavar="FILE")
-@click.option("-o", "--out", metavar="OUT", help="A file: .mmd (Mermaid), .dot, .svg or .png (Graphviz).")
+@click.option(
+    "-o", "--out", metavar="OUT", help="File to write: .mmd (Mermaid), .dot, .svg or .png (Graphviz)."
+)
 @click.option(
     "--to",
     "kind",
     type=click.Choice(["mmd", "dot", "svg", "png"]),
-    help="What to write; default: as OUT's suffix, else mmd.",
+    help="Format to write; by default the one of OUT's suffix, else mmd.",
 )
 @click.option(
     "--after",
@@ -35,10 +37,15 @@ _SUFFIXES: Final = (".mmd", ".dot", ".svg", ".png")
     default="scene",
     show_default=True,
     metavar="STAGE",
-    help="scene, lower, a pass, or program.",
+    help="Stage to draw: scene, lower, a pass, or program.",
 )
 @click.option(
-    "--most", type=click.IntRange(1, 10_000), default=200, show_default=True, help="Boxes to draw at most."
+    "--most",
+    type=click.IntRange(1, 10_000),
+    metavar="N",
+    default=200,
+    show_default=True,
+    help="Largest number of boxes to draw.",
 )
 @options.request
 @click.pass_context

@@ -19,11 +19,11 @@ _SUFFIXES: Final = (".gltf", ".glb")
 
 @click.command("import")
 @click.argument("file", metavar="FILE")
-@click.option("-o", "--out", metavar="OUT", help="A file instead of standard output, .nsg or .json.")
+@click.option("-o", "--out", metavar="OUT", help="File to write instead of standard output, .nsg or .json.")
 @options.choice(
     "--plane",
     words="xy xz",
-    help="What a 2D model sees of 3D: xy from the front, or xz, the ground, from above.",
+    help="Plane that a 2D model draws of 3D: xy from the front, or xz, the ground, from above.",
 )
 @options.model
 @click.option("--strict", is_flag=True, help="Write nothing if anything of the file would be left out.")

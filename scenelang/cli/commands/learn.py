@@ -22,62 +22,64 @@ if TYPE_CHECKING:
 @click.command("learn")
 @click.argument("files", metavar="FILE…", nargs=-1, required=True)
 @click.option(
-    "-o", "--out", required=True, metavar="ZOO", help="A file of elements, .safetensors; it may exist."
+    "-o", "--out", required=True, metavar="ZOO", help="File of elements to write or to add to, .safetensors."
 )
-@click.option("--name", metavar="NAME", help="Of the element, instead of the file's.")
+@click.option("--name", metavar="NAME", help="Name of the element; by default the file's.")
 @options.choice(
     "--as",
     "pictures",
     words="texture outline",
-    help="What a picture becomes: a material, or the flat shape of its opaque or, without transparency, dark "
-    "part.",
+    help="Element to make of a picture: a material, or the flat shape of its opaque or, without "
+    "transparency, dark part.",
 )
 @click.option(
     "--texels",
     type=click.IntRange(1, MOST_PIXELS),
+    metavar="N",
     default=TEXELS,
     show_default=True,
-    help="Of a texture along its longer side, at most; larger pictures are made smaller.",
+    help="Texels of a texture along its longer side, at most; larger pictures are made smaller.",
 )
 @options.choice(
     "--sign",
     words="auto winding closed",
-    help="What tells inside: winding numbers, of any mesh, or normals, of a closed one that nowhere passes "
-    "through itself; auto is winding.",
+    help="Test for the inside: winding numbers, of any mesh, or normals, of a closed one that "
+    "nowhere passes through itself; auto is winding.",
 )
 @click.option(
     "--parts/--together",
     default=None,
-    help="Whether parts are elements of their own too: solids that a mesh file names, areas of one colour. "
-    "Those of drawings are if this is left out.",
+    help="Make parts elements of their own too: solids that a mesh file names, areas of one "
+    "colour; by default those of drawings.",
 )
 @click.option(
     "--color-error",
     type=options.Real(0, 1, min_open=True),
     metavar="SHARE",
-    help="Root mean square off of a mesh's colours: 0.025.",
+    help="Largest root mean square error of a mesh's colours; by default 0.025.",
 )
 @click.option(
     "--max-error",
     type=options.Real(0, 1, min_open=True),
     metavar="SHARE",
-    help="Mean distance off at the surface, in radii of the shape: 0.0003 of solids, 0.0001 of flat shapes; "
-    "root mean square off of a texture's colours: 0.01.",
+    help="Largest mean error of distances at the surface, in radii of the shape, by default 0.0003 "
+    "for solids and 0.0001 for flat shapes; of a texture the root mean square error of its "
+    "colours, by default 0.01.",
 )
 @click.option(
     "--budget",
     type=options.Real(0, min_open=True),
     default=math.inf,
     metavar="SECONDS",
-    help="Begin nothing new after this time, for each file.",
+    help="Time after which nothing new is begun, for each file.",
 )
 @click.option(
-    "--steps", type=click.IntRange(1), metavar="N", help="Try so many forms at most, whatever the time."
+    "--steps", type=click.IntRange(1), metavar="N", help="Largest number of forms to try, whatever the time."
 )
-@click.option("--license", metavar="TEXT", help="Of the originals; kept in the file.")
-@click.option("--source", metavar="TEXT", help="Where they are from; kept in the file.")
+@click.option("--license", metavar="TEXT", help="License of the originals, kept in the file.")
+@click.option("--source", metavar="TEXT", help="Origin of the originals, kept in the file.")
 @options.cluster
-@click.option("--preview", metavar="OUT.png", help="A picture of the new elements.")
+@click.option("--preview", metavar="OUT.png", help="Write a picture of the new elements.")
 def command(
     files: tuple[str, ...],
     out: str,

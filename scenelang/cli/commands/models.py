@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from scenelang.cli import options
+
 if TYPE_CHECKING:
     from scenelang.models.manifest import Manifest
 
 
 @click.command("models")
 @click.argument("name", required=False)
-@click.option("--format", "kind", type=click.Choice(["human", "json"]), default="human", show_default=True)
+@options.choice("--format", "kind", words="human json", help="Format of what is printed.")
 def command(name: str | None, kind: Literal["human", "json"]) -> None:
     """List the models, or tell all about the model NAME.
 
@@ -73,7 +75,9 @@ def _tree(values: dict[str, Any], indent: str) -> list[str]:
 
 def _line(value: Any) -> str:
     if isinstance(value, dict):
-        return ", ".join(f"{key.replace('_', ' ')} {each}" for key, each in value.items())
+        return ", ".join(f"{key.replace('_', ' ')} {_line(each)}" for key, each in value.items())
     if isinstance(value, list | tuple):
-        return ", ".join(map(str, value))
+        return ", ".join(map(_line, value))
+    if isinstance(value, float):
+        return f"{value:.5g}"
     return f"{value:,}" if type(value) is int else str(value)

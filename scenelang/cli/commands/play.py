@@ -8,13 +8,24 @@ import click
 
 from scenelang.cli.main import Trouble
 
+NEW = "nsg 1;\n\nsquare { scale(0.6); material flat { color(#2a6f97); } }\n"  # as the page's own
 _PARTS = ("starlette", "uvicorn", "websockets", "watchfiles", "pygls", "lsprotocol")
 
 
 @click.command("play")
 @click.argument("path", default=".", metavar="[SCENE | FOLDER]", type=click.Path(path_type=Path))
-@click.option("--port", type=click.IntRange(1, 65535), metavar="N", help="By default 8766 or a free one.")
-@click.option("--host", default="127.0.0.1", metavar="H", help="Address to listen on; others can reach some.")
+@click.option(
+    "--port",
+    type=click.IntRange(1, 65535),
+    metavar="N",
+    help="Port to listen on; by default 8766 or a free one.",
+)
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    metavar="H",
+    help="Address to listen on; by default one that only this machine reaches.",
+)
 @click.option("--no-browser", is_flag=True, help="Only print the address.")
 @click.option(
     "--root",
@@ -24,8 +35,9 @@ _PARTS = ("starlette", "uvicorn", "websockets", "watchfiles", "pygls", "lsprotoc
 def command(path: Path, port: int | None, host: str, no_browser: bool, root: Path | None) -> None:
     """Edit scenes in a browser and see them while typing.
 
-    Opens a page with the scenes of a folder, by default this one. Nobody else reaches it: it listens to this
-    machine alone, and its address holds a token. Ctrl-C ends it, with exit code 130.
+    Opens a page with the scenes of a folder, by default this one. A SCENE that is not there is made. Nobody
+    else reaches the page: it listens to this machine alone, and its address holds a token. Ctrl-C ends it,
+    with exit code 130.
     """
     try:
         from scenelang.play.folder import Folder, fits
@@ -37,6 +49,10 @@ def command(path: Path, port: int | None, host: str, no_browser: bool, root: Pat
             raise
         raise Trouble(f"play needs {error.name}: pip install 'scenelang[play]'") from None
     first = None
+    if path.suffix == ".nsg" and path.parent.is_dir() and not path.exists() and fits(path.name):
+        with path.open("x", encoding="utf-8") as file:
+            file.write(NEW)
+        click.echo(f"Made {path}.")
     if path.is_file():
         path, first = path.parent, path.name
         if not fits(first):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import click
 
@@ -22,14 +22,21 @@ if TYPE_CHECKING:
     from scenelang.outputs import Output, Outputs, Proof
 
 
-@click.command("render")
+_SECTIONS: Final = {
+    "Animations": "--frame --frames --fps --jobs --cluster --palette --dither",
+    "How it is drawn": "--model --backend --samples --max-ms --max-flip --originals --device --threads",
+    "More than a picture": "--output --prove --redraw --verbose",
+}
+
+
+@click.command("render", cls=options.Sectioned, sections=_SECTIONS)
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
 @click.option(
     "-o",
     "--out",
     required=True,
     metavar="OUT",
-    help="A picture, an animation, numbered pictures or a folder.",
+    help="Picture, animation, numbered pictures or folder to write.",
 )
 @options.size
 @options.define
@@ -41,9 +48,14 @@ if TYPE_CHECKING:
 @options.choice(
     "--palette", words="auto global frame", help="Colours of a GIF: 255 for all frames or for each."
 )
-@click.option("--dither", is_flag=True, help="Dither what a GIF's palette lacks.")
+@click.option("--dither", is_flag=True, help="Dither colours that a GIF's palette lacks.")
 @options.model
-@options.backend
+@options.choice(
+    "--backend",
+    words="neural exact reference",
+    help="Draw with the trained network, with formulas of the shapes in its place (exact), or by the exact "
+    "definition, which is slow (reference).",
+)
 @options.choice(
     "--samples",
     words="adaptive four quick one draft",
@@ -55,7 +67,7 @@ if TYPE_CHECKING:
     "outputs",
     multiple=True,
     type=click.Choice(("depth", "normal", "object", "alpha", "proof")),
-    help="Write this beside the picture too, to OUT's STEM.depth.png and so on, or into an .exr; may be "
+    help="Output to write beside the picture, to STEM.depth.png and so on, or into an .exr; may be "
     "given several times.",
 )
 @click.option("--prove", is_flag=True, help="Prove how far pixels are from the exact picture at most (2D).")
@@ -64,13 +76,13 @@ if TYPE_CHECKING:
     "--max-ms",
     type=options.Real(0, min_open=True),
     metavar="N",
-    help="Choose the most exact way to draw that takes at most so long on one thread.",
+    help="Choose the most exact way to draw that takes at most N milliseconds on one thread.",
 )
 @click.option(
     "--max-flip",
     type=options.Real(0, 1),
     metavar="E",
-    help="Choose the fastest way to draw whose promised FLIP error is at most so large.",
+    help="Choose the fastest way to draw whose promised FLIP error is at most E.",
 )
 @options.originals
 @options.device
@@ -93,7 +105,7 @@ def command(
     palette: Literal["auto", "global", "frame"],
     dither: bool,
     model: str | None,
-    backend: options.Backend,
+    backend: options.Still,
     samples: Samples,
     outputs: tuple[Output, ...],
     prove: bool,
@@ -149,8 +161,11 @@ def command(
     outputs = tuple(dict.fromkeys(outputs))
     prove = prove or redraw or "proof" in outputs
     clock = Clock()
+    if backend == "exact" and device == "cuda":
+        raise click.UsageError("--backend exact draws on processors only; leave out --device cuda.")
+    moving: options.Backend = "neural" if backend == "exact" else backend  # which animations refuse below
     wanted = Requested(
-        frames, fps, jobs, cluster, palette, dither, backend, device, threads, strict, verbose, outputs
+        frames, fps, jobs, cluster, palette, dither, moving, device, threads, strict, verbose, outputs
     )
     _ = wanted.frames
     if frame is not None and wanted.certain:
@@ -166,7 +181,7 @@ def command(
     if len(files) == 1 and frame is None and not files[0].endswith(PROGRAM):
         target = wanted_target(files[0], out, wanted)
         if target is not None:
-            _only_stills(limits, samples, prove)
+            _only_stills(limits, samples, prove, backend)
             done = animate(files[0], out, target, request, wanted)
             if isinstance(done, int):
                 ctx.exit(done)
@@ -189,7 +204,7 @@ def command(
         request,
         clock,
         strict=strict,
-        compiled=backend == "neural",
+        compiled=backend != "reference",
         verbose=verbose or prove,
         source=source,
         refusal=refusal,
@@ -204,7 +219,7 @@ def command(
             raise click.UsageError("--samples is for the network, not for the reference.")
         draw = exact(request, clock)
     else:
-        draw = neural(clock, device, threads, samples)
+        draw = neural(clock, device, threads, samples, exactly=backend == "exact")
     proofs: list[Proof] = []
     if prove:
         draw = proved(draw, clock, redraw, proofs)
@@ -213,7 +228,7 @@ def command(
         for index, (job, path) in enumerate(ready):
             if outputs:  # before the picture: what it lacks is said at once
                 with clock("outputs"):
-                    found = job_outputs(job, outputs, request.model, threads, exactly=backend == "reference")
+                    found = job_outputs(job, outputs, request.model, threads, backend)
             image = draw(job, partial(_part, bar, index, len(ready)))
             if is_blank(job, image):
                 told.append(f"{path}: {_BLANK}")
@@ -254,8 +269,9 @@ def _part(bar: Bar, index: int, count: int, share: float) -> None:
     bar("drawing", index + share, count)
 
 
-def _only_stills(limits: Limits, samples: str, prove: bool) -> None:
+def _only_stills(limits: Limits, samples: str, prove: bool, backend: str) -> None:
     """Refuse for animations what chooses or changes how one picture is drawn."""
-    if limits or samples != "adaptive" or prove:
+    if limits or samples != "adaptive" or prove or backend == "exact":
         what = "--max-ms and --max-flip are" if limits else "a proof is" if prove else "--samples is"
+        what = "--backend exact is" if backend == "exact" else what
         raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")

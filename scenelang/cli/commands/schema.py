@@ -14,7 +14,7 @@ from scenelang.cli.say import put_out
 @options.choice(
     "--kind",
     words="scene diagnostics manifest",
-    help="Scenes as JSON, what `check --format json` prints, or a model's manifest.",
+    help="Schema of scenes as JSON, of what `check --format json` prints, or of a model's manifest.",
 )
 @options.out
 def command(kind: str, out: str | None) -> None:

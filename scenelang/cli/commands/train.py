@@ -23,10 +23,15 @@ def training(made: Callable[..., None]) -> Callable[..., None]:
             default=60.0,
             show_default=True,
             metavar="SECONDS",
-            help="Most time between checkpoints; the first comes after the first step.",
+            help="Longest time between checkpoints; the first comes after the first step.",
         ),
         click.option(
-            "--every", type=click.IntRange(1), default=500, show_default=True, help="Steps between reports."
+            "--every",
+            type=click.IntRange(1),
+            metavar="N",
+            default=500,
+            show_default=True,
+            help="Steps between reports.",
         ),
         options.threads,
         options.device,
@@ -44,7 +49,7 @@ def training(made: Callable[..., None]) -> Callable[..., None]:
             required=True,
             type=click.Path(file_okay=False, path_type=Path),
             metavar="FOLDER",
-            help="Gets the checkpoint, the log and at the end the weights.",
+            help="Folder for the checkpoint, the log and at the end the weights.",
         ),
         click.argument("config"),
     ):

@@ -12,6 +12,7 @@ import click
 from scenelang.cli import options
 from scenelang.cli.main import describe
 from scenelang.cli.say import wants_color
+from scenelang.diagnostics.suggest import plural
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 @click.command("watch")
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
-@click.option("-o", "--out", metavar="OUT", help="The picture, or an animation; by default STEM.png.")
+@click.option("-o", "--out", metavar="OUT", help="Picture or animation to write; by default STEM.png.")
 @options.size
 @options.define
 @options.still
@@ -111,7 +112,6 @@ def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] 
 
 
 def _report(easel: Easel, screen: Screen, outcome: Outcome) -> None:
-    from scenelang.diagnostics.render_text import plural
 
     clock = time.strftime("%H:%M:%S")
     screen.clear()

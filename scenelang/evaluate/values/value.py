@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
+from scenelang.diagnostics.suggest import plural
 from scenelang.scene.schema import Material
 
 MAX_VECTOR: Final = 1_000_000  # numbers in one vector, nested ones counted
@@ -197,7 +198,7 @@ def describe(value: Any) -> str:
     """What kind of value it is, for messages."""
     if value.__class__ is Vec:
         count = len(value.items)
-        return f"a vector of {count} item{'' if count == 1 else 's'}"
+        return f"a vector of {plural(count, 'item')}"
     return _KINDS.get(value.__class__, "another value")
 
 

@@ -26,7 +26,7 @@ from scenelang.lab.commands import common
     default=2,
     show_default=True,
     type=click.IntRange(1, 10_000),
-    help="Of an evaluation; what draws many for each value takes a twentieth, but at least 1.",
+    help="Scenes of an evaluation; what draws many for each value takes a twentieth, but at least 1.",
 )
 def command(out: Path, budget: float, scenes: int) -> None:
     """Measure everything that the documentation reports, from scratch.

@@ -17,7 +17,7 @@ from scenelang.files import write_whole
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
     metavar="FOLDER",
-    help="Where to; by default beside the measurements.",
+    help="Folder to write to; by default that of the measurements.",
 )
 def command(folder: Path, out: Path | None) -> None:
     """Draw what `scenelang lab experiment` left in FOLDER.

@@ -16,16 +16,28 @@ SECONDS = {"textures": 30.0, "meshes": 20.0}
 
 @click.command("codes")
 @click.argument("what", type=click.Choice(list(SECONDS)))
-@click.option("--scenes", default=200, show_default=True, type=click.IntRange(1, 10_000))
+@click.option(
+    "--scenes",
+    default=200,
+    show_default=True,
+    type=click.IntRange(1, 10_000),
+    metavar="N",
+    help="Number of scenes.",
+)
 @click.option(
     "--seconds",
     type=options.Real(0, min_open=True),
-    help="Processor time of training a decoder. Default: 30 of textures, 20 of meshes.",
+    help="Processor time of training a decoder; by default 30 of textures, 20 of meshes.",
 )
 @click.option(
-    "--sizes", metavar="D,D,…", help="Numbers of codes and forms. Default: 1 to 64, and forms on to 65536."
+    "--sizes", metavar="D,D,…", help="Numbers of codes and forms; by default 1 to 64, and forms on to 65536."
 )
-@click.option("--side", type=click.IntRange(16, 8192), metavar="PIXELS", help="Default: as the set says.")
+@click.option(
+    "--side",
+    type=click.IntRange(16, 8192),
+    metavar="PIXELS",
+    help="Shorter side of the canvas; by default as the set says.",
+)
 @click.option("--kept", type=click.Path(path_type=Path, file_okay=False), help="Folder of exact pictures.")
 @options.originals
 @common.seed

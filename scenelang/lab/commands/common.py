@@ -17,19 +17,41 @@ if TYPE_CHECKING:
 DEFAULT_SEED: Final = 2021
 
 out = click.option(
-    "-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True, metavar="FOLDER"
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("out"),
+    show_default=True,
+    metavar="FOLDER",
+    help="Folder to write to.",
 )
 weights = click.option(
-    "--weights", type=click.Path(path_type=Path, exists=True, dir_okay=False), help="Other weights."
+    "--weights",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="Weights instead of the shipped ones.",
 )
-threads = click.option("--threads", default=1, show_default=True, type=click.IntRange(1, 256))
-seed = click.option("--seed", default=DEFAULT_SEED, show_default=True, type=click.IntRange(0, 2**31 - 1))
+threads = click.option(
+    "--threads",
+    default=1,
+    show_default=True,
+    type=click.IntRange(1, 256),
+    metavar="N",
+    help="Number of threads on the CPU.",
+)
+seed = click.option(
+    "--seed",
+    default=DEFAULT_SEED,
+    show_default=True,
+    type=click.IntRange(0, 2**31 - 1),
+    metavar="N",
+    help="Seed of what is random.",
+)
 
 kept = click.option(
     "--kept",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="FOLDER",
-    help="Of exact pictures, which are drawn and kept there unless they are.",
+    help="Folder of exact pictures; those that are missing are drawn and kept there.",
 )
 
 

@@ -19,16 +19,23 @@ from scenelang.lab.commands import common
     "sets",
     multiple=True,
     metavar="NAME",
-    help="A set, or a file of elements, whose solids take the place of those of meshes3d; may be repeated. "
-    "Default: MODEL's own.",
+    help="Set to draw, or a file of elements, whose solids take the place of those of meshes3d; "
+    "may be repeated. By default MODEL's own.",
 )
-@click.option("--all-sets", is_flag=True, help="Every set there is.")
-@click.option("--scenes", default=1000, show_default=True, type=click.IntRange(1, 1_000_000))
+@click.option("--all-sets", is_flag=True, help="Draw every set there is.")
+@click.option(
+    "--scenes",
+    default=1000,
+    show_default=True,
+    type=click.IntRange(1, 1_000_000),
+    metavar="N",
+    help="Number of scenes.",
+)
 @click.option(
     "--side",
     type=click.IntRange(1, 8192),
     metavar="PIXELS",
-    help="Shorter side of the canvas. Default: as the set says.",
+    help="Shorter side of the canvas; by default as the set says.",
 )
 @common.kept
 @options.originals

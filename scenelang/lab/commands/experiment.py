@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     required=True,
     type=click.Path(file_okay=False, path_type=Path),
     metavar="FOLDER",
-    help="Gets NAME.json, strips of pictures, and checkpoints to go on from.",
+    help="Folder for NAME.json, strips of pictures, and checkpoints to go on from.",
 )
 @click.option(
     "--budget",
@@ -35,9 +35,20 @@ if TYPE_CHECKING:
     help="Processor time of each training.",
 )
 @click.option(
-    "--scenes", default=200, show_default=True, type=click.IntRange(8, 10_000), help="Unseen ones, measured."
+    "--scenes",
+    default=200,
+    show_default=True,
+    type=click.IntRange(8, 10_000),
+    help="Unseen scenes to measure.",
 )
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(0, 2000))
+@click.option(
+    "--seed",
+    default=1,
+    show_default=True,
+    type=click.IntRange(0, 2000),
+    metavar="N",
+    help="Seed of parameters and training scenes.",
+)
 @options.device
 @options.threads
 def command(

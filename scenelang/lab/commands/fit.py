@@ -12,7 +12,14 @@ from scenelang.lab.commands import common
 
 @click.command("fit")
 @click.argument("model")
-@click.option("--scenes", default=50, show_default=True, type=click.IntRange(1, 10_000))
+@click.option(
+    "--scenes",
+    default=50,
+    show_default=True,
+    type=click.IntRange(1, 10_000),
+    metavar="N",
+    help="Number of scenes.",
+)
 @click.option(
     "--params",
     "counts",
@@ -20,11 +27,13 @@ from scenelang.lab.commands import common
     default=(1, 2, 3),
     show_default=True,
     type=click.IntRange(1, 24),
-    help="Of a scene; may be repeated: scenes have so many in turn.",
+    help="Params of a scene; may be repeated: scenes have so many in turn.",
 )
-@click.option("--side", default=256, show_default=True, type=click.IntRange(32, 1024), help="Of targets.")
+@click.option(
+    "--side", default=256, show_default=True, type=click.IntRange(32, 1024), help="Side of targets in pixels."
+)
 @click.option("--gradients", is_flag=True, help="Compare descents by reverse passes and by differences.")
-@click.option("--name", default="fit", show_default=True, help="Of the record.")
+@click.option("--name", default="fit", show_default=True, help="Name of the record.")
 @common.seed
 @common.out
 def command(

@@ -21,11 +21,18 @@ VERIFY_SEED = 4042
 @click.command("frontier")
 @click.argument("model")
 @common.out
-@click.option("--scenes", default=80, show_default=True, type=click.IntRange(1, 100_000))
+@click.option(
+    "--scenes",
+    default=80,
+    show_default=True,
+    type=click.IntRange(1, 100_000),
+    metavar="N",
+    help="Number of scenes.",
+)
 @click.option(
     "--seed",
     type=click.IntRange(0, 2**31 - 1),
-    help=f"Of the scenes.  [default: {common.DEFAULT_SEED}; {VERIFY_SEED} to verify]",
+    help=f"Seed of the scenes.  [default: {common.DEFAULT_SEED}; {VERIFY_SEED} to verify]",
 )
 @common.threads
 @common.kept

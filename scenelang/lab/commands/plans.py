@@ -14,7 +14,9 @@ from scenelang.lab.commands.common import write_json
 @click.argument(
     "files", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True, dir_okay=False)
 )
-@click.option("-o", "--out", type=click.Path(path_type=Path), required=True, metavar="FILE")
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path), required=True, metavar="FILE", help="Record to write."
+)
 def command(files: tuple[Path, ...], out: Path) -> None:
     """Draw scenes on one thread and record their plans.
 

@@ -13,8 +13,22 @@ from scenelang.lab.commands import common
 
 @click.command("shadows")
 @click.argument("model", default="solids3d")
-@click.option("--scenes", default=100, show_default=True, type=click.IntRange(1, 10_000))
-@click.option("--side", default=128, show_default=True, type=click.IntRange(16, 1024), metavar="PIXELS")
+@click.option(
+    "--scenes",
+    default=100,
+    show_default=True,
+    type=click.IntRange(1, 10_000),
+    metavar="N",
+    help="Number of scenes.",
+)
+@click.option(
+    "--side",
+    default=128,
+    show_default=True,
+    type=click.IntRange(16, 1024),
+    metavar="PIXELS",
+    help="Shorter side of the canvas.",
+)
 @common.seed
 @common.out
 @common.weights

@@ -14,15 +14,17 @@ from scenelang.lab.commands import common
 
 @click.command("stability")
 @click.argument("model")
-@click.option("--only", multiple=True, metavar="NAME", help="A probe; may be repeated. Default: all.")
 @click.option(
-    "--scenes", default=20, show_default=True, type=click.IntRange(1, 10_000), help="Of each value."
+    "--only", multiple=True, metavar="NAME", help="Probe to measure; may be repeated. By default all."
+)
+@click.option(
+    "--scenes", default=20, show_default=True, type=click.IntRange(1, 10_000), help="Scenes of each value."
 )
 @click.option(
     "--known",
     multiple=True,
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    help="What this command wrote before: it is added to, not measured again; may be repeated.",
+    help="Record of this command to add to, not measured again; may be repeated.",
 )
 @common.seed
 @common.out

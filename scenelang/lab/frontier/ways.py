@@ -10,13 +10,13 @@ from typing import Any, Literal
 import numpy as np
 import torch
 
+from scenelang.backend.closed import closed_forms
 from scenelang.backend.neural import draw_program, open_model
 from scenelang.backend.options import Samples
 from scenelang.backend.small import choose_drawer, draw_small
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.image import Image, from_samples
-from scenelang.lab.frontier.closed import closed_forms
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.models.weights import read_facts

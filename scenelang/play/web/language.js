@@ -45,10 +45,12 @@ function ahead(stream, pattern) {
 function named(stream, state, word) {
   const before = state.before;
   state.before = word;
+  const inLook = state.look;  // `diffuse tex.grain` behind `material`
+  if (word === "material") state.look = true;
   const known = KNOWN.get(word)?.find(({ after }) => ahead(stream, after));
   if (known) return known.tag;
   if (before in DEFINED) return DEFINED[before];
-  if (ahead(stream, /\s*\{/y)) return "className";
+  if (inLook || ahead(stream, /\s*\{/y)) return "className";
   if (ahead(stream, /\s*\(/y)) return "variableName.function";
   return ahead(stream, /\s*=(?!=)/y) ? "propertyName" : "variableName";
 }
@@ -80,10 +82,11 @@ function token(stream, state) {
 
 const scenes = StreamLanguage.define({
   name: "nsg",
-  startState: () => ({ comment: false, before: "", depth: 0 }),
+  startState: () => ({ comment: false, before: "", depth: 0, look: false }),
   token(stream, state) {
     const found = token(stream, state);
     if (found === "punctuation") {
+      state.look = false;
       if ("([{".includes(stream.current())) state.depth += 1;
       if (")]}".includes(stream.current())) state.depth = Math.max(0, state.depth - 1);
     }

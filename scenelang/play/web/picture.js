@@ -276,12 +276,9 @@ export function makePicture(at, { send, oncamera }) {
     },
     onview({ file: of, version, view, problems }) {
       if (of !== file) return;
-      const errors = problems.filter(({ severity }) => severity === "error").length;
-      faulty = view === null && errors > 0;
-      if (faulty) {
-        const count = `${errors} ${errors === 1 ? "mistake" : "mistakes"}`;
-        const isOf = at.stage.dataset.shows === "none" ? "No picture" : "The last picture without mistakes";
-        note(`${isOf}: the text has ${count}`);
+      faulty = view === null && problems.some(({ severity }) => severity === "error");
+      if (faulty) {  // the language server counts them, of all the text
+        note(`${at.stage.dataset.shows === "none" ? "No picture" : "The last picture"}: the text has mistakes`);
         return;
       }
       unable = view === null ? (problems.at(-1)?.message ?? "no page draws it") : null;

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from scenelang.graph.nodes import Fold
@@ -30,6 +32,7 @@ def solid_image(
     *,
     per_side: int = 2,
     brought: Brought | None = None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> Image:
     """Draw the exact picture of a scene of solids.
 
@@ -39,6 +42,7 @@ def solid_image(
         canvas: width and height in pixels.
         per_side: samples along each side of a pixel; 2 is the definition (4 spp).
         brought: shapes of elements.
+        progress: called with the share done, in [0, 1].
 
     Returns:
         (H, W, 3), or (H, W, 4) with straight alpha where the stage is transparent.
@@ -56,6 +60,7 @@ def solid_image(
         rows = range(top, min(top + step, height))
         samples = radiance(field, stage, ways(stage, canvas, rows, per_side))
         picture[:, top : rows.stop] = samples.reshape(4, len(rows), per_side, width, per_side).mean((2, 4))
+        progress(rows.stop / height)
     return from_light(picture, stage.transparent)
 
 

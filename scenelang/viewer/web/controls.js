@@ -152,13 +152,15 @@ export function timeline(viewer) {
   return { box: element("div", { class: "bar timeline" }, button, place, time), dispose: unwatch };
 }
 
+const HINT = "Drag to turn the picture, with Shift to move it; pinch, or press + and -, to zoom.";
+
 /** The camera's line with a button to copy it, and one to go back to the scene's own. */
 export function cameraControls(viewer) {
-  const line = element("code", { class: "line" });
+  const line = element("span", { class: "line" });
   const back = element("button", { type: "button", onclick: () => (viewer.camera = null) }, "Reset camera");
   const copy = copyButton("Copy camera line", () => viewer.cameraLine());
   const refresh = () => {
-    line.textContent = viewer.moved ? viewer.cameraLine() : "Drag to turn, pinch or + and - to zoom, shift to move";
+    line.replaceChildren(viewer.moved ? element("code", {}, viewer.cameraLine()) : HINT);
     back.disabled = !viewer.moved;
   };
   const unwatch = viewer.watch(({ kind }) => {

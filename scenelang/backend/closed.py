@@ -1,12 +1,17 @@
-"""The exact field by formulas in place of the network, with all that the renderer saves: its rival."""
+"""The exact field: formulas of leaves and fold in place of the network, with all that the renderer saves.
+
+Shapes of users have no formula and stay the grids that they are.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from scenelang.backend.options import RenderError
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.reference.field import SECTORS, TORUS, leaf_distance
@@ -15,6 +20,9 @@ from scenelang.renderers.field import BLEND, SMOOTH, SUBTRACT, UNION
 from scenelang.renderers.network import FramedArrays, FramedConfig
 from scenelang.renderers.slopes import Floats
 from scenelang.renderers.solid.network import Cell, SolidArrays, Wanted
+
+if TYPE_CHECKING:
+    from scenelang.program.program import Program
 
 SHARP = 1e6  # per world unit: gates of the plane's cell open within a millionth
 
@@ -158,9 +166,27 @@ class ClosedSolids(SolidArrays):
         return np.where(cell.own[0] == SUBTRACT, -take, take), 1 - take
 
 
+@lru_cache(maxsize=8)
 def closed_forms(model: str) -> ClosedPlane | ClosedSolids:
-    """The exact field of a model's Programs."""
-    return (ClosedPlane if load_manifest(model).dimension == 2 else ClosedSolids)(model)
+    """The exact field of a model's Programs; raises `RenderError` where it has none."""
+    manifest = load_manifest(model)
+    if manifest.renderer not in ("framed", "solid") or manifest.lifting != "exact":
+        raise RenderError(f"model `{model}` has no frames that formulas could answer in")
+    return (ClosedPlane if manifest.dimension == 2 else ClosedSolids)(model)
+
+
+def field_of(program: Program, exact: bool) -> FramedArrays | SolidArrays:
+    """What answers for distances and colours of a Program: formulas, or its network.
+
+    Raises:
+        KeyError: there is no such model.
+        ModelError, ProgramError: its weights are missing, or others than it was compiled for.
+        RenderError: no formulas do.
+    """
+    formulas = closed_forms(program.model) if exact else None
+    network, digest = load_arrays(program.model)
+    program.check_weights(digest)
+    return formulas or network
 
 
 def _joined(token: Any, k: Array, state: Array, d: Array) -> Array:

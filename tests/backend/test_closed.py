@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.lab.frontier.closed import ExactShape, closed_forms
+from scenelang.backend.closed import ExactShape, closed_forms
+from scenelang.backend.options import Samples
 from scenelang.reference.field import SECTORS, leaf_distance
 from scenelang.renderers.draw import draw_objects
 from tests.passes.random_scenes import blob_scene, random_scene
 from tests.pictures import premultiplied, psnr_db
 
+PLANE = """chain {
+  square { scale(0.8); translate(-0.2, 0); material flat { color(#d33); } }
+  smooth(k = 0.3) pentagon { twirl(0.6); scale(0.5); rotate(30deg); translate(0.3, 0.3); }
+  subtract star { scale(0.3); translate(0.1, 0.1); }
+}"""
 SCENES = {
     "solids": (
         85,
@@ -98,3 +106,37 @@ def test_formulas_draw_the_exact_picture_of_the_plane() -> None:
         off += int((abs(drawn - exact).max(-1) > 1 / 255).sum())
     assert seen == {0, 1, 2, 3}
     assert off <= 4
+
+
+@pytest.mark.parametrize("samples", ["four", "adaptive"])
+def test_users_can_ask_for_formulas(samples: Samples) -> None:
+    """What differs from the exact picture is then the march and the samples, and no network."""
+    for text, least_db in ((PLANE, 90 if samples == "four" else 55), (SCENES["solids"][1], 45)):
+        scene = nsg.loads(f"canvas(64, 48); {text}")
+        exact = nsg.render(scene, backend="reference")
+        drawn = nsg.render(scene, backend="exact", samples=samples)
+        assert psnr_db(drawn, exact) > least_db
+        again = nsg.render(nsg.compile(scene), backend="exact", samples=samples)
+        assert np.array_equal(drawn, again)
+    near, far = (psnr_db(nsg.render(scene, backend=b), exact) for b in ("exact", "neural"))
+    assert near > far - 1
+
+
+def test_outputs_by_formulas() -> None:
+    scene = nsg.loads("canvas(48, 48); sphere { scale(0.5, 0.7, 0.4); }")
+    depth = {
+        b: nsg.render_outputs(scene, ("depth",), backend=b).depth for b in ("neural", "exact", "reference")
+    }
+    seen = np.isfinite(depth["reference"]) & np.isfinite(depth["exact"]) & np.isfinite(depth["neural"])
+    assert abs(depth["exact"][seen] - depth["reference"][seen]).max() < 1e-3
+    assert not np.array_equal(depth["exact"], depth["neural"])
+
+
+def test_what_has_no_formulas_is_refused(tmp_path: Path) -> None:
+    scene = nsg.loads('model "shapes2d-reading"; square { scale(0.5); }')
+    with pytest.raises(nsg.RenderError, match="no frames that formulas could answer in"):
+        nsg.render(scene, backend="exact")
+    with pytest.raises(nsg.RenderError, match="by numpy"):
+        nsg.render(nsg.loads("square {}"), backend="exact", device="cuda")
+    with pytest.raises(ValueError, match="unknown backend `exact` of animations"):
+        nsg.animate([scene, scene], tmp_path / "%d.png", backend="exact")  # type: ignore[arg-type]
