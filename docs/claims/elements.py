@@ -35,7 +35,7 @@ CLAIMS = [
 GIVEN = {
     "0.0003 of solids, 0.0001 of flat shapes": "errors that are asked for",
     "which is 40 dB": "the same in another unit",
-    "no inside 0.002 below more than 2 % of a surface": "where the report warns",
+    "no inside within a cell of more than 2 % of a surface": "where the report warns",
     "twice as many of its own radii": "a rule",
     "where it is half as large": "a rule",
     "1,025 in the plane": "the largest grid",

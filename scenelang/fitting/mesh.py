@@ -50,7 +50,6 @@ class Mesh:
     notes: tuple[str, ...] = ()
     look: Look | None = None
     dimension: ClassVar[int] = 3
-    beside: ClassVar[float] = _BESIDE
 
     @cached_property
     def _trees(self) -> tuple[Any, Any]:
@@ -110,8 +109,10 @@ class Mesh:
         share = points_to_barycentric(self.vertices[self.triangles[triangle]], at, "cross").clip(0, 1)
         return triangle, share / share.sum(1, keepdims=True)
 
-    def surface(self, count: int) -> tuple[Points, Points]:
+    def surface(self, count: int) -> tuple[Points, Points, float]:
         """Points (K, 3) spread evenly on the outside of the solid, K at most ``count``, and normals there.
+
+        Also the share of the surface that has no inside on either side.
 
         Raises:
             FitError: most of the surface has no inside.
@@ -121,18 +122,20 @@ class Mesh:
         normals = np.cross(b - a, c - a)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         points = self.points(at, share)
-        found, out = outer(self.distances, points, normals, _BESIDE)
+        found, out, thin = outer(self.distances, points, normals, _BESIDE)
         enclosed = len(found) / len(points)
         if enclosed < _ENCLOSED:
             open_ = f"{100 * (1 - enclosed):.0f} % of the surface has no inside"
             raise FitError(f"{open_} {_BESIDE:g} radii below it: it encloses no solid")
-        return found, out
+        return found, out, thin
 
 
 def outer(
     distances: Callable[[Points], Points], points: Points, normals: Points, beside: float
-) -> tuple[Points, Points]:
+) -> tuple[Points, Points, float]:
     """Of points of surfaces (M, d) those with an inside on one side alone (K, d), and outward normals.
+
+    Also the share of those that have none on either side.
 
     Args:
         distances: signed, of points.
@@ -142,7 +145,7 @@ def outer(
     sides = [distances(points + way * beside * normals) < 0 for way in (1, -1)]
     chosen = sides[0] != sides[1]
     turned = np.where(sides[0], -1.0, 1.0)[:, None]
-    return points[chosen], (normals * turned)[chosen]
+    return points[chosen], (normals * turned)[chosen], float((~(sides[0] | sides[1])).mean())
 
 
 def _once(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:

@@ -81,7 +81,6 @@ class Outline:
     """
 
     dimension = 2
-    beside = _BESIDE
 
     def __init__(self, layers: list[Layer], notes: tuple[str, ...] = ()) -> None:
         from scipy.spatial import cKDTree
@@ -148,8 +147,10 @@ class Outline:
             found = np.minimum(found, away)
         return found
 
-    def surface(self, count: int) -> tuple[Points, Points]:
+    def surface(self, count: int) -> tuple[Points, Points, float]:
         """Points (K, 2) spread evenly on the outline, K at most ``count``, and outward normals.
+
+        Also the share of the outline that has no inside on either side.
 
         Raises:
             FitError: nothing is thick enough to have an outline.
@@ -163,10 +164,10 @@ class Outline:
                 normals.append(side * way)
         all_points, all_normals = np.concatenate(points), np.concatenate(normals)
         chosen = random.choice(len(all_points), min(count, len(all_points)), replace=False)
-        found, out = outer(self.distances, all_points[chosen], all_normals[chosen], _BESIDE)
+        found, out, thin = outer(self.distances, all_points[chosen], all_normals[chosen], _BESIDE)
         if not len(found):
             raise FitError(f"it is nowhere thicker than {_BESIDE:g} of its radius")
-        return found, out
+        return found, out, thin
 
 
 def _moved(inside: Inside, middle: Points, size: float) -> Inside:
