@@ -70,7 +70,7 @@ class Elements(Frozen):
             zoo = load_zoo(place)
         except TensorError as error:
             return "E0217", f"`{self.path}` is not a file of elements: {error}"
-        except (OSError, ValueError) as error:
+        except (OSError, RuntimeError, ValueError) as error:
             reason = (getattr(error, "strerror", None) or str(error)).lower()
             return "E0214", f"cannot read `{self.path}`: {reason}"
         if zoo.digest != self.digest:

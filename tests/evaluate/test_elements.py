@@ -190,12 +190,14 @@ def test_json_has_the_file_and_its_digest(folder: Path) -> None:
         ({"path": "../zoo.safetensors"}, "outside the import root"),
         ({"path": "/etc/passwd"}, "outside the import root"),
         ({"path": "none"}, "no such file"),
+        ({"path": "loop"}, "loop|too many levels"),
         ({"path": 'a"; sphere { } //'}, "not a possible name"),
         ({"digest": "0" * 64}, "not the file that the scene was made with"),
     ],
 )
 def test_json_of_other_files(folder: Path, change: dict[str, Any], words: str) -> None:
     data = json.loads(good(folder, IMPORT + RING).to_json())
+    (folder / "loop").symlink_to("loop")
     data["elements"][0] |= change
     with pytest.raises(nsg.SceneError, match=words):
         nsg.Scene.from_json(json.dumps(data), root=folder)
