@@ -77,7 +77,7 @@ if TYPE_CHECKING:
 @click.option("--license", metavar="TEXT", help="Of the originals; kept in the file.")
 @click.option("--source", metavar="TEXT", help="Where they are from; kept in the file.")
 @options.cluster
-@click.option("--preview", metavar="OUT.png", help="A picture of the new elements.")
+@click.option("--preview", metavar="OUT.png", help="A picture of all elements of the file.")
 def command(
     files: tuple[str, ...],
     out: str,
@@ -108,7 +108,7 @@ def command(
 
     A scene says: import "zoo.safetensors" as zoo; zoo.cow { … }
     """
-    from scenelang.elements.zoo import SUFFIX
+    from scenelang.elements.zoo import SUFFIX, load_zoo
     from scenelang.fitting.learn import learn, names_of
     from scenelang.fitting.making import Wish
     from scenelang.fitting.mesh import FitError
@@ -125,7 +125,7 @@ def command(
     try:
         with Bar() as bar:
             say = partial(click.echo, err=True)
-            made = learn(files, out, wish, name=name, cluster=cluster, say=say, progress=bar)
+            learn(files, out, wish, name=name, cluster=cluster, say=say, progress=bar)
     except FitError as error:
         for line in str(error).split("\n"):
             say_trouble(line)
@@ -133,4 +133,4 @@ def command(
     if preview is not None:
         from scenelang.backend.thumbnail import sheet
 
-        sheet(made).save(preview)
+        sheet(load_zoo(out).elements).save(preview)
