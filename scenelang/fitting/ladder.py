@@ -32,7 +32,7 @@ BLOCK: Final = 100_000  # points that are asked for at a time
 LONG_S: Final = 240.0  # of processor time, into which the grids of a shape fit unless a budget is larger
 DEARER: Final = 4.0  # at most, a grid than the one before
 THIN: Final = 0.02  # share of a surface that may be too thin for a grid
-NEAR: Final = {2: 1e-4, 3: 3e-4}  # mean distance off that is near enough, by dimension
+NEAR: Final = {2: 1e-4, 3: 1.5e-4}  # mean distance off that is near enough, by dimension
 
 
 class Shape(Protocol):
@@ -110,12 +110,12 @@ class _Pyramid:
         self.steps.append(steps)
 
     def element(self, name: str, points: Points) -> Element:
-        """The element so far, settled on points of the surface."""
-        steps, true = self.steps, self.true
+        """The element so far, settled on points of the surface; of a solid, whose normals are seen, with finer steps."""
+        steps, true, finer = self.steps, self.true, False
         if len(points) and true is not None:
-            last = refine(self.before, len(true), true.ndim, lambda _: settled(true, points))[1]
-            steps = [*steps[:-1], last]
-        return packed(name, self.cells, steps, {})
+            finer, grid = true.ndim == 3, settled(true, points)
+            steps = [*steps[:-1], refine(self.before, len(true), true.ndim, lambda _: grid, finer)[1]]
+        return packed(name, self.cells, steps, {}, finer)
 
 
 def fit(
