@@ -5,8 +5,8 @@ number from -127 to 127, times a width that grows with the distance, so that nod
 have the step 0, and packing makes little of them. Between the nodes of a grid the next one expects what the
 cubic through four of them gives (Deslauriers and Dubuc 1989). Nothing here is learned.
 
-Of two codings, ``deflate`` has one width for all grids; ``bzip2`` has finer steps in the last grid, at the nodes
-that normals on the surface are made of. Without, a smooth surface looks hammered in the light.
+Of two codings, ``deflate`` has one width for all grids; ``bzip2`` has finer steps in the last grid, at the
+nodes that normals on the surface are made of. Without, a smooth surface looks hammered in the light.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ class Shape(Protocol):
         """Signed distances (M,) of points (M, d), negative inside."""
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """Points (K, d) of the surface, at most ``count``, outward normals, and the share that is too thin."""
+        """Points (K, d) of the surface, ``count`` at most, outward normals, and what share is too thin."""
 
 
 class Rung(NamedTuple):
@@ -110,7 +110,7 @@ class _Pyramid:
         self.steps.append(steps)
 
     def element(self, name: str, points: Points) -> Element:
-        """The element so far, settled on points of the surface; of a solid, whose normals are seen, with finer steps."""
+        """The element so far, settled on points of the surface; of a solid with fine steps there."""
         steps, true, finer = self.steps, self.true, False
         if len(points) and true is not None:
             finer, grid = true.ndim == 3, settled(true, points)

@@ -6,6 +6,7 @@ is refused here.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ Sign = Literal["auto", "winding", "closed"]
 MOST_TRIANGLES: Final = 4_000_000
 _ENCLOSED: Final = 0.5  # share of a surface that has to have an inside
 _BESIDE: Final = 2e-3  # leaf units from a surface to where its sides are asked
+_SLOW_S: Final = 2e-3  # of processor time that a point's distances may take: there are some 500,000
 _TOUCHING: Final = 1e-6  # leaf units from a surface to where its normals are those of its triangles
 
 
@@ -122,11 +124,16 @@ class Mesh:
         normals = np.cross(b - a, c - a)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         points = self.points(at, share)
-        found, out, thin = outer(self.distances, points, normals, _BESIDE)
-        enclosed = len(found) / len(points)
-        if enclosed < _ENCLOSED:
-            open_ = f"{100 * (1 - enclosed):.0f} % of the surface has no inside"
-            raise FitError(f"{open_} {_BESIDE:g} radii below it: it encloses no solid")
+        _ = None if self.closed else self._trees
+        for few, least in ((16, 0.0), (500, _ENCLOSED - 0.1), (count, _ENCLOSED)):
+            started = time.process_time()
+            found, out, thin = outer(self.distances, points[:few], normals[:few], _BESIDE)
+            spent_s, enclosed = time.process_time() - started, len(found) / len(points[:few])
+            if few < count and not self.closed and spent_s > 1 + _SLOW_S * few:
+                raise FitError("its triangles overlap so much that distances to it would take minutes")
+            if enclosed < least:
+                open_ = f"{100 * (1 - enclosed):.0f} % of the surface has no inside"
+                raise FitError(f"{open_} {_BESIDE:g} radii below it: it encloses no solid")
         return found, out, thin
 
 

@@ -21,6 +21,7 @@ MOST_EDGES: Final = 200_000
 MOST_PIXELS: Final = 16_000_000
 PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
 _STRIP: Final = 64  # points of neighbouring heights
+_TOGETHER: Final = 10_000  # edges that are asked at a time
 _BESIDE: Final = 1e-4  # leaf units from an edge to where its sides are asked
 Edges = npt.NDArray[np.float64]  # (E, 2, 2): edges, ends, coordinates
 Inside = Callable[[Points], npt.NDArray[np.bool_]]
@@ -184,10 +185,12 @@ def winding(edges: Edges, odd: bool) -> Inside:
         for first in range(0, len(p), _STRIP):  # points of a strip, and the edges that reach into it
             at = order[first : first + _STRIP]
             x, y = p[at].T[..., None]
-            (ax, ay), (bx, by) = edges[(low <= y[-1]) & (high >= y[0])].swapaxes(0, 1).swapaxes(1, 2)
-            up, down = (ay <= y) & (by > y), (ay > y) & (by <= y)
-            left = (bx - ax) * (y - ay) - (x - ax) * (by - ay) > 0
-            total[at] = (up & left).sum(1) - (down & ~left).sum(1)
+            reach = edges[(low <= y[-1]) & (high >= y[0])]
+            for part in (reach[k : k + _TOGETHER] for k in range(0, len(reach), _TOGETHER)):
+                (ax, ay), (bx, by) = part.swapaxes(0, 1).swapaxes(1, 2)
+                up, down = (ay <= y) & (by > y), (ay > y) & (by <= y)
+                left = (bx - ax) * (y - ay) - (x - ax) * (by - ay) > 0
+                total[at] += (up & left).sum(1) - (down & ~left).sum(1)
         return np.asarray(total % 2 != 0 if odd else total != 0)
 
     return inside
