@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     "--max-error",
     type=click.FloatRange(0, min_open=True),
     metavar="SHARE",
-    help="Mean distance off at the surface, in radii of the shape: 0.0003 of solids, 0.0001 of flat shapes; "
+    help="Mean distance off at the surface, in radii of the shape: 0.00015 of solids, 0.0001 of flat shapes; "
     "root mean square off of a texture's colours: 0.01.",
 )
 @click.option(
