@@ -18,10 +18,10 @@ TIMES = {
 LOAD = Figure(max(at("element-speed", "load_ms").values()))
 SMALL, LARGE = "solids3d/meshes3d", "solids3d-256/meshes3d"
 CLAIMS = [
-    f"at most {Figure(apart.READ_S)} s of processor time, and {Figure(apart.MEGABYTE_S)} s more for each MB of it up "
-    f"to {Figure(apart.MOST_READ_S)}, with {Figure(apart.READ / (1 << 30))} GiB of memory and {Figure(apart.TIMES)} "
-    f"times its size; it measures it in {Figure(apart.CPU_S)} s (or twice the budget) and "
-    f"{Figure(apart.MEMORY / (1 << 30))} GiB",
+    f"at most {Figure(apart.READ_S)} s of processor time, and {Figure(apart.MEGABYTE_S)} s more for each MB "
+    f"of it up to {Figure(apart.MOST_READ_S)}, with {Figure(apart.READ / (1 << 30))} GiB of memory and "
+    f"{Figure(apart.TIMES)} times its size; it measures it in {Figure(apart.CPU_S)} s "
+    f"(or twice the budget) and {Figure(apart.MEMORY / (1 << 30))} GiB",
     f"at most `--max-error`, {Figure(picture.NEAR_COLOUR)}, which",
     f"at most `--color-error`, {Figure(colours.NEAR)}, up",
     f"about {Figure(colours.MOST_BYTES / 1000)} KB. A part",

@@ -166,7 +166,8 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
         short += f", {100 * thin:.0f} % of the surface too thin for the grid"
     if shape.dimension == 3:  # light shows more than distances do
         best, cell = min(tried, key=lambda rung: rung.error), SEEN / (element.sides[-1] - 1)
-        short += f", normals {best.normal_deg:.1f}° off, details under {cell:.0f} pixels rounded at {SEEN} wide"
+        short += f", normals {best.normal_deg:.1f}° off"
+        short += f", details under {cell:.0f} pixels rounded at {SEEN} wide"
     shown = f"{element.sides[-1]} distances a side, {len(element.data):,} bytes, error {off:.5f}{short}"
     job.say(f"{name}: {shown}; {len(tried)} grids tried")
     return element
