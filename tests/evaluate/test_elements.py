@@ -244,3 +244,9 @@ def test_a_program_without_elements_is_of_the_old_format(folder: Path) -> None:
 def test_models_that_draw_elements() -> None:
     assert load_manifest("solids3d").elements == ("element of space", "texture", "colouring of space")
     assert load_manifest("shapes2d-reading").elements == ()
+
+
+def test_data_of_an_earlier_version_takes_the_meshes_that_ship_now() -> None:
+    data = json.loads(nsg.loads('import "std/meshes" as m; m.teapot { }').to_json())
+    data["elements"][0]["digest"] = "0" * 64
+    assert len(compile_scene(nsg.Scene.from_json(json.dumps(data), root="."))) == 1
