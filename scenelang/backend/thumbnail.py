@@ -17,6 +17,7 @@ from scenelang.image import Image
 from scenelang.program.compile import compile_scene
 from scenelang.scene.schema import Color, Elements, Material, Object, Rotate, Scale, Scene
 
+WIDEST: Final = 2048  # pixels of a sheet
 _TURN: Final = Rotate.degrees(30, axis=(0, 1, 0))
 
 
@@ -42,12 +43,12 @@ def thumbnail(element: Element, side: int = 128, worn: Element | None = None) ->
     return draw_small(compile_scene(Scene(elements=(zoo,), nodes=(shown,), canvas=(side, side)))).image
 
 
-def sheet(elements: Sequence[Element], side: int = 256) -> Image:
+def sheet(elements: Sequence[Element]) -> Image:
     """Elements in rows of about as many, in order, on white; geometries wear the colours of their name."""
     worn = {element.name: element for element in elements if element.form == "colours"}
     elements = [element for element in elements if element.name not in worn or not element.material]
     columns = math.ceil(math.sqrt(len(elements)))
-    rows = math.ceil(len(elements) / columns)
+    rows, side = math.ceil(len(elements) / columns), min(256, WIDEST // columns)
     picture = np.ones((rows * side, columns * side, 3), np.float32)
     for at, element in enumerate(elements):
         y, x = side * (at // columns), side * (at % columns)

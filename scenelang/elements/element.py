@@ -33,7 +33,9 @@ class Form(NamedTuple):
 FORMS: Final = {
     # a geometry: grids of distances over [-1, 1]^d (`scenelang.elements.pyramid`)
     "pyramid": Form(
-        ("dimension", "cells", "levels"), ("deflate",), {2: "element of the plane", 3: "element of space"}
+        ("dimension", "cells", "levels"),
+        ("deflate", "bzip2"),
+        {2: "element of the plane", 3: "element of space"},
     ),
     # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.elements.picture`)
     "picture": Form(("height", "width"), ("webp", "av1"), {2: "texture"}),
@@ -67,7 +69,7 @@ class Element:
     digest: str = field(init=False)
 
     def __post_init__(self) -> None:
-        words = (self.form, *self.sizes, *((self.coding,) if self.material else ()))
+        words = (self.form, *self.sizes, *((self.coding,) if self.names_coding else ()))
         said = "".join(f"{word} " for word in words).encode()
         object.__setattr__(self, "digest", hashlib.sha256(said + self.data).hexdigest())
 
@@ -75,6 +77,11 @@ class Element:
     def material(self) -> bool:
         """Whether it is a material, and no geometry."""
         return self.form != "pyramid"
+
+    @property
+    def names_coding(self) -> bool:
+        """Whether it is written how its bytes are coded; grids of distances were once all deflated."""
+        return self.material or self.coding != FORMS[self.form].codings[0]
 
     @property
     def dimension(self) -> int:

@@ -43,7 +43,7 @@ def pixels(element: Element) -> bytes:
                 if getattr(image, "n_frames", 1) > 1:
                     raise ValueError("more than one frame")
                 return image.convert("RGB").tobytes()
-    except (OSError, ValueError, SyntaxError, EOFError, struct.error, *bombs) as error:
+    except (OSError, ValueError, RuntimeError, SyntaxError, EOFError, struct.error, *bombs) as error:
         raise TensorError(f"element `{element.name}` is damaged: {error}") from None
 
 

@@ -28,7 +28,7 @@ from scenelang.tensors import Tensor, TensorError, read_tensors
 SUFFIX: Final = ".safetensors"
 MOST_BYTES: Final = 32 << 20
 MOST_ELEMENTS: Final = 1000
-MOST_HELD: Final = 32 << 20  # bytes that all elements of a file take unpacked
+MOST_HELD: Final = 128 << 20  # bytes that all elements of a file take unpacked
 _MOST_TEXT: Final = 2000
 
 
@@ -154,7 +154,7 @@ def is_said(value: Any) -> bool:
 def entry_of(element: Element) -> dict[str, Any]:
     """What a header says of an element."""
     sizes = dict(zip(FORMS[element.form].sizes, element.sizes, strict=True))
-    coding = {"coding": element.coding} if element.material else {}
+    coding = {"coding": element.coding} if element.names_coding else {}
     return {"form": element.form, **sizes, **coding, "about": element.about}
 
 

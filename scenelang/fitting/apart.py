@@ -18,8 +18,12 @@ from typing import IO, Any, Final
 from scenelang.fitting.mesh import FitError
 
 MEMORY: Final = 6 << 30  # bytes that the process may hold, where the system can bound them
-CPU_S: Final = 300.0  # of processor time for one file, and until it is read and something said of it
-READ_S: Final = 60.0
+CPU_S: Final = 300.0  # of processor time for one file
+READ_S: Final = 10.0  # of that until it is read and something said of it, and for each MB
+MEGABYTE_S: Final = 1.0  # so much more, but
+MOST_READ_S: Final = 60.0  # at most so much; and
+READ: Final = 1 << 30  # bytes of memory till then, and
+TIMES: Final = 48  # more for each byte of the file
 _CODE: Final = """
 import json, sys
 sys.path[:] = json.loads(sys.argv[1])
@@ -143,12 +147,16 @@ def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -
         request = json.loads(line)
         data = sys.stdin.buffer.read(request["bytes"])
         request["files"] = {name: sys.stdin.buffer.read(size) for name, size in request["files"].items()}
-        _bound(min(READ_S, request["cpu_s"]))
+        size = len(data) + sum(map(len, request["files"].values()))
+        memory = _bound(
+            min(READ_S + MEGABYTE_S * size / 1e6, MOST_READ_S, request["cpu_s"]), READ + TIMES * size
+        )
         limits = iter([request["cpu_s"]])
 
         def tell(kind: str, *told: Any, limits: Iterator[float] = limits) -> None:
+            nonlocal memory
             if kind == "say" and (limit_s := next(limits, None)):
-                _bound(limit_s)
+                memory = _bound(limit_s, MEMORY)
             _tell(out, kind, *told)
 
         try:
@@ -156,7 +164,7 @@ def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -
         except FitError as error:
             _tell(out, "error", str(error))
         except MemoryError:
-            _tell(out, "error", f"it takes more than {MEMORY >> 30} GiB of memory")
+            _tell(out, "error", f"it takes more than {memory >> 20:,} MiB of memory")
         except Exception as error:
             said = " ".join(f"{type(error).__name__}: {error}".split())
             _tell(out, "error", f"what reads it has failed ({said[:200]})")
@@ -174,18 +182,20 @@ def _refuse(event: str, arguments: object) -> None:
         raise PermissionError(f"{event} is not allowed here")
 
 
-def _bound(cpu_s: float) -> None:
-    """Bound memory, and the processor time from now on, where the system does such."""
+def _bound(cpu_s: float, memory: int) -> int:
+    """Bound memory, and the processor time from now on, where the system does such; returns the former."""
+    memory = min(memory, MEMORY)
     if sys.platform == "win32":
-        return
+        return memory
     import resource
 
     spent = resource.getrusage(resource.RUSAGE_SELF)
     for kind, most in (
-        (resource.RLIMIT_DATA, MEMORY),
+        (resource.RLIMIT_DATA, memory),
         (resource.RLIMIT_CPU, int(spent.ru_utime + spent.ru_stime + cpu_s) + 1),
         (resource.RLIMIT_CORE, 0),
     ):
         hard = resource.getrlimit(kind)[1]
         with suppress(ValueError, OSError):
             resource.setrlimit(kind, (most if hard < 0 else min(most, hard), hard))
+    return memory

@@ -60,6 +60,6 @@ def _read(folder: Path, name: str, most: int) -> bytes | None:
         if not path.is_relative_to(folder.resolve()):
             return None
         found = read_regular(path, most)
-    except (OSError, ValueError):
+    except (OSError, ValueError, RuntimeError):  # of a link to itself before Python 3.13
         return None
     return found if len(found) <= most else None

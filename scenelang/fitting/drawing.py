@@ -19,6 +19,9 @@ MOST_OF: Final = dict.fromkeys((".svg", ".png", ".jpg", ".jpeg"), 10 << 20)  # b
 _CURVE: Final = 48  # edges of a curve
 _PAINT: Final = re.compile(r"""url\(\s*['"]?#([^)'"\s]+)['"]?\s*\)[^;"}]*""")  # and what is meant without it
 _OPACITY: Final = re.compile(r"(?<![-\w])opacity\s*:\s*([^;]*)")
+_MOST_DRAWN: Final = 50_000  # elements of a drawing, each counted as often as it is used
+_MOST_STYLE: Final = 100_000  # letters of its style sheets, which are read again for each element
+_MOST_SAID: Final = 1_000_000  # letters of its paths, transforms and styles
 _UNSEEN: Final = {"mask": "masks", "marker": "markers", "filter": "filters", "clipPath": "clip paths"}
 
 
@@ -42,6 +45,8 @@ def drawn(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
         shapes = [e for e in parsed if isinstance(e, svgelements.Shape)]
         others = {type(e).__name__.lower() for e in parsed} & {"text", "image"}
         layers = [layer for shape in shapes for layer in _layers(shape, svgelements)]
+    except (FitError, MemoryError):
+        raise
     except Exception as error:
         raise FitError(f"damaged or not a drawing: {str(error) or type(error).__name__}"[:200]) from error
     strokes = sum(layer.inside is None for layer in layers)
@@ -53,6 +58,13 @@ def _simplified(root: Any, svg: Any) -> list[str]:
     """Change a tree into what svgelements draws as it is meant; what is lost by that."""
     found = [(element, element.tag.rpartition("}")[2]) for element in root.iter()]
     named = {element.get("id"): element for element, _ in found}
+    if sum(len(element.text or "") for element, tag in found if tag == "style") > _MOST_STYLE:
+        raise FitError(f"style sheets of more than {_MOST_STYLE:,} letters")
+    said = (value for element, _ in found for key, value in element.items() if not key.endswith("href"))
+    if sum(map(len, said)) > _MOST_SAID:
+        raise FitError(f"paths and styles of more than {_MOST_SAID:,} letters")
+    if _drawn(root, named) > _MOST_DRAWN:
+        raise FitError(f"a drawing of more than {_MOST_DRAWN:,} elements")
     means = {
         element.get("id"): _mean(element, named, svg) for element, tag in found if tag.endswith("Gradient")
     }
@@ -83,6 +95,26 @@ def _simplified(root: Any, svg: Any) -> list[str]:
     if any(_opacity(element) < 1 or "opacity" in "".join(element.attrib) for element, _ in found):
         notes.append("what is not opaque mixed with white")
     return notes
+
+
+def _drawn(root: Any, named: dict[str, Any]) -> int:
+    """How many elements svgelements goes through, those that are used as often as they are.
+
+    A use of itself counts as too many.
+    """
+    counts: dict[Any, int] = {}
+    waiting = [(root, False)]
+    while waiting:
+        element, counted = waiting.pop()
+        href = next((value for key, value in element.attrib.items() if key.endswith("href")), "")
+        used = named.get(href[1:]) if element.tag.endswith("use") else None
+        inner = [*element, *([] if used is None else [used])]
+        if counted:
+            counts[element] = 1 + sum(counts[part] or _MOST_DRAWN for part in inner)
+        elif element not in counts:
+            counts[element] = 0  # until all in it are
+            waiting += [(element, True), *((part, False) for part in inner)]
+    return counts[root]
 
 
 def _opacity(element: Any) -> float:

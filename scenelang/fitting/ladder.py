@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
@@ -31,7 +32,7 @@ BLOCK: Final = 100_000  # points that are asked for at a time
 LONG_S: Final = 240.0  # of processor time, into which the grids of a shape fit unless a budget is larger
 DEARER: Final = 4.0  # at most, a grid than the one before
 THIN: Final = 0.02  # share of a surface that may be too thin for a grid
-NEAR: Final = {2: 1e-4, 3: 3e-4}  # mean distance off that is near enough, by dimension
+NEAR: Final = {2: 1e-4, 3: 1.5e-4}  # mean distance off that is near enough, by dimension
 
 
 class Shape(Protocol):
@@ -49,15 +50,11 @@ class Shape(Protocol):
     def size(self) -> float:
         """Radius of the ball there."""
 
-    @property
-    def beside(self) -> float:
-        """How far below its surface it has an inside."""
-
     def distances(self, p: Points) -> Points:
         """Signed distances (M,) of points (M, d), negative inside."""
 
-    def surface(self, count: int) -> tuple[Points, Points]:
-        """Points (K, d) of the surface, at most ``count``, and outward normals."""
+    def surface(self, count: int) -> tuple[Points, Points, float]:
+        """Points (K, d) of the surface, ``count`` at most, outward normals, and what share is too thin."""
 
 
 class Rung(NamedTuple):
@@ -68,7 +65,7 @@ class Rung(NamedTuple):
         error: mean distance off at the surface, in leaf units.
         worst: what one point of a hundred exceeds.
         normal_deg: median angle between normals.
-        thin: share of the surface below which the grid has no inside.
+        thin: share of the surface within a cell of which the grid has no inside, or nothing has.
     """
 
     side: int
@@ -113,12 +110,12 @@ class _Pyramid:
         self.steps.append(steps)
 
     def element(self, name: str, points: Points) -> Element:
-        """The element so far, settled on points of the surface."""
-        steps, true = self.steps, self.true
+        """The element so far, settled on points of the surface; of a solid with fine steps there."""
+        steps, true, finer = self.steps, self.true, False
         if len(points) and true is not None:
-            last = refine(self.before, len(true), true.ndim, lambda _: settled(true, points))[1]
-            steps = [*steps[:-1], last]
-        return packed(name, self.cells, steps, {})
+            finer, grid = true.ndim == 3, settled(true, points)
+            steps = [*steps[:-1], refine(self.before, len(true), true.ndim, lambda _: grid, finer)[1]]
+        return packed(name, self.cells, steps, {}, finer)
 
 
 def fit(
@@ -145,7 +142,7 @@ def fit(
     """
     started, worked, spent = time.monotonic(), time.process_time(), 0.0
     long_s = max(LONG_S, budget_s) if budget_s < np.inf else LONG_S
-    points, normals = shape.surface(SAMPLES + SETTLED[shape.dimension])
+    points, normals, thin = shape.surface(SAMPLES + SETTLED[shape.dimension])
     others, points, normals = points[SAMPLES:], points[:SAMPLES], normals[:SAMPLES]
     growing = [_Pyramid(cells) for cells in CELLS]
     best: tuple[Rung, Element] | None = None
@@ -166,7 +163,7 @@ def fit(
         if pyramid.next_side // 2 + 1 < FEWEST[shape.dimension]:
             continue
         element = pyramid.element(name, others)
-        rung = measured(element, points, normals, shape.beside)
+        rung = measured(element, points, normals, thin)
         tried.append(rung)
         report(rung)
         if best is None or rung.error < best[0].error:
@@ -188,11 +185,11 @@ def fit(
     return replace(kept, about=said), tried
 
 
-def measured(element: Element, points: Points, normals: Points, beside: float) -> Rung:
+def measured(element: Element, points: Points, normals: Points, thin: float = 0.0) -> Rung:
     """How far an element is off at points (M, d) of the true surface and their normals.
 
     Args:
-        beside: leaf units below these points where the true shape has an inside.
+        thin: share of the surface that is too thin for any grid, and has no points here.
     """
     grid = unpacked(element)
     drawn = GridShape(NUMPY, grid.reshape(-1), len(grid), grid.ndim)
@@ -201,6 +198,19 @@ def measured(element: Element, points: Points, normals: Points, beside: float) -
     facing = np.clip((np.array(slope) * normals.T).sum(0) / length, -1, 1)
     away = abs(off)
     angle = float(np.degrees(np.median(np.arccos(facing))))
-    below = drawn.distance(np.ascontiguousarray((points - beside * normals).T, np.float32))
-    worst, thin = float(np.quantile(away, 0.99)), float((below > 0).mean())
-    return Rung(element.sides[-1], len(element.data), float(away.mean()), worst, angle, thin)
+    side, worst = element.sides[-1], float(np.quantile(away, 0.99))
+    thin += (1 - thin) * _lost(drawn, side, points)
+    return Rung(side, len(element.data), float(away.mean()), worst, angle, thin)
+
+
+def _lost(drawn: GridShape, side: int, points: Points) -> float:
+    """Share of points (M, d) of a surface within a cell of which nothing is inside.
+
+    An edge that is rounded has an inside that near; a fin that fell between the nodes has none.
+    """
+    ways = np.array([*product((-1, 0, 1), repeat=drawn.d)], float)
+    ways *= 2 / (side - 1) / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1)
+    left = points
+    for way in ways:
+        left = left[drawn.distance(np.ascontiguousarray((left + way).T, np.float32)) > 0]
+    return len(left) / len(points)

@@ -20,6 +20,7 @@ from scenelang.fitting.mesh import FitError, Mesh, Sign
 
 MOST_OF: Final = {**solids.MOST_OF, **drawing.MOST_OF, **picture.MOST_OF}
 """Bytes of a file, by the suffixes that are read."""
+SEEN: Final = 960  # pixels across which a solid is thought of, to say how small its details may be
 COARSER: Final = 2.0  # times as far as the whole a part may be off, in its own radii
 
 
@@ -164,6 +165,10 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
         short += ", a finer grid would take minutes: --budget"
     if (thin := float(element.about["thin"])) > THIN:
         short += f", {100 * thin:.0f} % of the surface too thin for the grid"
+    if shape.dimension == 3:  # light shows more than distances do
+        best, cell = min(tried, key=lambda rung: rung.error), SEEN / (element.sides[-1] - 1)
+        short += f", normals {best.normal_deg:.1f}° off"
+        short += f", details under {cell:.0f} pixels rounded at {SEEN} wide"
     shown = f"{element.sides[-1]} distances a side, {len(element.data):,} bytes, error {off:.5f}{short}"
     job.say(f"{name}: {shown}; {plural(len(tried), 'grid')} tried")
     return element

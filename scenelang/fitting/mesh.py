@@ -6,6 +6,7 @@ is refused here.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -23,6 +24,7 @@ Sign = Literal["auto", "winding", "closed"]
 MOST_TRIANGLES: Final = 4_000_000
 _ENCLOSED: Final = 0.5  # share of a surface that has to have an inside
 _BESIDE: Final = 2e-3  # leaf units from a surface to where its sides are asked
+_SLOW_S: Final = 2e-3  # of processor time that a point's distances may take: there are some 500,000
 _TOUCHING: Final = 1e-6  # leaf units from a surface to where its normals are those of its triangles
 
 
@@ -51,7 +53,6 @@ class Mesh:
     notes: tuple[str, ...] = ()
     look: Look | None = None
     dimension: ClassVar[int] = 3
-    beside: ClassVar[float] = _BESIDE
 
     @cached_property
     def _trees(self) -> tuple[Any, Any]:
@@ -111,8 +112,10 @@ class Mesh:
         share = points_to_barycentric(self.vertices[self.triangles[triangle]], at, "cross").clip(0, 1)
         return triangle, share / share.sum(1, keepdims=True)
 
-    def surface(self, count: int) -> tuple[Points, Points]:
+    def surface(self, count: int) -> tuple[Points, Points, float]:
         """Points (K, 3) spread evenly on the outside of the solid, K at most ``count``, and normals there.
+
+        Also the share of the surface that has no inside on either side.
 
         Raises:
             FitError: most of the surface has no inside.
@@ -122,18 +125,25 @@ class Mesh:
         normals = np.cross(b - a, c - a)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         points = self.points(at, share)
-        found, out = outer(self.distances, points, normals, _BESIDE)
-        enclosed = len(found) / len(points)
-        if enclosed < _ENCLOSED:
-            open_ = f"{100 * (1 - enclosed):.0f} % of the surface has no inside"
-            raise FitError(f"{open_} {_BESIDE:g} radii below it: it encloses no solid")
-        return found, out
+        _ = None if self.closed else self._trees
+        for few, least in ((16, 0.0), (500, _ENCLOSED - 0.1), (count, _ENCLOSED)):
+            started = time.process_time()
+            found, out, thin = outer(self.distances, points[:few], normals[:few], _BESIDE)
+            spent_s, enclosed = time.process_time() - started, len(found) / len(points[:few])
+            if few < count and not self.closed and spent_s > 1 + _SLOW_S * few:
+                raise FitError("its triangles overlap so much that distances to it would take minutes")
+            if enclosed < least:
+                open_ = f"{100 * (1 - enclosed):.0f} % of the surface has no inside"
+                raise FitError(f"{open_} {_BESIDE:g} radii below it: it encloses no solid")
+        return found, out, thin
 
 
 def outer(
     distances: Callable[[Points], Points], points: Points, normals: Points, beside: float
-) -> tuple[Points, Points]:
+) -> tuple[Points, Points, float]:
     """Of points of surfaces (M, d) those with an inside on one side alone (K, d), and outward normals.
+
+    Also the share of those that have none on either side.
 
     Args:
         distances: signed, of points.
@@ -143,7 +153,7 @@ def outer(
     sides = [distances(points + way * beside * normals) < 0 for way in (1, -1)]
     chosen = sides[0] != sides[1]
     turned = np.where(sides[0], -1.0, 1.0)[:, None]
-    return points[chosen], (normals * turned)[chosen]
+    return points[chosen], (normals * turned)[chosen], float((~(sides[0] | sides[1])).mean())
 
 
 def _once(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:

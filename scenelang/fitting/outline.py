@@ -21,6 +21,7 @@ MOST_EDGES: Final = 200_000
 MOST_PIXELS: Final = 16_000_000
 PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
 _STRIP: Final = 64  # points of neighbouring heights
+_TOGETHER: Final = 10_000  # edges that are asked at a time
 _BESIDE: Final = 1e-4  # leaf units from an edge to where its sides are asked
 Edges = npt.NDArray[np.float64]  # (E, 2, 2): edges, ends, coordinates
 Inside = Callable[[Points], npt.NDArray[np.bool_]]
@@ -81,7 +82,6 @@ class Outline:
     """
 
     dimension = 2
-    beside = _BESIDE
 
     def __init__(self, layers: list[Layer], notes: tuple[str, ...] = ()) -> None:
         from scipy.spatial import cKDTree
@@ -148,8 +148,10 @@ class Outline:
             found = np.minimum(found, away)
         return found
 
-    def surface(self, count: int) -> tuple[Points, Points]:
+    def surface(self, count: int) -> tuple[Points, Points, float]:
         """Points (K, 2) spread evenly on the outline, K at most ``count``, and outward normals.
+
+        Also the share of the outline that has no inside on either side.
 
         Raises:
             FitError: nothing is thick enough to have an outline.
@@ -163,10 +165,10 @@ class Outline:
                 normals.append(side * way)
         all_points, all_normals = np.concatenate(points), np.concatenate(normals)
         chosen = random.choice(len(all_points), min(count, len(all_points)), replace=False)
-        found, out = outer(self.distances, all_points[chosen], all_normals[chosen], _BESIDE)
+        found, out, thin = outer(self.distances, all_points[chosen], all_normals[chosen], _BESIDE)
         if not len(found):
             raise FitError(f"it is nowhere thicker than {_BESIDE:g} of its radius")
-        return found, out
+        return found, out, thin
 
 
 def _moved(inside: Inside, middle: Points, size: float) -> Inside:
@@ -183,10 +185,12 @@ def winding(edges: Edges, odd: bool) -> Inside:
         for first in range(0, len(p), _STRIP):  # points of a strip, and the edges that reach into it
             at = order[first : first + _STRIP]
             x, y = p[at].T[..., None]
-            (ax, ay), (bx, by) = edges[(low <= y[-1]) & (high >= y[0])].swapaxes(0, 1).swapaxes(1, 2)
-            up, down = (ay <= y) & (by > y), (ay > y) & (by <= y)
-            left = (bx - ax) * (y - ay) - (x - ax) * (by - ay) > 0
-            total[at] = (up & left).sum(1) - (down & ~left).sum(1)
+            reach = edges[(low <= y[-1]) & (high >= y[0])]
+            for part in (reach[k : k + _TOGETHER] for k in range(0, len(reach), _TOGETHER)):
+                (ax, ay), (bx, by) = part.swapaxes(0, 1).swapaxes(1, 2)
+                up, down = (ay <= y) & (by > y), (ay > y) & (by <= y)
+                left = (bx - ax) * (y - ay) - (x - ax) * (by - ay) > 0
+                total[at] += (up & left).sum(1) - (down & ~left).sum(1)
         return np.asarray(total % 2 != 0 if odd else total != 0)
 
     return inside

@@ -24,6 +24,7 @@ from scenelang.fitting.mesh import FitError
 
 MOST_OF: Final = dict.fromkeys((".png", ".jpg", ".jpeg"), 32 << 20)  # bytes of a file
 MOST_PIXELS: Final = 50_000_000
+MOST_DECODED: Final = 1_000_000_000  # pixels times the scans of a JPEG, each of which goes over all of them
 NEAR_COLOUR: Final = 0.01  # root mean square off that is near enough: 40 dB
 _BEST: Final = 100  # quality of AV1
 _PROFILED: Final = "CMYK", "RGB", "L"  # modes whose colours a profile tells of
@@ -67,8 +68,11 @@ def opened(data: bytes, most: int = MOST_PIXELS) -> Iterator[Image.Image]:
             with Image.open(io.BytesIO(data), formats=["PNG", "JPEG"]) as found:
                 if found.width * found.height > most:
                     raise FitError(f"a picture of more than {most:,} pixels")
+                scans = data.count(b"\xff\xda") if found.format == "JPEG" else 1
+                if found.width * found.height * scans > MOST_DECODED:
+                    raise FitError(f"a picture of {scans:,} scans")
                 yield found
-    except FitError:
+    except (FitError, MemoryError):
         raise
     except UnidentifiedImageError:
         raise FitError("neither a PNG nor a JPEG") from None

@@ -17,6 +17,12 @@ from scenelang.fitting.looks import Look, joined, look_of, white
 from scenelang.fitting.mesh import MOST_TRIANGLES, FitError, Mesh, Points, Sign, mesh_of, needed
 
 MOST_OF: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
+_MOST_PIECES: Final = (
+    10_000  # objects, groups and changes of material of a file; nodes and primitives of glTF
+)
+_MOST_CORNERS: Final = 1000  # of a face
+_MOST_DEPTH: Final = 100  # of nodes within nodes
+_MOST_NUMBERS: Final = 10 * MOST_TRIANGLES  # elements of all accessors, which may be more than their bytes
 _UNDERSTOOD: Final = re.compile("KHR_(materials|lights|node|xmp)|EXT_texture_webp")
 _IGNORED: Final = ("animations", "cameras", "skins")
 
@@ -63,6 +69,8 @@ def read_solids(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             notes = _notes(data) if suffix == ".glb" else []
+            if suffix == ".obj":
+                _few(data)
             objects = {"split_objects": True} if re.search(rb"^o ", data, re.M) else {"split_groups": True}
             kind = {"file_type": suffix[1:], "resolver": beside, **(objects if suffix == ".obj" else {})}
             found = trimesh.load_scene(io.BytesIO(data), skip_materials=files is None, **kind)
@@ -72,6 +80,18 @@ def read_solids(
     except Exception as error:
         raise FitError(f"damaged or not a mesh: {str(error) or type(error).__name__}"[:200]) from error
     return solids, [*notes, *(f"`{name}` not found beside it" for name in sorted(beside.missing))]
+
+
+def _few(data: bytes) -> None:
+    """Refuse an OBJ that trimesh would read for minutes.
+
+    Raises:
+        FitError: it has too many pieces, or a face of too many corners.
+    """
+    if len(re.findall(rb"^[ \t]*(?:o|g|usemtl)\b", data, re.M)) > _MOST_PIECES:
+        raise FitError(f"more than {_MOST_PIECES:,} objects, groups and changes of material")
+    if re.search(rb"^[ \t]*f(?:[ \t]+[^\s]+){%d}" % (_MOST_CORNERS + 1), data, re.M):
+        raise FitError(f"a face of more than {_MOST_CORNERS:,} corners")
 
 
 def _notes(data: bytes) -> list[str]:
@@ -87,6 +107,17 @@ def _notes(data: bytes) -> list[str]:
         raise FitError(f"{message}; export it without")
     meshes, notes = header.get("meshes", ()), [f"{name} left out" for name in _IGNORED if header.get(name)]
     primitives = [part for mesh in meshes for part in mesh.get("primitives", ())]
+    nodes = header.get("nodes", ())
+    if len(primitives) + len(nodes) > _MOST_PIECES:
+        raise FitError(f"more than {_MOST_PIECES:,} nodes and primitives")
+    above = {child: at for at, node in enumerate(nodes) for child in node.get("children", ())}
+    level = [*range(len(nodes))]
+    for _ in range(_MOST_DEPTH):
+        level = [above[at] for at in level if at in above]
+    if level:
+        raise FitError(f"nodes within nodes, more than {_MOST_DEPTH} deep")
+    if sum(accessor.get("count", 0) for accessor in header.get("accessors", ())) > _MOST_NUMBERS:
+        raise FitError(f"accessors of more than {_MOST_NUMBERS:,} elements")
     if any("targets" in part for part in primitives):
         notes.append("morph targets left out")
     if any(part.get("mode", 4) not in (4, 5) for part in primitives):

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from scenelang.elements.element import Element
 from scenelang.elements.picture import texels
-from scenelang.elements.pyramid import FAR, FARTHEST, FINE, FIRST, unpacked
+from scenelang.elements.pyramid import FAR, FARTHEST, FINE, FINER, FIRST, NEAR, has_finer, unpacked
 from scenelang.program.program import ProgramError
 from scenelang.tensors import TensorError
 from scenelang.viewer.store import Store
@@ -43,7 +43,10 @@ def _shape(element: Element, store: Store) -> dict[str, Any]:
         "sides": element.sides,
         "finest": len(unpacked(element)),
         "steps": store.add(_steps(element)),
-        "codec": {"fine": FINE, "far": FAR, "first": FIRST, "farthest": FARTHEST},
+        "codec": {
+            **{"fine": FINE, "far": FAR, "first": FIRST, "farthest": FARTHEST},
+            **{"finer": FINER, "near": NEAR if has_finer(element) else 0.0},
+        },
         "bounds": bounds_of(element) if element.dimension == 2 else None,
     }
 

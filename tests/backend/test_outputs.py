@@ -108,6 +108,18 @@ def test_mist_covers_as_much_as_it_takes_of_light_and_has_no_depth(backend) -> N
     assert not found.normal.any()
 
 
+def test_edges_of_what_is_carved_have_normals() -> None:
+    """Asked once more a little further on, past the rim there is nothing: it was a line of dark dashes."""
+    bowl = """canvas(160, 160); camera(eye = [0, 2, 3.4], target = [0, 0, 0], fov = 32deg);
+    chain { sphere { scale(0.8, 1, 0.8); } subtract sphere { scale(0.72, 0.92, 0.72); }
+      subtract sphere { scale(2); translate(0, 2.2, 0); } }"""
+    found = nsg.render_outputs(nsg.loads(bowl), ["depth", "normal"], threads=1)
+    assert found.depth is not None
+    assert found.normal is not None
+    seen = np.isfinite(found.depth) & (found.depth > 0)
+    assert np.linalg.norm(found.normal[seen], axis=-1).min() > 0.9
+
+
 def test_the_network_tells_what_the_reference_does() -> None:
     scene = nsg.loads(MIXED)
     ours, exact = (nsg.render_outputs(scene, ALL, backend=b) for b in ("neural", "reference"))

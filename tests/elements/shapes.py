@@ -29,16 +29,18 @@ def square(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     )
 
 
-def element(formula: Formula, name: str = "made", *, cells: int = 4, levels: int = 4, d: int = 3) -> Element:
-    """A pyramid of a formula, true at every node."""
+def element(
+    formula: Formula, name: str = "made", *, cells: int = 4, levels: int = 4, d: int = 3, finer: bool = False
+) -> Element:
+    """A pyramid of a formula, true at every node; the last one's steps may be finer."""
     grid: Grid | None = None
     steps = []
     for level in range(levels):
         axis = np.linspace(-1, 1, cells * 2**level + 1)
         true = formula(*np.meshgrid(*[axis] * d, indexing="ij")).astype(np.float32)
-        grid, found = refine(grid, len(axis), d, lambda _, true=true: true)
+        grid, found = refine(grid, len(axis), d, lambda _, true=true: true, finer and level == levels - 1)
         steps.append(found)
-    return packed(name, cells, steps, {"license": "none needed"})
+    return packed(name, cells, steps, {"license": "none needed"}, finer)
 
 
 def noise(*shape: int, name: str = "bark", seed: int = 0) -> Element:

@@ -52,12 +52,13 @@ def test_materials_of_obj_lie_beside_it(folder: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["../a.mtl", "t/../../a.mtl", "link.mtl", "pipe.mtl", "t", "b.mtl", "a\0.mtl"]
+    "name", ["../a.mtl", "t/../../a.mtl", "link.mtl", "loop.mtl", "pipe.mtl", "t", "b.mtl", "a\0.mtl"]
 )
 def test_what_is_elsewhere_or_no_file_is_not_read(folder: Path, name: str) -> None:
-    if sys.platform == "win32" and name in ("link.mtl", "pipe.mtl"):
+    if sys.platform == "win32" and name in ("link.mtl", "loop.mtl", "pipe.mtl"):
         pytest.skip("has no such files")
     (folder / "link.mtl").symlink_to("../a.mtl")
+    (folder / "loop.mtl").symlink_to("loop.mtl")
     os.mkfifo(folder / "pipe.mtl")
     look, notes = read(folder, TEXT.replace("a.mtl", name))
     shown = name.replace("\0", "")

@@ -54,6 +54,21 @@ def test_python_learns_what_the_command_does(folder: Path) -> None:
         nsg.learn(["bad.ply"], "zoo.safetensors")
 
 
+def test_a_preview_is_of_the_whole_file_however_it_came_about(folder: Path) -> None:
+    """What had been made before a run was killed was not in the picture of the run that went on."""
+    Path("flag.svg").write_text(
+        '<svg><rect width="9" height="9" fill="#f00"/><circle r="5" fill="#00f"/></svg>'
+    )
+    asked = ("--steps", 1, "--preview")
+    assert run("flag.svg", "star.svg", "-o", "whole.safetensors", *asked, "whole.png")[0] == 0
+    assert run("flag.svg", "-o", "zoo.safetensors", *asked, "part.png")[0] == 0
+    for _ in range(2):
+        assert run("flag.svg", "star.svg", "-o", "zoo.safetensors", *asked, "again.png")[0] == 0
+        assert Path("again.png").read_bytes() == Path("whole.png").read_bytes()
+    with Image.open("whole.png") as whole, Image.open("part.png") as part:
+        assert (whole.size, part.size) == ((512, 512), (512, 512))  # of four and three elements
+
+
 def test_learn_adds_to_a_file_and_a_scene_draws_it(folder: Path) -> None:
     about = ("--license", "CC0", "--source", "https://example.org")
     assert run("a-ball.ply", "-o", "zoo.safetensors", *about)[0] == 0

@@ -48,7 +48,7 @@ def test_inside_out_is_turned(sign: Sign, inside_out: bool) -> None:
     if inside_out:
         made.invert()
     mesh = mesh_of(*arrays(made), sign)
-    points, normals = mesh.surface(300)
+    points, normals, _ = mesh.surface(300)
     assert (mesh.distances(points * 0.9) < 0).all()
     assert (mesh.distances(points * 1.1) > 0).all()
     assert ((points * normals).sum(1) > 0).all()
@@ -60,7 +60,7 @@ def test_of_solids_that_overlap_the_outside_counts() -> None:
     mesh = mesh_of(*arrays(trimesh.util.concatenate([one, two])))
     assert not mesh.closed
     assert mesh.distances(np.zeros((1, 3)))[0] < 0
-    points, _ = mesh.surface(2000)
+    points, *_ = mesh.surface(2000)
     ball = np.linalg.norm(points * mesh.size + [0.45, 0, 0], axis=1)
     assert (ball > 0.98).all()  # none inside the other
 

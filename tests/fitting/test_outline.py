@@ -67,6 +67,20 @@ def test_up_is_up_and_layers_are_a_union() -> None:
     assert shape.distances(np.array([[0, 0.6]])) < -0.05  # where both lie there is no edge between
 
 
+@pytest.mark.parametrize(
+    ("body", "lost"),
+    [
+        ('<circle cx="1.5" cy="1.5" r="1.2"/>', False),
+        ('<rect width="80" height="80" transform="rotate(17)"/>', False),
+        ('<path d="M5 5 L95 61" stroke="#000" stroke-width="0.05"/><circle cx="50" cy="50" r="5"/>', True),
+    ],
+)
+def test_only_lines_that_are_lost_are_too_thin(body: str, lost: bool) -> None:
+    """A disc and a square that are drawn as near as is asked were said to be."""
+    thin = fit(drawn(body), "x", steps=8)[1][-1].thin
+    assert thin > 0.3 if lost else thin == 0
+
+
 @pytest.mark.parametrize("odd", [False, True])
 def test_inside_agrees_with_a_loop(odd: bool) -> None:
     """Also at the heights of corners, where an edge counts at one of its ends."""

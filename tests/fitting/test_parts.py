@@ -125,7 +125,7 @@ def test_what_is_learned_says_which_part_it_is(car: bytes, tmp_path: Path) -> No
     assert {element.name for element in made} == {*zoo.geometries}
     for name, element in zoo.geometries.items():
         shape = parts.shape_in(car, ".glb", "auto", int(element.about.get("part", 0)))
-        points, _ = shape.surface(100)
+        points, *_ = shape.surface(100)
         assert abs(shape.distances(points)).max() < 1e-6
         assert shape.size == pytest.approx(element.about["size"]), name
     learn([tmp_path / "car.glb"], out, Wish(steps=2, parts=True), say=said.append)

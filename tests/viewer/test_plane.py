@@ -194,6 +194,7 @@ def test_pyramids_unfold_as_elements_do(page: Any) -> None:
     elements = [
         *(element(square, d=2, levels=levels) for levels in (1, 2, 5)),
         *(element(ball, cells=cells, levels=2) for cells in (2, 3, 4)),
+        element(ball, levels=3, finer=True),
     ]
     for shape in elements:
         store = Store()

@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     "--max-error",
     type=options.Real(0, 1, min_open=True),
     metavar="SHARE",
-    help="Largest mean error of distances at the surface, in radii of the shape, by default 0.0003 "
+    help="Largest mean error of distances at the surface, in radii of the shape, by default 0.00015 "
     "for solids and 0.0001 for flat shapes; of a texture the root mean square error of its "
     "colours, by default 0.01.",
 )
@@ -79,7 +79,7 @@ if TYPE_CHECKING:
 @click.option("--license", metavar="TEXT", help="License of the originals, kept in the file.")
 @click.option("--source", metavar="TEXT", help="Origin of the originals, kept in the file.")
 @options.cluster
-@click.option("--preview", metavar="OUT.png", help="Write a picture of the new elements.")
+@click.option("--preview", metavar="OUT.png", help="Write a picture of all elements of the file.")
 def command(
     files: tuple[str, ...],
     out: str,
@@ -110,7 +110,7 @@ def command(
 
     A scene says: import "zoo.safetensors" as zoo; zoo.cow { … }
     """
-    from scenelang.elements.zoo import SUFFIX
+    from scenelang.elements.zoo import SUFFIX, load_zoo
     from scenelang.fitting.learn import learn, names_of
     from scenelang.fitting.making import Wish
     from scenelang.fitting.mesh import FitError
@@ -127,7 +127,7 @@ def command(
     try:
         with Bar() as bar:
             say = partial(click.echo, err=True)
-            made = learn(files, out, wish, name=name, cluster=cluster, say=say, progress=bar)
+            learn(files, out, wish, name=name, cluster=cluster, say=say, progress=bar)
     except FitError as error:
         for line in str(error).split("\n"):
             say_trouble(line)
@@ -135,4 +135,4 @@ def command(
     if preview is not None:
         from scenelang.backend.thumbnail import sheet
 
-        sheet(made).save(preview)
+        sheet(load_zoo(out).elements).save(preview)

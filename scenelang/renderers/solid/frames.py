@@ -166,7 +166,7 @@ def read_solid_frame(g: np.ndarray, layout: Layout = SOLID_LAYOUT) -> SolidFrame
     reach, moved = 1.0, 0.0
     steps: tuple[Turn | Map, ...] = tuple(inner)
     if outer:
-        back = np.linalg.inv(middle.linear)
+        back = inverse_of(middle.linear)
         reach, moved = float(np.linalg.norm(back, 2)), float(np.linalg.norm(back @ middle.shift))
         steps = (*outer, _single(middle), *inner)
     return SolidFrame(
@@ -179,6 +179,21 @@ def read_solid_frame(g: np.ndarray, layout: Layout = SOLID_LAYOUT) -> SolidFrame
         frequency=frequency,
         blend=blend if blend > 0 else BLEND,
     )
+
+
+def inverse_of(linear: np.ndarray) -> np.ndarray:
+    """The inverse of a linear map (3, 3).
+
+    Raises:
+        ProgramError: it has none in float32.
+    """
+    try:
+        found: np.ndarray = np.linalg.inv(linear)
+    except np.linalg.LinAlgError:
+        raise ProgramError("a damaged program: a frame without an inverse") from None
+    if not np.abs(found).max() < MOST:
+        raise ProgramError("a frame beyond float32")
+    return found
 
 
 def _map(frame: np.ndarray) -> Map:

@@ -241,13 +241,11 @@ class Lighting:
         if len(off):  # where the distances on both sides of the surface said little about it
             t_off = xp.take(t, off) + INTO + self._ahead(found, way, off)
             again = self.field.meet(trail.at(xp, xp.take(index, off)), t_off, Wanted.ALL, gradient=True)
-            xp.put(t, off, t_off - INTO)
-            for old, new in (
-                (found.distance, again.distance),
-                (found.register, again.register),
-                (found.gradient, again.gradient),
-            ):
-                xp.put(old, off, new)
+            there = xp.where(_dot(again.gradient, again.gradient) > 0.01)  # not past an edge
+            off = xp.take(off, there)
+            xp.put(t, off, xp.take(t_off, there) - INTO)
+            for name in ("distance", "register", "gradient"):
+                xp.put(getattr(found, name), off, xp.take(getattr(again, name), there))
         g = found.gradient
         towards = _dot(g, way)
         t = t + sharp * (INTO + self._ahead(found, way, None))

@@ -14,7 +14,7 @@ import numpy as np
 
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.field import INTERSECT, SMOOTH, SUBTRACT, UNION
-from scenelang.renderers.solid.frames import SolidFrame, read_solid_frame
+from scenelang.renderers.solid.frames import SolidFrame, inverse_of, read_solid_frame
 from scenelang.renderers.solid.network import SolidNetwork
 
 INF = float("inf")
@@ -77,7 +77,7 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) 
         if smooths and token == SUBTRACT:  # it says how deep points inside others lie
             blends += deepest
         radius = 1 + SLACK + abs(frame.amount) + blends / frame.scale
-        back = np.linalg.inv(frame.outer.linear.astype(np.float64))
+        back = inverse_of(frame.outer.linear.astype(np.float64))
         centre, ball = (-back @ frame.outer.shift).astype(np.float32), frame.ball(radius)
         solids.append(
             Solid(

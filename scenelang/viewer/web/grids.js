@@ -45,8 +45,12 @@ export function distances({ dimension, sides, finest, steps, codec }) {
     grid = grid ? between(grid, (side + 1) / 2, dimension) : new Float32Array(count);
     const near = Math.fround(2 / (side - 1) / codec.fine);
     const far = Math.fround(codec.far + codec.first / side);
+    const last = side === sides[sides.length - 1]; // whose steps beside the surface are finer
+    const band = last ? Math.fround((2 * codec.near) / (side - 1)) : 0;
+    const finer = Math.fround(2 / (side - 1) / codec.finer);
     for (let at = 0; at < count; at++) {
-      const found = grid[at] + steps[from + at] * Math.max(near, Math.abs(grid[at]) / far);
+      const away = Math.abs(grid[at]);
+      const found = grid[at] + steps[from + at] * (away < band ? finer : Math.max(near, away / far));
       grid[at] = Math.min(Math.max(found, -codec.farthest), codec.farthest);
     }
     from += count;

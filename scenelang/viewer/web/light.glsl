@@ -126,7 +126,13 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
     if (surface) {
       float ahead = 0.0, towards = 0.0;
       for (int i = zero; i < 2; i++) {
+        vec3 was = slope, wore = seen, plainly = even;
+        float off = state;
         look(list, eye + (t + INTO) * way);
+        if (i == 1 && dot(slope, slope) < 0.01) { // past an edge, where nothing is
+          slope = was, seen = wore, even = plainly, state = off;
+          t -= ahead;
+        }
         towards = dot(slope, way);
         ahead = clamp(towards < -0.02 ? -state / towards : -INTO, -GAP, GAP);
         if (edge || i == 1 || abs(state) <= 3.0 * INTO) break;
