@@ -105,9 +105,8 @@ def proved(draw: Draw, clock: Clock, redraw: bool, proofs: list[Proof]) -> Draw:
 
     def both(job: Job, progress: Callable[[float], None]) -> Image:
         assert job.program is not None
-        *_, graph = job.graphs.values()
         with clock("prove"):
-            image, proof = prove_drawn(graph, job.program.model, lambda: draw(job, progress), redraw)
+            image, proof = prove_drawn(job.graphs, job.program.model, lambda: draw(job, progress), redraw)
         proofs.append(proof)
         return image
 

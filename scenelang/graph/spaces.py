@@ -20,7 +20,7 @@ from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Turn, Warp
 from scenelang.models.manifest import Outline
 from scenelang.scene import schema
 
-_ALIKE = 1e-12  # relative tolerance below which two stretches, or a right angle, count as equal
+ALIKE = 1e-12  # relative tolerance below which two stretches, or a right angle, count as equal
 
 _ROUNDING = 1e-9  # boxes grow by this much, relative, to cover the rounding of float64
 
@@ -110,7 +110,7 @@ def _similarity(rows: Rows) -> tuple[float, float] | None:
     """
     a, b, c, d = rows[0], rows[1], rows[4], rows[5]
     s = sqrt(abs(a * d - b * c))
-    near = _ALIKE * s
+    near = ALIKE * s
     if abs(rows[3]) > near or abs(rows[7]) > near:
         return None
     if abs(a - d) <= near and abs(b + c) <= near:
