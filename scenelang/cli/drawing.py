@@ -49,6 +49,9 @@ def neural(clock: Clock, device: Device, threads: int | None, samples: Samples) 
                 drawing = draw_program(
                     job.program, model, threads=threads, samples=samples, progress=progress
                 )
+        if drawing.work is not None and drawing.work.lost:
+            lost = f"{drawing.work.lost:,} rays took too many steps"
+            click.echo(f"Warning: {job.name}: the picture is incomplete: {lost}", err=True)
         job.notes.append(f"drawn by {library} on {place}: {why}")
         width, height = job.program.canvas
         once = width * height - drawing.refined

@@ -119,3 +119,12 @@ def test_bounds_of_solids(inside: str, outside: str, words: str) -> None:
     assert warned(f"chain {{ torus {{ {inside} }} }}", SOLIDS) == []
     (found,) = warned(f"chain {{ torus {{ {outside} }} }}", SOLIDS)
     assert found.startswith(words)
+
+
+@pytest.mark.parametrize(("bend", "wild"), [(99, False), (-101, True), (1e20, True)])
+def test_far_outside_nothing_may_be_right(bend: float, wild: bool) -> None:
+    found = Diagnostics()
+    scene, spans = load_source(SourceFile("a.nsg", f"star {{ bend({bend}); }}"), diagnostics=found)
+    assert scene is not None
+    check_scene(scene, spans, found, MANIFEST)
+    assert [("nothing of the picture" in (d.help or "")) for d in found] == [wild]
