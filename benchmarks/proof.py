@@ -67,16 +67,16 @@ def measured(name: str, index: int, seed: int) -> dict[str, float]:
     manifest = load_manifest("textures2d" if name.startswith("textures") else "shapes2d")
     scene, graphs = sets_of(manifest)[name](np.random.default_rng([seed, index])), dict[str, Graph]()
     program = compile_scene(scene, model=manifest.name, after=graphs.__setitem__)
-    *_, graph = graphs.values()
-    rows = range(graph.canvas[1])
+    given = graphs["lower"], graphs["linearise"], manifest
+    canvas = scene.canvas
 
     def exact() -> Band:
-        return Band(Formulas(graph, manifest, known_errors(manifest)), graph.canvas, rows, np.zeros(4))
+        return Band(Formulas(*given, known_errors(manifest)), canvas, range(canvas[1]), np.zeros(4))
 
     ways: dict[str, Callable[[], Any]] = {
         "frame": lambda: draw_small(program).image,
-        "proof": lambda: prove_image(graph, manifest, image),
-        "both": lambda: prove_image(graph, manifest, image, redraw=True),
+        "proof": lambda: prove_image(*given, image),
+        "both": lambda: prove_image(*given, image, redraw=True),
         "exact": exact,
     }
     image = ways["frame"]()

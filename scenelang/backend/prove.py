@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from scenelang.backend.options import Device, RenderError, Samples, keep_memory
@@ -51,16 +51,20 @@ def prove(
     found = Diagnostics()
     scene, spans = opened(scene, found, size)
     program = compile_scene(scene, spans=spans, diagnostics=found, after=graphs.__setitem__)
-    *_, graph = graphs.values()
 
     def draw() -> Image:
         return render(program, device=device, threads=threads, samples=samples) if image is None else image
 
-    return prove_drawn(graph, program.model, draw, redraw)
+    return prove_drawn(graphs, program.model, draw, redraw)
 
 
-def prove_drawn(graph: Graph, model: str, draw: Callable[[], Image], redraw: bool) -> tuple[Image, Proof]:
-    """A picture of what all passes left, and its proof; raises as `prove`, before it is drawn."""
+def prove_drawn(
+    graphs: Mapping[str, Graph], model: str, draw: Callable[[], Image], redraw: bool
+) -> tuple[Image, Proof]:
+    """A picture and its proof, by the graphs after `lower` and each pass; raises as `prove`, before drawing.
+
+    The stream that is proved has all objects, so that no pass that drops some has to be believed.
+    """
     from scenelang.models.manifest import load_manifest
     from scenelang.models.weights import ModelError
     from scenelang.proof.picture import ProofError, known_errors, prove_image
@@ -68,6 +72,6 @@ def prove_drawn(graph: Graph, model: str, draw: Callable[[], Image], redraw: boo
     keep_memory()
     try:
         known_errors(manifest := load_manifest(model))
-        return prove_image(graph, manifest, draw(), redraw=redraw)
+        return prove_image(graphs["lower"], graphs["linearise"], manifest, draw(), redraw=redraw)
     except (ProofError, ModelError) as error:
         raise RenderError(str(error)) from None

@@ -56,6 +56,9 @@ def neural(
                 drawing = draw_program(
                     job.program, model, threads=threads, samples=samples, progress=progress
                 )
+        if drawing.work is not None and drawing.work.lost:
+            lost = f"{drawing.work.lost:,} rays took too many steps"
+            click.echo(f"Warning: {job.name}: the picture is incomplete: {lost}", err=True)
         job.notes.append(f"drawn by {library} on {place}: {why}")
         width, height = job.program.canvas
         once = width * height - drawing.refined
@@ -121,9 +124,8 @@ def proved(draw: Draw, clock: Clock, redraw: bool, proofs: list[Proof]) -> Draw:
 
     def both(job: Job, progress: Callable[[float], None]) -> Image:
         assert job.program is not None
-        *_, graph = job.graphs.values()
         with clock("prove"):
-            image, proof = prove_drawn(graph, job.program.model, lambda: draw(job, progress), redraw)
+            image, proof = prove_drawn(job.graphs, job.program.model, lambda: draw(job, progress), redraw)
         proofs.append(proof)
         return image
 

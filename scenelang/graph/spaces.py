@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import asin, atan2, cos, hypot, pi, sqrt, tau
+from struct import pack, unpack
 from typing import Final
 
 from scenelang.graph import affine
@@ -20,7 +21,7 @@ from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Turn, Warp
 from scenelang.models.manifest import Outline
 from scenelang.scene import schema
 
-_ALIKE = 1e-12  # relative tolerance below which two stretches, or a right angle, count as equal
+ALIKE = 1e-12  # relative tolerance below which two stretches, or a right angle, count as equal
 
 _ROUNDING = 1e-9  # boxes grow by this much, relative, to cover the rounding of float64
 
@@ -59,6 +60,15 @@ class Plane(Space):
 
     def stretches(self, rows: Rows) -> tuple[float, float]:
         return stretches(rows[0], rows[1], rows[4], rows[5])
+
+    def usable(self, rows: Rows) -> bool:
+        """Also whether the inverse, kept in float32, still has one itself: thin and slanted it may not."""
+        if not super().usable(rows):
+            return False
+        a, b, _, _, c, d = rows[:6]
+        det = a * d - b * c
+        p, q, r, s = unpack("4f", pack("4f", d / det, b / det, c / det, a / det))
+        return bool(p * s != q * r)
 
     def before(self, rows: Rows, turn: Turn) -> Turn | None:
         """Similarities about the origin trade places with warps: `scenelang.graph.chain.normal` proves it."""
@@ -110,7 +120,7 @@ def _similarity(rows: Rows) -> tuple[float, float] | None:
     """
     a, b, c, d = rows[0], rows[1], rows[4], rows[5]
     s = sqrt(abs(a * d - b * c))
-    near = _ALIKE * s
+    near = ALIKE * s
     if abs(rows[3]) > near or abs(rows[7]) > near:
         return None
     if abs(a - d) <= near and abs(b + c) <= near:

@@ -107,6 +107,8 @@ _SUBJECTS = {
     "texels": "a texture of {value} texels to a pixel on {name}",
 }
 """What is said of an object, in the order of the warnings."""
+_WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
+WILD = 100  # times the largest measured value of these pictures may be wrong all over
 _TOLERANCE = 1e-9
 
 
@@ -137,7 +139,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
             more = len({id(leaf) for *_, leaf in found}) - 1
             said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
             others = f", as {more:,} more {'are' if more > 1 else 'is'}" if more else ""
-            _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf)
+            _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf, value)
     widths = [(link.k, link.node) for link in graph.root.links if link.op == "smooth"]
     k, blended = max(widths, key=itemgetter(0), default=(0.0, None))
     if isinstance(blended, Leaf) and "width" in trained and k > trained["width"][1]:
@@ -216,10 +218,12 @@ def _texels(leaf: Leaf, graph: Graph) -> Measures:
     return [("texels", texels * pixel)]
 
 
-def _warn(context: Context, quantity: str, message: str, leaf: Leaf) -> None:
+def _warn(context: Context, quantity: str, message: str, leaf: Leaf, value: float = 0.0) -> None:
     low, high = context.manifest.trained[quantity]
     figures = context.manifest.measured.get("stability", {}).get(quantity)
     doubt = "the picture may be less exact than the model's figures"
     fact = message.format(f"{low:g} to {high:g} of model `{context.manifest.name}`")
     help = f"measured there: {figures}" if figures else doubt
+    if quantity in _WRONG and abs(value) > WILD * high:
+        help = f"it is more than {WILD} times what was measured: nothing of the picture may be right"
     context.diagnostics.add(_CODES[quantity], fact, leaf.span, help=help)

@@ -17,7 +17,7 @@ from scenelang.words import TOKENS
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 UNION, SMOOTH, SUBTRACT, INTERSECT = (TOKENS[word] for word in ("union", "smooth", "subtract", "intersect"))
-NOTHING = 1e9  # world units: the distance before the first object
+NOTHING = 1e200  # world units: the distance before the first object, beyond all blends
 
 
 class Enclosure(NamedTuple):
@@ -113,5 +113,6 @@ def _blended(meetings: Meetings, tokens: Index) -> Mask:
 
 def _blend(big: Floats, d: Floats, k: Floats) -> tuple[Floats, Floats]:
     """The share of the object's colour, and the state behind a smooth union."""
-    h = np.clip(0.5 + 0.5 * (big - d) / k, 0.0, 1.0)
+    with np.errstate(over="ignore"):
+        h = np.clip(0.5 + 0.5 * (big - d) / k, 0.0, 1.0)
     return h, big * (1 - h) + d * h - k * h * (1 - h)

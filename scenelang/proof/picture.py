@@ -23,12 +23,13 @@ class ProofError(Exception):
 
 
 def prove_image(
-    graph: Graph, manifest: Manifest, image: Image, *, redraw: bool = False
+    lowered: Graph, graph: Graph, manifest: Manifest, image: Image, *, redraw: bool = False
 ) -> tuple[Image, Proof]:
     """Prove by how much each pixel of a picture, whoever drew it, differs from the exact one at most.
 
     Args:
-        graph: the stream that all passes have left.
+        lowered: the scene as written.
+        graph: its stream of leaves.
         manifest: of the model that it was compiled for.
         image: (H, W, 3), or (H, W, 4) where the background is none.
         redraw: draw again what is not proved right to `PROVED`: by what is known of it, and where that is not
@@ -41,7 +42,7 @@ def prove_image(
         ProofError: the model is not of the plane, or learned more than distances; a file is missing.
         ModelError: a file is damaged.
     """
-    stream = Stream(graph, manifest, known_errors(manifest))
+    stream = Stream(lowered, graph, manifest, known_errors(manifest))
     (width, height), behind = graph.canvas, np.zeros(4)
     if graph.background is not None:
         behind = np.asarray(graph.background, np.float64)

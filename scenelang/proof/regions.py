@@ -66,6 +66,7 @@ class Band:
         centre = np.array([[grid.left], [grid.top]]) + (place + half) * [[grid.px], [-grid.px]]
         world = np.full(len(pairs), half * 2**0.5 * grid.px)
         q, radius = stream.frames.blocks(pairs.object, centre, world)
+        radius = radius + stream.rounding[pairs.object]
         some = np.flatnonzero(~(np.hypot(*q) - radius > self._reach[pairs.object]))
         pairs = pairs.take(some)
         meetings, source = meetings_of(pairs)

@@ -12,20 +12,20 @@ from scenelang.lifting.layout import PLANE_LAYOUT as LAYOUT
 from scenelang.models.manifest import Manifest
 from scenelang.proof.errors import Errors
 from scenelang.proof.fold import INTERSECT, NOTHING, SMOOTH, SUBTRACT, UNION, Enclosure, Floats
+from scenelang.proof.rounding import EPS, written
 from scenelang.reference.field import carry_back, leaf_distance
 from scenelang.reference.textures import colour_at
 from scenelang.renderers.frames import Frames
 from scenelang.renderers.meetings import Index
 from scenelang.words import TOKENS
 
-TAME = 1e-9  # leaf units: what float64 loses on the way to a leaf, times ten, where maps are not extreme
-
 
 class Stream:
     """N objects.
 
     Args:
-        graph: that all passes have left.
+        lowered: the scene as written.
+        graph: its stream of leaves.
         manifest: of the model that it was compiled for.
         known: of geometries, by their names.
 
@@ -35,10 +35,11 @@ class Stream:
         reach: (N,) leaf units from its origin beyond which an object has no say. Without it the fold is the
             same, or both folds are so far outside of everything that the blends to come, each of which brings
             them nearer by its width at most, leave them outside.
+        rounding: (N,) leaf units by which float64 may misplace points within reach, or the fold's distance.
         unknown: geometries of which nothing is known but that they lie in the unit disc.
     """
 
-    def __init__(self, graph: Graph, manifest: Manifest, known: dict[str, Errors]) -> None:
+    def __init__(self, lowered: Graph, graph: Graph, manifest: Manifest, known: dict[str, Errors]) -> None:
         self._leaves = [leaf for _, leaf in graph.rows()]
         levels = [split_levels(leaf.steps, manifest.limits, PLANE) for leaf in self._leaves]
         self.frames = Frames(lift_many(levels, [(0.0,) * LAYOUT.code] * len(levels), LAYOUT))
@@ -47,16 +48,20 @@ class Stream:
         self.widths = np.array([link.k for link in graph.root.links])
         blends = np.where(self.tokens == SMOOTH, self.widths, 0.0)[::-1].cumsum()[::-1]
         every = (self.tokens == INTERSECT) | ((self.tokens == SUBTRACT) & (blends > 0))
-        self.reach = np.where(every, np.inf, 1.0 + blends / self.frames.scale)
+        reach = np.where(every, np.inf, 1.0 + blends / self.frames.scale)
+        objects, far = written(lowered.root), np.hypot(*graph.canvas) / min(graph.canvas)
+        leaves = [objects[leaf.number] for leaf in self._leaves]
+        own = list(zip(leaves, reach.tolist(), strict=True))
+        self.rounding = np.array([leaf.misplaced(within, far) for leaf, within in own])
+        self.rounding += EPS * blends.max(initial=0.0) / self.frames.scale
+        self.reach = reach + self.rounding
         names = [leaf.geometry for leaf in self._leaves]
         self._known = {name: errors for name, errors in known.items() if name not in graph.elements}
         self.unknown = tuple(sorted(set(names) - self._known.keys()))
         self._shapes = {name: np.array([own == name for own in names]) for name in dict.fromkeys(names)}
-        numbers = abs(self.frames.numbers)
-        largest = [numbers[slot].max(0, initial=1.0) for slot in (LAYOUT.frame, LAYOUT.middle)]
-        self._rounding = TAME * (1 + 1e-5 * self.frames.stretch * largest[0] * largest[1])
         self._plain = np.array([leaf.look.colour() for leaf in self._leaves]).reshape(-1, 3).T
-        self._painted = np.array([leaf.look.element is not None for leaf in self._leaves], bool)
+        self._painted = np.array([leaf.look.element is not None for leaf in leaves], bool)
+        self._discoloured = [leaf.discoloured(within, far) for leaf, within in own]
 
     def crowd(self, canvas: tuple[int, int]) -> float:
         """How many objects a place on the canvas is in reach of, in the mean."""
@@ -77,7 +82,7 @@ class Stream:
             some = np.flatnonzero(own[which] & finite)
             if not len(some):
                 continue
-            p, rounding = q[:, some], self._rounding[which[some]]
+            p = q[:, some]
             if name in self.unknown:
                 length = np.hypot(*p)
                 found = Enclosure(length - 1, length + 1)
@@ -85,7 +90,7 @@ class Stream:
                 found = Enclosure(*[leaf_distance(name, p)] * 2)
             else:
                 found = self._known[name].exact(p)
-            low[some], high[some] = found.low - rounding, found.high + rounding
+            low[some], high[some] = found
         return Enclosure(low, high)
 
     def colour(self, which: Index, q: Floats, sampled: bool) -> Enclosure:
@@ -95,5 +100,6 @@ class Stream:
             some, look = which == at, self._leaves[at].look
             low[:, some], high[:, some] = 0.0, 1.0
             if sampled:
-                low[:, some] = high[:, some] = colour_at(look, carry_back(look.texture, q[:, some])).T
+                seen, off = colour_at(look, carry_back(look.texture, q[:, some])).T, self._discoloured[at]
+                low[:, some], high[:, some] = np.fmax(seen - off, 0.0), np.fmin(seen + off, 1.0)
         return Enclosure(low, high)

@@ -133,7 +133,8 @@ def _union(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) ->
 def _smooth(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
     h = xp.clip(0.5 + 0.5 * (big_d - d) / k, 0.0, 1.0)
     mixed = big_c + (c - big_c) * h[..., None]
-    return big_d + (d - big_d) * h - k * h * (1 - h), mixed
+    # each side by its own share: a difference of the two would swallow the nearer one's digits
+    return big_d * (1 - h) + d * h - k * h * (1 - h), mixed
 
 
 def _subtract(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:

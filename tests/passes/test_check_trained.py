@@ -140,3 +140,12 @@ def test_crowds_and_hairlines_are_drawn_well_and_not_warned_of(text: str) -> Non
     picture, exact = (np.asarray(p, np.float64) for p in (nsg.render(nsg.compile(scene)), draw_exact(scene)))
     assert exact.std() > 0.05
     assert psnr(picture, exact) > 45
+
+
+@pytest.mark.parametrize(("bend", "wild"), [(99, False), (-101, True), (1e20, True)])
+def test_far_outside_nothing_may_be_right(bend: float, wild: bool) -> None:
+    found = Diagnostics()
+    scene, spans = load_source(SourceFile("a.nsg", f"star {{ bend({bend}); }}"), diagnostics=found)
+    assert scene is not None
+    check_scene(scene, spans, found, MANIFEST)
+    assert [("nothing of the picture" in (d.help or "")) for d in found] == [wild]

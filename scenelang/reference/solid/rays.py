@@ -15,6 +15,7 @@ from scenelang.reference.field import Array
 from scenelang.reference.solid.field import FAR, MEDIUM, OPAQUE, OUT, Field
 
 STEP = 2e-3
+STEPS = 5_000  # of a ray at most
 
 Ints = npt.NDArray[np.int64]
 Kinds = npt.NDArray[np.int8]
@@ -72,7 +73,11 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
     origin, along, speed = o.take(ray, 1), d.take(ray, 1), speed.take(ray, 1)
     lower: Any = None
     found: list[tuple[Any, ...]] = []
+    taken = 0
     while len(ray):
+        taken += 1
+        if taken > STEPS:
+            raise ValueError(f"a ray of the exact picture takes more than {STEPS:,} steps")
         value, kind, way = field.probe(origin + t * along, (enter <= t) & (t <= leave), speed)
         if lower is None:
             first[ray] = np.where(t == 0.0, kind, OUT)

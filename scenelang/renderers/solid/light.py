@@ -18,7 +18,7 @@ from scenelang.renderers.solid.lookups import EVEN, INTO, Lookups
 from scenelang.renderers.solid.march import CAREFUL, Pace, Work, march
 from scenelang.renderers.solid.network import Wanted
 from scenelang.renderers.solid.passes import BEGIN, END, INF
-from scenelang.renderers.solid.rays import Piece, Trail
+from scenelang.renderers.solid.rays import STEPS, Piece, Trail
 
 CLEAR = 2e-4  # world units before a surface where rays from the light end
 PARTS = 3  # of pieces of which nodes do not tell enough
@@ -26,6 +26,7 @@ LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
 JUMP = 0.03  # linear: of colours that differ
 LOOKS = (0.003, *(i / 8 for i in range(1, 8)), 0.997)  # of a piece, where its colour is asked for
 HALVINGS = 8  # of the way between
+HASTY = 50  # steps of rays from the light, where rays from the eye were lost already
 LONG = 2.0  # world units: longer pieces are cut
 STEEP = 1.2  # how much more light the last node may get than the first
 NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle are cut
@@ -100,7 +101,7 @@ class Lighting:
         trail = march(self.field, self.eye, way, limit, gap=self.pace.gap)
         surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
         both, found = xp.concat([surface, floor], 0), []
-        work = Work(way.shape[1], 0, trail.near, trail.steps, trail.met + len(surface))
+        work = Work(way.shape[1], 0, trail.near, trail.steps, trail.met + len(surface), lost=trail.lost)
         if len(surface):
             found.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail, px)))
         if len(floor):
@@ -113,7 +114,7 @@ class Lighting:
         if not found:
             return Shade(seen[:3], seen[-3:], alpha, work)
         points = Points(*(xp.concat(list(part), 1) for part in zip(*found, strict=True)))
-        light, free, more = self._lit(points, xp.take(trail.soft, surface))
+        light, free, more = self._lit(points, xp.take(trail.soft, surface), _steps(trail))
         work += more
         xp.put(seen, both, light[:, : len(both)])
         xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
@@ -153,7 +154,9 @@ class Lighting:
             each = (end - begin) / PARTS
             finer = [(ray, begin + i * each, begin + (i + 1) * each, before + i * each) for i in range(PARTS)]
             pieces = tuple(xp.concat(part, 0) for part in zip(*finer, strict=True))
-            light, _, more = self._lit(self._scattering(way, trail, pieces, px)[0], trail.soft[:0])
+            light, _, more = self._lit(
+                self._scattering(way, trail, pieces, px)[0], trail.soft[:0], _steps(trail)
+            )
             work += more + Work(met=light.shape[1])
             xp.add(glow, pieces[0], light.reshape(len(light), count, -1).sum(1))
         return glow, work
@@ -203,12 +206,13 @@ class Lighting:
         points = Points(p, colour * AMBIENT[0], colour * self.power[:, None] / (4 * r * r))
         return points, weight.sum(0)
 
-    def _lit(self, points: Points, soft: Array) -> tuple[Array, Array, Work]:
+    def _lit(self, points: Points, soft: Array, steps: int) -> tuple[Array, Array, Work]:
         """Light (3, K) from points (3, K), which of them (K,) the light's own reaches, and what it took.
 
         Args:
             points: all of them.
             soft: of the first, 1 where they are not at a distance of 0 though something begins there.
+            steps: of rays at most.
         """
         xp, (p, light, more) = self.xp, points
         lit = xp.where(abs(more).sum(0) > 0)
@@ -218,7 +222,7 @@ class Lighting:
         edge[: len(soft)] = soft
         edge = xp.take(edge, lit) > 0
         limit = r - CLEAR * ~edge
-        trail = march(self.field, self.lamp, way / r.clip(1e-9), limit, 0, self.pace.gap, whole=True)
+        trail = march(self.field, self.lamp, way / r.clip(1e-9), limit, 0, self.pace.gap, True, steps)
         clear = (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length)
         inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
         if len(inside):  # rays may have ended before they met what is opaque there
@@ -228,7 +232,7 @@ class Lighting:
         xp.put(light, lit, xp.take(light, lit) + xp.take(more, lit) * clear)
         free = 0 * p[0] > 1
         xp.put(free, lit, clear > 0)
-        return light, free, Work(0, len(lit), trail.near, trail.steps, trail.met)
+        return light, free, Work(0, len(lit), trail.near, trail.steps, trail.met, lost=trail.lost)
 
     def surface(self, way: Array, index: Array, trail: Trail, px: float = 0.0) -> tuple[Array, ...]:
         """Where rays meet solids, and normals (3, K), colours, and light that joins in before (R, K)."""
@@ -337,6 +341,11 @@ class Lighting:
             some = xp.where(a < b)
             found.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin)))
         return tuple(xp.concat(list(parts), 0) for parts in zip(*found, strict=True))
+
+
+def _steps(trail: Trail) -> int:
+    """Of rays from the light to what rays from the eye met."""
+    return HASTY if trail.lost else STEPS
 
 
 def _dot(a: Array, b: Array) -> Array:

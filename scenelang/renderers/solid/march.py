@@ -9,7 +9,7 @@ from typing import NamedTuple
 from scenelang.renderers.arrays import Array
 from scenelang.renderers.solid.field import SolidField
 from scenelang.renderers.solid.passes import INF, placed
-from scenelang.renderers.solid.rays import Rays, Trail
+from scenelang.renderers.solid.rays import STEPS, Rays, Trail
 from scenelang.renderers.solid.segments import known, lengths
 
 HALVINGS = 16  # of the interval in which a medium gives way to a solid
@@ -43,6 +43,7 @@ class Work:
         steps: points of space on them at which the field was asked.
         met: (object, point) pairs that went through the network.
         refined: pixels that were sampled four times.
+        lost: rays that took all the steps there are without coming to an end.
     """
 
     rays: int = 0
@@ -51,6 +52,7 @@ class Work:
     steps: int = 0
     met: int = 0
     refined: int = 0
+    lost: int = 0
 
     def __add__(self, other: Work) -> Work:
         return Work(*map(add, astuple(self), astuple(other)))
@@ -64,6 +66,7 @@ def march(
     halvings: int = HALVINGS,
     gap: float = CAREFUL.gap,
     whole: bool = False,
+    steps: int = STEPS,
 ) -> Trail:
     """Follow rays.
 
@@ -75,6 +78,7 @@ def march(
         halvings: of the interval in which a medium gives way to a solid; none where only that it does counts.
         gap: as of `Pace`.
         whole: whether nobody asks where media begin and end, so that `segments.py` may answer.
+        steps: of all rays at most.
     """
     xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
@@ -88,5 +92,5 @@ def march(
             xp.put(length, xp.take(ids, some), answers)
         ids, passes = xp.take(ids, rest), passes.at(xp, rest)
     if len(ids):
-        Rays(solids, trail, ids, passes, gap).run(halvings)
+        Rays(solids, trail, ids, passes, gap).run(halvings, steps)
     return trail

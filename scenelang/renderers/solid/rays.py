@@ -47,7 +47,7 @@ class Trail:
         place: (M,) of rays in `passes`, -1 where they pass none.
         passes: the balls that those pass.
         pieces: of the ways in media.
-        near, steps, met: as of `Work`.
+        near, steps, met, lost: as of `Work`.
     """
 
     hit: Array
@@ -59,6 +59,7 @@ class Trail:
     near: int = 0
     steps: int = 0
     met: int = 0
+    lost: int = 0
 
     def at(self, xp: Arrays, index: Array) -> Passes:
         """The balls that some of the rays pass."""
@@ -106,10 +107,10 @@ class Rays:
         self.batches = [_Batch(every[:0], rows[:, :0], every[:0] < 0) for _ in range(2)]
         self._go_on(every, rows, passes)
 
-    def run(self, halvings: int) -> None:
-        """Follow the rays to their ends."""
+    def run(self, halvings: int, most: int = STEPS) -> None:
+        """Follow the rays to their ends, or for as many steps; what they have not met by then, they miss."""
         xp = self.xp
-        for _ in range(STEPS):
+        for _ in range(most):
             under_way = sum(batch.left + batch.more for batch in self.batches)
             if _enough(sum(len(place) for place, _ in self.between), under_way):
                 places, rows = zip(*self.between, strict=True)
@@ -124,6 +125,8 @@ class Rays:
                 self._step(batch)
             elif not self.between:
                 break
+        else:
+            self.trail.lost = sum(batch.left + batch.more for batch in self.batches)
         if self.struck:
             places, rows, frees = zip(*self.struck, strict=True)
             hit = self._root(xp.concat(rows, 1), xp.concat(frees, 0))
