@@ -33,7 +33,7 @@ from scenelang.scene.schema import (
     Twirl,
     Twist,
 )
-from scenelang.words import BLEND, COMBINE
+from scenelang.words import COMBINE
 
 Triple = tuple[float, float, float]
 AXES = "xy", "xz", "yx", "yz", "zx", "zy"
@@ -140,6 +140,6 @@ def random_solid(rng: Rng, config: SolidConfig) -> Scene:
         solid = Object(geometries[int(rng.integers(len(geometries)))], _moves(rng, config), material)
         word = "union" if unions or not links else COMBINE[int(rng.integers(4))]
         other = word == "smooth" and rng.random() < 0.5
-        links.append(Link(word, solid, k=float(rng.uniform(0.05, 0.5)) if other else BLEND))
+        links.append(Link(word, solid, k=float(rng.uniform(0.05, 0.5)) if other else None))
     others = _stage(rng) if config.staged else {"elements": zoo} if zoo is not None else {}
     return Scene(model="solids3d", canvas=config.canvas, nodes=Chain(links), **others)  # type: ignore[arg-type]
