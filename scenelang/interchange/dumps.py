@@ -268,10 +268,9 @@ def program_table(program: Program) -> str:
 
 def token_names(program: Program) -> list[str]:
     """How each row joins what came before it, in words."""
-    from scenelang.words import TOKENS
+    from scenelang.program.groups import token_name
 
-    names = {value: word for word, value in TOKENS.items()}
-    return [names[token] for token in program.tokens.tolist()]
+    return [token_name(token) for token in program.tokens.tolist()]
 
 
 def changes(before: str, after: str, old: str, new: str) -> str:

@@ -50,6 +50,12 @@ class Groups(NamedTuple):
         return int(self.path.shape[1])
 
 
+def token_name(token: int) -> str:
+    """The operator of a token in words, with brackets for the groups that begin and end with its row."""
+    ends = token >> ENDS
+    return COMBINE[token & OPERATOR] + " (" * ((token & BEGINS) > 0) + (" " + ")" * ends if ends else "")
+
+
 def token_fault(tokens: npt.NDArray[np.int8]) -> str | None:
     """Say what is wrong with the tokens (N,) of a stream, None where nothing is."""
     if not len(tokens):

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from scenelang.elements.element import Element
+from scenelang.program.groups import SMOOTH, UNION
 from scenelang.program.paints import Paint
 from scenelang.renderers.arrays import Array, Smooth
-from scenelang.renderers.field import SMOOTH, UNION
 from scenelang.renderers.grid import GridShape, grid_shape
 from scenelang.renderers.solid.boxes import element_box
 from scenelang.renderers.solid.frames import SolidFrame
