@@ -20,6 +20,7 @@ from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
 from scenelang.models.manifest import load_manifest
+from scenelang.program.groups import read_groups
 from scenelang.program.paints import Paint
 from scenelang.program.program import Program
 from scenelang.renderers.coverage import Coverage
@@ -72,6 +73,21 @@ def evaluated(name: str, seed: int) -> nsg.Scene:
     """A scene of an evaluation set."""
     textures = load_manifest("textures2d").textures if SETS[name].textures else ()
     return random_scene(np.random.default_rng([7, seed]), SETS[name], textures)
+
+
+def test_draws_any_tree() -> None:
+    """Groups of several depths, and cuts that round their edges."""
+    depths = set()
+    for seed in (2, 3, 5, 8):
+        p = program(evaluated("trees", seed), (33, 17))
+        depths.add(read_groups(p.tokens).deepest)
+        found = device.draw_on_device(network(), p)
+        usual = draw_objects(load_arrays("shapes2d").network, p, samples="four")
+        assert found is not None
+        np.testing.assert_allclose(
+            premultiplied(found.image), premultiplied(usual.image), rtol=0, atol=EQUAL
+        )
+    assert max(depths) > 1
 
 
 @pytest.mark.parametrize("name", ["shapes2d", "chains", "large", "tiny", "textures2d-mixed"])
