@@ -137,6 +137,35 @@ def _turned(red, green, blue, turns):
 
 
 @triton.jit
+def _object(x, y, row, part, weights, OUTER: tl.constexpr, INNER: tl.constexpr, WIDTH: tl.constexpr):
+    """Distances and colours (M,) of an object at world points."""
+    x, y = _affine(x, y, row)
+    row += 6
+    for _ in range(OUTER):  # unrolled the code would be ten times as long
+        x, y = _warp(x, y, row)
+        row += 3
+    x, y = _affine(x, y, row)
+    row += 6
+    for _ in range(INNER):
+        x, y = _warp(x, y, row)
+        row += 3
+    shape, side = weights + tl.load(part), tl.load(part + 1)
+    if side > 0:
+        distance = _grid(x, y, shape, side)
+    else:
+        distance = _learned(x, y, shape, WIDTH)
+    wide = tl.load(part + 5)
+    if wide > 0:
+        red, green, blue = _texture(
+            x, y, weights + tl.load(part + 2), tl.load(part + 3), tl.load(part + 4), wide
+        )
+    else:
+        nothing = 0.0 * x
+        red, green, blue = nothing + tl.load(row + 1), nothing + tl.load(row + 2), nothing + tl.load(row + 3)
+    return distance * tl.load(row), red, green, blue
+
+
+@triton.jit
 def _level(stack, here):
     """One (M,) of the levels of a stack."""
     return tl.sum(tl.where(here, stack, 0.0), 0)
@@ -198,44 +227,26 @@ def draw_blocks(
         row = rows + number * ROW
         part = parts + number * 6
         cell = row + CELL
-        distance = nothing
-        own_red, own_green, own_blue = nothing, nothing, nothing
         if LEVELS > 1:
             at = tl.load(levels + pair)
             here, above = place == at, place == at + 1
             state, red = _level(states, here), _level(reds, here)
             green, blue = _level(greens, here), _level(blues, here)
-        if (LEVELS > 1) & (number >= LEAVES):  # a group joins what it stands in as an object
-            distance = _level(states, above) * tl.load(row)
-            own_red, own_green, own_blue = _level(reds, above), _level(greens, above), _level(blues, above)
-            states = tl.where(above, empty, states)
-            reds, greens = tl.where(above, 0.0, reds), tl.where(above, 0.0, greens)
-            blues = tl.where(above, 0.0, blues)
-        else:
-            x, y = _affine(world_x, world_y, row)
-            row += 6
-            for _ in range(OUTER):  # unrolled the code would be ten times as long
-                x, y = _warp(x, y, row)
-                row += 3
-            x, y = _affine(x, y, row)
-            row += 6
-            for _ in range(INNER):
-                x, y = _warp(x, y, row)
-                row += 3
-            shape, side = weights + tl.load(part), tl.load(part + 1)
-            if side > 0:
-                distance = _grid(x, y, shape, side)
+            if number >= LEAVES:  # a group joins what it stands in as an object
+                distance = _level(states, above) * tl.load(row)
+                own_red, own_green = _level(reds, above), _level(greens, above)
+                own_blue = _level(blues, above)
+                states = tl.where(above, empty, states)
+                reds, greens = tl.where(above, 0.0, reds), tl.where(above, 0.0, greens)
+                blues = tl.where(above, 0.0, blues)
             else:
-                distance = _learned(x, y, shape, WIDTH)
-            distance *= tl.load(row)
-            wide = tl.load(part + 5)
-            if wide > 0:
-                own_red, own_green, own_blue = _texture(
-                    x, y, weights + tl.load(part + 2), tl.load(part + 3), tl.load(part + 4), wide
+                distance, own_red, own_green, own_blue = _object(
+                    world_x, world_y, row, part, weights, OUTER, INNER, WIDTH
                 )
-            else:
-                own_red, own_green = nothing + tl.load(row + 1), nothing + tl.load(row + 2)
-                own_blue = nothing + tl.load(row + 3)
+        else:
+            distance, own_red, own_green, own_blue = _object(
+                world_x, world_y, row, part, weights, OUTER, INNER, WIDTH
+            )
 
         # the cell: lines in what it is shown and what it remembers, the first of them the gate of the state
         take = _unit(tl.load(cell) * distance + tl.load(cell + 1) * state + tl.load(cell + 2))
