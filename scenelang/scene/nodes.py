@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import nextafter
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, overload
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from scenelang.scene.fields import (
     Dotted,
@@ -15,7 +16,7 @@ from scenelang.scene.fields import (
     first_joins_by_union,
 )
 from scenelang.scene.modifiers import MaterialOp, Transform, Transforms
-from scenelang.words import Combine
+from scenelang.words import BLEND, Combine
 
 MAX_FRAMES = 1_000_000
 MAX_NODE_DEPTH = 400  # nodes within nodes
@@ -79,12 +80,25 @@ class Group(Frozen):
         ) -> None: ...
 
 
+def blend_width(op: str, k: float) -> float | None:
+    """The k of a Scene for a width that is written, None for the usual one.
+
+    JSON from before cuts had widths says 0.15 in every node, so that one of 0.15 is the next number above.
+    """
+    if k != BLEND:
+        return k
+    return nextafter(BLEND, 1.0) if op in ("subtract", "intersect") else None
+
+
 class _Joining(Frozen):
     """What joins by an operator."""
 
     @model_validator(mode="after")
-    def _unions_have_no_width(self) -> Self:
-        if self.__dict__["op"] == "union" and self.__dict__["k"] is not None:
+    def _unions_have_no_width(self, info: ValidationInfo) -> Self:
+        op, k = self.__dict__["op"], self.__dict__["k"]
+        if k == BLEND:
+            self.__dict__["k"] = None if info.mode == "json" else blend_width(op, k)
+        elif op == "union" and k is not None:
             raise ValueError("`union` has no k: `smooth` blends")
         return self
 

@@ -84,9 +84,7 @@ def test_draws_any_tree() -> None:
         found = device.draw_on_device(network(), p)
         usual = draw_objects(load_arrays("shapes2d").network, p, samples="four")
         assert found is not None
-        np.testing.assert_allclose(
-            premultiplied(found.image), premultiplied(usual.image), rtol=0, atol=EQUAL
-        )
+        np.testing.assert_allclose(premultiplied(found.image), premultiplied(usual.image), rtol=0, atol=EQUAL)
     assert max(depths) > 1
 
 

@@ -20,6 +20,7 @@ from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import number
 from scenelang.evaluate.values.value import POISON, Problem, show
 from scenelang.scene import library
+from scenelang.scene.nodes import blend_width
 from scenelang.scene.schema import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object
 from scenelang.scene.spans import Written
 from scenelang.syntax import nodes
@@ -128,7 +129,8 @@ def _run_nested(body: Body, env: Env, inside: Builder, session: Session, span: S
 
 def _width(stmt: nodes.Node | nodes.Combined, place: Place) -> Callable[[Env], float | None]:
     """The k of a word that joins, None where none is written."""
-    word = KEYWORDS[stmt.op if isinstance(stmt, nodes.Combined) else stmt.kind]
+    op = stmt.op if isinstance(stmt, nodes.Combined) else stmt.kind
+    word = KEYWORDS[op]
     given = prepare_arguments(stmt.args, place)
     bound = bind(place.report, nodes.Name(stmt.keyword, word.name), word.params, word.required, given)
     if not bound or bound[0] is None:
@@ -138,7 +140,7 @@ def _width(stmt: nodes.Node | nodes.Combined, place: Place) -> Callable[[Env], f
 
     def run(env: Env) -> float | None:
         k = check(get(env))
-        return None if k is POISON else float(k)
+        return None if k is POISON else blend_width(op, float(k))
 
     return run
 
