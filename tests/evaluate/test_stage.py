@@ -131,8 +131,8 @@ def test_the_width_of_each_blend_reaches_the_graph() -> None:
     )
     graph = lower(run_text(text).good(), SOLIDS, None, Diagnostics())
     (chain,) = [link.node for link in graph.root.links]
-    assert [link.width for link in chain.links] == [0.15, 0.3, 0.15, 0.2]
-    assert [link.width for link in chain.links[3].node.links] == [0.15, 1.0]
+    assert [link.k for link in chain.links] == [0.0, 0.3, 0.0, 0.2]
+    assert [link.k for link in chain.links[3].node.links] == [0.0, 1.0]
 
 
 @pytest.mark.parametrize(
