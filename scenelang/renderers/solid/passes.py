@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenelang.renderers.arrays import Array, Arrays
 from scenelang.program.groups import INTERSECT, SMOOTH, SUBTRACT, UNION, Floats, Groups, Mask, felt
+from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.solid.frames import SolidFrame, read_solid_frame
 from scenelang.renderers.solid.network import SolidNetwork
 
