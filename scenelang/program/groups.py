@@ -13,11 +13,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.words import BLEND, TOKENS
+from scenelang.graph.bounds import Later
+from scenelang.graph.nodes import MOST_OPEN
+from scenelang.words import BLEND, COMBINE, TOKENS
 
 UNION, SMOOTH, SUBTRACT, INTERSECT = (TOKENS[word] for word in ("union", "smooth", "subtract", "intersect"))
 OPERATOR, BEGINS, ENDS = 3, 4, 3  # mask of the operator, bit of a beginning, shift of the number of ends
-MOST_OPEN = 15
 
 Index = npt.NDArray[np.intp]
 Floats = npt.NDArray[np.float64]
@@ -46,7 +47,13 @@ class Groups(NamedTuple):
     @property
     def deepest(self) -> int:
         """The most groups that are open at once; 0 in a flat stream."""
-        return self.path.shape[1]
+        return int(self.path.shape[1])
+
+
+def token_name(token: int) -> str:
+    """The operator of a token in words, with brackets for the groups that begin and end with its row."""
+    ends = token >> ENDS
+    return COMBINE[token & OPERATOR] + " (" * ((token & BEGINS) > 0) + (" " + ")" * ends if ends else "")
 
 
 def token_fault(tokens: npt.NDArray[np.int8]) -> str | None:
@@ -105,16 +112,12 @@ def widths_of(operators: Index, blends: npt.NDArray[np.floating]) -> Floats:
 
 
 class Felt(NamedTuple):
-    """How far beyond its leaf each of N rows matters to what is seen.
-
-    A change of a distance that stays at a level or above is after a `smooth` none, or one at that level less
-    its width; unions and intersections keep the level. What is cut out changes distances inside, which
-    later blends see, and so does what is subtracted with a width, up to that.
+    """How far beyond its leaf each of N rows matters to what is seen, as `scenelang.graph.bounds.Later`.
 
     Args:
         total: (N,) world units: widths of the blends that see the row, its own and those of its groups too.
         widest: (N,) the widest of these, 0 for none.
-        count: (N,) how many these are.
+        blends: (N,) how many these are.
         everywhere: (N,) whether it matters wherever its leaf is: what it intersects ends outside of it, or
             it is cut out of what a later blend sees.
         inside: (N,) whether a later blend sees how deep inside what it cuts points are.
@@ -122,37 +125,9 @@ class Felt(NamedTuple):
 
     total: Floats
     widest: Floats
-    count: Index
+    blends: Index
     everywhere: Mask
     inside: Mask
-
-
-class _Later(NamedTuple):
-    """The blends behind a row, and whether they see distances inside; and whether all rows here matter."""
-
-    total: float = 0.0
-    widest: float = 0.0
-    count: int = 0
-    inside: bool = False
-    everywhere: bool = False
-
-    def joined(self, operator: int, width: float) -> _Later:
-        """What the operand of an operator is seen by."""
-        hidden = self.everywhere or (operator == SUBTRACT and self.inside)
-        if not width or operator == INTERSECT:
-            return self._replace(everywhere=hidden)
-        blends = self.total + width, max(self.widest, width), self.count + 1
-        return _Later(*blends, self.inside or operator == SMOOTH, hidden)
-
-    def before(self, operator: int, width: float) -> _Later:
-        """What is seen of all that an operator joins to."""
-        if not width:
-            return self
-        if operator != SMOOTH:  # what stays at a level outside stays there
-            return self._replace(inside=True)
-        return _Later(
-            self.total + width, max(self.widest, width), self.count + 1, True, self.everywhere
-        )
 
 
 def felt(groups: Groups, widths: Floats) -> Felt:
@@ -165,24 +140,24 @@ def felt(groups: Groups, widths: Floats) -> Felt:
     count = len(groups.tokens)
     total, widest = np.zeros((2, count))
     blends, everywhere, inside = np.zeros(count, np.intp), np.zeros(count, bool), np.zeros(count, bool)
-    stack, later = list[_Later](), _Later()
+    stack, later = list[Later](), Later()
     path = groups.path
     depth = (path >= 0).sum(1)
     for row in range(count - 1, -1, -1):
         for up in range(int(groups.ends[row])):
             group = path[row, depth[row] - int(groups.ends[row]) + up]
             stack.append(later)
-            later = later.joined(int(groups.joins[group]), float(widths[groups.rows[group]]))
+            later = later.of(COMBINE[groups.joins[group]], float(widths[groups.rows[group]]))
         first = bool(groups.first[row])
         operator, width = (UNION, 0.0) if first else (int(groups.tokens[row]), float(widths[row]))
-        own = later.joined(operator, width)
-        total[row], widest[row], blends[row] = own.total, own.widest, own.count
+        own = later.of(COMBINE[operator], width)
+        total[row], widest[row], blends[row] = BLEND * own.total, own.widest, own.count
         inside[row], everywhere[row] = later.inside, own.everywhere or operator == INTERSECT
-        later = later.before(operator, width)
+        later = later.before(COMBINE[operator], width)
         if first:
             operator, width = int(groups.joins[path[row, depth[row] - 1]]), float(widths[row])
             everywhere[row] |= operator == INTERSECT
-            later = stack.pop().before(operator, width)
+            later = stack.pop().before(COMBINE[operator], width)
     return Felt(total, widest, blends, everywhere, inside)
 
 
@@ -195,7 +170,7 @@ def _felt_flat(tokens: Index, widths: Floats) -> Felt:
     return Felt(
         total=blends[::-1].cumsum()[::-1] + np.where(own, widths, 0.0),
         widest=np.maximum(np.maximum.accumulate(blends[::-1])[::-1], np.where(own, widths, 0.0)),
-        count=(blends[::-1] > 0).cumsum()[::-1] + own,
+        blends=(blends[::-1] > 0).cumsum()[::-1] + own,
         everywhere=(tokens == INTERSECT) | ((tokens == SUBTRACT) & inside),
         inside=inside,
     )

@@ -15,11 +15,13 @@ from scenelang.scene.fields import (
     first_joins_by_union,
 )
 from scenelang.scene.modifiers import MaterialOp, Transform, Transforms
-from scenelang.words import BLEND, Combine
+from scenelang.words import Combine
 
 MAX_FRAMES = 1_000_000
 MAX_NODE_DEPTH = 400  # nodes within nodes
-Blend = Annotated[Finite, Field(gt=0, description="width of the blend of `smooth`, which alone has one")]
+Blend = Annotated[
+    Finite, Field(gt=0, description="width of the blend; null: 0.15 of `smooth`, a sharp edge of a cut")
+]
 
 
 class Material(Frozen):
@@ -81,22 +83,21 @@ class _Joining(Frozen):
     """What joins by an operator."""
 
     @model_validator(mode="after")
-    def _blends_only_smooth(self) -> Self:
-        op, k = self.__dict__["op"], self.__dict__["k"]
-        if op != "smooth" and k != BLEND:
-            raise ValueError(f"`{op}` has no k: only smooth blends")
+    def _unions_have_no_width(self) -> Self:
+        if self.__dict__["op"] == "union" and self.__dict__["k"] is not None:
+            raise ValueError("`union` has no k: `smooth` blends")
         return self
 
 
 class Boolean(_Joining):
-    """A boolean node over its children, folded left; ``k`` is the width of a ``smooth`` blend."""
+    """A boolean node over its children, folded left; ``k`` is the width of its blend."""
 
     kind: Literal["boolean"] = "boolean"
     op: Combine
     children: tuple[SceneNode, ...] = ()
     transforms: Transforms = ()
     material: Material | None = None
-    k: Blend = BLEND
+    k: Blend | None = None
 
     if TYPE_CHECKING:
 
@@ -106,7 +107,7 @@ class Boolean(_Joining):
             children: Iterable[SceneNode] | SceneNode = (),
             transforms: Iterable[Transform] | Transform = (),
             material: Material | None = None,
-            k: float = BLEND,
+            k: float | None = None,
         ) -> None: ...
 
 
@@ -115,14 +116,14 @@ class Link(_Joining):
 
     op: Combine = "union"
     node: SceneNode
-    k: Blend = BLEND
+    k: Blend | None = None
 
     if TYPE_CHECKING:
 
         @overload
-        def __init__(self, op: Combine, node: SceneNode, k: float = BLEND) -> None: ...
+        def __init__(self, op: Combine, node: SceneNode, k: float | None = None) -> None: ...
         @overload
-        def __init__(self, *, op: Combine = "union", node: SceneNode, k: float = BLEND) -> None: ...
+        def __init__(self, *, op: Combine = "union", node: SceneNode, k: float | None = None) -> None: ...
         def __init__(self, *args: Any, **data: Any) -> None: ...
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenelang.passes.linearise import linearise
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
@@ -18,7 +19,6 @@ from scenelang.passes import PASSES
 from scenelang.passes.check_eye import check_eye
 from scenelang.passes.context import Context
 from scenelang.passes.drop import drop_hidden, drop_unseen
-from scenelang.passes.linearise import linearise
 from scenelang.reference.solid.field import Field
 from scenelang.reference.solid.image import solid_image
 from scenelang.scene import schema

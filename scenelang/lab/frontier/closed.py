@@ -9,9 +9,10 @@ import numpy as np
 
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
+from scenelang.program.groups import SMOOTH, SUBTRACT, UNION
 from scenelang.reference.field import SECTORS, TORUS, leaf_distance
 from scenelang.renderers.arrays import Array, Smooth
-from scenelang.renderers.field import BLEND, SMOOTH, SUBTRACT, UNION
+from scenelang.renderers.field import BLEND
 from scenelang.renderers.network import FramedArrays, FramedConfig
 from scenelang.renderers.slopes import Floats
 from scenelang.renderers.solid.network import Cell, SolidArrays, Wanted
