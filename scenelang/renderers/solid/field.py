@@ -94,6 +94,14 @@ class States:
     bound: Array
     owner: Array
 
+    def parts(self) -> tuple[Array, ...]:
+        """All of it, None where it is not asked for."""
+        return self.memory, self.slope, self.bound, self.owner
+
+    def at(self, xp: Arrays, index: Array) -> States:
+        """Some of the entries."""
+        return States(*(part if part is None else xp.take(part, index) for part in self.parts()))
+
 
 class SolidField(Objects):
     """A program's objects, ready to be met by points of rays."""
@@ -191,7 +199,7 @@ class SolidField(Objects):
             which, near, look = objects[pair], d[pair], self.looks
             if wanted:
                 look = xp.take(look, which) if looks is None else looks[:, pair]
-            slope = None if own is None else own[:, pair]
+            slope = own if own is None else own[:, pair]
             if not start and self.open and not owners:  # nothing has been met
                 after = xp.take(self.first, which) * near[None]
                 if wanted:
@@ -206,10 +214,7 @@ class SolidField(Objects):
             self._join(states, index, Operand(near, look, slope, None, which + 1 + 0 * near), which, wanted)
         for closing in closings[-1]:
             self._close(states, closing, wanted)
-        memory, slope, bound, owner = (
-            each if each is None or depth == 1 else each[..., :count]
-            for each in (states.memory, states.slope, states.bound, states.owner)
-        )
+        memory, slope, bound, owner = (part if part is None else part[..., :count] for part in states.parts())
         if bound is not None:
             bound = xp.minimum(bound, abs(memory[0]))
         return Meeting(memory[0], memory[1:], slope, bound, owner, len(rays))
@@ -217,14 +222,12 @@ class SolidField(Objects):
     def _close(self, states: States, closing: Closing, wanted: Wanted) -> None:
         """Let groups end: what they come to goes into the states that they stand in, and theirs are empty."""
         xp, (inner, index, which) = self.xp, closing
-        memory, *others = (
-            None if each is None else xp.take(each, inner)
-            for each in (states.memory, states.slope, states.bound, states.owner)
-        )
-        operand = Operand(memory[0].clip(-EMPTY, NOTHING), memory[1:], *others)
-        xp.put(states.memory[:1], inner, 0 * memory[:1] + EMPTY)
+        found = states.at(xp, inner)
+        d, look = found.memory[0].clip(-EMPTY, NOTHING), found.memory[1:]
+        xp.put(states.memory[:1], inner, 0 * found.memory[:1] + EMPTY)
         if states.bound is not None:
-            xp.put(states.bound, inner, 0 * memory[0] + EMPTY)
+            xp.put(states.bound, inner, 0 * d + EMPTY)
+        operand = Operand(d, look, found.slope, found.bound, found.owner)
         self._join(states, index, operand, which, wanted)
 
     def _join(

@@ -77,7 +77,7 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
     # what is taken away says how deep points inside others lie
     deep = matters.everywhere & _under(groups, SUBTRACT)
     for i, frame in enumerate(frames):
-        blends = float(matters.widest[i]) * (1 + int(matters.count[i]) / 4)
+        blends = float(matters.widest[i]) * (1 + int(matters.blends[i]) / 4)
         if deep[i]:
             blends += deepest
         radius = 1 + SLACK + abs(frame.amount) + blends / frame.scale
@@ -104,7 +104,7 @@ def showing(groups: Groups) -> Mask:
     """Whether rows may show something that was empty before (1 + D, N): at all, and in their groups."""
     shows = np.isin(groups.tokens, (UNION, SMOOTH))
     inner = [np.isin(groups.joins[path], (UNION, SMOOTH)) | (path < 0) for path in groups.path.T[::-1]]
-    return np.logical_and.accumulate([shows, *inner])[::-1]
+    return np.asarray(np.logical_and.accumulate([shows, *inner])[::-1])
 
 
 def _under(groups: Groups, operator: int) -> Mask:
