@@ -211,7 +211,8 @@ class SolidField(Objects):
                 if states.slope is not None:
                     states.slope = _update(xp, states.slope, index, xp.take(self.first, which) * slope)
                 continue
-            self._join(states, index, Operand(near, look, slope, None, which + 1 + 0 * near), which, wanted)
+            number = which + 1 + 0 * near if owners else None
+            self._join(states, index, Operand(near, look, slope, None, number), which, wanted)
         for closing in closings[-1]:
             self._close(states, closing, wanted)
         memory, slope, bound, owner = (part if part is None else part[..., :count] for part in states.parts())
