@@ -14,9 +14,10 @@ import numpy as np
 from scenelang.backend.options import RenderError
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
+from scenelang.program.groups import SMOOTH, SUBTRACT, UNION
 from scenelang.reference.field import SECTORS, TORUS, leaf_distance
 from scenelang.renderers.arrays import Array, Smooth
-from scenelang.renderers.field import BLEND, SMOOTH, SUBTRACT, UNION
+from scenelang.renderers.field import BLEND
 from scenelang.renderers.network import FramedArrays, FramedConfig
 from scenelang.renderers.slopes import Floats
 from scenelang.renderers.solid.network import Cell, SolidArrays, Wanted
@@ -126,6 +127,9 @@ class ClosedSolids(SolidArrays):
 
     def cell(self, token: int, width: float) -> tuple[Cell, ...]:
         """The token in the place of the first weight, the width of blends in that of the second."""
+        return self.cut(token, width if token == SMOOTH else 0.0)
+
+    def cut(self, token: int, width: float) -> tuple[Cell, ...]:
         token_, width_, none = (np.full((1, 1), value, np.float32) for value in (token, width, 0.0))
         return (Cell(token_, width_, none, none, none),) * len(Wanted)
 
@@ -197,4 +201,5 @@ def _joined(token: Any, k: Array, state: Array, d: Array) -> Array:
     if token == UNION:
         return np.stack([np.minimum(state, d), d < state, d < np.maximum(state, 0)])
     d = -d if token == SUBTRACT else d
-    return np.stack([np.maximum(state, d), d > state, 0 * d])
+    h = np.where(k > 0, (0.5 + 0.5 * (d - state) / np.maximum(k, 1e-9)).clip(0, 1), d > state)
+    return np.stack([(1 - h) * state + h * (d + k * (1 - h)), h, 0 * d])

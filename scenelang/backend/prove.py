@@ -72,6 +72,6 @@ def prove_drawn(
     keep_memory()
     try:
         known_errors(manifest := load_manifest(model))
-        return prove_image(graphs["lower"], graphs["linearise"], manifest, draw(), redraw=redraw)
+        return prove_image(graphs["lower"], graphs["flatten"], manifest, draw(), redraw=redraw)
     except (ProofError, ModelError) as error:
         raise RenderError(str(error)) from None

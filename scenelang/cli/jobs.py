@@ -186,16 +186,16 @@ def _stored(name: str, request: Request, clock: Clock) -> Job:
 
 def program_notes(program: Program, why: str) -> list[str]:
     """Lines about a compiled scene."""
-    from scenelang.words import TOKENS
+    from scenelang.program.groups import OPERATOR
+    from scenelang.words import COMBINE
 
-    names = {value: word for word, value in TOKENS.items()}
     shapes = Counter(program.objects)
-    words = Counter(program.tokens.tolist())
+    words = Counter((program.tokens & OPERATOR).tolist())
     width, height = program.canvas
     return [
         f"{width} x {height} pixels, model {program.model} ({why}), weights {program.weights[:12]}",
         f"objects: {len(program)}" + _counts(shapes),
-        "tokens: " + (_counts({names[t]: n for t, n in sorted(words.items())})[2:-1] or "none"),
+        "tokens: " + (_counts({COMBINE[t]: n for t, n in sorted(words.items())})[2:-1] or "none"),
     ]
 
 

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from scenelang.diagnostics.span import Span
 from scenelang.scene.schema import Link, Material
-from scenelang.words import BLEND, Combine
+from scenelang.words import Combine
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -73,7 +73,7 @@ class ChainBuilder(Builder):
     def __init__(self) -> None:
         super().__init__()
         self.op: Combine = "union"
-        self.k = BLEND
+        self.k: float | None = None
 
     def add(self, node: Any) -> None:
         self.children.append(make(Link, {"op": self.op, "node": node, "k": self.k}))

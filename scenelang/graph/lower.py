@@ -164,12 +164,17 @@ class _Open:
 
 def _children(node: Composite) -> Iterator[tuple[Combine, float, schema.SceneNode]]:
     if isinstance(node, schema.Chain):
-        return ((link.op, link.k, link.node) for link in node.children)
+        return ((link.op, _width(link), link.node) for link in node.children)
     op: Combine = "union"
-    k = BLEND
+    k = 0.0
     if isinstance(node, schema.Boolean):
-        op, k = node.op, node.k
+        op, k = node.op, _width(node)
     return ((op, k, child) for child in (node.nodes if isinstance(node, schema.Scene) else node.children))
+
+
+def _width(node: schema.Boolean | schema.Link) -> float:
+    """The width of a blend where it is not the usual one, else 0."""
+    return 0.0 if node.k is None or (node.op == "smooth" and node.k == BLEND) else node.k
 
 
 @dataclass(slots=True)
@@ -187,7 +192,7 @@ class _Lowering:
     steps: dict[int, Step | Refusal] = field(default_factory=dict)
 
     def run(self, scene: schema.Scene) -> Fold:
-        stack = [_Open("union", BLEND, scene, None, _children(scene))]
+        stack = [_Open("union", 0.0, scene, None, _children(scene))]
         while True:
             here = stack[-1]
             item = next(here.todo, None)
@@ -201,8 +206,8 @@ class _Lowering:
                 continue
             op, k, node = item
             if not here.links:
-                op, k = "union", BLEND
-            elif k != BLEND and not self.manifest.any_blend:
+                op, k = "union", 0.0
+            elif k and op == "smooth" and not self.manifest.any_blend:
                 fact = f"model `{self.manifest.name}` blends over {BLEND} and no other width"
                 joined = here.node if isinstance(here.node, schema.Boolean) else node
                 self.say("E0512", fact, joined, "leave k out, or draw with another model")

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import field
 from math import inf
 from operator import attrgetter
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 from scenelang.diagnostics.span import Span
 from scenelang.elements.element import Element
@@ -23,6 +23,7 @@ from scenelang.records import Record
 from scenelang.words import BLEND as BLEND
 from scenelang.words import Combine
 
+MOST_OPEN = 15  # groups of a stream within each other: a token has four bits for how many end
 BELOW = 1e-3  # world units below the ground that count as seen: more than a renderer's step behind a surface
 T = TypeVar("T")
 
@@ -74,17 +75,17 @@ class Leaf(Record):
 class Link(Record):
     """A child of a fold with the operator that joins it to what came before; the first is a union.
 
-    ``k`` is the width of a ``smooth`` blend, in world units, over 0.
+    ``k`` is the width of its blend as it was written, in world units, 0 where none was.
     """
 
     op: Combine
     node: Node
-    k: float = BLEND
+    k: float = 0.0
 
     @property
     def width(self) -> float:
-        """The width of the blend; 0 for a sharp edge."""
-        return self.k if self.op == "smooth" else 0.0
+        """The width of the blend: of a `smooth` `BLEND` unless written; 0 for a sharp edge."""
+        return self.k or (BLEND if self.op == "smooth" else 0.0)
 
 
 class Fold(Record):
@@ -104,11 +105,30 @@ class Fold(Record):
 Node = Leaf | Fold
 
 
+class Row(NamedTuple):
+    """A leaf of a stream.
+
+    Args:
+        op: joins it to what stands before it in its group; of the first leaf of a group it joins that.
+        k: the width of that as written, 0 where none was.
+        begins: whether it is the first leaf of a group.
+        ends: how many groups end behind it.
+        cuts: whether something takes it away, or a group around it.
+    """
+
+    op: Combine
+    leaf: Leaf
+    k: float
+    begins: bool
+    ends: int
+    cuts: bool
+
+
 class Graph(Record):
     """A whole scene as a graph for one model.
 
     Args:
-        root: the top level, a fold of kind ``scene``; after `linearise` all its children are leaves.
+        root: the top level, a fold of kind ``scene``; after `flatten` folds within it are groups of a stream.
         background: colour in [0, 1] as written, or None for transparency.
         stage: of a scene of solids, None in the plane.
         elements: geometries that users brought, by name.
@@ -125,9 +145,28 @@ class Graph(Record):
         """The same scene with another root."""
         return Graph(root, self.canvas, self.background, self.space, self.stage, self.elements)
 
-    def rows(self) -> list[tuple[Combine, Leaf]]:
-        """Operators and leaves of a graph that is one stream."""
-        return [(link.op, link.node) for link in self.root.links if isinstance(link.node, Leaf)]
+    def rows(self) -> list[Row]:
+        """The leaves in order; folds among the links of folds are groups, whose first link is a leaf."""
+        found: list[Row] = []
+        open_folds = [(iter(self.root.links), False)]
+        first: Link | None = None  # of a group, before its first leaf
+        while open_folds:
+            links, cut = open_folds[-1]
+            link = next(links, None)
+            if link is None:
+                open_folds.pop()
+                if open_folds:
+                    found[-1] = found[-1]._replace(ends=found[-1].ends + 1)
+                continue
+            cuts = cut or link.op == "subtract"
+            if isinstance(link.node, Fold):
+                first = link
+                open_folds.append((iter(link.node.links), cuts))
+                continue
+            op, k = (link.op, link.k) if first is None else (first.op, first.k)
+            found.append(Row(op, link.node, k, first is not None, 0, cuts))
+            first = None
+        return found
 
     def window(self) -> Box:
         """The part of the world that decides the picture.
@@ -178,6 +217,11 @@ def nodes(root: Node) -> Iterator[Node]:
 def leaves(root: Node) -> Iterator[Leaf]:
     """Every leaf, in file order."""
     return (node for node in nodes(root) if isinstance(node, Leaf))
+
+
+def links_within(fold: Fold) -> Iterator[Link]:
+    """Every link of a fold and of those within it."""
+    return (link for node in nodes(fold) if isinstance(node, Fold) for link in node.links)
 
 
 def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from enum import Enum
 
-from scenelang.graph.nodes import Fold, Graph, Leaf, Move
+from scenelang.graph.nodes import MOST_OPEN, Fold, Graph, Leaf, Move
 from scenelang.graph.space import Space
 from scenelang.graph.steps import Affine
 
@@ -18,7 +18,7 @@ class Invariant(Enum):
     LOOKS = "the look of a constant material is one colour"
     MERGED = "no two affine maps are neighbours"
     AT_LEAVES = "no fold has moves"
-    STREAM = "every child of the root is a leaf"
+    STREAM = "folds within folds are groups: none is a first link, and few lie within each other"
 
 
 Checked = tuple[Space, bool, bool, bool]
@@ -55,16 +55,16 @@ def _fault(graph: Graph, holds: frozenset[Invariant], sound: Sound) -> str | Non
     if checked not in sound:
         sound.clear()
     leaves = sound.setdefault(checked, {})
-    folds = [graph.root]
+    folds = [(graph.root, 0)]
     while folds:
-        fold = folds.pop()
-        fault = _fold_fault(fold, fold is graph.root, holds) or _moves_fault(fold.moves, checked)
+        fold, depth = folds.pop()
+        fault = _fold_fault(fold, depth, holds) or _moves_fault(fold.moves, checked)
         if fault is not None:
             return fault
         for link in fold.links:
             node = link.node
             if isinstance(node, Fold):
-                folds.append(node)
+                folds.append((node, depth + 1))
             elif leaves.get(id(node)) is not node:
                 leaves[id(node)] = node
                 fault = node.noted(checked, lambda leaf: _leaf_fault(leaf, checked))
@@ -73,14 +73,16 @@ def _fault(graph: Graph, holds: frozenset[Invariant], sound: Sound) -> str | Non
     return None
 
 
-def _fold_fault(fold: Fold, root: bool, holds: frozenset[Invariant]) -> str | None:
+def _fold_fault(fold: Fold, depth: int, holds: frozenset[Invariant]) -> str | None:
     if fold.links and fold.links[0].op != "union":
         return "the first link of a fold is a union"
     if fold.moves and Invariant.AT_LEAVES in holds:
         return Invariant.AT_LEAVES.value
-    if not root and Invariant.STREAM in holds:
+    if Invariant.STREAM in holds and (
+        depth > MOST_OPEN or (fold.links and isinstance(fold.links[0].node, Fold))
+    ):
         return Invariant.STREAM.value
-    if not root and Invariant.COMPOSITE in holds and len(fold.links) < 2:
+    if depth and Invariant.COMPOSITE in holds and len(fold.links) < 2:
         return Invariant.COMPOSITE.value
     return None
 

@@ -13,7 +13,7 @@ from scenelang.diagnostics.span import Span
 from scenelang.diagnostics.suggest import plural
 from scenelang.elements.element import Element
 from scenelang.graph.looks import Look
-from scenelang.graph.nodes import BLEND, Fold, Graph, Leaf, Link, Move, Node
+from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move, Node
 from scenelang.graph.space import Space
 from scenelang.graph.spaces import PLANE
 from scenelang.graph.stage import HORIZON, ZENITH, Stage, Triple, encoded, stage_data
@@ -145,7 +145,7 @@ def move_text(move: Move, space: Space) -> str:
 
 def op_text(link: Link) -> str:
     """An operator, ``smooth(0.3)`` where its blend is not of the usual width."""
-    return f"smooth({link.k:g})" if link.op == "smooth" and link.k != BLEND else link.op
+    return f"{link.op}({link.k:g})" if link.k else link.op
 
 
 def stage_text(stage: Stage) -> list[str]:
@@ -215,7 +215,7 @@ def _texture(element: Element) -> dict[str, Any]:
 
 def _width(link: Link) -> dict[str, Any]:
     """The width of a blend that is not the usual one."""
-    return {"k": link.k} if link.op == "smooth" and link.k != BLEND else {}
+    return {"k": link.k} if link.k else {}
 
 
 def _move(move: Move) -> dict[str, Any]:
@@ -269,10 +269,9 @@ def program_table(program: Program) -> str:
 
 def token_names(program: Program) -> list[str]:
     """How each row joins what came before it, in words."""
-    from scenelang.words import TOKENS
+    from scenelang.program.groups import token_name
 
-    names = {value: word for word, value in TOKENS.items()}
-    return [names[token] for token in program.tokens.tolist()]
+    return [token_name(token) for token in program.tokens.tolist()]
 
 
 def changes(before: str, after: str, old: str, new: str) -> str:

@@ -17,9 +17,10 @@ from torch import Tensor
 from scenelang.inverse.soft import softened
 from scenelang.inverse.target import WHITE
 from scenelang.models.load import load_model
+from scenelang.program.groups import SMOOTH
 from scenelang.program.program import WIDTH, Program
 from scenelang.renderers.arrays_torch import TORCH
-from scenelang.renderers.field import BLEND, SMOOTH
+from scenelang.renderers.field import BLEND
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.frames import Affine, Warp, way_back
 from scenelang.renderers.network import EMPTY

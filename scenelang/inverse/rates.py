@@ -15,8 +15,9 @@ import numpy.typing as npt
 from scenelang.inverse.space import Point, Space
 from scenelang.lifting.layout import LAYOUTS
 from scenelang.models.manifest import load_manifest
+from scenelang.program.groups import SMOOTH
 from scenelang.program.program import Program
-from scenelang.renderers.field import BLEND, SMOOTH
+from scenelang.renderers.field import BLEND
 
 Floats = npt.NDArray[np.float64]
 STEP: Final = 1e-3  # of differences, shares of a range: vectors are rounded to float32

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from scenelang.models.framed import load_arrays
-from scenelang.renderers.field import UNION
+from scenelang.program.groups import UNION
 from scenelang.renderers.network import Cell, FramedArrays
 
 

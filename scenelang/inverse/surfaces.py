@@ -15,8 +15,9 @@ import torch
 from torch import Tensor
 
 from scenelang.models.load import load_model
+from scenelang.program.groups import SMOOTH
 from scenelang.program.program import WIDTH, Program
-from scenelang.renderers.field import BLEND, SMOOTH
+from scenelang.renderers.field import BLEND
 from scenelang.renderers.solid.network import EMPTY, RADIUS, Cell, Wanted
 from scenelang.renderers.solid.parameters import Solids
 

@@ -18,6 +18,7 @@ from scenelang.measure.scenes import reference_of
 from scenelang.models.choose import WHITE, choose_model, lacking, uses, why_chosen
 from scenelang.models.load import Model, place_of
 from scenelang.models.manifest import Manifest, available, load_manifest
+from scenelang.program.groups import OPERATOR
 from scenelang.program.program import Program
 from scenelang.renderers.draw import Drawing
 from scenelang.renderers.solid.march import Work
@@ -80,7 +81,7 @@ def plan_of(
         **choice(scene, program.model, asked),
         "stages": stages(graphs),
         "rows": len(program),
-        "tokens": token_counts(program.tokens.tolist()),
+        "tokens": token_counts((program.tokens & OPERATOR).tolist()),
         "drawing": drawing_cost(scene, program, model, spans, threads),
     }
 

@@ -30,7 +30,7 @@ def rebuilt(
     for i, link in enumerate(chain.children):
         assert isinstance(link.node, Object)
         node = Object(link.node.geometry, moves(i, link.node), look(i, link.node))
-        links.append(Link(op := word(i, link.op), node, k=k if op == "smooth" else BLEND))
+        links.append(Link(op := word(i, link.op), node, k=k if op == "smooth" else None))
     return scene.model_copy(update={"nodes": (Chain(links),)})
 
 

@@ -110,10 +110,11 @@ def uses(scene: Scene) -> Iterator[Use]:
                 found.insert(0, (node.geometry, "geometries", node))
         elif isinstance(node, Chain):
             stack.extend(link.node for link in reversed(node.children))
-            found += [("smooth(k)", "settings", link.node) for link in node.children if link.k != BLEND]
+            wide = (link.node for link in node.children if link.k not in (None, BLEND))
+            found += [("smooth(k)", "settings", child) for child in wide]
         else:
             stack.extend(reversed(node.children))
-            if isinstance(node, Boolean) and node.k != BLEND:
+            if isinstance(node, Boolean) and node.k not in (None, BLEND):
                 found.append(("smooth(k)", "settings", node))
         for use in found:
             if use[:2] not in seen:

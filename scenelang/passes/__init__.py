@@ -20,8 +20,8 @@ from scenelang.passes.check_seen import check_seen
 from scenelang.passes.checks import check_levels, check_trained
 from scenelang.passes.context import Context
 from scenelang.passes.drop import drop_empty, drop_hidden, drop_unseen
+from scenelang.passes.flatten import flatten
 from scenelang.passes.leaves import fold_looks, fold_warps, push_transforms
-from scenelang.passes.linearise import linearise
 from scenelang.scene.schema import Scene
 
 
@@ -43,7 +43,7 @@ PASSES: tuple[Pass, ...] = (
     Pass(push_transforms, frozenset({Invariant.AT_LEAVES, Invariant.MERGED})),
     Pass(fold_warps, frozenset({Invariant.NO_IDENTITIES})),
     Pass(check_levels),
-    Pass(linearise, frozenset({Invariant.STREAM})),
+    Pass(flatten, frozenset({Invariant.STREAM})),
     Pass(check_eye),
     Pass(check_seen),
     Pass(drop_unseen),
@@ -99,7 +99,7 @@ def check_scene(
                 verify(graph, step.name, holds, sound)
             after(step.name, graph)
             if diagnostics.errors:
-                if step.run is linearise:
+                if step.run is flatten:
                     break  # every mistake is found, and what is left is not the scene
                 # Without sound chains no bound means anything: look for refusals only.
                 context = Context(manifest, diagnostics, whole=False)

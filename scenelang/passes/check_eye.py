@@ -7,7 +7,8 @@ from math import cos, exp, hypot, inf, sin
 from typing import Final
 
 from scenelang.graph.affine import composed, inverted
-from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.nodes import Fold, Graph, Leaf
+from scenelang.graph.space import Space
 from scenelang.graph.stage import EXTINCTION
 from scenelang.graph.steps import Affine, Displace, Step, Twist
 from scenelang.passes.context import Context
@@ -33,26 +34,8 @@ def check_eye(graph: Graph, context: Context) -> Graph:
     """
     if graph.stage is None or not context.whole:
         return graph
-    eye, depth, holder = graph.stage.camera.eye, inf, None
-    for link in graph.root.links:
-        leaf = link.node
-        if not isinstance(leaf, Leaf) or leaf.geometry not in _DISTANCES:
-            if link.op in ("subtract", "intersect"):
-                depth = inf
-            continue
-        steps = leaf.steps
-        d = _distance(leaf.geometry, steps, eye) * graph.space.stretches(composed(steps))[0]
-        if link.op == "subtract":
-            depth = max(depth, -d)
-        elif link.op == "intersect":
-            depth = max(depth, d)
-        elif link.op == "smooth":
-            h = min(max(0.5 + 0.5 * (depth - d) / link.k, 0.0), 1.0)
-            depth = (d if h == 1.0 else depth + h * (d - depth)) - link.k * h * (1.0 - h)
-            holder = leaf if h > 0.5 else holder
-        else:
-            holder = leaf if d < max(depth, 0.0) else holder
-            depth = min(depth, d)
+    eye = graph.stage.camera.eye
+    depth, holder = _folded(graph.root, eye, graph.space)
     if depth < 0.0 and holder is not None and holder.look.material != "volumetric":
         x, y, z = eye
         fact = f"the eye at [{x:g}, {y:g}, {z:g}] is inside this `{holder.geometry}`"
@@ -63,6 +46,38 @@ def check_eye(graph: Graph, context: Context) -> Graph:
         help = f"it lets {through:.2g} of the light through at most: move the camera or the object"
         context.diagnostics.add("W0403", fact, holder.span, help=help)
     return graph
+
+
+def _folded(fold: Fold, eye: Point, space: Space) -> tuple[float, Leaf | None]:
+    """The distance of a fold at a point, and the leaf whose material holds there."""
+    depth, holder = inf, None
+    for link in fold.links:
+        node, k = link.node, link.width
+        if isinstance(node, Fold):
+            d, leaf = _folded(node, eye, space)
+        elif node.geometry in _DISTANCES:
+            d, leaf = _distance(node.geometry, node.steps, eye), node
+            d *= space.stretches(composed(node.steps))[0]
+        else:
+            d, leaf = inf, None
+        if link.op in ("subtract", "intersect"):
+            cut = -d if link.op == "subtract" and leaf is not None else d
+            depth = -_smooth(-depth, -cut, k)[0] if k else max(depth, cut)
+        elif link.op == "smooth":
+            depth, h = _smooth(depth, d, k)
+            holder = leaf if h > 0.5 else holder
+        else:
+            holder = leaf if d < max(depth, 0.0) else holder
+            depth = min(depth, d)
+    return depth, holder
+
+
+def _smooth(depth: float, d: float, k: float) -> tuple[float, float]:
+    """The distance of a blend, and the share of what joins."""
+    if inf in (abs(depth), abs(d)):
+        return min(depth, d), float(d < depth)
+    h = min(max(0.5 + 0.5 * (depth - d) / k, 0.0), 1.0)
+    return (d if h == 1.0 else depth + h * (d - depth)) - k * h * (1.0 - h), h
 
 
 def _distance(geometry: str, steps: Sequence[Step], p: Point) -> float:

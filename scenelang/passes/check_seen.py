@@ -9,7 +9,7 @@ from typing import Final
 
 from scenelang.diagnostics.span import Span
 from scenelang.graph.bounds import leaf_box, meet, overlap
-from scenelang.graph.nodes import Graph, Leaf
+from scenelang.graph.nodes import Fold, Graph, Leaf, Link, links_within
 from scenelang.graph.space import Box
 from scenelang.passes.context import Context
 from scenelang.passes.drop import cover_of, covered
@@ -34,13 +34,13 @@ def check_seen(graph: Graph, context: Context) -> Graph:
     seen = [box for box in boxes if _in_sight(box, graph)]
     if context.moves and (seen or not boxes or not all(_is_far(box) for box in boxes)):
         return graph  # it may be in sight in another frame
-    op, last = rows[-1]
+    last = rows[-1].leaf
     if not boxes and cut is not None:
         fact = "nothing is left of the scene: the last cut takes all of it"
         _say(context, fact, cut, "let what is cut reach out of what cuts it, or what intersects meet")
     elif not seen:
-        _say(context, *_unseen(graph, rows[0][1]))
-    elif graph.stage is None and op == "union" and last.look.element is None:
+        _say(context, *_unseen(graph, rows[0].leaf))
+    elif graph.stage is None and graph.root.links[-1] == Link("union", last) and last.look.element is None:
         cover = cover_of(last, graph.space)
         if cover is not None and covered(graph.window(), [cover]):
             fact = f"this `{last.geometry}` covers the whole canvas: the picture has one colour"
@@ -54,26 +54,29 @@ def _say(context: Context, fact: str, span: Span | None, help: str) -> None:
 
 def _left(graph: Graph) -> tuple[list[Box] | None, Span | None]:
     """Boxes that hold all that the fold leaves, None where that is not known, and what left none of them."""
-    links, tests, cut = graph.root.links, 0, None
-    felt = sum(link.k for link in links if link.op == "smooth") / 4  # a blend adds so much at most
-    boxes: list[Box] = []
-    for link in links:
-        leaf, op = link.node, link.op
-        if not isinstance(leaf, Leaf):
-            return None, None
-        if op in ("union", "smooth"):
-            boxes.append(leaf_box(leaf, felt, graph.space))
-            continue
-        tests += len(boxes)
-        if tests > _TESTS:
-            return None, None
-        if op == "intersect":
-            own = leaf_box(leaf, felt, graph.space)
-            boxes = [shared for box in boxes if (shared := meet(box, own)) is not None]
-        elif not felt and (cover := cover_of(leaf, graph.space)) is not None:
-            boxes = [box for box in boxes if not covered(box, [cover])]
-        cut = leaf.span if not boxes else cut
-    return boxes, cut
+    widths = [link.width for link in links_within(graph.root) if link.op == "smooth"]
+    felt, tests = sum(widths) / 4, 0  # blends add so much at most
+
+    def left(fold: Fold) -> tuple[list[Box] | None, Span | None]:
+        nonlocal tests
+        boxes, cut = list[Box](), None
+        for link in fold.links:
+            node, op = link.node, link.op
+            own = [leaf_box(node, felt, graph.space)] if isinstance(node, Leaf) else left(node)[0]
+            tests += len(boxes) * len(own or ())
+            if own is None or tests > _TESTS:
+                return None, None
+            if op in ("union", "smooth"):
+                boxes += own
+            elif op == "intersect":
+                pairs = (meet(a, b) for a, b in product(boxes, own))
+                boxes = [shared for shared in pairs if shared is not None]
+            elif not felt and isinstance(node, Leaf) and (disc := cover_of(node, graph.space)) is not None:
+                boxes = [box for box in boxes if not covered(box, [disc])]
+            cut = cut if boxes or cut is not None else node.span
+        return boxes, None if boxes else cut
+
+    return left(graph.root)
 
 
 def _in_sight(box: Box, graph: Graph) -> bool:

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from math import dist, hypot, sqrt, tan
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.graph import affine
 from scenelang.graph.chain import LevelsError, split_levels
-from scenelang.graph.nodes import Graph, Leaf, leaves
+from scenelang.graph.nodes import Graph, Leaf, Row, leaves
 from scenelang.graph.space import REACH, Space
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
 from scenelang.passes.context import Context
-from scenelang.words import Combine
 
 
 def check_levels(graph: Graph, context: Context) -> Graph:
@@ -125,9 +124,9 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     rows, trained = graph.rows(), context.manifest.trained
     measures = partial(_measures, space=graph.space)
     outside: dict[str, list[tuple[float, float, Leaf]]] = {}  # (by how much, value, object)
-    for op, leaf in rows:
+    for _, leaf, _, _, _, cuts in rows:
         for quantity, value in (*leaf.noted("measures", measures), *_texels(leaf, graph)):
-            if quantity in trained and not (quantity == "thickness" and op == "subtract"):
+            if quantity in trained and not (quantity == "thickness" and cuts):
                 low, high = trained[quantity]
                 above = value - high if quantity != "thickness" else 0.0  # of which more does no harm
                 excess = max(low - value, above) / ((high - low) or 1.0)
@@ -140,11 +139,11 @@ def check_trained(graph: Graph, context: Context) -> Graph:
             said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
             others = f", as {more:,} more {'are' if more > 1 else 'is'}" if more else ""
             _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf, value)
-    widths = [(link.k, link.node) for link in graph.root.links if link.op == "smooth"]
-    k, blended = max(widths, key=itemgetter(0), default=(0.0, None))
-    if isinstance(blended, Leaf) and "width" in trained and k > trained["width"][1]:
-        _warn(context, "width", f"a `smooth` of width {k:.3g} is outside the measured range {{}}", blended)
-    smooth = [leaf for op, leaf in rows if op == "smooth"]
+    widest = max((row for row in rows if row.op != "union"), key=attrgetter("k"), default=None)
+    if widest is not None and "width" in trained and widest.k > trained["width"][1]:
+        fact = f"a `{widest.op}` of width {widest.k:.3g} is outside the measured range {{}}"
+        _warn(context, "width", fact, widest.leaf)
+    smooth = [row.leaf for row in rows if row.op == "smooth"]
     if "smooth" in trained and len(smooth) > trained["smooth"][1]:
         fact = f"{len(smooth):,} smooth unions are outside the measured range {{}}"
         _warn(context, "smooth", fact, smooth[-1])
@@ -152,13 +151,11 @@ def check_trained(graph: Graph, context: Context) -> Graph:
         _check_blends(rows, measures, context)
     if "objects" in trained and len(rows) > trained["objects"][1]:
         fact = f"{len(rows):,} objects are outside the measured range {{}}"
-        _warn(context, "objects", fact, rows[-1][1])
+        _warn(context, "objects", fact, rows[-1].leaf)
     return graph
 
 
-def _check_blends(
-    rows: list[tuple[Combine, Leaf]], measures: Callable[[Leaf], Measures], context: Context
-) -> None:
+def _check_blends(rows: list[Row], measures: Callable[[Leaf], Measures], context: Context) -> None:
     """Warn at the `smooth` whose colours lie furthest apart for its size.
 
     Where a blend's distances are off, by a share of the objects' scale, its colour is off by that share of
@@ -166,8 +163,8 @@ def _check_blends(
     """
     low, high, largest = [1.0] * 3, [0.0] * 3, 0.0
     worst: tuple[float, float, float, Leaf] | None = None
-    for op, leaf in rows:
-        if op not in ("union", "smooth"):
+    for op, leaf, *_, cuts in rows:
+        if cuts or op == "intersect":
             continue
         largest = max(largest, leaf.noted("measures", measures)[0][1])
         rgb = leaf.look.colour()

@@ -7,8 +7,8 @@ from functools import partial
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.graph.affine import composed
-from scenelang.graph.bounds import felt_level, leaf_box, overlap
-from scenelang.graph.nodes import BLEND, Fold, Graph, Leaf, Link, Node, bottom_up
+from scenelang.graph.bounds import Later, leaf_box, overlap
+from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Node, bottom_up, leaves, links_within
 from scenelang.graph.space import Box, Space
 from scenelang.graph.steps import Rows, Step
 from scenelang.passes.context import Context
@@ -68,34 +68,46 @@ def drop_unseen(graph: Graph, context: Context) -> Graph:
 
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
     """
-    window = graph.window()
-    links = graph.root.links
-    keep = [False] * len(links)
-    smooths = 0.0
-    for index, (op, leaf) in reversed(list(enumerate(graph.rows()))):
-        level = felt_level(op, links[index].k, smooths)
-        if level is None or overlap(leaf_box(leaf, level, graph.space), window):
-            keep[index] = True
-            smooths += links[index].k / BLEND if op == "smooth" else 0.0
-        elif op == "intersect":
-            break  # what comes before is cut down to nothing on the canvas
-    return graph.rooted(begun(links, keep))
+    window, space = graph.window(), graph.space
+
+    def seen(fold: Fold, later: Later) -> tuple[Link, ...]:
+        kept: list[Link | None] = [None] * len(fold.links)
+        for index in range(len(fold.links) - 1, -1, -1):
+            link = fold.links[index]
+            own, node = later.of(link.op, link.width), link.node
+            if isinstance(node, Fold):
+                links = seen(node, own)
+                matters = bool(links)
+                node = Fold(node.kind, links, (), node.span) if len(links) > 1 else node
+                node = links[0].node if len(links) == 1 else node
+            else:
+                level = own.level
+                matters = level is None or overlap(leaf_box(node, level, space), window)
+            if matters:
+                kept[index] = Link(link.op, node, link.k) if node is not link.node else link
+                later = later.before(link.op, link.width)
+            elif link.op == "intersect":
+                break  # what comes before is cut down to nothing on the canvas
+        return begun(kept)
+
+    return graph.rooted(Fold("scene", seen(graph.root, Later())))
 
 
-def begun(links: Sequence[Link], keep: Sequence[bool]) -> Fold:
-    """The stream of the rows to keep; where its first row goes, so do those that only cut what is left.
+def begun(links: Sequence[Link | None]) -> tuple[Link, ...]:
+    """The rows that are kept; where the first one goes, so do those that only cut what is left.
 
     A row that goes had no effect, or was the first.
     """
     kept: list[Link] = []
-    for index, (link, stays) in enumerate(zip(links, keep, strict=True)):
-        if not stays:
+    for index, link in enumerate(links):
+        if link is None:
             continue
-        if kept:
+        if kept or index == 0:
             kept.append(link)
-        elif index == 0 or link.op in ("union", "smooth"):
-            kept.append(Link("union", link.node))
-    return Fold("scene", tuple(kept))
+        elif link.op in ("union", "smooth"):
+            first = link.node.links if isinstance(link.node, Fold) else (Link("union", link.node),)
+            kept.extend(first)
+    return tuple(kept)
 
 
 _MOST = 8  # covers that are tried for each row: the largest ones seen, so that time stays linear
@@ -110,30 +122,40 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
     """Drop unions and subtractions whose whole leaf lies inside one that a later union draws.
 
     What a row does to the picture stays within its leaf, and there the later union decides distance sign
-    and colour alone. A `smooth` looks at distances, so rows before the last one are kept. A leaf that is
-    drawn twice in the very same place is covered too.
+    and colour alone. A blend looks at distances, so rows before the last one are kept. A leaf that is
+    drawn twice in the very same place is covered too. What a group without blends draws or cuts lies within
+    its leaves.
 
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
     """
-    space, links = graph.space, graph.root.links
-    keep = [True] * len(links)
+    space = graph.space
     covers: list[Cover] = []
     drawn: set[tuple[str, tuple[Step, ...]]] = set()
     cover = partial(cover_of, space=space)
-    for index, (op, leaf) in reversed(list(enumerate(graph.rows()))):
-        if op == "smooth":
-            break
-        if op == "intersect":
-            continue
+
+    def hidden(leaf: Leaf) -> bool:
         key = leaf.geometry, leaf.steps
-        if key in drawn or (covers and covered(leaf_box(leaf, 0.0, space), covers)):
-            keep[index] = False
-        elif op == "union":
-            drawn.add(key)
+        return key in drawn or (bool(covers) and covered(leaf_box(leaf, 0.0, space), covers))
+
+    kept: list[Link | None] = list(graph.root.links)
+    for index in range(len(kept) - 1, -1, -1):
+        link = graph.root.links[index]
+        if link.width:
+            break
+        if link.op == "intersect":
+            continue
+        if isinstance(link.node, Fold):
+            blends = any(inner.width for inner in links_within(link.node))
+            if not blends and all(hidden(leaf) for leaf in leaves(link.node)):
+                kept[index] = None
+        elif hidden(leaf := link.node):
+            kept[index] = None
+        elif link.op == "union":
+            drawn.add((leaf.geometry, leaf.steps))
             disc = leaf.noted("cover", cover)
             if disc is not None and (len(covers) < _MOST or disc > covers[-1]):
                 covers = sorted([*covers, disc], reverse=True)[:_MOST]
-    return graph.rooted(begun(links, keep))
+    return graph.rooted(Fold("scene", begun(kept)))
 
 
 def cover_of(leaf: Leaf, space: Space) -> Cover | None:

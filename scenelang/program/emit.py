@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.diagnostics.span import Span
-from scenelang.graph.bounds import felt_level, leaf_box
+from scenelang.graph.bounds import Later, leaf_box
 from scenelang.graph.chain import split_levels
-from scenelang.graph.nodes import BLEND, Graph, Leaf
+from scenelang.graph.nodes import Fold, Graph, Leaf, Row
 from scenelang.graph.space import Space
 from scenelang.graph.spaces import SPACES
 from scenelang.lifting.exact import lift_colours, lift_many
@@ -18,6 +18,7 @@ from scenelang.lifting.layout import LAYOUTS, WIDTH
 from scenelang.lifting.learned import lift_geometry, lift_material
 from scenelang.models.manifest import Manifest
 from scenelang.models.weights import Codes
+from scenelang.program.groups import BEGINS, ENDS
 from scenelang.program.paints import Paint
 from scenelang.program.program import Place, Program, ProgramError
 from scenelang.words import TOKENS
@@ -34,14 +35,14 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     if manifest.lifting != "exact" and codes.lifting is None:
         raise ProgramError(f"model `{manifest.name}` needs the lifting `{manifest.lifting}`")
     rows = graph.rows()
-    leaves = [leaf for _, leaf in rows]
+    leaves = [row.leaf for row in rows]
     listed = sorted({leaf.geometry for leaf in leaves} & graph.elements.keys())
     forms = {name: at for at, name in enumerate(listed)}
     palette, worn = _palette(leaves)
     materials = dict.fromkeys(paint.element for paint in palette)
     return Program(
-        vectors=_blended(_vectors(leaves, manifest, codes), graph, manifest),
-        tokens=np.array([TOKENS[op] for op, _ in rows], dtype=np.int8),
+        vectors=_blended(_vectors(leaves, manifest, codes), rows, manifest),
+        tokens=tokens_of(rows),
         bounds=_bounds(graph),
         canvas=graph.canvas,
         background=graph.background,
@@ -56,6 +57,11 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
         palette=palette,
         worn=worn,
     )
+
+
+def tokens_of(rows: list[Row]) -> npt.NDArray[np.int8]:
+    """Tokens (N,) of the rows of a stream."""
+    return np.array([TOKENS[r.op] | BEGINS * r.begins | r.ends << ENDS for r in rows], dtype=np.int8)
 
 
 def _palette(leaves: list[Leaf]) -> tuple[tuple[Paint, ...], npt.NDArray[np.int32]]:
@@ -85,11 +91,13 @@ def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArra
     return np.stack([known[id(leaf)] for leaf in leaves])
 
 
-def _blended(vectors: npt.NDArray[np.float32], graph: Graph, manifest: Manifest) -> npt.NDArray[np.float32]:
+def _blended(
+    vectors: npt.NDArray[np.float32], rows: list[Row], manifest: Manifest
+) -> npt.NDArray[np.float32]:
     """The same with the widths of blends that are not the usual one; these are of rows, not of leaves."""
-    for at, link in enumerate(graph.root.links):
-        if link.op == "smooth" and link.k != BLEND:
-            vectors[at, LAYOUTS[manifest.layout].blend] = link.k
+    for at, row in enumerate(rows):
+        if row.k:
+            vectors[at, LAYOUTS[manifest.layout].blend] = row.k
     return vectors
 
 
@@ -120,13 +128,19 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
 def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
     """Boxes (N, 4) of the plane, or balls of space; outside a row makes no difference."""
     found: list[Bound | None] = []
-    smooths = 0.0
-    for link in reversed(graph.root.links):
-        assert isinstance(link.node, Leaf)
-        level = felt_level(link.op, link.k, smooths)
-        everywhere = level is None or link.op == "intersect"
-        found.append(None if everywhere else _bound(link.node, level or 0.0, graph.space))
-        smooths += link.k / BLEND if link.op == "smooth" else 0.0
+
+    def bound(fold: Fold, later: Later, joins: bool) -> None:
+        for index in range(len(fold.links) - 1, -1, -1):
+            link = fold.links[index]
+            own = later.of(link.op, link.width)
+            if isinstance(link.node, Fold):
+                bound(link.node, own, link.op == "intersect")
+            else:
+                everywhere = link.op == "intersect" or (index == 0 and joins) or own.level is None
+                found.append(None if everywhere else _bound(link.node, own.level or 0.0, graph.space))
+            later = later.before(link.op, link.width)
+
+    bound(graph.root, Later(), False)
     whole = graph.window()[:4]
     if graph.stage is not None:
         reach = max((hypot(*b[:3]) + b[3] for b in found if b is not None), default=0.0)

@@ -6,7 +6,8 @@ Its file is safetensors with a JSON header, read as if a stranger had written it
 unknown, ``numbers`` I32 (N,) unless 1 to N. The header is metadata ``scenelang``, with a stage of solids.
 Programs with elements have format 2: the header lists these, ``forms`` I32 (N,) has the index of each
 row's geometry, and ``element.0`` and so on are their bytes. Where some are materials it is format 3, with a
-table of paints (`scenelang.program.paints`) and ``worn`` I32 (N,), the index of each row's paint or -1.
+table of paints (`scenelang.program.paints`) and ``worn`` I32 (N,), the index of each row's paint or -1. With
+groups, or cuts that have a width, it is format 4, and has these where the others would.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ from scenelang.elements.element import Element
 from scenelang.elements.zoo import entry_of
 from scenelang.files import write_output
 from scenelang.graph.stage import Stage, stage_data
+from scenelang.lifting.layout import LAYOUTS
+from scenelang.models.manifest import available, load_manifest
 from scenelang.notebook import bundle
+from scenelang.program.groups import OPERATOR, token_fault
 from scenelang.program.paints import Paint, paint_fault, paint_tensors
 from scenelang.tensors import FORMAT
 from scenelang.words import TOKENS
@@ -55,7 +59,8 @@ class Program:
 
     Args:
         vectors: float32 (N, 64), geometry vector (32) then material vector (32) of each object.
-        tokens: int8 (N,), how each joins what came before, as in `scenelang.words.TOKENS`; the first is 0.
+        tokens: int8 (N,), how each joins what came before, and the groups that begin and end with it: see
+            `scenelang.program.groups`; the first joins nothing.
         bounds: float32 (N, 4), world xmin, ymin, xmax, ymax: outside it the row makes no difference to
             the picture. An intersection, which reaches everything, has the whole canvas. Of solids it is a
             ball, x, y, z and radius, and of intersections the one around all others.
@@ -150,6 +155,16 @@ class Program:
         assert self.worn is not None
         return [self.palette[at] if at >= 0 else None for at in self.worn.tolist()]
 
+    @property
+    def extended(self) -> bool:
+        """Whether it has groups, or cuts that have a width: a chain of sharp cuts and blends has neither."""
+        if (self.tokens > OPERATOR).any():
+            return True
+        if self.model in available() and load_manifest(self.model).lifting != "exact":
+            return False  # its numbers mean something else
+        layout = LAYOUTS["plane" if self.stage is None else "solid"]
+        return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.blend] > 0.0).any())
+
     def check_weights(self, digest: str) -> None:
         """Raise ProgramError where it was compiled for other weights than those of a digest."""
         if self.weights != digest:
@@ -204,6 +219,8 @@ def program_bytes(program: Program) -> bytes:
     if program.palette and program.worn is not None:
         header["format"] = 3
         tensors |= {"worn": program.worn, **paint_tensors(program.palette, program.elements)}
+    if program.extended:
+        header["format"] = 4
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data
@@ -224,10 +241,8 @@ def _check_rows(program: Program) -> None:
         if not finite.all():
             row = int(np.argmin(finite))
             raise ProgramError(f"{name} of object {row} (`{program.objects[row]}`) are not finite")
-    known = (program.tokens >= 0) & (program.tokens < len(TOKENS))
-    if not known.all():
-        row = int(np.argmin(known))
-        raise ProgramError(f"token {int(program.tokens[row])} of object {row}, where 0 to 3 are known")
+    if (fault := token_fault(program.tokens)) is not None:
+        raise ProgramError(fault)
     for index, listed, what in (
         (program.forms, program.elements, "an element"),
         (program.worn, program.palette, "a paint"),
@@ -242,8 +257,6 @@ def _check_rows(program: Program) -> None:
         raise ProgramError(f"an element that is not of dimension {dimension}")
     if (fault := paint_fault(program.palette, program.elements, dimension)) is not None:
         raise ProgramError(fault)
-    if len(program) and program.tokens[0] != 0:
-        raise ProgramError(f"token {int(program.tokens[0])} of the first object, which is always 0")
     if program.stage is not None:
         if (program.bounds[:, 3:] < 0.0).any():
             raise ProgramError("bounds with a negative radius")

@@ -65,7 +65,7 @@ def parse_program(data: bytes) -> Program:
         ProgramError: they hold none.
     """
     try:
-        file = read_tensors(data, MOST_BYTES, (1, 2, 3))
+        file = read_tensors(data, MOST_BYTES, (1, 2, 3, 4))
         elements = _read_elements(file)
         count = _count(file)
         tensors = file.arrays()
@@ -111,10 +111,10 @@ def parse_program(data: bytes) -> Program:
 
 
 def _read_elements(file: TensorFile) -> tuple[Element, ...]:
-    """The elements of a file of format 2 or 3; their tensors are taken out of it."""
-    if file.header["format"] == 1:
-        if "elements" in file.header:
-            raise TensorError("elements in a file of format 1")
+    """The elements of a file of format 2 or above; their tensors are taken out of it."""
+    if file.header["format"] == 1 and "elements" in file.header:
+        raise TensorError("elements in a file of format 1")
+    if file.header["format"] == 1 or (file.header["format"] == 4 and "elements" not in file.header):
         return ()
     listed = file.header.get("elements")
     if not isinstance(listed, list) or not all(
@@ -133,6 +133,10 @@ def _count(file: TensorFile) -> int:
     """Objects of a file whose tensors are those of a Program."""
     format = file.header["format"]
     newer = ({"forms"} if format > 1 else set()) | ({"worn", *_TABLES} if format > 2 else set())
+    if format == 4:  # these are there where scenes have elements, and where materials are among them
+        newer &= file.tensors.keys() if "elements" in file.header else set()
+        if "worn" in newer:
+            newer |= _TABLES.keys()
     if not _LAYOUT.keys() | newer <= file.tensors.keys() <= _LAYOUT.keys() | newer | {"numbers"}:
         raise TensorError(f"it holds other tensors than a program of format {format}")
     count = (*file.tensors["vectors"].shape, 0)[0]

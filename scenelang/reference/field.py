@@ -110,9 +110,9 @@ def fold(
 
 
 def combine(
-    big_d: Array, big_c: Array, d: Array, c: Array, token: Array, k: float = BLEND
+    big_d: Array, big_c: Array, d: Array, c: Array, token: Array, k: float = 0.0
 ) -> tuple[Array, Array]:
-    """One step of the fold; see `fold` for shapes. k is the width of a blend."""
+    """One step of the fold; see `fold` for shapes. k is the width of a blend, 0 for the usual one."""
     xp = namespace(d)
     if isinstance(token, int):
         return _STEPS[token](xp, big_d, big_c, d, c, k)
@@ -131,6 +131,7 @@ def _union(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) ->
 
 
 def _smooth(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
+    k = k or BLEND
     h = xp.clip(0.5 + 0.5 * (big_d - d) / k, 0.0, 1.0)
     mixed = big_c + (c - big_c) * h[..., None]
     # each side by its own share: a difference of the two would swallow the nearer one's digits
@@ -138,11 +139,18 @@ def _smooth(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -
 
 
 def _subtract(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    return xp.maximum(big_d, -d), big_c
+    return _cut(xp, big_d, -d, k), big_c
 
 
 def _intersect(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    return xp.maximum(big_d, d), big_c
+    return _cut(xp, big_d, d, k), big_c
+
+
+def _cut(xp: Any, big_d: Array, d: Array, k: float) -> Array:
+    if not k:
+        return xp.maximum(big_d, d)
+    h = xp.clip(0.5 - 0.5 * (d - big_d) / k, 0.0, 1.0)  # the share of what is cut
+    return d + (big_d - d) * h + k * h * (1 - h)
 
 
 _STEPS = (_union, _smooth, _subtract, _intersect)
@@ -230,10 +238,11 @@ def evaluate(
             # nothing blends with the empty set, which is infinitely far from everywhere
             empty = np.isinf(big_d).all() or np.isinf(d).all()
             token = TOKENS["union" if empty and link.op == "smooth" else link.op]
+            width = 0.0 if empty else link.width
             with np.errstate(invalid="ignore"):
                 if owners:
-                    big_d, share = combine(big_d, 0.0 * c, d, 0.0 * c + 1.0, token, link.k)
+                    big_d, share = combine(big_d, 0.0 * c, d, 0.0 * c + 1.0, token, width)
                     big_c = np.where(share > 0.5, c, big_c)
                 else:
-                    big_d, big_c = combine(big_d, big_c, d, c, token, link.k)
+                    big_d, big_c = combine(big_d, big_c, d, c, token, width)
     return big_d, big_c

@@ -11,10 +11,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.renderers.meetings import Meetings
+from scenelang.renderers.meetings import Closing, Meetings, Nesting
 from scenelang.renderers.network import Cell
 
 Floats = npt.NDArray[np.float32]
+Columns = npt.NDArray[np.intp]
 
 
 class Interval(NamedTuple):
@@ -40,7 +41,14 @@ class Shown:
 
 
 def shown(
-    meetings: Meetings, distance: Interval, cell: Cell, colours: Interval, empty: float, slope: float
+    meetings: Meetings,
+    distance: Interval,
+    cell: Cell,
+    colours: Interval,
+    empty: float,
+    slope: float,
+    nest: Nesting | None = None,
+    joins: Cell | None = None,
 ) -> Shown:
     """Fold intervals, of a network whose state is one number and that knows one feature.
 
@@ -50,49 +58,173 @@ def shown(
         colours: of the pairs (3, P).
         empty: the state before the first object.
         slope: of coverage, per world unit.
+        nest: of a stream with groups.
+        joins: cells of these groups, which come last.
     """
     blocks, given = len(meetings.columns), meetings.pairs.open
-    low, high = np.full((2, blocks), empty, np.float32)
-    colour = Interval(*np.zeros((2, 3, blocks), np.float32))
-    shut, wide = np.zeros(len(given), bool), given.copy()
-    # ends are never averaged, as a wide interval's middle would swallow the digits of its nearer end
-    up, down = np.maximum(cell.lines, 0.0), np.minimum(cell.lines, 0.0)
-    # what the objects' own distances bring to the gates
-    own = Interval(
-        up[:, 0] * distance.low + down[:, 0] * distance.high + cell.bias,
-        up[:, 0] * distance.high + down[:, 0] * distance.low + cell.bias,
-    )
-    own.low[:, given] = own.high[:, given] = np.inf
-    bump = cell.bump[0] / 4
-    for part in meetings.slots():
-        n = part.stop - part.start
-        rising, falling = up[:, 1, part], down[:, 1, part]
-        past = rising * high[:n] + falling * low[:n]
-        least = own.low[:, part] + (rising * low[:n] + falling * high[:n])
-        most = own.high[:, part] + past
+    state = _State.empty(empty, blocks * (1 if nest is None else nest.levels))
+    shut, wide = np.zeros((2, len(given)), bool)
+    if nest is None or joins is None:
+        gates = _Gates.of(cell, distance, given)
+        for part in meetings.slots():
+            own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
+            shut[part], wide[part] = state.join(slice(part.stop - part.start), own, gates.some(part))
+        wide |= given
+    else:
+        _nested(state, blocks, nest, joins, distance, colours, cell, given, empty, shut, wide)
+    low, high = (side[:blocks] for side in state.distance)
+    covered = Interval((0.5 - slope * high).clip(0.0, 1.0), (0.5 - slope * low).clip(0.0, 1.0))
+    sides = zip(state.colour, covered, strict=True)
+    picture = Interval(*(np.vstack([c[:, :blocks] * share, share]) for c, share in sides))
+    return Shown(picture, shut, wide)
+
+
+class _Gates(NamedTuple):
+    """Gates of n operands: their cells, levels by their own distances, and slopes by the state's.
+
+    Those that are given as open have levels of infinity.
+    """
+
+    cell: Cell
+    own: Interval
+    up: Floats
+    down: Floats
+    given: npt.NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, cell: Cell, d: Interval, given: npt.NDArray[np.bool_]) -> _Gates:
+        # ends are never averaged, as a wide interval's middle would swallow the digits of its nearer end
+        up, down = np.maximum(cell.lines, 0.0), np.minimum(cell.lines, 0.0)
+        own = Interval(
+            up[:, 0] * d.low + down[:, 0] * d.high + cell.bias,
+            up[:, 0] * d.high + down[:, 0] * d.low + cell.bias,
+        )
+        own.low[:, given] = own.high[:, given] = np.inf
+        return cls(cell, own, up[:, 1], down[:, 1], given)
+
+    def some(self, which: slice | Columns) -> _Gates:
+        """Those of some of the operands."""
+        return _Gates(
+            Cell(*(part[..., which] for part in self.cell)),
+            Interval(*(part[..., which] for part in self.own)),
+            self.up[:, which],
+            self.down[:, which],
+            self.given[which],
+        )
+
+
+class _Operand(NamedTuple):
+    """What joins a state in n columns: its distance (n,) and colour (3, n)."""
+
+    distance: Interval
+    colour: Interval
+
+
+class _State(NamedTuple):
+    """Distances (B,) and colours (3, B) of a fold."""
+
+    distance: Interval
+    colour: Interval
+
+    @classmethod
+    def empty(cls, distance: float, count: int) -> _State:
+        return cls(
+            Interval(*np.full((2, count), distance, np.float32)),
+            Interval(*np.zeros((2, 3, count), np.float32)),
+        )
+
+    def at(self, columns: Columns) -> _Operand:
+        """What it is in some columns, as an operand."""
+        parts = ((low[..., columns], high[..., columns]) for low, high in self)
+        return _Operand(*(Interval(*part) for part in parts))
+
+    def clear(self, columns: Columns, distance: float) -> None:
+        """Empty it in some columns."""
+        for side, colour in zip(self.distance, self.colour, strict=True):
+            side[columns], colour[:, columns] = distance, 0.0
+
+    def join(
+        self, columns: Columns | slice, operand: _Operand, gates: _Gates
+    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+        """Take in an operand; whether it changes nothing (n,), and whether nothing else is left (n,)."""
+        d, own_colour = operand
+        low, high = self.distance.low[columns], self.distance.high[columns]
+        cell, own, up, down, given = gates
+        past = up * high + down * low
+        least, most = own.low + (up * low + down * high), own.high + past
         paint = Interval(least[1:].max(0).clip(0.0, 1.0), most[1:].max(0).clip(0.0, 1.0))
         keeps, takes = least[0] < 1, most[0] > 0
-        shut[part] = ~takes & (paint.high <= 0)
-        wide[part] |= ~keeps & (paint.low >= 1)
         # where the gate is not wide open, or not shut, its line bounds one number by the other
-        kept = _capped(Interval(low[:n], high[:n]), cell.lines[0, 1, part], 1.0 - own.low[0, part])
-        d = Interval(distance.low[part], distance.high[part])
-        taken = _capped(d, -cell.lines[0, 0, part], past[0] + cell.bias[0, part])
-        taken = Interval(*(np.where(given[part], *pair) for pair in zip(d, taken, strict=True)))
-        a, b = taken.low * cell.candidate[0, 0, part], taken.high * cell.candidate[0, 0, part]
-        dent = bump[part] * (keeps & takes)
-        low[:n] = np.minimum(
+        kept = _capped(Interval(low, high), cell.lines[0, 1], 1.0 - own.low[0])
+        taken = _capped(d, -cell.lines[0, 0], past[0] + cell.bias[0])
+        taken = Interval(*(np.where(given, *pair) for pair in zip(d, taken, strict=True)))
+        a, b = taken.low * cell.candidate[0, 0], taken.high * cell.candidate[0, 0]
+        dent = cell.bump[0] / 4 * (keeps & takes)
+        self.distance.low[columns] = np.minimum(
             np.where(keeps, kept.low, np.inf), np.where(takes, np.minimum(a, b), np.inf)
         ) - np.maximum(dent, 0.0)
-        high[:n] = np.maximum(
+        self.distance.high[columns] = np.maximum(
             np.where(keeps, kept.high, -np.inf), np.where(takes, np.maximum(a, b), -np.inf)
         ) - np.minimum(dent, 0.0)
-        for side, own_colour, choose in zip(colour, colours, (np.minimum, np.maximum), strict=True):
-            more = own_colour[:, part] - side[:, :n]
-            side[:, :n] += choose(paint.low * more, paint.high * more)
-    covered = Interval((0.5 - slope * high).clip(0.0, 1.0), (0.5 - slope * low).clip(0.0, 1.0))
-    picture = Interval(*(np.vstack([c * share, share]) for c, share in zip(colour, covered, strict=True)))
-    return Shown(picture, shut, wide)
+        for side, c, choose in zip(self.colour, own_colour, (np.minimum, np.maximum), strict=True):
+            now = side[:, columns]
+            more = c - now
+            side[:, columns] = now + choose(paint.low * more, paint.high * more)
+        return ~takes & (paint.high <= 0), ~keeps & (paint.low >= 1)
+
+
+def _nested(
+    state: _State,
+    blocks: int,
+    nest: Nesting,
+    joins: Cell,
+    distance: Interval,
+    colours: Interval,
+    cell: Cell,
+    given: npt.NDArray[np.bool_],
+    empty: float,
+    shut: npt.NDArray[np.bool_],
+    wide: npt.NDArray[np.bool_],
+) -> None:
+    """Fold with a stack of states; fills in which pairs are shut, hidden ones too, and which are open.
+
+    Args:
+        state: levels of so many blocks, one after the other.
+    """
+    done = []  # of groups that ended, round by round: where they join, and what came of it
+
+    def close(closings: list[Closing]) -> None:
+        for columns, groups, level in closings:
+            top, below = level * blocks + columns, (level - 1) * blocks + columns
+            operand = state.at(top)
+            cells = Cell(*(part[..., groups] for part in joins))
+            gates = _Gates.of(cells, operand.distance, np.zeros(len(columns), bool))
+            done.append((top, below, state.join(below, operand, gates)))
+            state.clear(top, empty)
+
+    fresh = np.concatenate([turn.fresh for turn in nest.turns])
+    gates = _Gates.of(cell, distance, given | fresh)
+    for part, level, _, before, after in nest.turns:
+        close(before)
+        own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
+        places = level * blocks + np.arange(len(level))
+        shut[part], wide[part] = state.join(places, own, gates.some(part))
+        close(after)
+    wide |= given
+    hidden = np.zeros(nest.levels * blocks, bool)
+
+    def reopen(closings: list[Closing]) -> None:
+        for _ in closings:
+            top, below, (closed, opened) = done.pop()
+            hidden[top] = hidden[below] | closed
+            hidden[below] |= opened
+
+    for part, level, _, before, after in reversed(nest.turns):
+        reopen(after)
+        places = level * blocks + np.arange(len(level))
+        shut[part] |= hidden[places]
+        hidden[places] |= wide[part]
+        reopen(before)
 
 
 def _capped(x: Interval, factor: Floats, most: Floats) -> Interval:

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenelang.renderers.arrays import Array
+from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.field import Field, Trace
-from scenelang.renderers.meetings import Index, Meetings, Pairs, meetings_of
+from scenelang.renderers.meetings import Index, Meetings, Nesting, Pairs, meetings_of
 from scenelang.renderers.network import RADIUS
 from scenelang.renderers.raster import LEVELS, ROUNDING, Raster, raster
 from scenelang.renderers.worn import CORNER, QUARTER, add_textures, blending, ties
@@ -70,6 +70,7 @@ class Coverage:
         self.field, self.xp, self.skip = field, field.xp, skip
         self.prove = prove and field.provable
         self._all_draw = bool(field.draws.all())
+        self._flat = not field.groups.deepest
 
     def tile(
         self, canvas: tuple[int, int], rows: range, samples: str, background: np.ndarray | None = None
@@ -104,7 +105,7 @@ class Coverage:
         if samples == "one":
             return self._picture(meetings, p, tile)
         field = self.field
-        traced = field.textured or field.blended
+        traced = field.textured or field.blended or not self._flat
         trace = field.trace(p.shape[1], len(meetings.pairs)) if traced else None
         q, d, memory = self.ask(meetings, p, tile, trace)
         edge = abs(memory[:, 0]) / field.unit
@@ -113,6 +114,8 @@ class Coverage:
         for part in meetings.slots():
             some = edge[:, : part.stop - part.start]
             some[:] = self.xp.minimum(some, near[:, part])
+        for (columns, _, _), _, _, distance in trace.joined if trace is not None else ():
+            edge[:, columns] = self.xp.minimum(edge[:, columns], abs(distance))
         near = edge < NEAR * px
         if trace is not None:
             seen = memory[:, 0] * field.slope < 0.5
@@ -174,7 +177,9 @@ class Coverage:
                 trace = self.field.trace(points.shape[1], len(part.pairs))
                 memory = self.ask(part, points, tile, trace)[2]
                 painted = self.xp.to_numpy(trace.paint) > 0.5
-                for slot in part.slots():
+                if (nest := self.field.nesting(part)) is not None:
+                    own = _owners(self.xp, nest, trace, painted, part.pairs.object)
+                for slot in part.slots() if nest is None else ():
                     some = own[:, : slot.stop - slot.start]
                     some[:] = np.where(painted[:, slot], part.pairs.object[slot] + 1, some)
                 covered = self.xp.to_numpy(self.field.picture(memory)[:, 3]) > 0.5
@@ -257,7 +262,7 @@ class Coverage:
             far = ~(length + radius <= RADIUS)
         if not self._all_draw:
             # what draws nothing by itself matters where something was drawn before
-            drawn = np.cumsum(kept & (field.draws[objects] | pairs.open))
+            drawn = np.cumsum(kept & (field.draws[objects] | (pairs.open & self._flat)))
             begins = np.searchsorted(pairs.block, pairs.block)
             kept &= drawn > np.where(begins > 0, drawn[begins - 1], 0)
         index = np.flatnonzero(kept)
@@ -286,12 +291,34 @@ class Coverage:
         # back in the order of pairs, where those in front of an open one go
         left, opened = np.empty((2, len(pairs)), bool)
         left[source], opened[source] = ~shown.shut & ~flat[meetings.places()], shown.open
-        later = np.cumsum(opened[::-1])[::-1]  # open pairs from each on
-        ends = np.searchsorted(pairs.block, pairs.block, "right")
-        after = np.where(ends < len(pairs), later[np.minimum(ends, len(pairs) - 1)], 0)
-        left &= later - after - opened == 0
+        if self._flat:  # with groups that is known already
+            later = np.cumsum(opened[::-1])[::-1]  # open pairs from each on
+            ends = np.searchsorted(pairs.block, pairs.block, "right")
+            after = np.where(ends < len(pairs), later[np.minimum(ends, len(pairs) - 1)], 0)
+            left &= later - after - opened == 0
         kept = replace(pairs, open=opened).take(np.flatnonzero(left))
         return kept, meetings.columns[flat], ((low + high) / 2).T[flat]
+
+
+def _owners(xp: Arrays, nest: Nesting, trace: Trace, painted: np.ndarray, objects: Index) -> np.ndarray:
+    """Numbers (groups, B), from 1, of the objects that paint, of a stream with groups; 0 for none."""
+    own = np.zeros((nest.levels, len(painted), len(nest.turns[0].level)), np.int32)
+    rounds = iter(trace.joined)
+
+    def close(count: int) -> None:
+        for (columns, _, level), paint, *_ in (next(rounds) for _ in range(count)):
+            top, here = own[level, :, columns], xp.to_numpy(paint).T > 0.5
+            own[level - 1, :, columns] = np.where(here, top, own[level - 1, :, columns])
+            own[level, :, columns] = 0
+
+    for part, level, _, before, after in nest.turns:
+        close(len(before))
+        columns = np.arange(len(level))
+        mine = objects[part][:, None] + 1
+        own[level, :, columns] = np.where(painted[:, part].T, mine, own[level, :, columns])
+        close(len(after))
+    found: np.ndarray = own[0]
+    return found
 
 
 def _portions(meetings: Meetings, points: int) -> list[tuple[int, Meetings]]:

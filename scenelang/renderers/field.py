@@ -8,24 +8,31 @@ objects they are of; then the cell takes a point's objects in one by one. Nothin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from scenelang.elements.element import Element
+from scenelang.program.groups import (
+    OPERATOR,
+    SMOOTH,
+    UNION,
+    felt,
+    read_groups,
+    widths_of,
+)
 from scenelang.program.paints import Paint
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array
 from scenelang.renderers.bounds import Interval, Shown, shown
 from scenelang.renderers.frames import FAR, Frames
 from scenelang.renderers.grid import GridShape, grid_shape
-from scenelang.renderers.meetings import Meetings
+from scenelang.renderers.meetings import Closing, Meetings, Nesting, nesting
 from scenelang.renderers.network import EMPTY, RADIUS, Cell, Decoder, FramedNetwork
 from scenelang.renderers.slopes import Floats, Slopes
 from scenelang.renderers.texture import Texture
 
-UNION, SMOOTH, SUBTRACT, INTERSECT = range(4)
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
 BLEND = 0.15  # world units: the width of the blends that the cell is trained on
 FARTHER = 1.3  # widths of a blend at which objects cannot change where its outline lies
@@ -33,6 +40,9 @@ FARTHEST = 3.0  # widths at which they cannot by any number of blends, but for 1
 CHUNK = 4096  # points that go through a decoder at once: fewer cost calls, more cost caches
 ROUNDING = 1e-4, 2e-6  # leaf units, and share of a distance and world units, by which float32 may be off
 NO_TEXTURE = -1
+ROUNDED = (
+    3  # from a cut to the cell of one with a width: a smooth union's, and two cuts', stand behind the four
+)
 _UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is proved
 
 
@@ -43,18 +53,46 @@ class Trace:
     Args:
         paint: (groups, P) how far the object's colour came in.
         margin: (groups, P) by how much what was there before is nearer than the object, world units.
+        joined: the same of groups of the stream that ended, round by round, with which these were and their
+            distances.
     """
 
     paint: Array
     margin: Array
+    joined: list[tuple[Closing, Array, Array, Array]] = field(default_factory=list)
 
-    def shares(self, meetings: Meetings, seen: Array) -> Array:
+    def shares(self, meetings: Meetings, nest: Nesting | None, seen: Array) -> Array:
         """How much of each object's colour (groups, P) is left when all are met, 0 at points not seen."""
         left, found = 1.0 * seen, 0.0 * self.paint
+        if nest is not None:
+            return self._nested(nest, left, found)
         for part in reversed(meetings.slots()):
             rest, paint = left[:, : part.stop - part.start], self.paint[:, part]
             found[:, part] = rest * paint
             rest *= 1.0 - paint
+        return found
+
+    def _nested(self, nest: Nesting, seen: Array, found: Array) -> Array:
+        left = [seen, *(0.0 * seen for _ in range(nest.levels - 1))]
+        rounds = iter(reversed(self.joined))
+
+        def opened(closings: list[Closing]) -> None:
+            for (columns, _, level), (_, paint, *_) in zip(reversed(closings), rounds, strict=False):
+                for at in np.unique(level).tolist():
+                    some = np.flatnonzero(level == at)
+                    below = left[at - 1][:, columns[some]]
+                    left[at][:, columns[some]] = below * paint[:, some]
+                    left[at - 1][:, columns[some]] = below * (1.0 - paint[:, some])
+
+        for part, level, _, before, after in reversed(nest.turns):
+            opened(after)
+            paint = self.paint[:, part]
+            for at in np.unique(level).tolist():
+                some = np.flatnonzero(level == at)
+                rest = left[at][:, some]
+                found[:, part.start + some] = rest * paint[:, some]
+                left[at][:, some] = rest * (1.0 - paint[:, some])
+            opened(before)
         return found
 
 
@@ -86,11 +124,14 @@ class Field:
         paints: Sequence[Paint | None] | None = None,
     ) -> None:
         self.network, self.xp, self.like = network, network.xp, network.codes
-        self.vectors, self.tokens = vectors, np.asarray(tokens, np.intp)
+        self.vectors, self.groups = vectors, read_groups(tokens)
+        self.tokens = self.groups.tokens
+        self._raw = np.asarray(tokens, np.intp) & OPERATOR
         self.brought, self.paints = brought or [None] * len(vectors), paints or [None] * len(vectors)
         self.layout = layout = network.layout
         self.frames = Frames(vectors[:, : layout.geometry], layout)
-        self.draws = self.tokens <= SMOOTH
+        cuts = np.append(self.groups.joins > SMOOTH, False)  # of no group, too
+        self.draws = (self.tokens <= SMOOTH) & ~cuts[self.groups.path].any(1)
         with self.xp.inference():
             self.slope = float(self.xp.exp(network.read_slope)) / 4
             self.unit = float(np.linalg.norm(self.xp.to_numpy(network.cell_weights()[2][UNION, 0])))
@@ -117,26 +158,30 @@ class Field:
             self.slopes.append(self.shapes[-1].slopes())  # type: ignore[union-attr]
 
     def _cells(self) -> None:
-        """Cells by token and width of the blend; behind them the same with gates that are open."""
-        xp, layout = self.xp, self.layout
-        widths = self.vectors[:, layout.blend].astype(np.float64)
-        self.widths = widths = np.where((widths > 0) & (self.tokens == SMOOTH), widths, BLEND)
+        """Cells by operator and width of the blend; behind them the same with gates that are open."""
+        xp, groups = self.xp, self.groups
+        given = self.vectors[:, self.layout.blend].astype(np.float64)
+        widths = widths_of(self._raw, given)
+        self.widths = np.where(self.tokens == SMOOTH, widths, BLEND)
         """Of the blends by which objects join (N,), world units."""
-        # of the smooth unions from each row on the widest, and the sum; 0 for none
-        blends = np.where(self.tokens == SMOOTH, widths, 0.0)[::-1]
-        after, total = np.maximum.accumulate(blends)[::-1], np.cumsum(blends)[::-1]
-        self.widest = max([BLEND, *after[:1].tolist()])
-        every = (self.tokens == INTERSECT) | ((self.tokens == SUBTRACT) & (after > 0))
-        beyond = np.minimum(FARTHER * total, FARTHEST * after) / self.frames.scale
-        self.reach = np.where(every, np.inf, 1.0 + SLACK + beyond)
-        kinds, self._cell = _numbered(list(zip(self.tokens.tolist(), widths.tolist(), strict=True)))
-        tokens = [token for token, _ in kinds]
-        lines, bias, candidate, bump = (
-            np.asarray(xp.to_numpy(part))[tokens].T for part in self.network.cell_weights()
-        )
-        lines, candidate = lines.swapaxes(0, 1), candidate.swapaxes(0, 1)
+        self.group_widths = widths[groups.rows]
+        """And of those by which groups do (G,), 0 for none."""
+        seen = felt(groups, widths)
+        self.widest = max([BLEND, *seen.widest.tolist()])
+        beyond = np.minimum(FARTHER * seen.total, FARTHEST * seen.widest) / self.frames.scale
+        self.reach = np.where(seen.everywhere, np.inf, 1.0 + SLACK + beyond)
+        operators = [*self.tokens.tolist(), *groups.joins.tolist()]
+        blends = [*np.where(groups.first, 0.0, widths).tolist(), *self.group_widths.tolist()]
+        kinds, which = _numbered(list(zip(operators, blends, strict=True)))
+        self._cell, self._joins = which[: len(self.tokens)], which[len(self.tokens) :]
+        cells = Cell(*(np.asarray(xp.to_numpy(part)) for part in self.network.cell_weights()))
         # The fold of s d and s D is s D', so that the cell's own width is that of any other.
-        scale = np.array([BLEND / width for _, width in kinds], np.float32)
+        scale = np.array([BLEND / (width or BLEND) for _, width in kinds], np.float32)
+        shown = [
+            operator if operator == SMOOTH or not width else operator + ROUNDED for operator, width in kinds
+        ]
+        lines, bias, candidate, bump = (part[shown].T for part in _rounded(cells, self.network.config.state))
+        lines, candidate = lines.swapaxes(0, 1), candidate.swapaxes(0, 1)
         table = Cell(lines * scale, bias, candidate, bump[0] / scale)
         opened = Cell(0 * lines, 0 * bias + 1, candidate, 0 * bump[0])
         host = [np.concatenate(pair, -1).astype(np.float32) for pair in zip(table, opened, strict=True)]
@@ -171,7 +216,7 @@ class Field:
     @property
     def blended(self) -> bool:
         """Whether some object joins by a blend."""
-        return bool((self.tokens == SMOOTH).any())
+        return bool((self._raw == SMOOTH).any())
 
     @property
     def textured(self) -> bool:
@@ -183,9 +228,13 @@ class Field:
         """The state of points that have met nothing."""
         return float(EMPTY * self.widest / BLEND)
 
-    def cells(self, objects: np.ndarray) -> Cell:
-        """Cells of objects, which come last, on the host."""
-        return Cell(*(part.take(self._cell[objects], -1) for part in self._host))
+    def cells(self, objects: np.ndarray, opened: bool = False) -> Cell:
+        """Cells of objects, which come last, on the host; with gates that are open if asked for."""
+        return Cell(*(part.take(self._cell[objects] + self._opened * opened, -1) for part in self._host))
+
+    def joins(self) -> Cell:
+        """Cells of all groups, which come last, on the host."""
+        return Cell(*(part.take(self._joins, -1) for part in self._host))
 
     def empty(self, groups: int, count: int, register: int = 3) -> Array:
         """State and register (groups, S + R, count) of points that have met nothing."""
@@ -233,6 +282,18 @@ class Field:
             parts.append(self.network.decode(part, radius, 1.0, shape))
         return parts[0] if len(parts) == 1 else self.xp.concat(parts, 1)
 
+    def nests(self) -> tuple[np.ndarray, ...]:
+        """The groups around each object (N, D), their operators and widths, -1 for none."""
+        path, joins = self.groups.path, np.append(self.groups.joins, -1)
+        return path, joins[path], np.append(self.group_widths, -1.0)[path]
+
+    def nesting(self, meetings: Meetings) -> Nesting | None:
+        """Which states pairs join, None where no column has a group with a state of its own."""
+        if not self.groups.deepest:
+            return None
+        found = nesting(meetings, self.groups)
+        return found if found.levels > 1 else None
+
     def fold(self, meetings: Meetings, features: Array, trace: Trace | None = None) -> Array:
         """State and register (groups, S + 3, B) of columns that have met their objects.
 
@@ -240,30 +301,91 @@ class Field:
             features: of the pairs (groups, F, P).
             trace: where to write down what each object did.
         """
-        xp, s = self.xp, self.network.config.state
-        pairs = meetings.pairs
+        xp, s, pairs = self.xp, self.network.config.state, meetings.pairs
+        nest = self.nesting(meetings)
+        fresh = pairs.open
+        if nest is not None:
+            fresh = fresh | np.concatenate([turn.fresh for turn in nest.turns])
         memory = self.empty(features.shape[0], len(meetings.columns), 3 if trace is None else 4)
-        kind = xp.array(self._cell[pairs.object] + self._opened * pairs.open, self.like)
-        lines, bias, candidate, bump = (xp.take(part, kind) for part in self._table)
+        cell = self._cells_at(self._cell[pairs.object] + self._opened * fresh)
         colours = xp.take(self.colours, xp.array(pairs.object, self.like))
         if trace is not None:  # a colour of 1 over a register of 0 shows the gate
             colours = xp.concat([colours, 0.0 * colours[:1] + 1.0], 0)
+        if nest is not None:
+            return self._fold_nested(nest, features, memory, cell, colours, trace)[:, : s + 3]
         for part in meetings.slots():
-            d, old = features[..., part], memory[..., : part.stop - part.start]
-            levels, wanted = bias[:, part], 0.0
-            for i in range(d.shape[1]):
-                levels = levels + d[:, i : i + 1] * lines[:, i, part]
-                wanted = wanted + d[:, i : i + 1] * candidate[:, i, part]
-            for i in range(s):
-                levels = levels + old[:, i : i + 1] * lines[:, d.shape[1] + i, part]
+            old = memory[..., : part.stop - part.start]
+            given = Cell(*(each[..., part] for each in cell)), features[..., part], colours[:, part]
+            took = self._took(old, *given, trace is not None)
             if trace is not None:
-                trace.margin[:, part] = old[:, 0] / self.unit - d[:, 0]
-                old[:, s + 3] = 0.0
-            new = self.network.update(levels, wanted, bump[:, part], old[:, :s], old[:, s:], colours[:, part])
-            old[:, :s], old[:, s:] = new
-            if trace is not None:
-                trace.paint[:, part] = old[:, s + 3]
+                trace.paint[:, part], trace.margin[:, part] = took
         return memory[:, : s + 3]
+
+    def _cells_at(self, kinds: np.ndarray) -> Cell:
+        index = self.xp.array(kinds, self.like)
+        return Cell(*(self.xp.take(part, index) for part in self._table))
+
+    def _took(self, memory: Array, cell: Cell, d: Array, colours: Array, traced: bool) -> tuple[Array, Array]:
+        """Let memories (groups, S + R, n) take an object in each; how far its colour came in, and the margin.
+
+        Args:
+            cell: of the objects (…, n).
+            d: their features (groups, F, n).
+            colours: their registers (R, n), or (groups, R, n).
+        """
+        s, (lines, bias, candidate, bump) = self.network.config.state, cell
+        levels, wanted = bias, 0.0
+        for i in range(d.shape[1]):
+            levels = levels + d[:, i : i + 1] * lines[:, i]
+            wanted = wanted + d[:, i : i + 1] * candidate[:, i]
+        for i in range(s):
+            levels = levels + memory[:, i : i + 1] * lines[:, d.shape[1] + i]
+        paint = margin = None
+        if traced:
+            margin = memory[:, 0] / self.unit - d[:, 0]
+            memory[:, s + 3] = 0.0
+        new = self.network.update(levels, wanted, bump, memory[:, :s], memory[:, s:], colours)
+        memory[:, :s], memory[:, s:] = new
+        if traced:
+            paint = memory[:, s + 3] + 0.0
+        return paint, margin
+
+    def _fold_nested(
+        self, nest: Nesting, features: Array, memory: Array, cell: Cell, colours: Array, trace: Trace | None
+    ) -> Array:
+        """`fold` with a stack of memories; a group that ends joins the one below as an object."""
+        xp, s, count = self.xp, self.network.config.state, memory.shape[2]
+        stack = xp.concat([memory] * nest.levels, 2)
+
+        def close(closings: list[Closing]) -> None:
+            for columns, groups, level in closings:
+                top = xp.array(level * count + columns, self.like)
+                below = xp.array((level - 1) * count + columns, self.like)
+                inner, outer = xp.take(stack, top), xp.take(stack, below)
+                if trace is not None:
+                    inner[:, s + 3] = 1.0
+                given = self._cells_at(self._joins[groups]), inner[:, :s] / self.unit, inner[:, s:]
+                took = self._took(outer, *given, trace is not None)
+                if trace is not None:
+                    trace.joined.append((Closing(columns, groups, level), *took, given[1][:, 0]))
+                put(below, outer)
+                put(top, xp.take(memory, xp.array(columns, self.like)))
+
+        def put(index: Array, values: Array) -> None:
+            for plane, new in zip(stack, values, strict=True):
+                xp.put(plane, index, new)
+
+        for part, level, _, before, after in nest.turns:
+            close(before)
+            index = xp.array(level * count + np.arange(len(level)), self.like)
+            old = xp.take(stack, index)
+            given = Cell(*(each[..., part] for each in cell)), features[..., part], colours[:, part]
+            took = self._took(old, *given, trace is not None)
+            put(index, old)
+            if trace is not None:
+                trace.paint[:, part], trace.margin[:, part] = took
+            close(after)
+        return stack[..., :count]
 
     def trace(self, groups: int, pairs: int) -> Trace:
         """Room for a trace."""
@@ -301,7 +423,29 @@ class Field:
         dark = np.asarray(self.xp.to_numpy(self.colours)).take(objects, -1)
         colours = Interval(dark, np.where(self.texture[objects] == NO_TEXTURE, dark, 1.0))
         with np.errstate(all="ignore"):
-            return shown(meetings, distance, cell, colours, self.nothing, self.slope)
+            nest = self.nesting(meetings)
+            joins = None if nest is None else self.joins()
+            return shown(meetings, distance, cell, colours, self.nothing, self.slope, nest, joins)
+
+
+def _rounded(cells: Cell, s: int) -> Cell:
+    """Cells with tokens in front, and behind them those of operators whose edges have a width.
+
+    A cut that rounds its edge is a smooth union turned inside out: where that takes (D, d) to D', the
+    intersection takes (-D, -d) to -D', and the subtraction (-D, d). So its lines are those that were learned
+    of the union, with their signs turned. Colours are kept: gates of the register stay shut.
+    """
+    lines, bias, candidate, bump = (part[SMOOTH] for part in cells)
+    features = lines.shape[-1] - s
+    found = [lines], [bias], [candidate], [bump]
+    for sign in (1.0, -1.0):  # of the object's features
+        turned = lines * np.array([sign] * features + [-1.0] * s, np.float32)
+        shut = np.where(np.arange(len(bias)) < s, bias, -1.0).astype(np.float32)
+        turned[s:] = 0.0
+        for part, more in zip(found, (turned, shut, -sign * candidate, -bump), strict=True):
+            part.append(more)
+    more = Cell(*(np.stack(part) for part in found))
+    return Cell(*(np.concatenate([one, two]) for one, two in zip(cells, more[:], strict=True)))
 
 
 def _numbered(things: list[Any]) -> tuple[list[Any], np.ndarray]:

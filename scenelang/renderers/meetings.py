@@ -8,9 +8,12 @@ with so many objects, and column i is its i-th pair.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from scenelang.program.groups import SMOOTH, Groups
 
 Index = npt.NDArray[np.intp]
 
@@ -108,3 +111,89 @@ def meetings_of(pairs: Pairs) -> tuple[Meetings, Index]:
     lengths = (-counts).searchsorted(-np.arange(counts[0] if len(counts) else 0))
     index = np.concatenate([*(first[:n] + k for k, n in enumerate(lengths.tolist())), block[:0]])
     return Meetings(block[first], pairs.take(index), lengths), index
+
+
+class Closing(NamedTuple):
+    """Groups that end, one in each of some columns.
+
+    Args:
+        columns: (n,) in ascending order.
+        groups: (n,) their numbers.
+        level: (n,) of the states that go into the ones below them.
+    """
+
+    columns: Index
+    groups: Index
+    level: Index
+
+
+class Turn(NamedTuple):
+    """A slot of nested meetings.
+
+    Args:
+        part: where its pairs lie.
+        level: (n,) of the states that its pairs join; 0 is the stream's own.
+        fresh: (n,) whether an object begins its state as it is.
+        before, after: groups that end before the slot, and behind it where columns end, in rounds.
+    """
+
+    part: slice
+    level: Index
+    fresh: npt.NDArray[np.bool_]
+    before: list[Closing]
+    after: list[Closing]
+
+
+class Nesting(NamedTuple):
+    """Meetings of a stream with groups.
+
+    Args:
+        turns: slot by slot.
+        levels: how many states are needed.
+    """
+
+    turns: list[Turn]
+    levels: int
+
+
+def nesting(meetings: Meetings, groups: Groups) -> Nesting:
+    """Find which states the pairs of each column join.
+
+    Of a group's rows a column may meet some or none. A group that draws goes on in the state around it where
+    that is still empty, so that only those that meet something take a state of their own.
+    """
+    count, deepest = len(meetings.columns), groups.deepest
+    cuts = groups.joins > SMOOTH
+    last = np.full((count, deepest), -1)
+    real = np.zeros((count, deepest), bool)  # whether a group that is open has a state of its own
+    every, number = np.arange(count), np.arange(deepest)
+    turns, levels = list[Turn](), 1
+    slots = meetings.slots()
+    for at, part in enumerate(slots):
+        n = part.stop - part.start
+        objects = meetings.pairs.object[part]
+        path = groups.path[objects]
+        same = (path == last[:n]) & (path >= 0)
+        shared = np.logical_and.accumulate(same, 1).sum(1)
+        before = _closings(every[:n], last, real, shared)
+        begins = (number >= shared[:, None]) & (path >= 0)
+        inner = begins & (cuts[path] | ((number == shared[:, None]) & (at > 0)))
+        real[:n] = np.where(begins, inner, real[:n] & (number < shared[:, None]))
+        last[:n] = path
+        level = real[:n].sum(1)
+        levels = max(levels, int(level.max(initial=0)) + 1)
+        fresh = inner.any(1) & (groups.tokens[objects] <= SMOOTH)
+        left = slots[at + 1].stop - slots[at + 1].start if at + 1 < len(slots) else 0
+        after = _closings(every[left:n], last, real, np.zeros(n - left, np.intp))
+        turns.append(Turn(part, level, fresh, before, after))
+    return Nesting(turns, levels)
+
+
+def _closings(columns: Index, open_groups: Index, real: npt.NDArray[np.bool_], kept: Index) -> list[Closing]:
+    """Rounds in which the groups (B, D) of columns (n,) end, but for the outermost ``kept`` (n,) of each."""
+    found = []
+    for at in range(open_groups.shape[1] - 1, -1, -1):
+        some = columns[(kept <= at) & real[columns, at]]
+        if len(some):
+            found.append(Closing(some, open_groups[some, at], real[some, : at + 1].sum(1)))
+    return found

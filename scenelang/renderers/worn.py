@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from scenelang.program.groups import SMOOTH, UNION
 from scenelang.renderers.arrays import Array
-from scenelang.renderers.field import NO_TEXTURE, SMOOTH, UNION, Field, Trace
+from scenelang.renderers.field import NO_TEXTURE, Field, Trace
 from scenelang.renderers.meetings import Meetings
 
 QUARTER = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)
@@ -28,6 +29,13 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
         if narrow[part].any():
             some = found[:, : part.stop - part.start]
             some |= (abs(trace.margin[:, part]) < gap[part]) & xp.array(narrow[part], field.like)
+    if trace.joined and worn.any():
+        most = CORNER * px * (1 + float(field.frames.stretch.max()))
+        for (columns, groups, _), _, margin, _ in trace.joined:
+            width = field.group_widths[groups]
+            narrow = (field.groups.joins[groups] == SMOOTH) & (px > NARROW * width) & worn[columns]
+            near = abs(margin) < xp.array((width + most).astype(np.float32), field.like)
+            found[:, columns] |= near & xp.array(narrow, field.like)
     return found
 
 
@@ -43,7 +51,17 @@ def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
         n, paint = part.stop - part.start, trace.paint[:, part]
         shown[:, :n] |= tied[:, :n] & blends[part] & (paint > LEAST) & (paint < 1 - LEAST)
         tied[:, :n] |= joins[part] & (abs(trace.margin[:, part]) < 2 * CORNER * px)
-    return shown
+    if not trace.joined:
+        return shown
+    blended = 0.0 * tied > 0
+    for part in meetings.slots():
+        n, paint = part.stop - part.start, trace.paint[:, part]
+        blended[:, :n] |= blends[part] & (paint > LEAST) & (paint < 1 - LEAST)
+    for (columns, groups, _), paint, margin, _ in trace.joined:
+        joins, blends = (xp.array(field.groups.joins[groups] == kind, field.like) for kind in (UNION, SMOOTH))
+        blended[:, columns] |= blends & (paint > LEAST) & (paint < 1 - LEAST)
+        tied[:, columns] |= joins & (abs(margin) < 2 * CORNER * px)
+    return shown | (tied & blended)
 
 
 def add_textures(
@@ -58,7 +76,7 @@ def add_textures(
         px: side of the pixels for which textures are looked up four times, world units; 0: once.
     """
     xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
-    shares = trace.shares(meetings, seen)
+    shares = trace.shares(meetings, field.nesting(meetings), seen)
     groups, columns = seen.shape
     offsets = xp.array(QUARTER * np.float32(px), p)[:, :, None] if px else None
     total = xp.full((3, groups * columns), 0.0, p)

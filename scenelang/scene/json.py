@@ -25,6 +25,7 @@ from scenelang.scene.fields import said
 from scenelang.scene.json_places import Key, Value, deeper_than, follow, read_places, record_places
 from scenelang.scene.nodes import MAX_NODE_DEPTH, Link, Object, SceneNode
 from scenelang.scene.spans import SpanMap
+from scenelang.words import BLEND
 
 S = TypeVar("S", bound=SceneData)
 
@@ -206,6 +207,9 @@ def _build(data: Any, adapter: TypeAdapter[Any], source: SourceFile, path: tuple
             else _build(child, adapter, source, here)
             for child, here in zip(data["children"], inside, strict=True)
         ]
+        for child in (data, *children):
+            if isinstance(child, dict) and child.get("k") == BLEND:
+                child["k"] = None
         data = {**data, "children": children}
     try:
         return adapter.validate_python(data)

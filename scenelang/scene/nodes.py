@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import nextafter
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, overload
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from scenelang.scene.fields import (
     Dotted,
@@ -19,7 +20,9 @@ from scenelang.words import BLEND, Combine
 
 MAX_FRAMES = 1_000_000
 MAX_NODE_DEPTH = 400  # nodes within nodes
-Blend = Annotated[Finite, Field(gt=0, description="width of the blend of `smooth`, which alone has one")]
+Blend = Annotated[
+    Finite, Field(gt=0, description="width of the blend; null: 0.15 of `smooth`, a sharp edge of a cut")
+]
 
 
 class Material(Frozen):
@@ -85,26 +88,38 @@ class Group(Frozen):
         ) -> None: ...
 
 
+def blend_width(op: str, k: float) -> float | None:
+    """The k of a Scene for a width that is written, None for the usual one.
+
+    JSON from before cuts had widths says 0.15 in every node, so that one of 0.15 is the next number above.
+    """
+    if k != BLEND:
+        return k
+    return nextafter(BLEND, 1.0) if op in ("subtract", "intersect") else None
+
+
 class _Joining(Frozen):
     """What joins by an operator."""
 
     @model_validator(mode="after")
-    def _blends_only_smooth(self) -> Self:
+    def _unions_have_no_width(self, info: ValidationInfo) -> Self:
         op, k = self.__dict__["op"], self.__dict__["k"]
-        if op != "smooth" and k != BLEND:
-            raise ValueError(f"`{op}` has no k: only smooth blends")
+        if k == BLEND:
+            self.__dict__["k"] = None if info.mode == "json" else blend_width(op, k)
+        elif op == "union" and k is not None:
+            raise ValueError("`union` has no k: `smooth` blends")
         return self
 
 
 class Boolean(_Joining):
-    """A boolean node over its children, folded left; ``k`` is the width of a ``smooth`` blend."""
+    """A boolean node over its children, folded left; ``k`` is the width of its blend."""
 
     kind: Literal["boolean"] = "boolean"
     op: Combine
     children: tuple[SceneNode, ...] = ()
     transforms: Transforms = ()
     material: Material | None = None
-    k: Blend = BLEND
+    k: Blend | None = None
 
     if TYPE_CHECKING:
 
@@ -114,7 +129,7 @@ class Boolean(_Joining):
             children: Iterable[SceneNode] | SceneNode = (),
             transforms: Iterable[Transform] | Transform = (),
             material: Material | None = None,
-            k: float = BLEND,
+            k: float | None = None,
         ) -> None: ...
 
 
@@ -123,14 +138,14 @@ class Link(_Joining):
 
     op: Combine = "union"
     node: SceneNode
-    k: Blend = BLEND
+    k: Blend | None = None
 
     if TYPE_CHECKING:
 
         @overload
-        def __init__(self, op: Combine, node: SceneNode, k: float = BLEND) -> None: ...
+        def __init__(self, op: Combine, node: SceneNode, k: float | None = None) -> None: ...
         @overload
-        def __init__(self, *, op: Combine = "union", node: SceneNode, k: float = BLEND) -> None: ...
+        def __init__(self, *, op: Combine = "union", node: SceneNode, k: float | None = None) -> None: ...
         def __init__(self, *args: Any, **data: Any) -> None: ...
 
 

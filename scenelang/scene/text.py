@@ -19,7 +19,7 @@ from scenelang.scene.elements import Elements
 from scenelang.scene.fields import Frozen, Rgb
 from scenelang.scene.modifiers import MaterialOp, Transform
 from scenelang.scene.nodes import Boolean, Link, Material, Object, SceneNode
-from scenelang.words import BLEND, OPERATIONS, STAGE, TRANSFORMS
+from scenelang.words import OPERATIONS, STAGE, TRANSFORMS
 
 _Line = str | tuple[str, SceneNode, int]
 _INDENT: Final = "  "
@@ -84,9 +84,9 @@ def _field(name: str | None, value: Any) -> str:
     return angle(value) if name == "fov" else number(value)
 
 
-def blend(op: str, k: float) -> str:
-    """A word that joins, with its width where it is not the usual one."""
-    return op if k == BLEND else f"{op}(k = {number(k)})"
+def blend(op: str, k: float | None) -> str:
+    """A word that joins, with its width where one is written."""
+    return op if k is None else f"{op}(k = {number(k)})"
 
 
 def _node(word: str, node: SceneNode, depth: int) -> list[_Line]:

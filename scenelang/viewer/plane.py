@@ -90,7 +90,7 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
             "farther": field.FARTHER,
             "farthest": field.FARTHEST,
             "tokens": TOKENS,
-            "draws": [token <= field.SMOOTH for token in TOKENS.values()],
+            "draws": [token <= TOKENS["smooth"] for token in TOKENS.values()],
             "paintSteps": list(STEPS),
             "decoders": [
                 {

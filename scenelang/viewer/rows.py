@@ -12,8 +12,9 @@ import numpy as np
 from scenelang.graph.stage import Stage
 from scenelang.lifting.layout import LAYOUTS, Layout
 from scenelang.models.manifest import Manifest
+from scenelang.program.groups import SMOOTH
 from scenelang.program.program import Program, ProgramError
-from scenelang.renderers.field import BLEND, SMOOTH
+from scenelang.renderers.field import BLEND
 from scenelang.renderers.frames import Frames
 from scenelang.renderers.solid.frames import read_solid_frame
 

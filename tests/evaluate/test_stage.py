@@ -131,8 +131,8 @@ def test_the_width_of_each_blend_reaches_the_graph() -> None:
     )
     graph = lower(run_text(text).good(), SOLIDS, None, Diagnostics())
     (chain,) = [link.node for link in graph.root.links]
-    assert [link.k for link in chain.links] == [0.15, 0.3, 0.15, 0.2]
-    assert [link.k for link in chain.links[3].node.links] == [0.15, 1.0]
+    assert [link.k for link in chain.links] == [0.0, 0.3, 0.0, 0.2]
+    assert [link.k for link in chain.links[3].node.links] == [0.0, 1.0]
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_the_width_of_each_blend_reaches_the_graph() -> None:
         (lambda: nsg.Light(power=-1), "power"),
         (lambda: nsg.Light((0, 1e13, 0)), "position"),
         (lambda: nsg.Ground(-1e13), "y"),
-        (lambda: nsg.Link("union", nsg.Object("sphere"), 0.3), "only smooth blends"),
+        (lambda: nsg.Link("union", nsg.Object("sphere"), 0.3), "`union` has no k"),
         (lambda: nsg.Boolean("smooth", k=0), "k"),
         (lambda: nsg.Scene(ground="none"), "`ground`"),
     ],

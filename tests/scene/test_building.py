@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import scenelang as nsg
+from scenelang.scene.text import to_nsg
 
 ROOT = Path(__file__).parents[2]
 STAR = nsg.Object("star")
@@ -114,3 +115,25 @@ def test_colours_of_the_stage_are_written_as_others_are() -> None:
     assert nsg.Light(color="#d33").color == nsg.Ground(color="#dd3333").color == red
     assert nsg.Scene(background="#d33").background == nsg.Color("#d33").rgb == red
     assert nsg.Ground(color="default") == nsg.Ground()
+
+
+def test_widths_of_cuts() -> None:
+    """In JSON from before cuts had widths every node has a `k` of 0.15, which was none."""
+    two = [nsg.Object("square"), nsg.Object("star")]
+    for op, k, kept in (
+        ("subtract", None, None),
+        ("subtract", 0.15, 0.15),
+        ("intersect", 0.3, 0.3),
+        ("smooth", 0.15, None),
+        ("smooth", 0.2, 0.2),
+    ):
+        scene = nsg.Scene(nodes=nsg.Boolean(op, two, k=k))
+        again = nsg.Scene.from_json(scene.to_json())
+        assert again == scene
+        (node,) = again.nodes
+        assert node.k == (kept if kept is None else pytest.approx(kept, rel=1e-15))
+        assert (f"{op}(k = {kept}" in to_nsg(scene)) == (kept is not None)
+    old = '{"nodes": [{"kind": "boolean", "op": "subtract", "children": [], "k": 0.15}]}'
+    assert nsg.Scene.from_json(old).nodes[0].k is None  # type: ignore[union-attr]
+    with pytest.raises(ValueError, match="`union` has no k"):
+        nsg.Boolean("union", two, k=0.2)

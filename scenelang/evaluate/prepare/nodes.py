@@ -20,10 +20,11 @@ from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import number
 from scenelang.evaluate.values.value import POISON, Problem, show
 from scenelang.scene import library
+from scenelang.scene.nodes import blend_width
 from scenelang.scene.schema import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object
 from scenelang.scene.spans import Written
 from scenelang.syntax import nodes
-from scenelang.words import BLEND, KEYWORDS, LANGUAGE
+from scenelang.words import KEYWORDS, LANGUAGE
 
 HOLDERS = ("file", "group", "chain", "unknown")
 
@@ -133,18 +134,20 @@ def _run_nested(body: Body, env: Env, inside: Builder, session: Session, span: S
     session.node_depth -= 1
 
 
-def _width(stmt: nodes.Node | nodes.Combined, place: Place) -> Callable[[Env], float]:
-    """The k of `smooth`, or the default's."""
-    word, given = KEYWORDS["smooth"], prepare_arguments(stmt.args, place)
+def _width(stmt: nodes.Node | nodes.Combined, place: Place) -> Callable[[Env], float | None]:
+    """The k of a word that joins, None where none is written."""
+    op = stmt.op if isinstance(stmt, nodes.Combined) else stmt.kind
+    word = KEYWORDS[op]
+    given = prepare_arguments(stmt.args, place)
     bound = bind(place.report, nodes.Name(stmt.keyword, word.name), word.params, word.required, given)
-    if bound is None or bound[0] is None:
-        return lambda env: BLEND
+    if not bound or bound[0] is None:
+        return lambda env: None
     get, operand = bound[0].code.run, bound[0].arg.value
     check = guarded(place, _above_0, operand.span, (operand,))
 
-    def run(env: Env) -> float:
+    def run(env: Env) -> float | None:
         k = check(get(env))
-        return BLEND if k is POISON else float(k)
+        return None if k is POISON else blend_width(op, float(k))
 
     return run
 
@@ -156,7 +159,7 @@ def _above_0(k: Any) -> float:
 
 
 def _finish(
-    kind: str, inside: Builder, transforms: list[Any], material: Material | None, k: float = BLEND
+    kind: str, inside: Builder, transforms: list[Any], material: Material | None, k: float | None = None
 ) -> Any:
     fields: dict[str, Any] = {
         "children": tuple(inside.children),
@@ -207,7 +210,7 @@ def prepare_combined(stmt: nodes.Combined, place: Place) -> Action | None:
         if out.children:
             out.op, out.k = op, width(env)
         act(env, out)
-        out.op, out.k = "union", BLEND
+        out.op, out.k = "union", None
 
     return action
 

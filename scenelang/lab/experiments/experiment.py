@@ -28,7 +28,7 @@ from scenelang.lab.experiments.lpips import Lpips, LpipsError, load_lpips
 from scenelang.lab.experiments.runs import EXPERIMENTS, Run
 from scenelang.measure.metrics import MOST_DB, compare
 from scenelang.measure.scenes import summarise
-from scenelang.renderers.field import SMOOTH
+from scenelang.program.groups import SMOOTH
 
 UNSEEN = 2021  # seed of the scenes that are measured; trainings use small ones
 STRIP = 8  # scenes of a strip
