@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST
+from scenelang.program.groups import INTERSECT, SMOOTH, SUBTRACT
 from scenelang.renderers.arrays import Smooth
 from scenelang.renderers.network import TOKENS
 from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, SolidArrays
@@ -20,7 +21,7 @@ from scenelang.renderers.solid.passes import SLACK
 from scenelang.viewer.script import web
 from scenelang.viewer.store import Store
 
-FILES: Final = ("solid.glsl", "rays.glsl", "look.glsl", "light.glsl")
+FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "light.glsl")
 """Of ``web/``, one behind the other."""
 _CONSTANTS: Final = {
     "EMPTY": EMPTY,
@@ -38,12 +39,15 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     """The parts ``shader`` and ``network`` of a view."""
     config, decoders = network.config, [network.decoder(code) for code in network.codes]
     paint, kind, width = config.paint_lines, config.kind_lines, config.width
-    cells = np.concatenate([_cell(network, token) for token in range(TOKENS)])
+    cells = [_cell(network, token) for token in range(TOKENS)]
+    cells = np.concatenate(
+        [*cells, *(_rounded(cells[token], cells[SMOOTH]) for token in (SUBTRACT, INTERSECT))]
+    )
     sizes = {"CELL": 2 + paint + kind, "GEOMETRIES": len(decoders)}
     parts = [web("angles.glsl"), *(f"const float {name} = {value!r};" for name, value in _CONSTANTS.items())]
     parts += [f"const int {name} = {value};" for name, value in sizes.items()]
     parts += [
-        f"uniform vec4 cells[{len(cells)}]; // of each token what is made of a distance, a bump; then lines"
+        f"uniform vec4 cells[{len(cells)}]; // of each kind of join what is made of a distance, a bump; then lines"
     ]
     parts += [_decoders(decoders, sloped=False), _decoders(decoders, sloped=True), _gates(paint, kind)]
     return {
@@ -67,6 +71,20 @@ def _cell(network: SolidArrays, token: int) -> np.ndarray:
     cell = network.cell(token, BLEND)[-1]
     lines = np.concatenate([cell.own, cell.past, cell.bias, 0 * cell.bias], 1)
     return np.concatenate([[[cell.candidate.item(), cell.bump.item(), 0.0, 0.0]], lines])
+
+
+def _rounded(sharp: np.ndarray, smooth: np.ndarray) -> np.ndarray:
+    """The cell of a cut that rounds its edge, from those of a sharp one and of a smooth union.
+
+    It is the union turned inside out: where that takes (D, d) to D', an intersection takes (-D, -d) to -D', and
+    a subtraction (-D, d). Colours and kinds are kept.
+    """
+    side = np.sign(sharp[0, 0])  # of the object's distance
+    cell = sharp.copy()
+    cell[0, :2] = side * smooth[0, 0], -smooth[0, 1]
+    cell[1, :3] = smooth[1, :3] * [-side, -1.0, 1.0]
+    cell[2:] = 0.0, 0.0, -1.0, 0.0
+    return cell
 
 
 def _gates(paint: int, kind: int) -> str:
