@@ -74,4 +74,4 @@ class Changes:
 
 def softens(program: Program) -> bool:
     """Whether there are derivatives of a Program's soft picture."""
-    return len(program) > 0 and not program.elements and not program.palette
+    return len(program) > 0 and not program.elements and not program.palette and not program.extended

@@ -10,7 +10,7 @@ shapes, warps and booleans, and any moves and colours of textures, one object in
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -62,7 +62,8 @@ class SetConfig:
     # of a model's textures: "few" are flipped, rotated and their hue turned, "any" moved and coloured in any
     # order, "" has none
     textures: Literal["", "few", "any"] = ""
-    # how objects are put together: "chain", "groups" (each in two nested groups) or "tree"
+    # how objects are put together: "chain", "groups" (each in two nested groups), "tree", which needs no
+    # group of a stream, "any" tree, or the "leaves" of such a tree as a chain
     nest: str = "chain"
 
 
@@ -78,6 +79,8 @@ SETS: dict[str, SetConfig] = {
     "wide": SetConfig(canvas=(320, 192)),
     "tree": SetConfig(nest="tree", objects=(3, 4)),
     "deep": SetConfig(nest="tree", objects=(5, 8)),
+    "trees": SetConfig(nest="any"),
+    "leaves": SetConfig(nest="leaves"),
     "many": SetConfig(objects=(16, 16)),
     "crowd": SetConfig(objects=(100, 100), size=0.4),
     "strong": SetConfig(warp=2.4),
@@ -165,7 +168,7 @@ def random_object(rng: Rng, config: SetConfig, textures: Sequence[str] = ()) -> 
 
 
 def _tree(rng: Rng, leaves: list[SceneNode]) -> SceneNode:
-    """A nested tree that the compiler can linearise: the first child may be composite, unions any."""
+    """A nested tree without groups of a stream: the first child may be composite, unions any."""
     if len(leaves) == 1:
         return leaves[0]
     cut = int(rng.integers(1, len(leaves)))
@@ -178,11 +181,40 @@ def _tree(rng: Rng, leaves: list[SceneNode]) -> SceneNode:
     return Boolean(op=word, children=(_tree(rng, leaves[:-1]), leaves[-1]))
 
 
+def any_tree(rng: Rng, leaf: Callable[[], SceneNode], depth: int = 4) -> Boolean:
+    """A tree of up to a depth, of operators as likely as each other; a third of the cuts has a width."""
+    word = COMBINE[int(rng.integers(4))]
+    rounds = word in ("subtract", "intersect") and rng.random() < 1 / 3
+    k = _uniform(rng, 0.05, 0.5) if rounds else None
+    children = [
+        leaf() if depth == 1 or rng.random() < 0.4 else any_tree(rng, leaf, depth - 1)
+        for _ in range(int(rng.integers(2, 4)))
+    ]
+    return Boolean(word, children, k=k)
+
+
+def chained(rng: Rng, node: SceneNode) -> Chain:
+    """The leaves of a tree, joined one by one by operators as likely as each other."""
+    leaves, stack = list[SceneNode](), [node]
+    while stack:
+        here = stack.pop()
+        if isinstance(here, Boolean):
+            stack.extend(reversed(here.children))
+        else:
+            leaves.append(here)
+    words = ["union", *(COMBINE[int(rng.integers(4))] for _ in leaves[1:])]
+    return Chain([Link(op=op, node=leaf) for op, leaf in zip(words, leaves, strict=True)])
+
+
 def random_scene(rng: Rng, config: SetConfig, textures: Sequence[str] = ()) -> Scene:
     """One scene of a set; ``textures`` are the names of a model's."""
+    model = "textures2d" if textures else "shapes2d"
+    if config.nest in ("any", "leaves"):
+        tree = any_tree(rng, lambda: random_object(rng, config, textures))
+        node = tree if config.nest == "any" else chained(rng, tree)
+        return Scene(model=model, canvas=config.canvas, nodes=(node,))
     count = int(rng.integers(config.objects[0], config.objects[1] + 1))
     objects = [random_object(rng, config, textures) for _ in range(count)]
-    model = "textures2d" if textures else "shapes2d"
     if config.nest == "tree":
         return Scene(model=model, canvas=config.canvas, nodes=(_tree(rng, list(objects)),))
     unions = rng.random() < config.unions

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scenelang.measure.sets import Rng
+from scenelang.measure.sets import Rng, any_tree
 from scenelang.scene.elements import Brought, load_elements
 from scenelang.scene.schema import (
     Bend,
@@ -56,6 +56,7 @@ class SolidConfig:
         staged: a random camera, light, ground and sky.
         canvas: pixels.
         meshes: a file of elements whose solids take the place of spheres and tori.
+        trees: any trees of booleans; see `scenelang.measure.sets.any_tree`.
     """
 
     objects: tuple[int, int] = (1, 3)
@@ -68,6 +69,7 @@ class SolidConfig:
     staged: bool = False
     canvas: tuple[int, int] = (128, 128)
     meshes: str = ""
+    trees: bool = False
 
 
 SOLID_SETS: dict[str, SolidConfig] = {
@@ -76,6 +78,7 @@ SOLID_SETS: dict[str, SolidConfig] = {
     "media": SolidConfig(media=1.0),
     "deformed": SolidConfig(warp=WARP),
     "booleans": SolidConfig(unions=0.0, objects=(2, 4), spread=0.5),
+    "trees": SolidConfig(trees=True, media=0.3, spread=0.5),
     "shuffled": SolidConfig(shuffled=True),
     "wide": SolidConfig(canvas=(160, 96)),
     "staged": SolidConfig(staged=True),
@@ -133,13 +136,19 @@ def random_solid(rng: Rng, config: SolidConfig) -> Scene:
     zoo = load_elements(config.meshes, "zoo") if config.meshes else None
     brought = Brought.of((zoo,)).geometries if zoo is not None else {}
     geometries = [name for name, it in brought.items() if it.dimension == 3] or ["sphere", "torus"]
-    links: list[Link] = []
-    for _ in range(int(rng.integers(config.objects[0], config.objects[1] + 1))):
+
+    def solid() -> Object:
         kind = "volumetric" if rng.random() < config.media else "diffuse"
         material = Material(kind, Color(_triple(rng, 0.1, 1.0)))
-        solid = Object(geometries[int(rng.integers(len(geometries)))], _moves(rng, config), material)
+        return Object(geometries[int(rng.integers(len(geometries)))], _moves(rng, config), material)
+
+    if config.trees:
+        return Scene(model="solids3d", canvas=config.canvas, nodes=(any_tree(rng, solid),))
+    links: list[Link] = []
+    for _ in range(int(rng.integers(config.objects[0], config.objects[1] + 1))):
+        item = solid()
         word = "union" if unions or not links else COMBINE[int(rng.integers(4))]
         other = word == "smooth" and rng.random() < 0.5
-        links.append(Link(word, solid, k=float(rng.uniform(0.05, 0.5)) if other else None))
+        links.append(Link(word, item, k=float(rng.uniform(0.05, 0.5)) if other else None))
     others = _stage(rng) if config.staged else {"elements": zoo} if zoo is not None else {}
     return Scene(model="solids3d", canvas=config.canvas, nodes=Chain(links), **others)  # type: ignore[arg-type]

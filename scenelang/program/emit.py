@@ -42,7 +42,7 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     materials = dict.fromkeys(paint.element for paint in palette)
     return Program(
         vectors=_blended(_vectors(leaves, manifest, codes), rows, manifest),
-        tokens=np.array([TOKENS[r.op] | BEGINS * r.begins | r.ends << ENDS for r in rows], dtype=np.int8),
+        tokens=tokens_of(rows),
         bounds=_bounds(graph),
         canvas=graph.canvas,
         background=graph.background,
@@ -57,6 +57,11 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
         palette=palette,
         worn=worn,
     )
+
+
+def tokens_of(rows: list[Row]) -> npt.NDArray[np.int8]:
+    """Tokens (N,) of the rows of a stream."""
+    return np.array([TOKENS[r.op] | BEGINS * r.begins | r.ends << ENDS for r in rows], dtype=np.int8)
 
 
 def _palette(leaves: list[Leaf]) -> tuple[tuple[Paint, ...], npt.NDArray[np.int32]]:

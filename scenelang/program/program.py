@@ -154,6 +154,16 @@ class Program:
         assert self.worn is not None
         return [self.palette[at] if at >= 0 else None for at in self.worn.tolist()]
 
+    @property
+    def extended(self) -> bool:
+        """Whether it has groups, or cuts that have a width: a chain of sharp cuts and blends has neither."""
+        if (self.tokens > OPERATOR).any():
+            return True
+        if self.model in available() and load_manifest(self.model).lifting != "exact":
+            return False  # its numbers mean something else
+        layout = LAYOUTS["plane" if self.stage is None else "solid"]
+        return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.blend] > 0.0).any())
+
     def check_weights(self, digest: str) -> None:
         """Raise ProgramError where it was compiled for other weights than those of a digest."""
         if self.weights != digest:
@@ -208,21 +218,11 @@ def program_bytes(program: Program) -> bytes:
     if program.palette and program.worn is not None:
         header["format"] = 3
         tensors |= {"worn": program.worn, **paint_tensors(program.palette, program.elements)}
-    if _newer(program):
+    if program.extended:
         header["format"] = 4
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data
-
-
-def _newer(program: Program) -> bool:
-    """Whether a reader of format 3 would draw it otherwise: it has groups, or cuts with a width."""
-    if (program.tokens > OPERATOR).any():
-        return True
-    if program.model in available() and load_manifest(program.model).lifting != "exact":
-        return False  # its numbers mean something else
-    layout = LAYOUTS["plane" if program.stage is None else "solid"]
-    return bool((program.vectors[program.tokens >= TOKENS["subtract"], layout.blend] > 0.0).any())
 
 
 def _frozen(name: str, array: Any, dtype: type[np.generic], shape: tuple[int, ...]) -> npt.NDArray[Any]:

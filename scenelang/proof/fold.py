@@ -11,12 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.renderers.meetings import Index, Meetings
-from scenelang.words import TOKENS
+from scenelang.program.groups import INTERSECT, SMOOTH, SUBTRACT, UNION
+from scenelang.renderers.meetings import Closing, Index, Meetings, Nesting
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
-UNION, SMOOTH, SUBTRACT, INTERSECT = (TOKENS[word] for word in ("union", "smooth", "subtract", "intersect"))
 NOTHING = 1e9  # world units: the distance before the first object
 
 
@@ -39,27 +38,127 @@ class Enclosed(NamedTuple):
     left: Mask
 
 
+class Joins(NamedTuple):
+    """How P operands join.
+
+    Args:
+        tokens: operators.
+        widths: of their blends, 0 for sharp edges.
+        free: whether no blend follows: what is outside, and how deep inside the rest, is all one.
+        fresh: whether they begin a state as they are.
+    """
+
+    tokens: Index
+    widths: Floats
+    free: Mask
+    fresh: Mask
+
+    def some(self, which: slice | Index) -> Joins:
+        """Those of some of them."""
+        return Joins(self.tokens[which], self.widths[which], self.free[which], self.fresh[which])
+
+
 def enclosed(
-    meetings: Meetings, distance: Enclosure, colour: Enclosure, tokens: Index, widths: Floats, behind: Floats
+    meetings: Meetings,
+    distance: Enclosure,
+    colour: Enclosure,
+    joins: Joins,
+    behind: Floats,
+    nest: Nesting | None = None,
+    groups: Joins | None = None,
 ) -> Enclosed:
     """Fold the enclosed distances of the objects that regions meet.
 
     Args:
         distance: world distances of the pairs (P,), wherever in the region.
         colour: of the pairs (3, P).
-        tokens, widths: of the pairs (P,), the latter of blends.
+        joins: of the pairs.
         behind: (K,) what is shown where nothing is: a background, or four zeros.
+        nest: of a stream with groups.
+        groups: how these join.
     """
-    count = len(meetings.columns)
-    low, high = np.full((2, count), NOTHING)
-    first, last = np.zeros((2, 3, count))
-    shut, opened = np.empty((2, len(tokens)), bool)
-    blended = _blended(meetings, tokens)
-    for part in meetings.slots():
-        n, token = part.stop - part.start, tokens[part]
-        k, d, e = widths[part], distance.low[part], distance.high[part]
-        a, b = low[:n].copy(), high[:n].copy()
-        free = ~blended[part]  # no blend follows: what is outside, and how deep inside the rest, is all one
+    count, pairs = len(meetings.columns), len(joins.tokens)
+    shut, opened = np.empty((2, pairs), bool)
+    hidden = np.zeros((1 if nest is None else nest.levels, count), bool)
+    states = [_State.empty(count) for _ in hidden]
+    if nest is None or groups is None:
+        for part in meetings.slots():
+            own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
+            shut[part], opened[part] = states[0].join(slice(part.stop - part.start), *own, joins.some(part))
+        for part in reversed(meetings.slots()):
+            n = part.stop - part.start
+            shut[part] |= hidden[0, :n]
+            hidden[0, :n] |= opened[part]
+    else:
+        done = []  # of groups that ended, round by round: which changed nothing, and which left nothing else
+
+        def close(closings: list[Closing]) -> None:
+            for columns, ended, level in closings:
+                flags = np.empty((2, len(columns)), bool)
+                for at in np.unique(level).tolist():
+                    some = np.flatnonzero(level == at)
+                    here, how = columns[some], groups.some(ended[some])
+                    flags[:, some] = states[at - 1].join(here, *states[at].at(here), how)
+                    states[at].clear(here)
+                done.append((columns, level, flags))
+
+        def reopen(closings: list[Closing]) -> None:
+            for _ in closings:
+                columns, level, (closed, wide) = done.pop()
+                hidden[level, columns] = hidden[level - 1, columns] | closed
+                hidden[level - 1, columns] |= wide
+
+        for part, level, fresh, before, after in nest.turns:
+            close(before)
+            for at in np.unique(level).tolist():
+                here = np.flatnonzero(level == at)
+                which = part.start + here
+                own = Enclosure(*(d[which] for d in distance)), Enclosure(*(c[:, which] for c in colour))
+                how = joins.some(which)._replace(fresh=fresh[here])
+                shut[which], opened[which] = states[at].join(here, *own, how)
+            close(after)
+        for part, level, _, before, after in reversed(nest.turns):
+            reopen(after)
+            here = np.arange(len(level))
+            shut[part] |= hidden[level, here]
+            hidden[level, here] |= opened[part]
+            reopen(before)
+    (low, high), (first, last) = states[0]
+    if len(behind) > 3:
+        first, last = (np.vstack([c, np.ones(count)]) for c in (first, last))
+    back = behind[:, None]
+    shown = Enclosure(
+        np.where(high < 0, first, np.where(low < 0, np.minimum(first, back), back)),
+        np.where(high < 0, last, np.where(low < 0, np.maximum(last, back), back)),
+    )
+    return Enclosed(shown, ~shut)
+
+
+class _State(NamedTuple):
+    """Distances (B,) and colours (3, B) of a fold."""
+
+    distance: Enclosure
+    colour: Enclosure
+
+    @classmethod
+    def empty(cls, count: int) -> _State:
+        return cls(Enclosure(*np.full((2, count), NOTHING)), Enclosure(*np.zeros((2, 3, count))))
+
+    def at(self, columns: Index) -> tuple[Enclosure, Enclosure]:
+        """What it is in some columns."""
+        return tuple(Enclosure(low[..., columns], high[..., columns]) for low, high in self)  # type: ignore[return-value]
+
+    def clear(self, columns: Index) -> None:
+        """Empty it in some columns."""
+        for side, colour in zip(self.distance, self.colour, strict=True):
+            side[columns], colour[:, columns] = NOTHING, 0.0
+
+    def join(
+        self, columns: Index | slice, distance: Enclosure, colour: Enclosure, how: Joins
+    ) -> tuple[Mask, Mask]:
+        """Take in n operands; which change nothing (n,), and which leave nothing else (n,)."""
+        (d, e), (token, k, free, fresh) = distance, how
+        a, b = self.distance.low[columns].copy(), self.distance.high[columns].copy()
         union = token == UNION
         # the object's share of the colour; of a union all or none
         some = union & ((e < np.maximum(a, 0.0)) | (free & (a >= 0.0)))
@@ -74,44 +173,41 @@ def enclosed(
             closed, wide = _chosen(which, (blend[1] <= 0, blend[0] >= 1), (closed, wide))
         for operator, (near, far) in ((SUBTRACT, (-e, -d)), (INTERSECT, (d, e))):
             if (which := token == operator).any():
+                rounds = which & (k > 0)
                 ends = _chosen(which, (np.maximum(a, near), np.maximum(b, far)), ends)
                 closed = np.where(which, (far <= a) | (free & (far < 0.0)), closed)
+                if rounds.any():  # a smooth union turned inside out
+                    blends = -_blend(-a, -near, k)[1], -_blend(-b, -far, k)[1]
+                    ends = _chosen(rounds, blends, ends)
+                    closed = np.where(rounds, far + k <= a, closed)
                 wide &= ~which
-        low[:n], high[:n] = ends
-        shut[part], opened[part] = closed, wide
-        for side, choose, own in ((first, np.minimum, colour.low), (last, np.maximum, colour.high)):
-            more = own[:, part] - side[:, :n]
-            side[:, :n] += choose(shares[0] * more, shares[1] * more)
-    if len(behind) > 3:
-        first, last = (np.vstack([c, np.ones(count)]) for c in (first, last))
-    back = behind[:, None]
-    shown = Enclosure(
-        np.where(high < 0, first, np.where(low < 0, np.minimum(first, back), back)),
-        np.where(high < 0, last, np.where(low < 0, np.maximum(last, back), back)),
-    )
-    hidden = np.zeros(count, bool)
-    for part in reversed(meetings.slots()):
-        n = part.stop - part.start
-        shut[part] |= hidden[:n]
-        hidden[:n] |= opened[part]
-    return Enclosed(shown, ~shut)
+        if fresh.any():
+            ends, shares = _chosen(fresh, (d, e), ends), _chosen(fresh, (1.0, 1.0), shares)
+            closed, wide = closed & ~fresh, wide | fresh
+        self.distance.low[columns], self.distance.high[columns] = ends
+        for side, choose, own in zip(self.colour, (np.minimum, np.maximum), colour, strict=True):
+            now = side[:, columns]
+            more = own - now
+            side[:, columns] = now + choose(shares[0] * more, shares[1] * more)
+        return closed, wide
 
 
 def _chosen(which: Mask, new: tuple[Any, Any], old: tuple[Any, Any]) -> tuple[Any, Any]:
     return np.where(which, new[0], old[0]), np.where(which, new[1], old[1])
 
 
-def _blended(meetings: Meetings, tokens: Index) -> Mask:
+def blended(meetings: Meetings, rounds: Mask) -> Mask:
     """After which pairs (P,) a blend follows in their region."""
-    found, seen = np.empty(len(tokens), bool), np.zeros(len(meetings.columns), bool)
+    found, seen = np.empty(len(rounds), bool), np.zeros(len(meetings.columns), bool)
     for part in reversed(meetings.slots()):
         n = part.stop - part.start
         found[part] = seen[:n]
-        seen[:n] |= tokens[part] == SMOOTH
+        seen[:n] |= rounds[part]
     return found
 
 
 def _blend(big: Floats, d: Floats, k: Floats) -> tuple[Floats, Floats]:
     """The share of the object's colour, and the state behind a smooth union."""
+    k = np.where(k > 0, k, 1.0)  # of others, which do not ask
     h = np.clip(0.5 + 0.5 * (big - d) / k, 0.0, 1.0)
     return h, big * (1 - h) + d * h - k * h * (1 - h)

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenelang.proof.fold import NOTHING, Enclosure, Floats, Mask, enclosed
+from scenelang.proof.fold import NOTHING, Enclosure, Floats, Mask, blended, enclosed
 from scenelang.proof.stream import Stream
-from scenelang.renderers.meetings import Index, Pairs, meetings_of
+from scenelang.renderers.meetings import Index, Pairs, meetings_of, nesting
 from scenelang.renderers.raster import raster
 
 SIDES = 16, 8, 4, 2, 1  # of regions, samples: two along a side of a pixel
@@ -75,9 +75,12 @@ class Band:
         # what is not a number bounds nothing
         low = np.fmax((exact.low - radius) * scale, -NOTHING)
         world_distance = Enclosure(low, np.fmin((exact.high + radius) * scale, NOTHING))
-        told = enclosed(
-            meetings, world_distance, colour, stream.tokens[thing], stream.widths[thing], self._behind
-        )
+        joins, nest = stream.joins.some(thing), None
+        if stream.groups.deepest:
+            nest = nesting(meetings, stream.groups)
+        else:
+            joins = joins._replace(free=~blended(meetings, stream.rounds[thing]))
+        told = enclosed(meetings, world_distance, colour, joins, self._behind, nest, stream.group_joins)
         left = np.empty(len(pairs), bool)
         left[source] = told.left
         return meetings.columns, told.shown, pairs.take(left)

@@ -10,8 +10,10 @@ from scenelang.graph.spaces import PLANE
 from scenelang.lifting.exact import lift_many
 from scenelang.lifting.layout import PLANE_LAYOUT as LAYOUT
 from scenelang.models.manifest import Manifest
+from scenelang.program.emit import tokens_of
+from scenelang.program.groups import felt, read_groups, widths_of
 from scenelang.proof.errors import Errors
-from scenelang.proof.fold import INTERSECT, NOTHING, SMOOTH, SUBTRACT, UNION, Enclosure, Floats
+from scenelang.proof.fold import NOTHING, Enclosure, Floats, Joins
 from scenelang.reference.field import carry_back, leaf_distance
 from scenelang.reference.textures import colour_at
 from scenelang.renderers.frames import Frames
@@ -31,7 +33,9 @@ class Stream:
 
     Attributes:
         frames: ways from the world to the leaves, in float64.
-        tokens, widths: (N,) operators, and widths of blends.
+        groups: of the stream.
+        joins, group_joins: how objects and groups join; a blend that is free of others is not known here.
+        rounds: (N,) which objects join by a blend, or begin a group that does.
         reach: (N,) leaf units from its origin beyond which an object has no say. Without it the fold is the
             same, or both folds are so far outside of everything that the blends to come, each of which brings
             them nearer by its width at most, leave them outside.
@@ -39,15 +43,21 @@ class Stream:
     """
 
     def __init__(self, graph: Graph, manifest: Manifest, known: dict[str, Errors]) -> None:
-        self._leaves = [leaf for _, leaf in graph.rows()]
+        rows = graph.rows()
+        self._leaves = [row.leaf for row in rows]
         levels = [split_levels(leaf.steps, manifest.limits, PLANE) for leaf in self._leaves]
         self.frames = Frames(lift_many(levels, [(0.0,) * LAYOUT.code] * len(levels), LAYOUT))
-        self.tokens = np.array([TOKENS[op] for op, _ in graph.rows()], np.intp)
-        self.tokens[:1] = UNION
-        self.widths = np.array([link.k for link in graph.root.links])
-        blends = np.where(self.tokens == SMOOTH, self.widths, 0.0)[::-1].cumsum()[::-1]
-        every = (self.tokens == INTERSECT) | ((self.tokens == SUBTRACT) & (blends > 0))
-        self.reach = np.where(every, np.inf, 1.0 + blends / self.frames.scale)
+        self.groups = groups = read_groups(tokens_of(rows))
+        raw = np.array([TOKENS[row.op] for row in rows], np.intp)
+        widths = widths_of(raw, np.array([row.k for row in rows]))
+        seen = felt(groups, widths)
+        self.reach = np.where(seen.everywhere, np.inf, 1.0 + seen.total / self.frames.scale)
+        free, never = ~seen.inside & (seen.blends == 0), np.zeros(len(rows), bool)
+        self.rounds = widths > 0
+        self.joins = Joins(groups.tokens, np.where(groups.first, 0.0, widths), free, never)
+        first = groups.rows
+        # what follows a group follows its first row, and the group's own blend does
+        self.group_joins = Joins(groups.joins, widths[first], free[first], never[first])
         names = [leaf.geometry for leaf in self._leaves]
         self._known = {name: errors for name, errors in known.items() if name not in graph.elements}
         self.unknown = tuple(sorted(set(names) - self._known.keys()))

@@ -58,6 +58,7 @@ class Kept:
         shown = (
             *(scene.vectors, scene.xp.to_numpy(scene.colours).T, scene.tokens, reach),
             np.frombuffer(b"".join(looks), np.uint8).reshape(-1, 32),
+            *scene.nests(),
         )
         common = (
             repr((type(scene.xp).__name__, program.canvas, program.background, list(tiles))).encode()

@@ -277,6 +277,11 @@ class Field:
             parts.append(self.network.decode(part, radius, 1.0, shape))
         return parts[0] if len(parts) == 1 else self.xp.concat(parts, 1)
 
+    def nests(self) -> tuple[np.ndarray, ...]:
+        """The groups around each object (N, D), their operators and widths, -1 for none."""
+        path, joins = self.groups.path, np.append(self.groups.joins, -1)
+        return path, joins[path], np.append(self.group_widths, -1.0)[path]
+
     def nesting(self, meetings: Meetings) -> Nesting | None:
         """Which states pairs join, None where no column has a group with a state of its own."""
         if not self.groups.deepest:

@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from scenelang.image import from_samples
+from scenelang.program.groups import OPERATOR
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing
 from scenelang.renderers.reading import Reading
@@ -32,6 +33,8 @@ def draw_whole(
     """
     if program.background is None or min(program.background) < 1.0:
         raise ProgramError("this model draws on white only")
+    if (program.tokens > OPERATOR).any():
+        raise ProgramError("this model draws no groups")
     width, height = program.canvas
     if not len(program):
         return Drawing(from_samples(np.ones((height, width, 3), np.float32), None), 0, 0, 0)

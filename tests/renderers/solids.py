@@ -10,7 +10,7 @@ import numpy as np
 
 from scenelang.graph.affine import composed
 from scenelang.graph.looks import Look
-from scenelang.graph.nodes import Fold, Leaf, Link, Move
+from scenelang.graph.nodes import BLEND, Fold, Leaf, Link, Move, Node
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
 from scenelang.lifting.exact import inverse_frame
 from scenelang.lifting.layout import SOLID_LAYOUT as LAYOUT
@@ -19,7 +19,7 @@ from scenelang.models.weights import shipped_weights
 from scenelang.program.paints import Paint
 from scenelang.renderers.solid.field import SolidField
 from scenelang.renderers.solid.network import SolidArrays, SolidNetwork
-from scenelang.words import TOKENS
+from scenelang.words import TOKENS, Combine
 
 LEAVES, MATERIALS = ("sphere", "torus"), ("diffuse", "volumetric")
 
@@ -27,15 +27,16 @@ LEAVES, MATERIALS = ("sphere", "torus"), ("diffuse", "volumetric")
 class Object(NamedTuple):
     """An object; steps are nearest the leaf first: displacement, turns, maps, turns, maps.
 
-    With a paint, whose texture is moved, in place of the colour.
+    With a paint, whose texture is moved, in place of the colour. The width of its blend is the usual one
+    where it is 0.
     """
 
     leaf: str
     steps: Sequence[Step] = ()
     material: str = "diffuse"
     rgb: tuple[float, float, float] = (0.8, 0.5, 0.3)
-    token: str = "union"
-    k: float = 0.15
+    token: Combine = "union"
+    k: float = 0.0
     paint: Paint | None = None
     texture: tuple[Affine, ...] = ()
 
@@ -131,10 +132,17 @@ MIXED = (
 
 def graph(objects: Sequence[Object]) -> Fold:
     """The same stream as a graph, for the reference."""
-    return Fold(
-        "scene",
-        tuple(Link(o.token, Leaf(o.leaf, look(o), tuple(map(Move, o.steps))), o.k) for o in objects),
-    )
+    return Fold("scene", tuple(link(o.token, o.k, leaf(o)) for o in objects))
+
+
+def leaf(o: Object) -> Leaf:
+    """An object as a graph has it."""
+    return Leaf(o.leaf, look(o), tuple(map(Move, o.steps)))
+
+
+def link(token: Combine, k: float, node: Node) -> Link:
+    """With the width that 0 stands for."""
+    return Link(token, node, k or (BLEND if token == "smooth" else 0.0))
 
 
 def look(o: Object) -> Look:

@@ -61,10 +61,13 @@ def join(op: str, k: float, a: State, b: State) -> State:
         h = np.clip(0.5 + 0.5 * (a.d - b.d) / k, 0.0, 1.0)
         d, paint, turn = (1.0 - h) * a.d + h * b.d - k * h * (1.0 - h), h, h
         near = None if near is None else np.minimum(near, abs(a.d - b.d) / 2.0)
-    elif op == "subtract":
-        d, turn, side = np.maximum(a.d, -b.d), -b.d >= a.d, -1.0
     else:
-        d, turn = np.maximum(a.d, b.d), b.d >= a.d
+        side = -1.0 if op == "subtract" else 1.0
+        cut = side * b.d
+        d, turn = np.maximum(a.d, cut), cut >= a.d
+        if k:
+            h = np.clip(0.5 + 0.5 * (cut - a.d) / k, 0.0, 1.0)
+            d, turn = (1.0 - h) * a.d + h * cut + k * h * (1.0 - h), h
     slope = None if a.slope is None or b.slope is None else a.slope + (side * b.slope - a.slope) * turn
     if paint is None:
         return State(d, a.medium, near, a.rgb, slope, a.owner)
@@ -155,7 +158,7 @@ def _fold(node: Node, known: Callable[[], State]) -> State:
         return NOTHING
     state = _fold(node.links[0].node, known)
     for link in node.links[1:]:
-        state = join(link.op, link.k, state, _fold(link.node, known))
+        state = join(link.op, link.width, state, _fold(link.node, known))
     return state
 
 
@@ -174,7 +177,7 @@ def _leaves(
 def _blends(fold: Fold) -> Iterator[float]:
     """Widths of all blends."""
     for at, link in enumerate(fold.links):
-        if at and link.op == "smooth":
-            yield link.k
+        if at and link.width:
+            yield link.width
         if isinstance(link.node, Fold):
             yield from _blends(link.node)

@@ -51,7 +51,7 @@ def draw_on_device(network: Framed, program: Program, samples: str = "adaptive")
 
     Returns:
         The drawing, None of what the kernel does not know: solids, decoders of more than 32 units, features
-        beside a distance, a state of more than one number, and frames that need float64.
+        beside a distance, a state of more than one number, groups, and frames that need float64.
 
     Raises:
         ProgramError: as `scenelang.renderers.draw.draw`.
@@ -65,7 +65,7 @@ def draw_on_device(network: Framed, program: Program, samples: str = "adaptive")
     versions = [(id(p), 0 if p.is_inference() else p._version) for p in network.parameters()]
     host = on_host(network, tuple(versions))
     field = Field(host, program.vectors, program.tokens, program.brought(), program.paints())
-    if field.frames.wild.any():
+    if field.frames.wild.any() or field.groups.deepest:
         return None
     grid = raster(program.canvas, range(program.canvas[1]))
     pairs = Coverage(field, prove=False).candidates(grid)

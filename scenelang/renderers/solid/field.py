@@ -2,11 +2,14 @@
 
 Each object's frame (`frames.py`) carries points into its own space. There pairs of points and objects meet
 the network together, where the point is in the object's ball (`passes.py`); then the cell takes a point's
-objects in, one by one.
+objects in, one by one. Where groups of the stream are open it has a state for each (`stacks.py`), and what
+a group comes to is taken in as an object is.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from scenelang.renderers.arrays import Array, Arrays
@@ -21,6 +24,9 @@ from scenelang.renderers.solid.passes import (
     Passes,
     find_passes,
 )
+from scenelang.renderers.solid.stacks import Closing, Stacks
+
+NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
 
 
 class Meeting(NamedTuple):
@@ -48,10 +54,13 @@ class Pairs(NamedTuple):
 
     Args:
         places: the points (k,) that meet an object, those that meet a second, and so on; None where all do.
+            Of points in groups they are those of their states, as `Closing` has them.
         rays: (P,), place by place.
         objects: their numbers (P,).
         at: where the rays begin behind the objects' maps (3, P).
         way: how that changes along the rays (3, P).
+        closings: of the groups that end before each place, and behind the last.
+        depth: how many states a point has.
     """
 
     places: list[Array | None]
@@ -59,10 +68,47 @@ class Pairs(NamedTuple):
     objects: Array
     at: Array
     way: Array
+    closings: list[list[Closing]]
+    depth: int = 1
+
+
+class Operand(NamedTuple):
+    """What states take in (k,): an object or a group, as of `Meeting`; `look` is a register (R, k or 1)."""
+
+    distance: Array
+    look: Array
+    gradient: Array
+    change: Array
+    owner: Array
+
+
+@dataclass(slots=True)
+class States:
+    """What states carry: distances and registers, and what else is asked for, as of `Meeting`.
+
+    Entries are those of M points, then, where groups are open, those of each one's second state, and so on.
+    """
+
+    memory: Array
+    slope: Array
+    bound: Array
+    owner: Array
+
+    def parts(self) -> tuple[Array, ...]:
+        """All of it, None where it is not asked for."""
+        return self.memory, self.slope, self.bound, self.owner
+
+    def at(self, xp: Arrays, index: Array) -> States:
+        """Some of the entries."""
+        return States(*(part if part is None else xp.take(part, index) for part in self.parts()))
 
 
 class SolidField(Objects):
     """A program's objects, ready to be met by points of rays."""
+
+    @cached_property
+    def _stacks(self) -> Stacks:
+        return Stacks(self.xp, self.tree, self.network.codes)
 
     def passes(self, origin: Array, way: Array, limit: Array, tight: bool = True) -> tuple[Array, Passes]:
         """As `find_passes`, of unit directions way (3, M)."""
@@ -110,7 +156,11 @@ class SolidField(Objects):
         objects = xp.whole(pairs[OBJECT])
         if not self.draws:
             objects = xp.select(objects < 0, -1 - objects, objects)
-        return Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY])
+        found = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
+        if most < 2 or not self.tree.deepest:
+            return found
+        places, closings, depth = self._stacks.followed(places, objects, every)
+        return found._replace(places=places, closings=closings, depth=depth)
 
     def answer(
         self,
@@ -124,7 +174,8 @@ class SolidField(Objects):
     ) -> Meeting:
         """As `meet`, of pairs whose rays have come to t (M,)."""
         xp, count = self.xp, len(t)
-        places, rays, objects, at, way = pairs
+        places, rays, objects, at, way, closings, depth = pairs
+        size = depth * count
         if p is None:
             at = way * xp.take(t, rays) + at
         else:
@@ -132,50 +183,78 @@ class SolidField(Objects):
         q, own_points = self._local(at, objects)
         d, own = self._distances(q, own_points, objects, gradient)
         looks = self._looks(q, objects) if wanted == Wanted.ALL and self.textures else None
-        memory = xp.full(((1, 2, 1 + len(self.looks))[wanted], count), 0.0, t)
-        memory[0] = EMPTY
-        slope = xp.full((3, count), 0.0, t) if gradient else None
-        bound = xp.full((count,), EMPTY, t) if change else None
-        owner = xp.full((count,), 0.0, t) if owners else None
+        states = States(
+            memory=xp.full(((1, 2, 1 + len(self.looks))[wanted], size), 0.0, t),
+            slope=xp.full((3, size), 0.0, t) if gradient else None,
+            bound=xp.full((size,), EMPTY, t) if change else None,
+            owner=xp.full((size,), 0.0, t) if owners else None,
+        )
+        states.memory[0] = EMPTY
         stop = 0
-        for index in places:
+        for index, ending in zip(places, closings, strict=False):
+            for closing in ending:
+                self._close(states, closing, wanted)
             start, stop = stop, stop + (count if index is None else len(index))
             pair = slice(start, stop)
-            which, near = objects[pair], d[pair]
-            before, look = _part(xp, memory, index), self.looks
+            which, near, look = objects[pair], d[pair], self.looks
             if wanted:
                 look = xp.take(look, which) if looks is None else looks[:, pair]
-            if not start and self.open and owner is None:  # nothing has been met
+            slope = own if own is None else own[:, pair]
+            if not start and self.open and not owners:  # nothing has been met
                 after = xp.take(self.first, which) * near[None]
                 if wanted:
-                    after = xp.concat([after, look[1 - len(memory) :]], 0)
-                memory = _update(xp, memory, index, after)
-                if bound is not None:
+                    after = xp.concat([after, look[1 - len(states.memory) :]], 0)
+                states.memory = _update(xp, states.memory, index, after)
+                if states.bound is not None:
                     gap = xp.select(look[-1] > 0.5, abs(near), 0 * near + EMPTY)
-                    bound = _update(xp, bound, index, gap)
-                if slope is not None and own is not None:
-                    slope = _update(xp, slope, index, xp.take(self.first, which) * own[:, pair])
+                    states.bound = _update(xp, states.bound, index, gap)
+                if states.slope is not None:
+                    states.slope = _update(xp, states.slope, index, xp.take(self.first, which) * slope)
                 continue
-            cell = self.cells[wanted]
-            if not self.alike:
-                cell = Cell(*(xp.take(weights, which) for weights in cell))
-            if owner is not None:  # behind a register of 0, a look of 1 shows where its gate is open
-                before, look = xp.concat([before[:1], 0 * before[1:]], 0), 0 * look + 1
-            after, take = self.network.join(near, before, look, cell, wanted)
-            if owner is not None:
-                held = xp.select(after[-1] > 0.5, which + 1 + 0 * near, _part(xp, owner, index))
-                owner = _update(xp, owner, index, held)
-            if bound is not None:
-                gap = self._gap(near, before, look, which)
-                bound = _update(xp, bound, index, xp.minimum(_part(xp, bound, index), gap))
-            if slope is not None and own is not None:
-                by_own, by_past = self.network.partials(near, before[0], take, cell)
-                past = _part(xp, slope, index)
-                slope = _update(xp, slope, index, by_own * own[:, pair] + by_past * past)
-            memory = _update(xp, memory, index, after)
+            self._join(states, index, Operand(near, look, slope, None, which + 1 + 0 * near), which, wanted)
+        for closing in closings[-1]:
+            self._close(states, closing, wanted)
+        memory, slope, bound, owner = (part if part is None else part[..., :count] for part in states.parts())
         if bound is not None:
             bound = xp.minimum(bound, abs(memory[0]))
         return Meeting(memory[0], memory[1:], slope, bound, owner, len(rays))
+
+    def _close(self, states: States, closing: Closing, wanted: Wanted) -> None:
+        """Let groups end: what they come to goes into the states that they stand in, and theirs are empty."""
+        xp, (inner, index, which) = self.xp, closing
+        found = states.at(xp, inner)
+        d, look = found.memory[0].clip(-EMPTY, NOTHING), found.memory[1:]
+        xp.put(states.memory[:1], inner, 0 * found.memory[:1] + EMPTY)
+        if states.bound is not None:
+            xp.put(states.bound, inner, 0 * d + EMPTY)
+        operand = Operand(d, look, found.slope, found.bound, found.owner)
+        self._join(states, index, operand, which, wanted)
+
+    def _join(
+        self, states: States, index: Array | None, operand: Operand, which: Array, wanted: Wanted
+    ) -> None:
+        """Let states at an index take in operands by the cells of rows, or groups, `which`."""
+        xp, cell = self.xp, self.cells[wanted]
+        near, look = operand.distance, operand.look
+        if not self.alike:
+            cell = Cell(*(xp.take(weights, which) for weights in cell))
+        before = _part(xp, states.memory, index)
+        if states.owner is not None:  # behind a register of 0, a look of 1 shows where its gate is open
+            before, look = xp.concat([before[:1], 0 * before[1:]], 0), 0 * look + 1
+        after, take = self.network.join(near, before, look, cell, wanted)
+        if states.owner is not None:
+            held = xp.select(after[-1] > 0.5, operand.owner, _part(xp, states.owner, index))
+            states.owner = _update(xp, states.owner, index, held)
+        if states.bound is not None:
+            gap = xp.minimum(_part(xp, states.bound, index), self._gap(near, before, look, which))
+            if operand.change is not None:
+                gap = xp.minimum(gap, operand.change)
+            states.bound = _update(xp, states.bound, index, gap)
+        if states.slope is not None:
+            by_own, by_past = self.network.partials(near, before[0], take, cell)
+            past = _part(xp, states.slope, index)
+            states.slope = _update(xp, states.slope, index, by_own * operand.gradient + by_past * past)
+        states.memory = _update(xp, states.memory, index, after)
 
     def _gap(self, d: Array, before: Array, look: Array, which: Array) -> Array:
         """How far (k,) objects with distances d (k,) leave the kind of material as it is."""

@@ -25,6 +25,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from scenelang.lifting.layout import SOLID_LAYOUT, Layout
+from scenelang.program.groups import SMOOTH, SUBTRACT
 from scenelang.renderers.arrays import NUMPY, SMOOTH_BLOCK, Array, Arrays, Smooth
 from scenelang.renderers.network import TOKENS
 from scenelang.renderers.solid.boxes import decoder_box
@@ -118,6 +119,23 @@ class SolidNetwork:
         kept = [[0], [0, *range(1 + paint, len(bias))], [*range(len(bias))]]
         candidate = self.candidate[token].reshape(1, 1)
         return tuple(Cell(own[rows], past[rows], bias[rows], candidate, bump) for rows in kept)
+
+    def cut(self, token: int, width: float) -> tuple[Cell, ...]:
+        """As `cell`, of a cut with an edge that is rounded over a width: a blend turned inside out.
+
+        What is left by `subtract` is -smooth(-D, d), by `intersect` -smooth(-D, -d).
+        """
+        blend, concat = self.cell(SMOOTH, width)[Wanted.DISTANCE], self.xp.concat
+        side = -1.0 if token == SUBTRACT else 1.0
+        edge = Cell(-side * blend.own, -blend.past, blend.bias, side * blend.candidate, -blend.bump)
+        return tuple(
+            edge._replace(
+                own=concat([edge.own, sharp.own[1:]], 0),
+                past=concat([edge.past, sharp.past[1:]], 0),
+                bias=concat([edge.bias, sharp.bias[1:]], 0),
+            )
+            for sharp in self.cell(token, BLEND)
+        )
 
     def look(self, material_code: Array) -> Array:
         """Colour and medium (…, 4) of material codes (…, material_code)."""

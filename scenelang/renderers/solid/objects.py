@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from scenelang.elements.element import Element
-from scenelang.program.groups import SMOOTH, UNION
+from scenelang.program.groups import OPERATOR, SMOOTH, SUBTRACT, UNION, Floats, read_groups, widths_of
 from scenelang.program.paints import Paint
 from scenelang.renderers.arrays import Array, Smooth
 from scenelang.renderers.grid import GridShape, grid_shape
@@ -28,7 +28,7 @@ class Objects:
     Args:
         network: trained parameters, on any device.
         vectors: (N, 64) float32, geometry and material vectors.
-        tokens: (N,) boolean tokens 0 to 3.
+        tokens: (N,) as of a Program.
         brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
         paints: likewise, None where a row has the colour of its vector.
 
@@ -44,11 +44,13 @@ class Objects:
         brought: Sequence[Element | None] | None = None,
         paints: Sequence[Paint | None] | None = None,
     ) -> None:
-        self.network, self.xp, self.tokens = network, network.xp, tokens
+        self.network, self.xp, self.tree = network, network.xp, read_groups(tokens)
         none = [None] * len(vectors)
+        widths = widths_of(np.asarray(tokens, np.intp) & OPERATOR, vectors[:, network.layout.blend])
         with self.xp.inference():
-            self.solids = read_solids(network, vectors, tokens)
+            self.solids = read_solids(network, vectors, self.tree, widths)
             self._tables(vectors)
+            self._cells(widths)
             self._textures(vectors[:, network.layout.geometry :], paints or none)
             self._decoders(vectors, brought or none)
             self._alone()
@@ -84,11 +86,23 @@ class Objects:
         colour = (matrix[:, :3] * look[:3]).sum(1) + matrix[:, 3]
         self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
         """Of each object colour and medium (R, N); where some have textures, a plain colour between these."""
-        self.smooth = table(self.tokens == SMOOTH) > 0 if SMOOTH in self.tokens else None
-        keys = [(solid.token, solid.frame.blend if solid.token == SMOOTH else BLEND) for solid in self.solids]
+
+    def _cells(self, widths: Floats) -> None:
+        """Cells of the objects and, behind these, of the groups; `widths` are those of rows' blends."""
+        xp, network, groups = self.xp, self.network, self.tree
+        operators = np.concatenate([groups.tokens, groups.joins])
+        widths = np.concatenate([np.where(groups.first, 0.0, widths), widths[groups.rows]])
+        smooth = xp.array((operators == SMOOTH).astype(np.float32), network.codes) > 0
+        self.smooth = smooth if SMOOTH in operators else None
+        keys = list(zip(operators.tolist(), widths.tolist(), strict=True))
         self.alike = len(set(keys)) <= 1
-        cells = [network.cell(*key) for key in (keys[:1] if self.alike else keys)]
-        cells = cells or [network.cell(UNION, BLEND)]
+        known = {
+            (token, width): network.cut(token, width)
+            if token >= SUBTRACT and width
+            else network.cell(token, width or BLEND)
+            for token, width in dict.fromkeys(keys)
+        }
+        cells = [known[key] for key in (keys[:1] if self.alike else keys)] or [network.cell(UNION, BLEND)]
         self.cells = [
             Cell(*(xp.concat(list(part), 1) for part in zip(*each, strict=True)))
             for each in zip(*cells, strict=True)
@@ -160,7 +174,8 @@ class Objects:
         """What holds where an object is the first that is met, or the only one."""
         xp, like, solids = self.xp, self.network.codes, self.solids
         reach = np.array([2 * s.radius * s.frame.scale for s in solids], np.float32)
-        self.first = self.network.alone(xp.array(reach, like), self.cells[Wanted.ALL])
+        cell = Cell(*(weights[:, : len(solids)] for weights in self.cells[Wanted.ALL]))
+        self.first = self.network.alone(xp.array(reach, like), cell)
         """What distances (N,) of objects that are met first are multiplied with; 0: the cell has to say."""
         drawn = xp.array(np.array([s.draws for s in solids], np.float32), like)
         self.open = bool(((self.first > 0) | (drawn == 0)).all())

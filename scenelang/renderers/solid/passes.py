@@ -1,7 +1,7 @@
 """Which objects rays may meet: each lies in a ball, and farther than its blends reach it changes nothing.
 
 A ray has a slot for each ball that it passes, so that what follows costs what the balls along a ray do,
-however many objects the scene has.
+however many objects the scene has. What cuts all that lies outside of it is met wherever that may be.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenelang.program.groups import INTERSECT, SMOOTH, SUBTRACT, UNION
+from scenelang.program.groups import INTERSECT, SMOOTH, SUBTRACT, UNION, Floats, Groups, Mask, felt
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.solid.frames import SolidFrame, read_solid_frame
 from scenelang.renderers.solid.network import SolidNetwork
@@ -29,38 +29,42 @@ class Solid:
 
     Args:
         frame: where it lies.
-        token: how it joins what came before.
+        draws: whether something may be seen, where it is met, of what was empty before.
+        clips: whether outside its ball nothing is left of what came before in its group, or before the group
+            that it begins.
+        begins: whether it begins a group.
+        ends: how many groups end behind it.
         radius: leaf units from its origin beyond which it changes nothing.
         ball: radius of the ball around that behind the frame's outer map.
         rate: how fast its world distance changes in it at most, per step of 1 behind the map.
         centre, extent: a ball (3,) of the world around that.
+        wide: whether its ball holds more than what its leaf changes.
         box: behind the map the least and the greatest coordinates (3, 1) of what it changes, if known.
     """
 
     frame: SolidFrame
-    token: int
+    draws: bool
+    clips: bool
+    begins: bool
+    ends: int
     radius: float
     ball: float
     rate: float
     centre: Array
     extent: float
+    wide: bool = False
     box: tuple[Array, Array] | None = None
-
-    @property
-    def draws(self) -> bool:
-        """Whether something may be seen, where it is met, of what was empty before."""
-        return self.token in (UNION, SMOOTH)
 
     def within(self, xp: Arrays, box: np.ndarray, like: Array) -> Solid:
         """The same with its leaf's box (2, 3), where an affine map leads to the leaf and the box is small."""
-        if (box[1] - box[0]).min() > SMALL or self.frame.steps:
+        if (box[1] - box[0]).min() > SMALL or self.frame.steps or self.wide:
             return self
         low, high = (box[:, :, None] + np.reshape([-1, 1], (2, 1, 1)) * (self.radius - 1)).astype(np.float32)
         return replace(self, box=(xp.array(low, like), xp.array(high, like)))
 
 
-def read_solids(network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) -> list[Solid]:
-    """The objects of a stream.
+def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widths: Floats) -> list[Solid]:
+    """The objects of a stream, whose groups and widths of blends are as of `felt`.
 
     Raises:
         ProgramError: an object's vector holds no way from the world to a leaf.
@@ -69,12 +73,12 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) 
     solids: list[Solid] = []
     frames = [read_solid_frame(vector[: layout.geometry], layout) for vector in vectors]
     deepest = max((frame.scale * (1 + abs(frame.amount)) for frame in frames), default=0.0)
-    smooths, widest = 0, 0.0  # of the blends from an object on
-    for frame, token in zip(frames[::-1], tokens[::-1].tolist(), strict=True):
-        smooth = token == SMOOTH
-        smooths, widest = smooths + smooth, max(widest, frame.blend * smooth)
-        blends = widest * (1 + smooths / 4)
-        if smooths and token == SUBTRACT:  # it says how deep points inside others lie
+    matters, seen = felt(groups, widths), showing(groups)
+    # what is taken away says how deep points inside others lie
+    deep = matters.everywhere & _under(groups, SUBTRACT)
+    for i, frame in enumerate(frames):
+        blends = float(matters.widest[i]) * (1 + int(matters.blends[i]) / 4)
+        if deep[i]:
             blends += deepest
         radius = 1 + SLACK + abs(frame.amount) + blends / frame.scale
         back = np.linalg.inv(frame.outer.linear.astype(np.float64))
@@ -82,7 +86,10 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) 
         solids.append(
             Solid(
                 frame=frame.placed(xp, like),
-                token=token,
+                draws=bool(seen[0, i]),
+                clips=bool(groups.tokens[i] == INTERSECT),
+                begins=bool(groups.first[i]),
+                ends=int(groups.ends[i]),
                 radius=radius,
                 ball=ball,
                 rate=frame.scale * frame.growth(radius),
@@ -90,7 +97,76 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, tokens: np.ndarray) 
                 extent=float(np.linalg.norm(back, 2)) * ball,
             )
         )
-    return solids[::-1]
+    return _widened(xp, solids, frames, groups, seen) if groups.deepest else solids
+
+
+def showing(groups: Groups) -> Mask:
+    """Whether rows may show something that was empty before (1 + D, N): at all, and in their groups."""
+    shows = np.isin(groups.tokens, (UNION, SMOOTH))
+    inner = [np.isin(groups.joins[path], (UNION, SMOOTH)) | (path < 0) for path in groups.path.T[::-1]]
+    return np.asarray(np.logical_and.accumulate([shows, *inner])[::-1])
+
+
+def _under(groups: Groups, operator: int) -> Mask:
+    """Which rows (N,) an operator joins, or a group around them."""
+    found = groups.tokens == operator
+    for path in groups.path.T:
+        found = found | ((path >= 0) & (groups.joins[path] == operator))
+    return found
+
+
+def _widened(
+    xp: Arrays, solids: list[Solid], frames: Sequence[SolidFrame], groups: Groups, seen: Mask
+) -> list[Solid]:
+    """The same, of which those that intersect are met wherever they have to be.
+
+    A group that is intersected with what stands before it has to be there, whatever cuts it: so there what
+    intersects in it is met wherever the group may be. Elsewhere what came before ends with its ball.
+
+    Args:
+        xp: functions of the arrays' library.
+        solids, groups: of the stream.
+        frames: where they lie, as arrays of numpy.
+        seen: as `showing` tells.
+    """
+    centres = np.array([np.asarray(xp.to_numpy(solid.centre), np.float64) for solid in solids])
+    extents = np.array([solid.extent for solid in solids])[:, None]
+    number = len(groups.joins)
+    middle, reach = np.zeros((number, 3)), np.zeros(number)  # balls of what may be in the groups
+    for path, shown in zip(groups.path.T, seen[1:], strict=True):
+        rows = np.flatnonzero((path >= 0) & shown)
+        low, high = np.full((number, 3), INF), np.full((number, 3), -INF)
+        np.minimum.at(low, path[rows], centres[rows] - extents[rows])
+        np.maximum.at(high, path[rows], centres[rows] + extents[rows])
+        here = np.unique(path[rows])
+        middle[here] = (low[here] + high[here]) / 2
+        far = np.linalg.norm(centres[rows] - middle[path[rows]], axis=1) + extents[rows, 0]
+        np.maximum.at(reach, path[rows], far)
+    depth = (groups.path >= 0).sum(1)
+    for i, solid in enumerate(solids):
+        own = groups.path[i, : depth[i]].tolist()
+        held = own.pop() if solid.begins else -1  # what its ball has to hold, and where that stands
+        if not (solid.clips or (held >= 0 and groups.joins[held] == INTERSECT)):
+            continue
+        clips = not own or bool(groups.joins[own[-1]] != INTERSECT)
+        if not clips:
+            held = own[-1]
+        if held < 0:
+            continue
+        linear, frame = frames[i].outer.linear.astype(np.float64), frames[i]
+        far = float(np.linalg.norm(centres[i] - middle[held]) + reach[held])
+        ball = max(solid.ball, float(np.linalg.norm(linear, 2)) * far)
+        radius = (ball - frame.moved) / frame.reach
+        solids[i] = replace(
+            solid,
+            clips=clips,
+            radius=radius,
+            ball=ball,
+            rate=frame.scale * frame.growth(radius),
+            extent=float(np.linalg.norm(np.linalg.inv(linear), 2)) * ball,
+            wide=True,
+        )
+    return solids
 
 
 class Passes(NamedTuple):
@@ -133,9 +209,13 @@ def find_passes(
     """
     low, high, found = 0 * way[0], limit, []
     filled, drawn = xp.whole(low), low > 0
+    around: list[tuple[Array, Array]] = []  # of the groups that a group stands in
     for i, solid in reversed(list(enumerate(solids))):
+        around += [(low, high)] * solid.ends
         rays, values = _crossed(xp, solid, origin, origins[:, i], way, low, high, tight)
-        if solid.token == INTERSECT:  # outside its ball nothing is left of what came before
+        if solid.begins:
+            low, high = around.pop()
+        if solid.clips:
             low, high = 0 * way[0] + INF, 0 * way[0] - INF
             xp.put(low, rays, values[BEGIN])
             xp.put(high, rays, values[END])
