@@ -13,10 +13,10 @@ from typing import Any, Final
 import numpy as np
 
 from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST
-from scenelang.program.groups import INTERSECT, SMOOTH, SUBTRACT
+from scenelang.program.groups import INTERSECT, SUBTRACT
 from scenelang.renderers.arrays import Smooth
 from scenelang.renderers.network import TOKENS
-from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, SolidArrays
+from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidArrays
 from scenelang.renderers.solid.passes import SLACK
 from scenelang.viewer.script import web
 from scenelang.viewer.store import Store
@@ -39,15 +39,15 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     """The parts ``shader`` and ``network`` of a view."""
     config, decoders = network.config, [network.decoder(code) for code in network.codes]
     paint, kind, width = config.paint_lines, config.kind_lines, config.width
-    cells = [_cell(network, token) for token in range(TOKENS)]
-    cells = np.concatenate(
-        [*cells, *(_rounded(cells[token], cells[SMOOTH]) for token in (SUBTRACT, INTERSECT))]
-    )
+    kinds = [*(network.cell(token, BLEND) for token in range(TOKENS))]
+    kinds += [network.cut(token, BLEND) for token in (SUBTRACT, INTERSECT)]
+    cells = np.concatenate([_cell(each[-1]) for each in kinds])
+    cells[TOKENS * (2 + paint + kind) :].reshape(2, -1, 4)[:, 2:] = 0.0, 0.0, -1.0, 0.0  # colours are kept
     sizes = {"CELL": 2 + paint + kind, "GEOMETRIES": len(decoders)}
     parts = [web("angles.glsl"), *(f"const float {name} = {value!r};" for name, value in _CONSTANTS.items())]
     parts += [f"const int {name} = {value};" for name, value in sizes.items()]
     parts += [
-        f"uniform vec4 cells[{len(cells)}]; // of each kind of join what is made of a distance, a bump; then lines"
+        f"uniform vec4 cells[{len(cells)}]; // of each join what is made of a distance, a bump; then lines"
     ]
     parts += [_decoders(decoders, sloped=False), _decoders(decoders, sloped=True), _gates(paint, kind)]
     return {
@@ -66,25 +66,10 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     }
 
 
-def _cell(network: SolidArrays, token: int) -> np.ndarray:
-    """A token's cell (K, 4): what is made of a distance and the bump; then each line's own, past and bias."""
-    cell = network.cell(token, BLEND)[-1]
+def _cell(cell: Cell) -> np.ndarray:
+    """A cell (K, 4): what is made of a distance and the bump; then each line's own, past and bias."""
     lines = np.concatenate([cell.own, cell.past, cell.bias, 0 * cell.bias], 1)
     return np.concatenate([[[cell.candidate.item(), cell.bump.item(), 0.0, 0.0]], lines])
-
-
-def _rounded(sharp: np.ndarray, smooth: np.ndarray) -> np.ndarray:
-    """The cell of a cut that rounds its edge, from those of a sharp one and of a smooth union.
-
-    It is the union turned inside out: where that takes (D, d) to D', an intersection takes (-D, -d) to -D', and
-    a subtraction (-D, d). Colours and kinds are kept.
-    """
-    side = np.sign(sharp[0, 0])  # of the object's distance
-    cell = sharp.copy()
-    cell[0, :2] = side * smooth[0, 0], -smooth[0, 1]
-    cell[1, :3] = smooth[1, :3] * [-side, -1.0, 1.0]
-    cell[2:] = 0.0, 0.0, -1.0, 0.0
-    return cell
 
 
 def _gates(paint: int, kind: int) -> str:
