@@ -39,7 +39,7 @@ WHAT = {
     "shuffled": "scale, rotate, translate, shear in random order",
     "tiny": "a tenth of the size",
     "wide": "320 × 192 pixels",
-    "tree": "3 or 4 objects in a nested tree that the compiler linearises",
+    "tree": "3 or 4 objects in a nested tree that needs no group",
     "deep": "the same with 5 to 8 objects",
     "many": "16 objects",
     "crowd": "100 objects at 0.4 of the size",

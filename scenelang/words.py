@@ -64,6 +64,7 @@ def _call(
 
 _ANGLE = "an angle, such as `30deg`, `0.5rad` or `0.25turn`"
 _TURN = "R(a) turns a point clockwise by a, so what it draws turns counter-clockwise."
+_ROUNDS = ("rounds the edge that is cut over this width; sharp without it",)
 _RATE = ("radians per unit length, a bare number",)
 
 DECLARING: Final = _table(
@@ -114,8 +115,10 @@ NODES: Final = _table(
     _call(
         "smooth", "k?", "Joins with a blend, of shape and colour.", ("its width, 0.15 by default",), "smooth"
     ),
-    _word("subtract", "Cuts the object out of what came before."),
-    _word("intersect", "Keeps of what came before only what lies in the object."),
+    _call("subtract", "k?", "Cuts the object out of what came before.", _ROUNDS, "subtract"),
+    _call(
+        "intersect", "k?", "Keeps of what came before only what lies in the object.", _ROUNDS, "intersect"
+    ),
 )
 MATERIAL: Final = _table(
     _word(

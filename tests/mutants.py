@@ -48,7 +48,7 @@ DRAWING = (
     "tests/renderers/test_cell.py", "tests/animation/test_run.py", "tests/conformance",
 )  # fmt: skip
 COMPILING = (
-    "tests/graph", "tests/program/test_program_compile.py", "tests/passes/test_linearise.py",
+    "tests/graph", "tests/program/test_program_compile.py", "tests/passes/test_flatten.py",
     "tests/passes/test_check_trained.py", "tests/passes/test_drop_hidden.py",
     "tests/passes/test_without.py", "tests/passes/test_prove.py", "tests/passes/test_pass_picture.py",
     "tests/animation/test_clip.py", "tests/conformance",

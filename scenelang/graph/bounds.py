@@ -48,12 +48,12 @@ class Later(Record):
     def of(self, op: Combine, width: float) -> Later:
         """What sees the operand of an operator, itself included.
 
-        Of an intersection that is what sees all that stands before it. A subtraction with a width changes
-        what lies within that of its operand.
+        Of an intersection that is what sees all that stands before it, and with a width how deep inside its
+        operand points are. A subtraction with a width changes what lies within that of its operand.
         """
         everywhere = self.everywhere or (op == "subtract" and self.inside)
         if not width or op == "intersect":
-            return Later(self.total, self.widest, self.count, self.inside, everywhere)
+            return Later(self.total, self.widest, self.count, self.inside or width > 0, everywhere)
         return self._wider(width, self.inside or op == "smooth", everywhere)
 
     def before(self, op: Combine, width: float) -> Later:

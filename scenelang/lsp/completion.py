@@ -154,7 +154,7 @@ class _Maker:
             yield from self._materials(self.words.materials)
         elif before[-2:-1] == ("material",) and last in self.words.materials:
             yield from self._materials(frozenset())
-        elif (len(before) == 1 and last in COMBINE) or (before[0] == "smooth" and last == ")"):
+        elif (len(before) == 1 and last in COMBINE) or (before[0] in COMBINE and last == ")"):
             yield from self._children("a")
             yield from (self._keyword(word) for word in ("group", *COMBINE, "chain"))
         elif before[0] == "param" and len(before) > 3 and "in" not in before and _ends_operand(last):

@@ -228,7 +228,7 @@ def _call(read: _Reader, head: int, index: int) -> Call | None:
 def _callee(read: _Reader, head: int, opening: int) -> tuple[str, int]:
     """The name before a `(`, and where it begins; empty for a parenthesis of another kind."""
     at = opening - 1
-    if at < head or read.kind(at) not in ("NAME", "step", "as", "smooth"):
+    if at < head or read.kind(at) not in ("NAME", "step", "as", "smooth", "subtract", "intersect"):
         return "", 0
     if at > head and read.kind(at - 1) in ("fn", "module"):
         return "", 0

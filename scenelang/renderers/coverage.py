@@ -105,7 +105,7 @@ class Coverage:
         if samples == "one":
             return self._picture(meetings, p, tile)
         field = self.field
-        traced = field.textured or field.blended
+        traced = field.textured or field.blended or not self._flat
         trace = field.trace(p.shape[1], len(meetings.pairs)) if traced else None
         q, d, memory = self.ask(meetings, p, tile, trace)
         edge = abs(memory[:, 0]) / field.unit
@@ -114,6 +114,8 @@ class Coverage:
         for part in meetings.slots():
             some = edge[:, : part.stop - part.start]
             some[:] = self.xp.minimum(some, near[:, part])
+        for (columns, _, _), _, _, distance in trace.joined if trace is not None else ():
+            edge[:, columns] = self.xp.minimum(edge[:, columns], abs(distance))
         near = edge < NEAR * px
         if trace is not None:
             seen = memory[:, 0] * field.slope < 0.5
@@ -304,7 +306,7 @@ def _owners(xp: Arrays, nest: Nesting, trace: Trace, painted: np.ndarray, object
     rounds = iter(trace.joined)
 
     def close(count: int) -> None:
-        for (columns, _, level), paint, _ in (next(rounds) for _ in range(count)):
+        for (columns, _, level), paint, *_ in (next(rounds) for _ in range(count)):
             top, here = own[level, :, columns], xp.to_numpy(paint).T > 0.5
             own[level - 1, :, columns] = np.where(here, top, own[level - 1, :, columns])
             own[level, :, columns] = 0

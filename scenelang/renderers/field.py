@@ -53,12 +53,13 @@ class Trace:
     Args:
         paint: (groups, P) how far the object's colour came in.
         margin: (groups, P) by how much what was there before is nearer than the object, world units.
-        joined: the same of groups of the stream that ended, round by round, with which these were.
+        joined: the same of groups of the stream that ended, round by round, with which these were and their
+            distances.
     """
 
     paint: Array
     margin: Array
-    joined: list[tuple[Closing, Array, Array]] = field(default_factory=list)
+    joined: list[tuple[Closing, Array, Array, Array]] = field(default_factory=list)
 
     def shares(self, meetings: Meetings, nest: Nesting | None, seen: Array) -> Array:
         """How much of each object's colour (groups, P) is left when all are met, 0 at points not seen."""
@@ -76,7 +77,7 @@ class Trace:
         rounds = iter(reversed(self.joined))
 
         def opened(closings: list[Closing]) -> None:
-            for (columns, _, level), (_, paint, _) in zip(reversed(closings), rounds, strict=False):
+            for (columns, _, level), (_, paint, *_) in zip(reversed(closings), rounds, strict=False):
                 for at in np.unique(level).tolist():
                     some = np.flatnonzero(level == at)
                     below = left[at - 1][:, columns[some]]
@@ -362,7 +363,7 @@ class Field:
                 given = self._cells_at(self._joins[groups]), inner[:, :s] / self.unit, inner[:, s:]
                 took = self._took(outer, *given, trace is not None)
                 if trace is not None:
-                    trace.joined.append((Closing(columns, groups, level), *took))
+                    trace.joined.append((Closing(columns, groups, level), *took, given[1][:, 0]))
                 put(below, outer)
                 put(top, xp.take(memory, xp.array(columns, self.like)))
 

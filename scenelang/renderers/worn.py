@@ -31,7 +31,7 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
             some |= (abs(trace.margin[:, part]) < gap[part]) & xp.array(narrow[part], field.like)
     if trace.joined and worn.any():
         most = CORNER * px * (1 + float(field.frames.stretch.max()))
-        for (columns, groups, _), _, margin in trace.joined:
+        for (columns, groups, _), _, margin, _ in trace.joined:
             width = field.group_widths[groups]
             narrow = (field.groups.joins[groups] == SMOOTH) & (px > NARROW * width) & worn[columns]
             near = abs(margin) < xp.array((width + most).astype(np.float32), field.like)
@@ -57,7 +57,7 @@ def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
     for part in meetings.slots():
         n, paint = part.stop - part.start, trace.paint[:, part]
         blended[:, :n] |= blends[part] & (paint > LEAST) & (paint < 1 - LEAST)
-    for (columns, groups, _), paint, margin in trace.joined:
+    for (columns, groups, _), paint, margin, _ in trace.joined:
         joins, blends = (xp.array(field.groups.joins[groups] == kind, field.like) for kind in (UNION, SMOOTH))
         blended[:, columns] |= blends & (paint > LEAST) & (paint < 1 - LEAST)
         tied[:, columns] |= joins & (abs(margin) < 2 * CORNER * px)

@@ -217,7 +217,7 @@ class Call(Stmt):
 class Node(Stmt):
     """``group``, ``union``, ``smooth``, ``subtract``, ``intersect`` or ``chain`` with its block.
 
-    Only ``smooth`` may have arguments, here and as the word of a chain's child.
+    ``smooth``, ``subtract`` and ``intersect`` may have arguments, here and as the word of a chain's child.
     """
 
     kind: Literal["group", "union", "smooth", "subtract", "intersect", "chain"]

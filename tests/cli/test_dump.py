@@ -28,9 +28,9 @@ def test_the_stages(folder: Folder) -> None:
 
 
 def test_graphs_change_on_the_way(folder: Folder) -> None:
-    result = folder.run("dump", folder.write("a.nsg", TEXT), "--after", "lower", "--after", "linearise")
+    result = folder.run("dump", folder.write("a.nsg", TEXT), "--after", "lower", "--after", "flatten")
     assert result.exit_code == 0
-    lower, _, linear = result.stdout.partition("after linearise:")
+    lower, _, linear = result.stdout.partition("after flatten:")
     assert lower.startswith("after lower:\nscene 256x256\n")
     assert "(group)" in lower
     assert "(group)" not in linear
@@ -77,8 +77,8 @@ def test_differences_apply_in_order(folder: Folder) -> None:
 
 
 def test_a_pass_that_changed_nothing(folder: Folder) -> None:
-    result = folder.run("dump", folder.write("a.nsg", "square {}"), "--diff", "--after", "linearise")
-    assert (result.exit_code, result.stdout) == (0, "after linearise:\n")
+    result = folder.run("dump", folder.write("a.nsg", "square {}"), "--diff", "--after", "flatten")
+    assert (result.exit_code, result.stdout) == (0, "after flatten:\n")
 
 
 def test_large_changes_are_told_by_their_size() -> None:
@@ -122,7 +122,7 @@ def test_scenes_with_mistakes_are_shown_as_far_as_they_go(folder: Folder) -> Non
 def test_unknown_stages(folder: Folder) -> None:
     result = folder.run("dump", folder.write("a.nsg", TEXT), "--after", "linearize")
     assert result.exit_code == 2
-    assert "Did you mean `linearise`?" in result.stderr
+    assert "Did you mean `flatten`?" in result.stderr
     assert folder.run("graph", "a.nsg", "--after", "syntax").exit_code == 2
 
 
@@ -144,7 +144,7 @@ def test_mermaid(folder: Folder) -> None:
     assert not re.search(r"[{}]", re.sub(r"#\d+;", "", said)), "what means something to Mermaid is escaped"
 
 
-@pytest.mark.parametrize("stage", ["scene", "lower", "linearise", "program"])
+@pytest.mark.parametrize("stage", ["scene", "lower", "flatten", "program"])
 @pytest.mark.parametrize("kind", ["mmd", "dot"])
 def test_large_scenes_are_cut(folder: Folder, stage: str, kind: str) -> None:
     square = "square { scale(0.01 + i / 100); translate(i / 50, j / 60); }"

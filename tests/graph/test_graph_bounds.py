@@ -10,7 +10,7 @@ from test_graph_chain import random_step
 
 from scenelang.graph import affine
 from scenelang.graph.affine import composed
-from scenelang.graph.bounds import Grid, leaf_box, overlap
+from scenelang.graph.bounds import leaf_box
 from scenelang.graph.chain import normal
 from scenelang.graph.looks import Look
 from scenelang.graph.nodes import Leaf, Move
@@ -117,31 +117,3 @@ def test_boxes_that_cannot_be_known() -> None:
     assert leaf_box(flat, 1.0, SPACES[3]) == EVERYWHERE
     assert leaf_box(huge, 0.0, SPACES[3]) == EVERYWHERE
     assert not any(np.isnan(leaf_box(far, 0.1, PLANE)))
-
-
-@pytest.mark.parametrize("deep", [0, 1])
-def test_the_grid_finds_what_a_loop_finds(deep: int) -> None:
-    rng = random.Random(8)
-    leaf = Leaf("square", Look("flat"))
-
-    def box():
-        x, y = rng.uniform(-3, 3), rng.uniform(-3, 3)
-        w, h = 10 ** rng.uniform(-3, 0), 10 ** rng.uniform(-3, 0)
-        z = rng.uniform(-1, 1) * deep
-        return x, y, x + w, y + h, z, z + w * deep
-
-    grid, boxes = Grid(), []
-    found = 0
-    for _ in range(600):
-        new = box()
-        hit = any(overlap(new, old) for old in boxes)
-        assert (grid.touched(new) is not None) == hit
-        found += hit
-        if not hit or rng.random() < 0.02:
-            grid.add(new, leaf)
-            boxes.append(new)
-    assert 50 < found < 550
-    grid.clip((0.0, 0.0, 1.0, 1.0, -1.0, 2.0), leaf)
-    assert len(grid.entries) == 1
-    assert grid.touched((2.0, 2.0, 3.0, 3.0, -1.0, 2.0)) is None
-    assert grid.touched(EVERYWHERE) is leaf

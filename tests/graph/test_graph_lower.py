@@ -189,6 +189,11 @@ def test_verify_names_the_pass() -> None:
     graph = lower(schema.Scene(nodes=(schema.Object(geometry="star"),)), SHAPES, None, Diagnostics())
     leaf = Leaf("star", Look("flat"))
     group = Fold("group", (Link("union", leaf),))
+
+    def nested(depth: int) -> Fold:
+        inner = leaf if depth == 1 else nested(depth - 1)
+        return Fold("union", (Link("union", leaf), Link("subtract", inner)))
+
     grey = Look("flat", colours=(("grayscale", 1.0),))
     tilted = Move(Affine((1, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0)))
     cases = [
@@ -197,6 +202,7 @@ def test_verify_names_the_pass() -> None:
         (Fold("scene", (Link("union", replace(leaf, moves=(tilted,))),)), ()),
         (Fold("scene", (Link("union", group),)), {Invariant.COMPOSITE}),
         (Fold("scene", (Link("union", group),)), {Invariant.STREAM}),
+        (Fold("scene", (Link("union", leaf), Link("smooth", nested(16)))), {Invariant.STREAM}),
         (
             Fold("scene", (Link("union", replace(group, moves=(Move(Warp(1, (0, 0))),))),)),
             {Invariant.AT_LEAVES},
@@ -209,8 +215,8 @@ def test_verify_names_the_pass() -> None:
         (Fold("group", ()), ()),
     ]
     for root, holds in cases:
-        with pytest.raises(InternalError, match="`linearise`"):
-            verify(replace(graph, root=root), "linearise", holds)
+        with pytest.raises(InternalError, match="`flatten`"):
+            verify(replace(graph, root=root), "flatten", holds)
 
 
 def test_a_constant_look_folds_to_its_colour() -> None:

@@ -47,7 +47,7 @@ def test_counts_of_a_scene_by_hand() -> None:
     assert not rows["check_trained"]["changed"]
     # the file joins the subtraction and the group, these two things each
     assert rows["lower"]["tokens"] == {"union": 5, "subtract": 1}
-    assert rows["linearise"]["tokens"] == {"union": 3, "subtract": 1}
+    assert rows["flatten"]["tokens"] == {"union": 3, "subtract": 1}
     assert rows["drop_hidden"]["tokens"] == {"union": 2, "subtract": 1}
 
 

@@ -69,9 +69,19 @@ def random_node(rng: random.Random, depth: int, warps: bool, spread: float = 1.0
         ops = ["union"] + [
             rng.choice(["union", "union", "smooth", "subtract", "intersect"]) for _ in children[1:]
         ]
-        links = tuple(schema.Link(op=op, node=child) for op, child in zip(ops, children, strict=False))
+        links = tuple(
+            schema.Link(op=op, node=child, k=random_width(rng, op))
+            for op, child in zip(ops, children, strict=False)
+        )
         return schema.Chain(children=links, transforms=moves, material=material)
-    return schema.Boolean(op=kind, children=children, transforms=moves, material=material)
+    return schema.Boolean(
+        op=kind, children=children, transforms=moves, material=material, k=random_width(rng, kind)
+    )
+
+
+def random_width(rng: random.Random, op: str) -> float | None:
+    """The width of a blend, of a third of what may have one."""
+    return rng.uniform(0.05, 0.5) if op != "union" and rng.random() < 1 / 3 else None
 
 
 def random_scene(seed: int, warps: bool = True) -> schema.Scene:

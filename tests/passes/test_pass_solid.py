@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenelang.passes.linearise import linearise
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
@@ -19,6 +18,7 @@ from scenelang.passes import PASSES
 from scenelang.passes.check_eye import check_eye
 from scenelang.passes.context import Context
 from scenelang.passes.drop import drop_hidden, drop_unseen
+from scenelang.passes.flatten import flatten
 from scenelang.reference.solid.field import Field
 from scenelang.reference.solid.image import solid_image
 from scenelang.scene import schema
@@ -70,9 +70,12 @@ def random_node(rng: random.Random, depth: int, spread: float = 1.2) -> schema.S
 def widened(graph: Graph, rng: random.Random) -> Graph:
     """The same with blends of many widths."""
 
+    def width(op: str) -> float:
+        return rng.choice([0.15, 0.05, 0.4] if op == "smooth" else [0.0, 0.0, 0.2]) * (op != "union")
+
     def node(fold: Fold) -> Fold:
         links = [
-            Link(x.op, x.node if isinstance(x.node, Leaf) else node(x.node), rng.choice([0.15, 0.05, 0.4]))
+            Link(x.op, x.node if isinstance(x.node, Leaf) else node(x.node), width(x.op))
             for x in fold.links
         ]
         return Fold(fold.kind, tuple(links), fold.moves, fold.span)
@@ -134,7 +137,7 @@ def test_eyes_inside_are_reported() -> None:
         )
         graph = widened(lower(schema.Scene(nodes=chain), SOLIDS, None, Diagnostics()), rng)
         context = Context(SOLIDS, Diagnostics())
-        for step in PASSES[: [step.run for step in PASSES].index(linearise) + 1]:
+        for step in PASSES[: [step.run for step in PASSES].index(flatten) + 1]:
             graph = step.run(graph, context)
         eye = rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3)
         found = Field(graph.root).at(np.reshape(eye, (3, 1)))
@@ -159,7 +162,7 @@ def test_what_is_left_out_is_seen_nowhere() -> None:
         nodes = [random_leaf(rng, 1.2) for _ in range(5)] + [random_node(rng, 1)]
         graph = replace(lower(schema.Scene(nodes=nodes), SOLIDS, None, Diagnostics()), stage=stage)
         context = Context(SOLIDS, Diagnostics())
-        for step in PASSES[: [step.run for step in PASSES].index(linearise) + 1]:
+        for step in PASSES[: [step.run for step in PASSES].index(flatten) + 1]:
             graph = step.run(graph, context)
         left = drop_hidden(drop_unseen(graph, context), context)
         if context.diagnostics.errors or len(left.root.links) == len(graph.root.links):
@@ -187,12 +190,13 @@ def test_what_is_in_a_later_sphere_is_left_out() -> None:
     small = schema.Object("torus", (schema.Scale.uniform(0.4), schema.Twist(2.0)))
     scene = schema.Scene(nodes=[small, schema.Object("sphere", schema.Scale.uniform(0.9))])
     (*_, last), _ = stages_of(scene, random.Random(0))
-    assert [leaf.geometry for _, leaf in last.rows()] == ["sphere"]
+    assert [row.leaf.geometry for row in last.rows()] == ["sphere"]
 
 
 def test_colours_are_linear() -> None:
     red = schema.Material("diffuse", (schema.Color((0.5, 0.0, 0.0)), schema.Grayscale(1.0)))
     (first, *_), _ = stages_of(schema.Scene(nodes=schema.Object("sphere", (), red)), random.Random(0))
-    (_, leaf), *_ = first.rows()
+    leaf = first.root.links[0].node
+    assert isinstance(leaf, Leaf)
     grey = 0.2126 * ((0.5 + 0.055) / 1.055) ** 2.4
     assert leaf.look.colour() == pytest.approx((grey, grey, grey))

@@ -85,7 +85,7 @@ def test_scenes_have_what_passes_look_for() -> None:
     for seed in range(200):
         found = dict(stages(full_scene(seed)) or ())
         if found:
-            rows = [(link.node, link.op) for link in found["linearise"].root.links]
+            rows = [(link.node, link.op) for link in found["flatten"].root.links]
             twins += len(set(rows)) < len(rows)
             dropped += len(rows) > len(found["drop_hidden"].root.links)
     assert twins > 5

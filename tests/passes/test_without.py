@@ -27,5 +27,5 @@ def test_rows_stay_one_to_one_without_dropping() -> None:
 
 
 def test_a_needed_pass_cannot_be_left_out() -> None:
-    with pytest.raises(ValueError, match="linearise"):
-        compile_scene(nsg.loads(SCENE), without={"linearise"})
+    with pytest.raises(ValueError, match="flatten"):
+        compile_scene(nsg.loads(SCENE), without={"flatten"})

@@ -91,22 +91,28 @@ def chain_distance(points: np.ndarray, geometry: str, transforms: list[schema.Tr
     return polygon_distance(points, corners(geometry)) * scale
 
 
-def combine(op, distance, colour, d, c):
+def combine(op, distance, colour, d, c, k=None):
     """One step of the fold: (D, C) and (d, c) to (D, C)."""
     if op == "union":
         later = d < np.maximum(distance, 0)
         return np.minimum(distance, d), np.where(later[:, None], c, colour)
     if op == "subtract":
-        return np.maximum(distance, -d), colour
-    if op == "intersect":
-        return np.maximum(distance, d), colour
-    with np.errstate(invalid="ignore"):
-        h = np.clip(0.5 + 0.5 * (distance - d) / K, 0, 1)
-        blended = distance + (d - distance) * h - K * h * (1 - h)
-    # An empty operand is at infinity, where the mix has no value but the limit does.
-    blended = np.where(h == 1, d, np.where(h == 0, distance, blended))
+        d = -d
+    if op != "smooth":
+        return np.maximum(distance, d) if not k else -blended(-distance, -d, k)[0], colour
+    distance, h = blended(distance, d, k or K)
     h = h[:, None]
-    return blended, colour * (1 - h) + c * h
+    return distance, colour * (1 - h) + c * h
+
+
+def blended(distance, d, k):
+    """D behind a blend, and the share of the later operand."""
+    with np.errstate(invalid="ignore"):
+        h = np.clip(0.5 + 0.5 * (distance - d) / k, 0, 1)
+        # An empty operand is at infinity, where the mix has no value but the limit does.
+        h = np.where(np.isnan(h), 0.5, h)
+        found = distance + (d - distance) * h - k * h * (1 - h)
+    return np.where(h == 1, d, np.where(h == 0, distance, found)), h
 
 
 def colour_of(material: schema.Material | None) -> np.ndarray:
@@ -119,15 +125,15 @@ def colour_of(material: schema.Material | None) -> np.ndarray:
 
 def tree_picture(scene: schema.Scene, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """D (P,) and C (P, 3) of a scene at world points (P, 2)."""
-    links = [("union", node) for node in scene.nodes]
+    links = [("union", node, None) for node in scene.nodes]
     return _fold(links, points, [], None)
 
 
 def _fold(links, points, outer, material):
     state = np.full(len(points), np.inf), np.ones((len(points), 3))
-    for index, (op, node) in enumerate(links):
+    for index, (op, node, k) in enumerate(links):
         value = _node(node, points, outer, material)
-        state = value if index == 0 else combine(op, *state, *value)
+        state = value if index == 0 else combine(op, *state, *value, k)
     return state
 
 
@@ -138,10 +144,10 @@ def _node(node, points, outer, material):
         d = chain_distance(points, node.geometry, transforms)
         return d, np.broadcast_to(colour_of(material), (len(points), 3))
     if isinstance(node, schema.Chain):
-        links = [(link.op, link.node) for link in node.children]
+        links = [(link.op, link.node, link.k) for link in node.children]
     else:
-        op = node.op if isinstance(node, schema.Boolean) else "union"
-        links = [(op, child) for child in node.children]
+        op, k = (node.op, node.k) if isinstance(node, schema.Boolean) else ("union", None)
+        links = [(op, child, k) for child in node.children]
     return _fold(links, points, transforms, material)
 
 
@@ -168,13 +174,23 @@ def moved_distance(points: np.ndarray, geometry: str, moves) -> np.ndarray:
 
 
 def stream_picture(graph: Graph, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """D (P,) and C (P, 3) of a compiled stream at world points (P, 2)."""
-    state = np.full(len(points), np.inf), np.ones((len(points), 3))
-    for index, link in enumerate(graph.root.links):
-        leaf = link.node
+    """D (P,) and C (P, 3) of a compiled stream at world points (P, 2), with a stack of states."""
+    nothing = np.full(len(points), np.inf), np.ones((len(points), 3))
+    stack, waiting = [nothing], []
+    for index, row in enumerate(graph.rows()):
+        leaf = row.leaf
         colours = np.tile(leaf.look.colour(), (len(points), 1))
         value = moved_distance(points, leaf.geometry, leaf.moves), colours
-        state = value if index == 0 else combine(link.op, *state, *value)
+        if row.begins:
+            waiting.append((row.op, row.k))
+            stack.append(value)
+        else:
+            stack[-1] = value if index == 0 else combine(row.op, *stack[-1], *value, row.k)
+        for _ in range(row.ends):
+            inner = stack.pop()
+            op, k = waiting.pop()
+            stack[-1] = combine(op, *stack[-1], *inner, k)
+    (state,) = stack
     return state
 
 
@@ -189,7 +205,7 @@ def graph_picture(graph: Graph, points: np.ndarray) -> tuple[np.ndarray, np.ndar
         state = np.full(len(points), np.inf), np.ones((len(points), 3))
         for index, link in enumerate(node.links):
             value = visit(link.node, moves)
-            state = value if index == 0 else combine(link.op, *state, *value)
+            state = value if index == 0 else combine(link.op, *state, *value, link.k)
         return state
 
     return visit(graph.root, ())

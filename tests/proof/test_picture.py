@@ -83,7 +83,7 @@ def test_fewer_pixels_are_asked_at_a_time_where_more_objects_reach_them() -> Non
     scene = nsg.loads("canvas(64, 32); square { scale(9); } square { scale(0.5); translate(-1.5, 0.5); }")
     graphs: dict[str, Any] = {}
     nsg.compile(scene, after=graphs.__setitem__)
-    stream = Stream(graphs["linearise"], load_manifest("shapes2d"), {})
+    stream = Stream(graphs["flatten"], load_manifest("shapes2d"), {})
     assert stream.crowd(scene.canvas) == pytest.approx(1 + 1 / 8)
 
 

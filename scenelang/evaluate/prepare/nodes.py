@@ -128,9 +128,10 @@ def _run_nested(body: Body, env: Env, inside: Builder, session: Session, span: S
 
 def _width(stmt: nodes.Node | nodes.Combined, place: Place) -> Callable[[Env], float | None]:
     """The k of a word that joins, None where none is written."""
-    word, given = KEYWORDS["smooth"], prepare_arguments(stmt.args, place)
+    word = KEYWORDS[stmt.op if isinstance(stmt, nodes.Combined) else stmt.kind]
+    given = prepare_arguments(stmt.args, place)
     bound = bind(place.report, nodes.Name(stmt.keyword, word.name), word.params, word.required, given)
-    if bound is None or bound[0] is None:
+    if not bound or bound[0] is None:
         return lambda env: None
     get, operand = bound[0].code.run, bound[0].arg.value
     check = guarded(place, _above_0, operand.span, (operand,))

@@ -50,7 +50,7 @@ _RANGE: Final = "ranges are written with `..`"
 ONCE: Final = "`<n>` cannot be changed"
 ONCE_HELP: Final = "names keep their values; bind another one with let, or count with for (i in 0..<n) { … }"
 _BRACKETS: Final = "vectors stand in brackets"
-_WIDTH: Final = "of boolean words only `smooth` has one, the width of its blend: smooth(k = 0.3) { … }"
+_WIDTH: Final = "the width of a blend stands with `smooth`, `subtract` or `intersect`: smooth(k = 0.3) { … }"
 _BLOCKS: Final = "write camera(eye = [0, 1, 6]); light(position = [2, 4, 3]); sphere { translate(0, 1, 0); }"
 _IMPORT: Final = "functions are there without an import"
 

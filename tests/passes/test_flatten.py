@@ -1,4 +1,4 @@
-"""The boolean rule: what is rewritten to which stream, and what is refused with both operands underlined."""
+"""Any tree of booleans: which operands go on in the open state, and which become groups."""
 
 from __future__ import annotations
 
@@ -44,16 +44,16 @@ def check(text: str) -> tuple[str, Diagnostics]:
         assert alone is not None
         row = check_scene(alone, None, Diagnostics(), load_manifest("shapes2d")).root.links[0].node
         names[row.geometry, tuple(move.step for move in row.moves)] = letter
-    stream = "".join(
-        SHORT[link.op] + names[link.node.geometry, tuple(move.step for move in link.node.moves)]
-        for link in stages["linearise"].root.links
-    )
+    stream = ""
+    for row in stages["flatten"].rows():
+        name = names[row.leaf.geometry, tuple(move.step for move in row.leaf.moves)]
+        stream += SHORT[row.op] + "(" * row.begins + name + ")" * row.ends
     return stream, diagnostics
 
 
 def tree(text: str) -> str:
     """``U{…}`` for union and so on, so that leaves can be single small letters."""
-    words = {"U": "union", "M": "smooth", "S": "subtract", "I": "intersect", "G": "group", "C": "chain"}
+    words = {"R": "subtract(k = 0.1)", "U": "union", "M": "smooth", "S": "subtract", "I": "intersect", "G": "group"}
     out = ""
     for char in text:
         out += f"{words[char]} " if char in words else LEAVES.get(char, char)
@@ -83,40 +83,27 @@ REWRITES = {
     "U{a S{}}": "a",
     "I{a b G{}}": "",
     "U{I{a G{}} b}": "b",
-    # a u (b - c) where bounds prove a and b apart
-    "U{p S{r s}}": "r-sp",
-    "U{p I{r s}}": "r&sp",
-    "U{p U{a S{r s}}}": "par-s",
-    # composites apart, one after the other
-    "U{S{p q} S{r s}}": "p-qr-s",
-    "U{M{p q} M{r s}}": "p~qr~s",
-    "U{p M{r s}}": "pr~s",
-    "U{S{p u} S{r s}}": "p-ur-s",
-    # an operator of the second reaches the first, none of the first the second
-    "U{S{p q} S{r v}}": "r-vp-q",
-    "U{S{p q} I{r s}}": "r&sp-q",
-    "U{S{p q} I{x y}}": "x&yp-q",
-}
-
-REFUSALS = {
-    "S{a I{b c}}": ("E0402", "intersect", "square"),
-    "I{a U{b c}}": ("E0403", "union", "square"),
-    "S{a S{b c}}": ("E0402", "subtract", "square"),
-    "M{a U{b c}}": ("E0404", "union", "square"),
-    "M{a G{b c}}": ("E0404", "group", "square"),
-    "M{a M{b c}}": ("E0404", "smooth", "square"),
-    "I{a M{b c}}": ("E0403", "smooth", "square"),
-    "S{a M{b c}}": ("E0402", "smooth", "square"),
-    "U{a S{b c}}": ("E0401", "subtract", "square"),
-    "U{a M{b c}}": ("E0401", "smooth", "square"),
-    "U{a I{b c}}": ("E0401", "intersect", "square"),
-    # both operators reach the other composite
-    "U{S{p u} S{r v}}": ("E0401", "subtract", "square"),
-    # intersect reaches everything, and the first has one too
-    "U{I{p q} I{r s}}": ("E0401", "intersect", "square"),
-    # no swap when a smooth follows
-    "M{U{p S{r s}} a}": ("E0401", "subtract", "square"),
-    "M{U{p S{r s}} U{a} b}": ("E0401", "subtract", "square"),
+    # what a left fold does not equal
+    "S{a I{b c}}": "a-(b&c)",
+    "S{a S{b c}}": "a-(b-c)",
+    "I{a U{b c}}": "a&(bc)",
+    "I{a M{b c}}": "a&(b~c)",
+    "M{a U{b c}}": "a~(bc)",
+    "M{a G{b c}}": "a~(bc)",
+    "M{a M{b c}}": "a~(b~c)",
+    "U{a S{b c}}": "a(b-c)",
+    "U{S{a b} S{c d}}": "a-b(c-d)",
+    # what follows in an operand is taken off its end
+    "U{a U{S{b c} d}}": "a(b-c)d",
+    "S{a U{I{b c} d}}": "a-(b&c)-d",
+    "I{a S{U{b c} d}}": "a&(bc)-d",
+    "I{a I{b S{c d}}}": "a&b&c-d",
+    "M{a U{b c} d}": "a~(bc)~d",
+    "U{a S{b M{c d}} p}": "a(b-(c~d))p",
+    # not where an edge has a width
+    "R{a U{b c}}": "a-(bc)",
+    "I{a R{b c}}": "a&(b-c)",
+    "I{a S{R{b c} d}}": "a&(b-c)-d",
 }
 
 
@@ -127,41 +114,28 @@ def test_rewritten(text: str) -> None:
     assert stream == REWRITES[text]
 
 
-@pytest.mark.parametrize("text", REFUSALS)
-def test_refused_with_both_operands_underlined(text: str) -> None:
-    code, operand, other = REFUSALS[text]
-    _, diagnostics = check(tree(text))
-    (error,) = diagnostics.errors
-    assert error.code == code
-    assert error.span is not None
-    assert error.span.text.split()[0] == operand
-    assert other in {label.span.text.split()[0] for label in error.labels}
-    assert error.help
-
-
-def test_every_refusal_is_found() -> None:
-    _, diagnostics = check(tree("U{S{a I{b c}} S{p S{q I{p q}}}}") + tree("M{a G{b S{c I{a b}}}}"))
-    codes = sorted(error.code for error in diagnostics.errors)
-    assert codes == ["E0402", "E0402", "E0402", "E0402", "E0404"]
-
-
 def test_an_empty_intersection_warns() -> None:
     _, diagnostics = check(tree("I{a G{}}"))
     assert [d.code for d in diagnostics if d.code == "W0401"] == ["W0401"]
 
 
-def test_a_stream_of_tiles_is_found_apart() -> None:
-    """A grid of composites, where one box around all before would touch the next."""
-    text = (
-        "for (i in 0..<12) { for (j in 0..<12) { subtract { pentagon { scale(0.05); } star { scale(0.03); }"
-        " translate(-0.9 + 0.15 * i, -0.9 + 0.15 * j); } } }"
-    )
-    diagnostics = Diagnostics()
-    scene, spans = load_source(SourceFile("tiles.nsg", text), diagnostics=diagnostics)
-    assert scene is not None
-    graph = check_scene(scene, spans, diagnostics, load_manifest("shapes2d"))
+def nested(depth: int) -> str:
+    """A leaf in so many groups, each cut out of another leaf."""
+    return "S{a " * depth + "I{b c}" + "}" * depth
+
+
+def test_fifteen_groups_deep() -> None:
+    stream, diagnostics = check(tree(nested(15)))
     assert not diagnostics.errors
-    assert len(graph.root.links) == 288
+    assert stream == "a-" + "(a-" * 14 + "(b&c" + ")" * 15
+
+
+def test_deeper_is_an_error_that_names_the_node() -> None:
+    _, diagnostics = check(tree(nested(16)))
+    (error,) = diagnostics.errors
+    assert error.code == "E0409"
+    assert error.span is not None
+    assert error.span.text.startswith("intersect")
 
 
 @pytest.mark.parametrize("shape", ["left", "right"])
