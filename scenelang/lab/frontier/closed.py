@@ -119,6 +119,9 @@ class ClosedSolids(SolidArrays):
 
     def cell(self, token: int, width: float) -> tuple[Cell, ...]:
         """The token in the place of the first weight, the width of blends in that of the second."""
+        return self.cut(token, width if token == SMOOTH else 0.0)
+
+    def cut(self, token: int, width: float) -> tuple[Cell, ...]:
         token_, width_, none = (np.full((1, 1), value, np.float32) for value in (token, width, 0.0))
         return (Cell(token_, width_, none, none, none),) * len(Wanted)
 
@@ -172,4 +175,5 @@ def _joined(token: Any, k: Array, state: Array, d: Array) -> Array:
     if token == UNION:
         return np.stack([np.minimum(state, d), d < state, d < np.maximum(state, 0)])
     d = -d if token == SUBTRACT else d
-    return np.stack([np.maximum(state, d), d > state, 0 * d])
+    h = np.where(k > 0, (0.5 + 0.5 * (d - state) / np.maximum(k, 1e-9)).clip(0, 1), d > state)
+    return np.stack([(1 - h) * state + h * (d + k * (1 - h)), h, 0 * d])
