@@ -15,7 +15,8 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.measure.sets import SETS
 from scenelang.measure.sets import random_scene as random_set_scene
-from scenelang.scene.schema import Scene
+from scenelang.measure.solid_sets import SOLID_SETS, random_solid
+from scenelang.scene.schema import Camera, Scene
 from tests.passes.random_scenes import blob_scene, full_scene, random_scene
 from tests.viewer.live import (
     check_picture,
@@ -95,6 +96,20 @@ def test_random_trees_of_space(viewer_page: Any) -> None:
     scenes = (SourceFile(f"solid {n}", solid_text(random.Random(n))) for n in range(200))
     good, refused = agree(viewer_page, scenes, model="solids3d")
     assert min(good, refused) > 30
+
+
+def test_eyes_in_trees(viewer_page: Any) -> None:
+    """Inside what is opaque, in holes, in mist, and outside."""
+    scenes = []
+    for n in range(80):
+        rng = np.random.default_rng(n)
+        scene = random_solid(rng, SOLID_SETS["trees"])
+        eye = tuple(rng.uniform(-0.7, 0.7, 3).tolist())
+        scene = scene.model_copy(update={"camera": Camera(eye, (9.0, 0.5, 0.0))})
+        scenes.append(SourceFile(str(n), scene.to_nsg()))
+    good, refused = agree(viewer_page, scenes)
+    assert good > 30
+    assert refused >= 5
 
 
 DEEP = "module m(n) { intersect { square; union { if (n > 1) { m(n - 1); } triangle; star; } } } m(n);"
