@@ -38,13 +38,15 @@ rng = np.random.default_rng(7)
 
 def everywhere(solids: SolidField, p: np.ndarray, gradient: bool = False) -> Meeting:
     """What a field answers where every object is met."""
-    count = len(solids.solids)
+    xp, like, count = solids.xp, solids.network.codes, len(solids.solids)
     slots = np.zeros((SLOT, count, p.shape[1]), np.float32)
     drawn = np.array([solid.draws for solid in solids.solids])
     slots[OBJECT] = np.where(drawn, np.arange(count), -1 - np.arange(count))[::-1, None]
-    slots[WAY] = np.moveaxis(np.tensordot(solids.linear, p, ((1,), (0,))), 1, 0).swapaxes(0, 1)[:, ::-1]
+    slots[WAY] = np.einsum("ijn,jp->inp", xp.to_numpy(solids.linear), p)[:, ::-1]
     slots[END] = INF
-    return solids.meet(Passes(slots, solids.shift), np.ones_like(p[0]), Wanted.ALL, gradient)
+    passes = Passes(xp.array(slots, like), solids.shift)
+    with xp.inference():
+        return solids.meet(passes, xp.array(np.ones_like(p[0]), like), Wanted.ALL, gradient)
 
 
 def test_frames_lead_back_step_by_step() -> None:
