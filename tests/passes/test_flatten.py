@@ -53,7 +53,8 @@ def check(text: str) -> tuple[str, Diagnostics]:
 
 def tree(text: str) -> str:
     """``U{…}`` for union and so on, so that leaves can be single small letters."""
-    words = {"R": "subtract(k = 0.1)", "U": "union", "M": "smooth", "S": "subtract", "I": "intersect", "G": "group"}
+    words = {"U": "union", "M": "smooth", "S": "subtract", "I": "intersect", "G": "group"}
+    words["R"] = "subtract(k = 0.1)"
     out = ""
     for char in text:
         out += f"{words[char]} " if char in words else LEAVES.get(char, char)

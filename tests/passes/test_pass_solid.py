@@ -75,8 +75,7 @@ def widened(graph: Graph, rng: random.Random) -> Graph:
 
     def node(fold: Fold) -> Fold:
         links = [
-            Link(x.op, x.node if isinstance(x.node, Leaf) else node(x.node), width(x.op))
-            for x in fold.links
+            Link(x.op, x.node if isinstance(x.node, Leaf) else node(x.node), width(x.op)) for x in fold.links
         ]
         return Fold(fold.kind, tuple(links), fold.moves, fold.span)
 

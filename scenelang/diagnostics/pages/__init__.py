@@ -5,6 +5,7 @@ documentation site (which renders each file of this folder as ``errors/CODE.html
 index), and the tests, which run every example.
 
 - The first line is ``# CODE: title``. Codes are stable and never reused.
+- A title that begins with ``retired:`` is of a code that is not given any more; its examples are good ones.
 - The sections ``## Why``, ``## Example`` and ``## Instead`` follow the paragraph that says what it is.
 - A fence ``nsg {.bad}`` gives exactly this code, ``nsg {.good}`` nothing at all; ``json`` is a Scene for
   `scenelang.scene.json`, ``python`` is run and raises `SceneError`.
@@ -64,6 +65,11 @@ class Page(Record):
     @property
     def title(self) -> str:
         return self.text.partition("\n")[0].partition(": ")[2]
+
+    @property
+    def retired(self) -> bool:
+        """Whether no diagnostic has this code any more; it is not used again."""
+        return self.title.startswith("retired: ")
 
     @property
     def severity(self) -> str:
