@@ -26,6 +26,7 @@ from scenelang.viewer.script import script
 from scenelang.viewer.view import view_of
 from tests.browser import watched
 from tests.elements.shapes import element, noise, torus
+from tests.renderers.test_group_steps import LEFT, scene_of
 
 pytestmark = pytest.mark.browser
 
@@ -200,46 +201,9 @@ def test_trees_are_the_networks(page: Any, seed: int) -> None:
     assert psnr(pictured(page, program), network_picture(program)) > 40
 
 
-SEEN = {
-    "beads": """
-        intersect {
-            sphere { scale(1.1); }
-            union {
-                sphere { scale(0.2); translate(-0.6, 0.2, 0.5); }
-                sphere { scale(0.25); translate(0.5, 0.1, 0.6); }
-            }
-        }
-        """,
-    "hole": """
-        subtract {
-            sphere;
-            subtract {
-                sphere { scale(0.9); translate(0.25, 0.25, 0.6); }
-                sphere { scale(0.16); translate(0, 0.2, 0.35); }
-                sphere { scale(0.1); translate(0.3, 0.45, 0.35); }
-            }
-        }
-        """,
-    "mist": """
-        intersect {
-            sphere { material volumetric; }
-            union {
-                sphere { scale(0.4); translate(-0.6, 0.2, 0.5); }
-                subtract {
-                    sphere { scale(0.6); translate(0.5, 0.1, 0.3); }
-                    sphere { scale(0.2); translate(0.5, 0.3, 0.6); }
-                }
-            }
-        }
-        sphere { scale(0.3); translate(-0.2, -0.3, 0.3); }
-        """,
-}
-
-
-@pytest.mark.parametrize("name", SEEN)
+@pytest.mark.parametrize("name", LEFT)
 def test_rays_meet_what_groups_leave(page: Any, name: str) -> None:
-    """Of all that a ray has met nothing may be left, until it comes to what else the group is made of."""
-    scene = nsg.loads(f"canvas(64, 48); camera(eye = [0, 1.2, 4]); {SEEN[name]}")
+    scene = scene_of(name)
     picture = pictured(page, nsg.compile(scene))[..., :3]
     assert psnr(picture, np.asarray(nsg.render(scene, backend="reference"))) > 45
 
