@@ -60,7 +60,7 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
     config = network.config
     if not config.features == config.state == 1:
         raise ProgramError("a network that knows more than distances, which no page draws")
-    cells = field.rounded(network.cell_weights(), config.state)
+    cells = field.rounded(Cell(*network.cell_weights()), config.state)
     cell = Cell(*(np.delete(part, field.ROUNDED + TOKENS["smooth"], 0) for part in cells))
     lines = np.concatenate([cell[0], cell[1][..., None]], 2)  # (kinds, 1 + L, 3)
     ends = np.concatenate([cell[2][:, 0], cell[3][:, 0]], 1)  # (kinds, 2)
