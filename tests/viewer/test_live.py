@@ -11,12 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+import scenelang as nsg
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
+from scenelang.lifting.layout import LAYOUTS
 from scenelang.measure.sets import SETS
 from scenelang.measure.sets import random_scene as random_set_scene
 from scenelang.measure.solid_sets import SOLID_SETS, random_solid
+from scenelang.program.groups import OPERATOR, felt, read_groups, widths_of
 from scenelang.scene.schema import Camera, Scene
+from scenelang.viewer.view import view_of
 from tests.passes.random_scenes import blob_scene, full_scene, random_scene
 from tests.viewer.live import (
     check_picture,
@@ -96,6 +100,19 @@ def test_random_trees_of_space(viewer_page: Any) -> None:
     scenes = (SourceFile(f"solid {n}", solid_text(random.Random(n))) for n in range(200))
     good, refused = agree(viewer_page, scenes, model="solids3d")
     assert min(good, refused) > 30
+
+
+def test_rows_of_trees_matter_as_far_as_programs_have_it(viewer_page: Any) -> None:
+    told = "seen.total, seen.widest, seen.count, always || seen.hidden"
+    ask = f"(rows) => joinsOf(rows).map(({{ seen, always }}) => [{told}])"
+    for seed in range(60):
+        program = nsg.compile(any_scene(seed))
+        blends = program.vectors[:, LAYOUTS["plane"].blend]
+        known = felt(
+            read_groups(program.tokens), widths_of(program.tokens.astype(np.intp) & OPERATOR, blends)
+        )
+        found = viewer_page.evaluate(ask, view_of(program).data["program"]["rows"])
+        np.testing.assert_allclose(np.array(found, float).T, np.array(known[:4], float), rtol=1e-6)
 
 
 def test_eyes_in_trees(viewer_page: Any) -> None:

@@ -28,7 +28,7 @@ function stretched([kind, ...strengths], radius) {
 export function solidBalls(rows, joins, network, boxOf) {
   const deepest = rows.reduce((most, row) => Math.max(most, row.scale * (1 + Math.abs(row.amount))), 0);
   return rows.map((row, i) => {
-    const { widest, count, hidden } = joins[i];
+    const { widest, count, hidden } = joins[i].seen;
     const blends = widest * (1 + count / 4) + (hidden ? deepest : 0);
     const radius = 1 + network.slack + Math.abs(row.amount) + blends / row.scale;
     const mapped = row.steps.length > 0 && row.steps[0][0] === "map";

@@ -3,22 +3,19 @@
 
 export const SMOOTH = 1;
 export const SUBTRACT = 2;
-export const INTERSECT = 3;
+const INTERSECT = 3;
 export const OPERATOR = 3; // of a token: mask of the operator,
 export const BEGINS = 4; // bit of a row that begins a group,
 export const ENDS = 3; // and shift of the number of groups that end behind it
-
-/** The place of an operator's lines among a network's: behind the four those of cuts that have a width. */
-export const kindOfCell = (operator, blend) => operator + (operator > SMOOTH && blend > 0 ? 2 : 0);
 
 /**
  * What a row's token says, row by row, and how far it matters.
  *
  * `operator` and `blend` join it to the group `around` it (null: the stream), of which it may be the `first`;
  * `draws`: whether it may be seen where nothing was before; `adds`: whether it takes nothing away; `always`:
- * whether what was before ends outside of it, or of its group; `total`, `widest` and `count` of the widths of the
- * blends that see it; `blends`: whether there are any, or one makes its edge; `hidden`: whether it matters
- * wherever it is, being cut out of what a blend sees.
+ * whether what was before ends outside of it, or of its group; `seen`: by which blends, `total`, `widest` and
+ * `count` of their widths; whether by any, or one makes its edge (`blends`); whether these see how deep inside it
+ * points are (`inside`); whether it matters wherever it is, being cut out of what they see (`hidden`).
  */
 export function joinsOf(rows) {
   const joins = [];
@@ -38,7 +35,7 @@ export function joinsOf(rows) {
       group.later = later;
       later = operandSeen(later, group);
     }
-    Object.assign(row, operandSeen(later, row));
+    row.seen = operandSeen(later, row);
     later = beforeSeen(later, row);
     if (row.first) later = beforeSeen(row.around.later, row.around);
   }
@@ -47,7 +44,8 @@ export function joinsOf(rows) {
 
 function joint(operator, blend, around, more) {
   return {
-    operator, blend, around, kind: kindOfCell(operator, blend),
+    operator, blend, around,
+    kind: operator + (operator > SMOOTH && blend > 0 ? 2 : 0), // the cell's: behind operators rounded cuts
     draws: operator <= SMOOTH && (around?.draws ?? true),
     adds: (operator !== SUBTRACT) === (around?.adds ?? true),
     ...more,
@@ -57,6 +55,7 @@ function joint(operator, blend, around, more) {
 /** What sees the operand of an operator. */
 function operandSeen(later, { operator, blend }) {
   const hidden = later.hidden || (operator === SUBTRACT && later.inside);
+  if (!(blend > 0) && hidden === later.hidden) return later;
   if (blend > 0 && operator !== INTERSECT) return wider({ ...later, hidden }, blend, operator === SMOOTH);
   return { ...later, hidden, blends: later.blends || blend > 0, inside: later.inside || blend > 0 };
 }

@@ -108,12 +108,12 @@ function packed({ network, materials }, leaves, pictures, { rows }, joins, reach
 
 /** How a row joins, as plane.glsl has it. */
 function flagsOf(join) {
-  const far = join.always || (join.hidden && join.operator < 2);
-  return join.kind + 8 * join.blends + 16 * far + 32 * hides(join);
+  const far = join.always || (join.seen.hidden && join.operator < 2);
+  return join.kind + 8 * join.seen.blends + 16 * far + 32 * hides(join);
 }
 
 /** Whether nothing is seen of what was before, where a row is solid. */
-const hides = ({ operator, around, blends }) => operator === 0 && around === null && !blends;
+const hides = ({ operator, around, seen }) => operator === 0 && around === null && !seen.blends;
 
 /** Tiles' lists as texels: where each begins and how long it is, then texels of rows, four to one. */
 function listed({ starts, objects }, begins) {

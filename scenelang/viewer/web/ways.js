@@ -73,7 +73,7 @@ function extent(way, x, y, radius) {
 
 /** Leaf units from each object's origin beyond which it makes no difference, Infinity where it always may. */
 export function reaches(rows, joins, { slack, farther, farthest }) {
-  return Float64Array.from(joins, ({ always, hidden, total, widest }, i) => (
+  return Float64Array.from(joins, ({ always, seen: { hidden, total, widest } }, i) => (
     always || hidden ? Infinity : 1 + slack + Math.min(farther * total, farthest * widest) / rows[i].scale
   ));
 }
