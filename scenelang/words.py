@@ -116,9 +116,7 @@ NODES: Final = _table(
         "smooth", "k?", "Joins with a blend, of shape and colour.", ("its width, 0.15 by default",), "smooth"
     ),
     _call("subtract", "k?", "Cuts the object out of what came before.", _ROUNDS, "subtract"),
-    _call(
-        "intersect", "k?", "Keeps of what came before only what lies in the object.", _ROUNDS, "intersect"
-    ),
+    _call("intersect", "k?", "Keeps of what came before only what lies in the object.", _ROUNDS, "intersect"),
 )
 MATERIAL: Final = _table(
     _word(

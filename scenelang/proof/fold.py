@@ -79,51 +79,44 @@ def enclosed(
     """
     count, pairs = len(meetings.columns), len(joins.tokens)
     shut, opened = np.empty((2, pairs), bool)
-    hidden = np.zeros((1 if nest is None else nest.levels, count), bool)
-    states = [_State.empty(count) for _ in hidden]
+    hidden = np.zeros(count * (1 if nest is None else nest.levels), bool)
+    state = _State.empty(len(hidden))
     if nest is None or groups is None:
         for part in meetings.slots():
             own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
-            shut[part], opened[part] = states[0].join(slice(part.stop - part.start), *own, joins.some(part))
+            shut[part], opened[part] = state.join(slice(part.stop - part.start), *own, joins.some(part))
         for part in reversed(meetings.slots()):
             n = part.stop - part.start
-            shut[part] |= hidden[0, :n]
-            hidden[0, :n] |= opened[part]
+            shut[part] |= hidden[:n]
+            hidden[:n] |= opened[part]
     else:
-        done = []  # of groups that ended, round by round: which changed nothing, and which left nothing else
+        done = []  # of groups that ended, round by round: where they join, and what came of it
 
         def close(closings: list[Closing]) -> None:
             for columns, ended, level in closings:
-                flags = np.empty((2, len(columns)), bool)
-                for at in np.unique(level).tolist():
-                    some = np.flatnonzero(level == at)
-                    here, how = columns[some], groups.some(ended[some])
-                    flags[:, some] = states[at - 1].join(here, *states[at].at(here), how)
-                    states[at].clear(here)
-                done.append((columns, level, flags))
+                top, below = level * count + columns, (level - 1) * count + columns
+                done.append((top, below, state.join(below, *state.at(top), groups.some(ended))))
+                state.clear(top)
 
         def reopen(closings: list[Closing]) -> None:
             for _ in closings:
-                columns, level, (closed, wide) = done.pop()
-                hidden[level, columns] = hidden[level - 1, columns] | closed
-                hidden[level - 1, columns] |= wide
+                top, below, (closed, wide) = done.pop()
+                hidden[top] = hidden[below] | closed
+                hidden[below] |= wide
 
         for part, level, fresh, before, after in nest.turns:
             close(before)
-            for at in np.unique(level).tolist():
-                here = np.flatnonzero(level == at)
-                which = part.start + here
-                own = Enclosure(*(d[which] for d in distance)), Enclosure(*(c[:, which] for c in colour))
-                how = joins.some(which)._replace(fresh=fresh[here])
-                shut[which], opened[which] = states[at].join(here, *own, how)
+            own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
+            places, how = level * count + np.arange(len(level)), joins.some(part)._replace(fresh=fresh)
+            shut[part], opened[part] = state.join(places, *own, how)
             close(after)
         for part, level, _, before, after in reversed(nest.turns):
             reopen(after)
-            here = np.arange(len(level))
-            shut[part] |= hidden[level, here]
-            hidden[level, here] |= opened[part]
+            places = level * count + np.arange(len(level))
+            shut[part] |= hidden[places]
+            hidden[places] |= opened[part]
             reopen(before)
-    (low, high), (first, last) = states[0]
+    (low, high), (first, last) = (tuple(side[..., :count] for side in pair) for pair in state)
     if len(behind) > 3:
         first, last = (np.vstack([c, np.ones(count)]) for c in (first, last))
     back = behind[:, None]

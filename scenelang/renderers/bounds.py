@@ -62,21 +62,20 @@ def shown(
         joins: cells of these groups, which come last.
     """
     blocks, given = len(meetings.columns), meetings.pairs.open
-    states = [_State.empty(empty, blocks)]
+    state = _State.empty(empty, blocks * (1 if nest is None else nest.levels))
     shut, wide = np.zeros((2, len(given)), bool)
     if nest is None or joins is None:
         gates = _Gates.of(cell, distance, given)
         for part in meetings.slots():
             own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
-            shut[part], wide[part] = states[0].join(slice(part.stop - part.start), own, gates.some(part))
+            shut[part], wide[part] = state.join(slice(part.stop - part.start), own, gates.some(part))
         wide |= given
     else:
-        states += [_State.empty(empty, blocks) for _ in range(nest.levels - 1)]
-        _nested(states, nest, joins, distance, colours, cell, given, empty, shut, wide)
-    low, high = states[0].distance
+        _nested(state, blocks, nest, joins, distance, colours, cell, given, empty, shut, wide)
+    low, high = (side[:blocks] for side in state.distance)
     covered = Interval((0.5 - slope * high).clip(0.0, 1.0), (0.5 - slope * low).clip(0.0, 1.0))
-    sides = zip(states[0].colour, covered, strict=True)
-    picture = Interval(*(np.vstack([c * share, share]) for c, share in sides))
+    sides = zip(state.colour, covered, strict=True)
+    picture = Interval(*(np.vstack([c[:, :blocks] * share, share]) for c, share in sides))
     return Shown(picture, shut, wide)
 
 
@@ -175,7 +174,8 @@ class _State(NamedTuple):
 
 
 def _nested(
-    states: list[_State],
+    state: _State,
+    blocks: int,
     nest: Nesting,
     joins: Cell,
     distance: Interval,
@@ -186,46 +186,44 @@ def _nested(
     shut: npt.NDArray[np.bool_],
     wide: npt.NDArray[np.bool_],
 ) -> None:
-    """Fold with a stack of states; fills in which pairs are shut, hidden ones too, and which are open."""
-    done = []  # of groups that ended, round by round: which changed nothing, and which left nothing else
+    """Fold with a stack of states; fills in which pairs are shut, hidden ones too, and which are open.
+
+    Args:
+        state: levels of so many blocks, one after the other.
+    """
+    done = []  # of groups that ended, round by round: where they join, and what came of it
 
     def close(closings: list[Closing]) -> None:
         for columns, groups, level in closings:
-            flags = np.empty((2, len(columns)), bool)
-            for at in np.unique(level).tolist():
-                some = np.flatnonzero(level == at)
-                here, never = columns[some], np.zeros(len(some), bool)
-                operand = states[at].at(here)
-                cells = Cell(*(part[..., groups[some]] for part in joins))
-                gates = _Gates.of(cells, operand.distance, never)
-                flags[:, some] = states[at - 1].join(here, operand, gates)
-                states[at].clear(here, empty)
-            done.append((columns, level, flags))
+            top, below = level * blocks + columns, (level - 1) * blocks + columns
+            operand = state.at(top)
+            cells = Cell(*(part[..., groups] for part in joins))
+            gates = _Gates.of(cells, operand.distance, np.zeros(len(columns), bool))
+            done.append((top, below, state.join(below, operand, gates)))
+            state.clear(top, empty)
 
     fresh = np.concatenate([turn.fresh for turn in nest.turns])
     gates = _Gates.of(cell, distance, given | fresh)
     for part, level, _, before, after in nest.turns:
         close(before)
-        for at in np.unique(level).tolist():
-            here = np.flatnonzero(level == at)
-            pairs = part.start + here
-            own = _Operand(*(Interval(x.low[..., pairs], x.high[..., pairs]) for x in (distance, colours)))
-            shut[pairs], wide[pairs] = states[at].join(here, own, gates.some(pairs))
+        own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
+        places = level * blocks + np.arange(len(level))
+        shut[part], wide[part] = state.join(places, own, gates.some(part))
         close(after)
     wide |= given
-    hidden = np.zeros((nest.levels, len(states[0].distance.low)), bool)
+    hidden = np.zeros(nest.levels * blocks, bool)
 
     def reopen(closings: list[Closing]) -> None:
         for _ in closings:
-            columns, level, (closed, opened) = done.pop()
-            hidden[level, columns] = hidden[level - 1, columns] | closed
-            hidden[level - 1, columns] |= opened
+            top, below, (closed, opened) = done.pop()
+            hidden[top] = hidden[below] | closed
+            hidden[below] |= opened
 
     for part, level, _, before, after in reversed(nest.turns):
         reopen(after)
-        columns = np.arange(len(level))
-        shut[part] |= hidden[level, columns]
-        hidden[level, columns] |= wide[part]
+        places = level * blocks + np.arange(len(level))
+        shut[part] |= hidden[places]
+        hidden[places] |= wide[part]
         reopen(before)
 
 

@@ -228,9 +228,13 @@ class Field:
         """The state of points that have met nothing."""
         return float(EMPTY * self.widest / BLEND)
 
-    def cells(self, objects: np.ndarray) -> Cell:
-        """Cells of objects, which come last, on the host."""
-        return Cell(*(part.take(self._cell[objects], -1) for part in self._host))
+    def cells(self, objects: np.ndarray, opened: bool = False) -> Cell:
+        """Cells of objects, which come last, on the host; with gates that are open if asked for."""
+        return Cell(*(part.take(self._cell[objects] + self._opened * opened, -1) for part in self._host))
+
+    def joins(self) -> Cell:
+        """Cells of all groups, which come last, on the host."""
+        return Cell(*(part.take(self._joins, -1) for part in self._host))
 
     def empty(self, groups: int, count: int, register: int = 3) -> Array:
         """State and register (groups, S + R, count) of points that have met nothing."""
@@ -420,12 +424,8 @@ class Field:
         colours = Interval(dark, np.where(self.texture[objects] == NO_TEXTURE, dark, 1.0))
         with np.errstate(all="ignore"):
             nest = self.nesting(meetings)
-            ends = self._host_joins(nest)
-            return shown(meetings, distance, cell, colours, self.nothing, self.slope, nest, ends)
-
-    def _host_joins(self, nest: Nesting | None) -> Cell | None:
-        """Cells of all groups, which come last, on the host."""
-        return None if nest is None else Cell(*(part.take(self._joins, -1) for part in self._host))
+            joins = None if nest is None else self.joins()
+            return shown(meetings, distance, cell, colours, self.nothing, self.slope, nest, joins)
 
 
 def rounded(cells: Cell, s: int) -> Cell:

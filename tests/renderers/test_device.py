@@ -20,6 +20,7 @@ from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
 from scenelang.models.manifest import load_manifest
+from scenelang.program.groups import read_groups
 from scenelang.program.paints import Paint
 from scenelang.program.program import Program
 from scenelang.renderers.coverage import Coverage
@@ -72,6 +73,21 @@ def evaluated(name: str, seed: int) -> nsg.Scene:
     """A scene of an evaluation set."""
     textures = load_manifest("textures2d").textures if SETS[name].textures else ()
     return random_scene(np.random.default_rng([7, seed]), SETS[name], textures)
+
+
+def test_draws_any_tree() -> None:
+    """Groups of several depths, and cuts that round their edges."""
+    depths = set()
+    for seed in (2, 3, 5, 8):
+        p = program(evaluated("trees", seed), (33, 17))
+        depths.add(read_groups(p.tokens).deepest)
+        found = device.draw_on_device(network(), p)
+        usual = draw_objects(load_arrays("shapes2d").network, p, samples="four")
+        assert found is not None
+        np.testing.assert_allclose(
+            premultiplied(found.image), premultiplied(usual.image), rtol=0, atol=EQUAL
+        )
+    assert max(depths) > 1
 
 
 @pytest.mark.parametrize("name", ["shapes2d", "chains", "large", "tiny", "textures2d-mixed"])
@@ -205,24 +221,27 @@ from triton import compile
 from triton.backends.compiler import GPUTarget
 from triton.compiler import ASTSource
 from scenelang.renderers.device.kernel import draw_blocks
-INTEGERS, POINTERS = ("width", "height", "across"), ("starts", "objects", "parts")
+INTEGERS, POINTERS = ("width", "height", "across"), ("starts", "objects", "levels", "parts")
 NUMBERS = ("left", "top", "px", "empty", "slope")
 types = {n: "constexpr" if n.isupper() else "i32" if n in INTEGERS else "fp32" if n in NUMBERS
          else "*i32" if n in POINTERS else "*fp32" for n in draw_blocks.arg_names}
-sizes = dict(SIDE=8, ROW=42, OUTER=3, INNER=2, LINES=2, **eval(sys.argv[2]))
+sizes = dict(SIDE=8, ROW=42, OUTER=3, INNER=2, CELL=31, LINES=2, LEAVES=9, **eval(sys.argv[2]))
 built = compile(ASTSource(draw_blocks, types, sizes), target=GPUTarget("cuda", int(sys.argv[1]), 32),
                 options={"num_warps": 8})
 print(len(built.asm["cubin"]), built.metadata.shared)
 """
 
 
-LARGE, SMALL = {"SAMPLES": 4, "CHANNELS": 3, "WIDTH": 32}, {"SAMPLES": 1, "CHANNELS": 4, "WIDTH": 16}
+LARGE = {"SAMPLES": 4, "CHANNELS": 3, "WIDTH": 32, "LEVELS": 1}
+SMALL = {"SAMPLES": 1, "CHANNELS": 4, "WIDTH": 16, "LEVELS": 1}
+NESTED = {**LARGE, "LEVELS": 4}
 
 
 @pytest.mark.parametrize(
     ("generation", "sizes"),
     [
         (90, LARGE),
+        (90, NESTED),
         *(
             pytest.param(*other, marks=pytest.mark.slow)
             for other in ((75, LARGE), (80, LARGE), (90, SMALL), (100, LARGE))

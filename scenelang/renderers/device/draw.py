@@ -26,7 +26,7 @@ from scenelang.renderers.draw import Drawing, as_image, halved
 from scenelang.renderers.field import Field
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.grid import GridShape
-from scenelang.renderers.meetings import Pairs
+from scenelang.renderers.meetings import Closing, Pairs, meetings_of, nesting
 from scenelang.renderers.network import Decoder, FramedArrays
 from scenelang.renderers.raster import LEVELS, Raster, raster
 from scenelang.renderers.texture import Texture
@@ -51,7 +51,7 @@ def draw_on_device(network: Framed, program: Program, samples: str = "adaptive")
 
     Returns:
         The drawing, None of what the kernel does not know: solids, decoders of more than 32 units, features
-        beside a distance, a state of more than one number, groups, and frames that need float64.
+        beside a distance, a state of more than one number, and frames that need float64.
 
     Raises:
         ProgramError: as `scenelang.renderers.draw.draw`.
@@ -65,7 +65,7 @@ def draw_on_device(network: Framed, program: Program, samples: str = "adaptive")
     versions = [(id(p), 0 if p.is_inference() else p._version) for p in network.parameters()]
     host = on_host(network, tuple(versions))
     field = Field(host, program.vectors, program.tokens, program.brought(), program.paints())
-    if field.frames.wild.any() or field.groups.deepest:
+    if field.frames.wild.any():
         return None
     grid = raster(program.canvas, range(program.canvas[1]))
     pairs = Coverage(field, prove=False).candidates(grid)
@@ -87,13 +87,17 @@ def start(
     """
     (width, height), across = grid.canvas, grid.wide // LEVELS[0]
     blocks = across * grid.high // LEVELS[0]
-    starts = pairs.block.searchsorted(np.arange(blocks + 1))
+    objects, levels, deepest = pairs.object, np.zeros(0, int), 1
+    block = pairs.block
+    if field.groups.deepest:
+        block, objects, levels, deepest = _ordered(field, pairs)
+    starts = block.searchsorted(np.arange(blocks + 1))
     config = field.network.config
     rows, wide = _rows(field), WIDTHS[config.decoder_width > WIDTHS[0]]
     parts, weights = _weights(field, wide)
     behind = np.asarray(() if background is None else background, np.float32)
     out = like.new_empty((height, width, len(behind) or 4))
-    there = upload([starts, pairs.object, rows, parts, weights, behind], out.device)
+    there = upload([starts, objects, levels, rows, parts, weights, behind], out.device)
     launch(
         blocks,
         *(out, *there, width, height, across, grid.left, grid.top, grid.px, field.nothing, field.slope),
@@ -103,8 +107,11 @@ def start(
         ROW=rows.shape[1],
         OUTER=field.layout.outer,
         INNER=field.layout.inner,
+        CELL=_cell_at(field),
         WIDTH=wide,
         LINES=config.paint_lines,
+        LEVELS=1 << (deepest - 1).bit_length(),
+        LEAVES=2 * len(field.tokens) if field.groups.deepest else 0,
     )
     return out
 
@@ -137,20 +144,57 @@ def on_host(network: Framed, versions: tuple[tuple[int, int], ...]) -> FramedArr
     return found
 
 
+def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Blocks, rows and levels of pairs and of the groups that end between them, and how many levels are used.
+
+    The rows of N objects are followed by those of objects that begin a state as they are, and by groups'.
+    """
+    meetings, _ = meetings_of(pairs)
+    nest, count = nesting(meetings, field.groups), len(field.tokens)
+    found = list[tuple[np.ndarray, ...]]()  # columns, rows, levels, moments
+
+    def close(closings: list[Closing]) -> None:
+        for columns, groups, level in closings:
+            found.append((columns, 2 * count + groups, level - 1, np.full(len(columns), len(found))))
+
+    for part, level, fresh, before, after in nest.turns:
+        close(before)
+        rows = meetings.pairs.object[part] + count * fresh
+        found.append((np.arange(len(level)), rows, level, np.full(len(level), len(found))))
+        close(after)
+    columns, rows, levels, moments = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    block = meetings.columns[columns]
+    by = np.lexsort((moments, block))
+    return block[by], rows[by], levels[by], nest.levels
+
+
+def _cell_at(field: Field) -> int:
+    """Where in a row of the kernel its cell begins: behind the way to the leaf, scale and colour."""
+    return int(field.layout.inner_warps.stop - field.layout.frame.start + 4)
+
+
 def _rows(field: Field) -> np.ndarray:
-    """What the kernel knows of each object (N, ROW)."""
+    """What the kernel knows of each object, and behind these of those that begin a state, and of groups."""
     count, layout = len(field.tokens), field.layout
-    cell = field.cells(np.arange(count))
-    lines = np.concatenate([cell.lines, cell.bias[:, None]], 1)  # (1 + L, 3, N)
-    parts = [
-        field.vectors[:, layout.frame.start : layout.inner_warps.stop],
-        field.frames.scale[:, None],
-        field.colours.T,
-        lines.reshape(3 * len(lines), count).T,
-        cell.candidate[0].T,
-        cell.bump.T,
-    ]
-    return np.concatenate(parts, 1, dtype=np.float32)
+    whole = np.concatenate(
+        [
+            field.vectors[:, layout.frame.start : layout.inner_warps.stop],
+            field.frames.scale[:, None],
+            field.colours.T,
+        ],
+        1,
+    )
+    parts = [(whole, field.cells(np.arange(count)))]
+    if field.groups.deepest:
+        groups = np.zeros((len(field.groups.joins), whole.shape[1]))
+        groups[:, 0] = 1 / field.unit
+        parts += [(whole, field.cells(np.arange(count), opened=True)), (groups, field.joins())]
+    found = []
+    for row, cell in parts:
+        lines = np.concatenate([cell.lines, cell.bias[:, None]], 1)  # (1 + L, 3, N)
+        gates = [lines.reshape(3 * len(lines), len(row)).T, cell.candidate[0].T, cell.bump.T]
+        found.append(np.concatenate([row, *gates], 1, dtype=np.float32))
+    return np.concatenate(found)
 
 
 def _weights(field: Field, wide: int) -> tuple[np.ndarray, np.ndarray]:
@@ -165,7 +209,8 @@ def _weights(field: Field, wide: int) -> tuple[np.ndarray, np.ndarray]:
     texture = np.concatenate([begins[len(shapes) : -1, None], np.reshape(looks, (-1, 3))], 1)
     none = np.zeros((1, 4))  # which the last place is, and so that of `NO_TEXTURE`
     parts = [shape[field.shape], np.concatenate([texture, none])[field.texture]]
-    return np.concatenate(parts, 1).astype(np.int32), np.concatenate(weights)
+    whole = np.concatenate(parts, 1).astype(np.int32)
+    return np.concatenate([whole] * (2 if field.groups.deepest else 1)), np.concatenate(weights)
 
 
 def _texture(texture: Texture) -> np.ndarray:

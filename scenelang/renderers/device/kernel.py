@@ -137,6 +137,41 @@ def _turned(red, green, blue, turns):
 
 
 @triton.jit
+def _object(x, y, row, part, weights, OUTER: tl.constexpr, INNER: tl.constexpr, WIDTH: tl.constexpr):
+    """Distances and colours (M,) of an object at world points."""
+    x, y = _affine(x, y, row)
+    row += 6
+    for _ in range(OUTER):  # unrolled the code would be ten times as long
+        x, y = _warp(x, y, row)
+        row += 3
+    x, y = _affine(x, y, row)
+    row += 6
+    for _ in range(INNER):
+        x, y = _warp(x, y, row)
+        row += 3
+    shape, side = weights + tl.load(part), tl.load(part + 1)
+    if side > 0:
+        distance = _grid(x, y, shape, side)
+    else:
+        distance = _learned(x, y, shape, WIDTH)
+    wide = tl.load(part + 5)
+    if wide > 0:
+        red, green, blue = _texture(
+            x, y, weights + tl.load(part + 2), tl.load(part + 3), tl.load(part + 4), wide
+        )
+    else:
+        nothing = 0.0 * x
+        red, green, blue = nothing + tl.load(row + 1), nothing + tl.load(row + 2), nothing + tl.load(row + 3)
+    return distance * tl.load(row), red, green, blue
+
+
+@triton.jit
+def _level(stack, here):
+    """One (M,) of the levels of a stack."""
+    return tl.sum(tl.where(here, stack, 0.0), 0)
+
+
+@triton.jit
 def _mean(x, SAMPLES: tl.constexpr):
     """Means of pixels' samples."""
     return tl.sum(tl.reshape(x, (x.shape[0] // SAMPLES, SAMPLES)), 1) / SAMPLES
@@ -146,8 +181,9 @@ def _mean(x, SAMPLES: tl.constexpr):
 def draw_blocks(
     out,  # (height, width, CHANNELS): over a background, else premultiplied colour and coverage
     starts,  # (blocks + 1,): where in `objects` those of each block begin
-    objects,  # (pairs,)
-    rows,  # (N, ROW): the way to the leaf, scale, colour, cell
+    objects,  # (pairs,): rows, in the order in which they join; those from N on are groups that end
+    levels,  # (pairs,): of the states that they join, 0 for the stream's own; none in a flat one
+    rows,  # (N + groups, ROW): the way to the leaf, scale, colour, cell
     parts,  # (N, 6): where in `weights` its shape begins; the side of its grid, 0 for a decoder; where its
     # texture begins, how many steps that has, and its lines and columns, 0 for none
     weights,
@@ -166,8 +202,11 @@ def draw_blocks(
     ROW: tl.constexpr,
     OUTER: tl.constexpr,  # warps
     INNER: tl.constexpr,
+    CELL: tl.constexpr,  # where in a row it begins
     WIDTH: tl.constexpr,  # of decoders
     LINES: tl.constexpr,  # of the gate of colour
+    LEVELS: tl.constexpr,  # states, a power of two
+    LEAVES: tl.constexpr,  # N in a stream with groups
 ):
     block = tl.program_id(0)
     pixel = tl.arange(0, SIDE * SIDE * SAMPLES) // SAMPLES
@@ -179,30 +218,37 @@ def draw_blocks(
 
     nothing = tl.zeros((SIDE * SIDE * SAMPLES,), tl.float32)
     state, red, green, blue = nothing + empty, nothing, nothing, nothing
+    if LEVELS > 1:
+        flat = tl.zeros((LEVELS, SIDE * SIDE * SAMPLES), tl.float32)
+        states, reds, greens, blues = flat + empty, flat, flat, flat
+        place = tl.arange(0, LEVELS)[:, None]
     for pair in range(tl.load(starts + block), tl.load(starts + block + 1)):
         number = tl.load(objects + pair)
         row = rows + number * ROW
-        x, y = _affine(world_x, world_y, row)
-        row += 6
-        for _ in range(OUTER):  # unrolled the code would be ten times as long
-            x, y = _warp(x, y, row)
-            row += 3
-        x, y = _affine(x, y, row)
-        row += 6
-        for _ in range(INNER):
-            x, y = _warp(x, y, row)
-            row += 3
-
         part = parts + number * 6
-        shape, side = weights + tl.load(part), tl.load(part + 1)
-        if side > 0:
-            distance = _grid(x, y, shape, side)
+        cell = row + CELL
+        if LEVELS > 1:
+            at = tl.load(levels + pair)
+            here, above = place == at, place == at + 1
+            state, red = _level(states, here), _level(reds, here)
+            green, blue = _level(greens, here), _level(blues, here)
+            if number >= LEAVES:  # a group joins what it stands in as an object
+                distance = _level(states, above) * tl.load(row)
+                own_red, own_green = _level(reds, above), _level(greens, above)
+                own_blue = _level(blues, above)
+                states = tl.where(above, empty, states)
+                reds, greens = tl.where(above, 0.0, reds), tl.where(above, 0.0, greens)
+                blues = tl.where(above, 0.0, blues)
+            else:
+                distance, own_red, own_green, own_blue = _object(
+                    world_x, world_y, row, part, weights, OUTER, INNER, WIDTH
+                )
         else:
-            distance = _learned(x, y, shape, WIDTH)
-        distance *= tl.load(row)
+            distance, own_red, own_green, own_blue = _object(
+                world_x, world_y, row, part, weights, OUTER, INNER, WIDTH
+            )
 
         # the cell: lines in what it is shown and what it remembers, the first of them the gate of the state
-        cell = row + 4
         take = _unit(tl.load(cell) * distance + tl.load(cell + 1) * state + tl.load(cell + 2))
         paint = nothing
         for _ in tl.static_range(LINES):
@@ -212,18 +258,17 @@ def draw_blocks(
         paint = tl.minimum(paint, 1.0)
         candidate, bump = tl.load(cell + 3) * distance, tl.load(cell + 4)
         state = state + take * (candidate - state) - take * (1.0 - take) * bump
-        wide = tl.load(part + 5)
-        if wide > 0:
-            own_red, own_green, own_blue = _texture(
-                x, y, weights + tl.load(part + 2), tl.load(part + 3), tl.load(part + 4), wide
-            )
-        else:
-            own_red, own_green = nothing + tl.load(row + 1), nothing + tl.load(row + 2)
-            own_blue = nothing + tl.load(row + 3)
         red += paint * (own_red - red)
         green += paint * (own_green - green)
         blue += paint * (own_blue - blue)
+        if LEVELS > 1:
+            states, reds = tl.where(here, state, states), tl.where(here, red, reds)
+            greens, blues = tl.where(here, green, greens), tl.where(here, blue, blues)
 
+    if LEVELS > 1:
+        bottom = place == 0
+        state, red = _level(states, bottom), _level(reds, bottom)
+        green, blue = _level(greens, bottom), _level(blues, bottom)
     alpha = _unit(0.5 - state * slope)
     red, green = _mean(red * alpha, SAMPLES), _mean(green * alpha, SAMPLES)
     blue, alpha = _mean(blue * alpha, SAMPLES), _mean(alpha, SAMPLES)
