@@ -53,7 +53,10 @@ COMPILING = (
     "tests/passes/test_without.py", "tests/passes/test_prove.py", "tests/passes/test_pass_picture.py",
     "tests/animation/test_clip.py", "tests/conformance",
 )  # fmt: skip
-SOLIDS = "tests/lab/test_closed.py", "tests/renderers/test_solids.py", "tests/backend/test_solids.py"
+SOLIDS = (
+    "tests/lab/test_closed.py", "tests/renderers/test_solids.py", "tests/renderers/trees/test_solid.py",
+    "tests/backend/test_solids.py",
+)  # fmt: skip
 TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/renderers/solid/*.py": SOLIDS,
     "scenelang/reference/solid/*.py": ("tests/lab/test_closed.py", "tests/reference/test_solid.py"),

@@ -211,10 +211,11 @@ class SolidField(Objects):
                 if states.slope is not None:
                     states.slope = _update(xp, states.slope, index, xp.take(self.first, which) * slope)
                 continue
-            self._join(states, index, Operand(near, look, slope, None, which + 1 + 0 * near), which, wanted)
+            number = which + 1 + 0 * near if owners else None
+            self._join(states, index, Operand(near, look, slope, None, number), which, wanted)
         for closing in closings[-1]:
             self._close(states, closing, wanted)
-        memory, slope, bound, owner = (part if part is None else part[..., :count] for part in states.parts())
+        memory, slope, bound, owner = (_first(part, count) for part in states.parts())
         if bound is not None:
             bound = xp.minimum(bound, abs(memory[0]))
         return Meeting(memory[0], memory[1:], slope, bound, owner, len(rays))
@@ -300,6 +301,11 @@ class SolidField(Objects):
 def _part(xp: Arrays, whole: Array, index: Array | None) -> Array:
     """Entries (…, k) of an array (…, M), or all."""
     return whole if index is None else xp.take(whole, index)
+
+
+def _first(whole: Array, count: int) -> Array:
+    """The first entries (…, M) of an array, or None."""
+    return whole if whole is None else whole[..., :count]
 
 
 def _update(xp: Arrays, whole: Array, index: Array | None, values: Array) -> Array:

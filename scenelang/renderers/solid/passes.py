@@ -112,7 +112,7 @@ def _under(groups: Groups, operator: int) -> Mask:
     found = groups.tokens == operator
     for path in groups.path.T:
         found = found | ((path >= 0) & (groups.joins[path] == operator))
-    return found
+    return np.asarray(found)
 
 
 def _widened(

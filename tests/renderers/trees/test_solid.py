@@ -21,7 +21,7 @@ from scenelang.renderers.solid.passes import SLACK
 from scenelang.words import BLEND, TOKENS
 from tests.renderers.solids import Object, field, moved, network, psnr, scaled, turned
 from tests.renderers.test_solids import everywhere
-from tests.renderers.trees import Answer, Join, Tree, fold, random_tree, rows, tree_field, tree_graph
+from tests.renderers.trees import Answer, Join, Tree, fold, random_tree, tree_field, tree_graph
 
 STAGE = Stage(light=Light((1.5, 3.0, 2.5), 16.0))
 LEAST = 2e-3  # world units from a surface where sides are told apart
@@ -281,20 +281,27 @@ def test_both_libraries_draw_trees_alike() -> None:
     assert psnr(mine, theirs) > 55
 
 
-def test_balls_hold_what_an_intersection_ends() -> None:
-    """Groups of intersections in one another, each of whose leaves lies somewhere else."""
-    rng = np.random.default_rng(8)
+def ball(x: float, y: float, radius: float = 0.9) -> Object:
+    return Object("sphere", (scaled(radius, radius, radius), moved(x, y, 0)))
 
-    def ball(*place: float) -> Object:
-        return Object("sphere", (scaled(0.9, 0.9, 0.9), moved(*place)))
 
-    inner = Tree(
-        (Join("union", ball(0.4, 0, 0)), Join("intersect", ball(-0.4, 0, 0)), Join("union", ball(1.5, 0, 0)))
-    )
-    outer = Tree((Join("union", ball(0, 0.5, 0)), Join("intersect", inner)))
-    tree = Tree((Join("union", ball(0, 0, 0)), Join("union", ball(1.8, 0, 0)), Join("intersect", outer)))
-    p = rng.uniform(-2, 2, (3, 20000)).astype(np.float32)
-    exact = Field(tree_graph(tree)).at(p.astype(float)).d
+BOTH = Tree((Join("union", ball(0.4, 0)), Join("intersect", ball(-0.4, 0))))
+INNER = Tree((Join("union", BOTH), Join("union", ball(1.5, 0))))
+OUTER = Tree((Join("union", ball(0, 0.5)), Join("intersect", INNER)))
+HOLE = Tree((Join("union", ball(0, 0, 1.5)), Join("subtract", ball(0.8, 0, 0.2))))
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        Tree((Join("union", ball(0, 0)), Join("union", ball(1.8, 0)), Join("intersect", OUTER))),
+        Tree((Join("union", ball(0, 0)), Join("intersect", HOLE, 0.5))),
+    ],
+)
+def test_balls_hold_what_an_intersection_ends(tree: Tree) -> None:
+    """Intersections in one another whose leaves lie apart; a rounded edge along a hole in a group."""
+    p = np.random.default_rng(8).uniform(-2, 2, (3, 20000)).astype(np.float32)
+    exact = Field(_root(tree)).at(p.astype(float)).d
     solids = tree_field(tree, CLOSED)
     t = np.linalg.norm(p - EYE[:, None], axis=0)
     met, passes = solids.passes(EYE, (p - EYE[:, None]) / t, t + 5)
@@ -303,4 +310,3 @@ def test_balls_hold_what_an_intersection_ends() -> None:
     clear = abs(exact) > LEAST
     assert ((d < 0) == (exact < 0))[clear].all()
     assert (exact < 0).sum() > 100
-    assert len(rows(tree)) == len(solids.solids)
