@@ -180,7 +180,7 @@ class Field:
         shown = [
             operator if operator == SMOOTH or not width else operator + ROUNDED for operator, width in kinds
         ]
-        lines, bias, candidate, bump = (part[shown].T for part in _rounded(cells, self.network.config.state))
+        lines, bias, candidate, bump = (part[shown].T for part in rounded(cells, self.network.config.state))
         lines, candidate = lines.swapaxes(0, 1), candidate.swapaxes(0, 1)
         table = Cell(lines * scale, bias, candidate, bump[0] / scale)
         opened = Cell(0 * lines, 0 * bias + 1, candidate, 0 * bump[0])
@@ -428,7 +428,7 @@ class Field:
             return shown(meetings, distance, cell, colours, self.nothing, self.slope, nest, joins)
 
 
-def _rounded(cells: Cell, s: int) -> Cell:
+def rounded(cells: Cell, s: int) -> Cell:
     """Cells with tokens in front, and behind them those of operators whose edges have a width.
 
     A cut that rounds its edge is a smooth union turned inside out: where that takes (D, d) to D', the

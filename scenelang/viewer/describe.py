@@ -7,7 +7,10 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Any, Final
 
+import numpy as np
+
 from scenelang.graph.stage import encoded
+from scenelang.program.groups import SMOOTH, SUBTRACT, UNION, read_groups
 
 MOST: Final = 5  # kinds of objects and colours that are named
 _HUES: Final = (
@@ -30,12 +33,15 @@ def alternative(data: dict[str, Any]) -> str:
     program, animation, solid = data["program"], data["animation"], data["dimension"] == 3
     rows = program["rows"]
     shapes = [shape["name"] for shape in data["shapes"]]
-    parts = _counted(shapes[row["shape"]] for row in rows if row["token"] != 2)
-    holes = sum(row["token"] == 2 for row in rows)
+    groups = read_groups(np.array([row["token"] for row in rows], np.int8))
+    around = np.append(groups.joins, UNION)[groups.path]
+    joins = np.column_stack([around, groups.tokens])  # of rows and of the groups that they are in
+    holes, drawn = (joins == SUBTRACT).any(1), (joins <= SMOOTH).all(1)
+    parts = _counted(shapes[rows[at]["shape"]] for at in np.flatnonzero(~holes))
     said = f"A {'3D scene' if solid else 'picture'} of {parts}" if parts else "An empty picture"
-    if holes:
-        said += f", with {holes:,} cut-outs" if holes > 1 else ", with a cut-out"
-    plain = [row for row in rows if row["token"] in (0, 1) and row["paint"] < 0]
+    if count := int(holes.sum()):
+        said += f", with {count:,} cut-outs" if count > 1 else ", with a cut-out"
+    plain = [rows[at] for at in np.flatnonzero(drawn) if rows[at]["paint"] < 0]
     colours = Counter(colour_name(_colour(data, row)) for row in plain)
     if colours:
         said += f", in {_listed([name for name, _ in colours.most_common(MOST)], len(colours))}"

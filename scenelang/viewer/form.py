@@ -64,7 +64,6 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
         for word, uses in writer.lengths.items():
             reached = writer.reached(uses)
             reasons |= {name: _WHY[word] for name, _, _, bound in writer.params if id(bound) in reached}
-    outlines = [manifest.outlines.get(name) for name in manifest.geometries]
     data = {
         "model": manifest.name,
         "dimension": manifest.dimension,
@@ -75,7 +74,6 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
         "plain": manifest.materials.index(manifest.default_material),
         "media": [at for at, name in enumerate(manifest.materials) if name == "volumetric"],
         "geometries": manifest.geometries,
-        "corners": [None if outline is None else outline.corners for outline in outlines],
         "spatial": [int(paint.dimension == 3) for paint in writer.paints],
         "blends": manifest.any_blend,
         "turns": [manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)],

@@ -17,7 +17,7 @@ from scenelang.graph.looks import LUMA
 from scenelang.program.paints import STEPS
 from scenelang.program.program import ProgramError
 from scenelang.renderers import field
-from scenelang.renderers.network import EMPTY, RADIUS, FramedArrays
+from scenelang.renderers.network import EMPTY, RADIUS, Cell, FramedArrays
 from scenelang.viewer.script import web
 from scenelang.viewer.store import Store
 from scenelang.words import TOKENS
@@ -60,14 +60,16 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
     config = network.config
     if not config.features == config.state == 1:
         raise ProgramError("a network that knows more than distances, which no page draws")
-    cell = network.cell_weights()
-    lines = np.concatenate([cell[0], cell[1][..., None]], 2)  # (tokens, 1 + L, 3)
-    ends = np.concatenate([cell[2][:, 0], cell[3][:, 0]], 1)  # (tokens, 2)
-    table = np.zeros((len(TOKENS), config.paint_lines + 2, 4), np.float32)
+    cells = field.rounded(Cell(*network.cell_weights()), config.state)
+    cell = Cell(*(np.delete(part, field.ROUNDED + TOKENS["smooth"], 0) for part in cells))
+    lines = np.concatenate([cell[0], cell[1][..., None]], 2)  # (kinds, 1 + L, 3)
+    ends = np.concatenate([cell[2][:, 0], cell[3][:, 0]], 1)  # (kinds, 2)
+    table = np.zeros((len(lines), config.paint_lines + 2, 4), np.float32)
     table[:, :-1, :3], table[:, -1, :2] = lines, ends
-    unit = float(np.linalg.norm(cell[2][TOKENS["union"], 0]))
+    unit = float(np.linalg.norm(cells[2][TOKENS["union"], 0]))
     sizes = {
         **{name.upper(): token for name, token in TOKENS.items()},
+        "KINDS": len(lines),
         "LINES": config.paint_lines,
         "RIM": RADIUS,
         "BLEND": field.BLEND,
@@ -89,8 +91,6 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
             "slack": field.SLACK,
             "farther": field.FARTHER,
             "farthest": field.FARTHEST,
-            "tokens": TOKENS,
-            "draws": [token <= TOKENS["smooth"] for token in TOKENS.values()],
             "paintSteps": list(STEPS),
             "decoders": [
                 {

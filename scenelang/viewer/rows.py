@@ -12,9 +12,8 @@ import numpy as np
 from scenelang.graph.stage import Stage
 from scenelang.lifting.layout import LAYOUTS, Layout
 from scenelang.models.manifest import Manifest
-from scenelang.program.groups import SMOOTH
+from scenelang.program.groups import OPERATOR, widths_of
 from scenelang.program.program import Program, ProgramError
-from scenelang.renderers.field import BLEND
 from scenelang.renderers.frames import Frames
 from scenelang.renderers.solid.frames import read_solid_frame
 
@@ -36,7 +35,8 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
     layout = LAYOUTS[manifest.layout]
     forms = [at for at, element in enumerate(program.elements) if not element.material]
     paints = [element for element in program.elements if element.material]
-    scales = _scales(program, layout)
+    scales, blends = _scales(program, layout), program.vectors[:, layout.blend]
+    widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, blends).tolist()
     rows = []
     for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]
         m = v[layout.geometry :]
@@ -53,7 +53,7 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             "paint": -1,
             "amount": 0.0,
             "frequency": 0.0,
-            "blend": float(v[layout.blend]) if program.tokens[i] == SMOOTH and v[layout.blend] > 0 else BLEND,
+            "blend": widths[i],
             "object": program.numbers[i],
         }
         if layout.extras:

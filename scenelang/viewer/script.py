@@ -12,8 +12,8 @@ from importlib.resources import files
 from typing import Final
 
 MODULES: Final = (
-    *("store", "gl", "grids", "ways", "plane"),
-    *("values", "functions", "maps", "looks", "chain", "bounds", "graph", "stage"),
+    *("store", "gl", "grids", "groups", "ways", "plane"),
+    *("values", "functions", "maps", "looks", "chain", "graph", "stage"),
     *("eye", "expressions", "evaluate"),
     *("elements", "balls", "solid"),
     *("camera", "pace", "surface", "viewer", "dom", "steer", "controls", "page"),

@@ -13,14 +13,15 @@ from typing import Any, Final
 import numpy as np
 
 from scenelang.graph.stage import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST
+from scenelang.program.groups import INTERSECT, SUBTRACT
 from scenelang.renderers.arrays import Smooth
 from scenelang.renderers.network import TOKENS
-from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, SolidArrays
+from scenelang.renderers.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidArrays
 from scenelang.renderers.solid.passes import SLACK
 from scenelang.viewer.script import web
 from scenelang.viewer.store import Store
 
-FILES: Final = ("solid.glsl", "rays.glsl", "look.glsl", "light.glsl")
+FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "light.glsl")
 """Of ``web/``, one behind the other."""
 _CONSTANTS: Final = {
     "EMPTY": EMPTY,
@@ -38,12 +39,15 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     """The parts ``shader`` and ``network`` of a view."""
     config, decoders = network.config, [network.decoder(code) for code in network.codes]
     paint, kind, width = config.paint_lines, config.kind_lines, config.width
-    cells = np.concatenate([_cell(network, token) for token in range(TOKENS)])
+    kinds = [*(network.cell(token, BLEND) for token in range(TOKENS))]
+    kinds += [network.cut(token, BLEND) for token in (SUBTRACT, INTERSECT)]
+    cells = np.concatenate([_cell(each[-1]) for each in kinds])
+    cells[TOKENS * (2 + paint + kind) :].reshape(2, -1, 4)[:, 2:] = 0.0, 0.0, -1.0, 0.0  # colours are kept
     sizes = {"CELL": 2 + paint + kind, "GEOMETRIES": len(decoders)}
     parts = [web("angles.glsl"), *(f"const float {name} = {value!r};" for name, value in _CONSTANTS.items())]
     parts += [f"const int {name} = {value};" for name, value in sizes.items()]
     parts += [
-        f"uniform vec4 cells[{len(cells)}]; // of each token what is made of a distance, a bump; then lines"
+        f"uniform vec4 cells[{len(cells)}]; // of each join what is made of a distance, a bump; then lines"
     ]
     parts += [_decoders(decoders, sloped=False), _decoders(decoders, sloped=True), _gates(paint, kind)]
     return {
@@ -62,9 +66,8 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     }
 
 
-def _cell(network: SolidArrays, token: int) -> np.ndarray:
-    """A token's cell (K, 4): what is made of a distance and the bump; then each line's own, past and bias."""
-    cell = network.cell(token, BLEND)[-1]
+def _cell(cell: Cell) -> np.ndarray:
+    """A cell (K, 4): what is made of a distance and the bump; then each line's own, past and bias."""
     lines = np.concatenate([cell.own, cell.past, cell.bias, 0 * cell.bias], 1)
     return np.concatenate([[[cell.candidate.item(), cell.bump.item(), 0.0, 0.0]], lines])
 

@@ -20,12 +20,13 @@ from scenelang.graph.steps import Affine, Displace, Step, Warp
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.passes import OPTIONAL
 from scenelang.program.compile import compile_scene, find_model
+from scenelang.program.groups import BEGINS, ENDS
 from scenelang.program.program import Program
 from scenelang.syntax import parse
 from scenelang.viewer.form import Form, form_of
 from scenelang.viewer.rows import stage_of
 from scenelang.viewer.view import view_of
-from scenelang.words import TOKENS
+from scenelang.words import BLEND, TOKENS
 from tests.viewer.test_view import carried
 
 WORDS = ("token", "shape", "material", "paint", "object")
@@ -97,16 +98,16 @@ def way_back(steps: tuple[Step, ...], p: np.ndarray) -> np.ndarray:
 def check_picture(picture: dict[str, Any], expected: Compiled, form: Form) -> None:
     """Hold what a page's evaluator says against what the compiler says."""
     graph, d = expected.graph, expected.manifest.dimension
-    links = graph.root.links
-    assert len(picture["rows"]) == len(links)
+    rows = graph.rows()
+    assert len(picture["rows"]) == len(rows)
     names = [*expected.manifest.geometries, *form.shapes]
-    for at, (row, link) in enumerate(zip(picture["rows"], links, strict=True)):
-        leaf, look = link.node, link.node.look
-        assert row["token"] == (TOKENS[link.op] if at else 0)
+    for row, (op, leaf, k, begins, ends, _) in zip(picture["rows"], rows, strict=True):
+        look = leaf.look
+        assert row["token"] == TOKENS[op] + BEGINS * begins + (ends << ENDS)
         assert names[row["shape"]] == graph.elements.get(leaf.geometry, leaf.geometry)
         assert expected.manifest.materials[row["material"]] == look.material
         assert row["object"] == leaf.number
-        assert link.op != "smooth" or row["blend"] == link.k
+        assert row["blend"] == (k or (BLEND if op == "smooth" else 0))
         np.testing.assert_allclose(row["colour"], look.rgb, atol=1e-9)
         stretch = graph.space.stretches(affine.composed(leaf.steps))[0]
         np.testing.assert_allclose(row["scale"], stretch, rtol=1e-9)

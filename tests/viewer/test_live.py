@@ -8,10 +8,19 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+import scenelang as nsg
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
+from scenelang.lifting.layout import LAYOUTS
+from scenelang.measure.sets import SETS
+from scenelang.measure.sets import random_scene as random_set_scene
+from scenelang.measure.solid_sets import SOLID_SETS, random_solid
+from scenelang.program.groups import OPERATOR, felt, read_groups, widths_of
+from scenelang.scene.schema import Camera, Scene
+from scenelang.viewer.view import view_of
 from tests.passes.random_scenes import blob_scene, full_scene, random_scene
 from tests.viewer.live import (
     check_picture,
@@ -74,11 +83,17 @@ def test_scenes_of_documentation_and_conformance_suite(viewer_page: Any) -> None
     assert refused >= 5  # by passes, not by the evaluator
 
 
+def any_scene(seed: int) -> Scene:
+    """A tree with groups in groups, and blends of several widths."""
+    return random_set_scene(np.random.default_rng(seed), SETS["trees"])
+
+
 def test_random_trees_of_the_plane(viewer_page: Any) -> None:
-    makers = (random_scene, full_scene, blob_scene)
+    makers = (random_scene, full_scene, blob_scene, any_scene)
     scenes = [(f"{make.__name__}({n})", make(n).to_nsg()) for make in makers for n in range(60)]
     good, refused = agree(viewer_page, (SourceFile(*scene) for scene in scenes), model="shapes2d")
-    assert min(good, refused) > 30
+    assert good > 200
+    assert refused >= 5  # as the model lacks room
 
 
 def test_random_trees_of_space(viewer_page: Any) -> None:
@@ -87,6 +102,34 @@ def test_random_trees_of_space(viewer_page: Any) -> None:
     assert min(good, refused) > 30
 
 
+def test_rows_of_trees_matter_as_far_as_programs_have_it(viewer_page: Any) -> None:
+    told = "seen.total, seen.widest, seen.count, always || seen.hidden"
+    ask = f"(rows) => joinsOf(rows).map(({{ seen, always }}) => [{told}])"
+    for seed in range(60):
+        program = nsg.compile(any_scene(seed))
+        blends = program.vectors[:, LAYOUTS["plane"].blend]
+        known = felt(
+            read_groups(program.tokens), widths_of(program.tokens.astype(np.intp) & OPERATOR, blends)
+        )
+        found = viewer_page.evaluate(ask, view_of(program).data["program"]["rows"])
+        np.testing.assert_allclose(np.array(found, float).T, np.array(known[:4], float), rtol=1e-6)
+
+
+def test_eyes_in_trees(viewer_page: Any) -> None:
+    """Inside what is opaque, in holes, in mist, and outside."""
+    scenes = []
+    for n in range(80):
+        rng = np.random.default_rng(n)
+        scene = random_solid(rng, SOLID_SETS["trees"])
+        eye = tuple(rng.uniform(-0.7, 0.7, 3).tolist())
+        scene = scene.model_copy(update={"camera": Camera(eye, (9.0, 0.5, 0.0))})
+        scenes.append(SourceFile(str(n), scene.to_nsg()))
+    good, refused = agree(viewer_page, scenes)
+    assert good > 30
+    assert refused >= 5
+
+
+DEEP = "module m(n) { intersect { square; union { if (n > 1) { m(n - 1); } triangle; star; } } } m(n);"
 MISTAKES = [
     ("for (i in 1..n) { square; }", 1e9, "20000 objects"),
     ("for (i in 1..n) { for (j in 1..n) { let v = i * j; } }", 1e9, "takes too long"),
@@ -95,7 +138,8 @@ MISTAKES = [
     ("module m(n) { group { if (n > 0) { m(n - 1); m(n - 1); } square; } } m(n);", 150, "20000 objects"),
     ("square { scale(n - 3); }", 3, "scale by 0"),
     ("square { scale(1 / (n - 3)); }", 3, "not a finite number"),
-    ("intersect { square; group { square; if (n > 1) { star; } } }", 2, "one operand of `intersect`"),
+    (DEEP, 16, "deeper than 15"),
+    ("subtract(k = n) { square; star; }", 0, "not above 0"),
     ("square { if (n > 1) { material flat; } material flat; }", 2, "a second material"),
     ("group { square; if (n > 1) { scale(2); } star; }", 2, "a child after a transform"),
     ("chain { if (n < 2) { square; } subtract star; }", 2, "nothing before it"),

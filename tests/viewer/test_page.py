@@ -91,6 +91,8 @@ def test_a_picture_in_words() -> None:
     assert "square" in alternative(data)
     told = alternative(data)
     assert told.startswith("A picture of a s")
+    holed = nsg.loads("subtract { square; intersect { star; union { pentagon; square; } } }")
+    assert alternative(view_of(nsg.compile(holed)).data).startswith("A picture of a square, with 3 cut-outs")
     assert "blue" in told
     assert told.endswith("on white.")
     solid = nsg.compile(

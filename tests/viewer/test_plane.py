@@ -16,7 +16,9 @@ import scenelang as nsg
 from benchmarks.viewer import SMALL, timed
 from scenelang.backend.small import draw_small
 from scenelang.elements.pyramid import unpacked
+from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.framed import load_arrays
+from scenelang.program.groups import read_groups
 from scenelang.program.program import Program
 from scenelang.renderers.coverage import Coverage, Tile
 from scenelang.renderers.field import Field
@@ -180,6 +182,25 @@ def compared(page: Any, program: Program) -> float:
     if network.shape[2] == 3:
         assert (picture[..., 3] == 1).all()
     return psnr_db(picture[..., : network.shape[2]], network)
+
+
+@pytest.mark.browser
+def test_trees_are_the_networks(page: Any) -> None:
+    """Groups in groups and rounded cuts, at points, which meet all rows, and in pictures, which skip some."""
+    depths, found = set(), {}
+    for seed in range(12):
+        scene = random_scene(np.random.default_rng(seed), SETS["trees"]).sized((88, 80))
+        program = nsg.compile(scene.model_copy(update={"background": None}))
+        depths.add(read_groups(program.tokens).deepest)
+        p = np.random.default_rng(seed).uniform(-1.1, 1.1, (1000, 2)).astype(np.float32)
+        answer = page.evaluate(ASK, [view_of(program).message(), p.ravel().tolist()])
+        known = asked(program, p)
+        off = abs(np.reshape(answer, (-1, 4)) - known)[known[:, 0] < 0.5]
+        assert off[:, 0].max() < 1e-4, seed
+        assert (off < 1e-3).all(1).mean() > 0.995, seed
+        found[seed] = compared(page, program)
+    assert depths == {1, 2, 3}
+    assert not {name: db for name, db in found.items() if db < LEAST_DB}
 
 
 @pytest.mark.browser

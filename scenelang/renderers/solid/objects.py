@@ -57,12 +57,23 @@ class Objects:
         kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
         self.draws = all(solid.draws for solid in self.solids)
         """Whether all objects draw."""
+        self.adding = self._adding()
         self.media = bool(kinds.any())
         """Whether some object is a medium."""
         self.mixed = self.media and not kinds.all()
         """Whether not all are."""
         self.coloured = self.media and np.ptp(self.xp.to_numpy(self.looks)[-4:-1, kinds], 1).max() > 0
         """Whether media have different colours."""
+
+    def _adding(self) -> Array | None:
+        """Which objects (N,) of groups do not draw but take nothing away, 1 or 0; None without groups."""
+        groups = self.tree
+        if not groups.deepest:
+            return None
+        there, drawn = groups.path >= 0, np.array([solid.draws for solid in self.solids])
+        cuts = (there & (groups.joins[groups.path] == SUBTRACT)).sum(1) + (groups.tokens == SUBTRACT)
+        adding = there.any(1) & ~drawn & (cuts % 2 == 0)
+        return self.xp.array(adding.astype(np.float32), self.network.codes)
 
     def _tables(self, vectors: np.ndarray) -> None:
         """What pairs of points and objects look up: arrays (…, N)."""

@@ -160,6 +160,12 @@ class Rays:
             within = rows[WITHIN] > 0
             at = xp.select(within & (end > t), xp.minimum(at, end), at)
         rows[T] = xp.least(self._drawn(passes.slots, xp.select(at <= end, at, self.never)))
+        if solids.adding is not None:  # what a group leaves may begin where it meets more
+            objects = xp.whole(passes.slots[OBJECT])
+            objects = xp.select(objects < 0, -1 - objects, objects)
+            adds = xp.take(solids.adding, objects.reshape(-1)).reshape(begin.shape)
+            more = xp.select((adds > 0) & (begin > t), begin, self.never)
+            rows[T] = xp.minimum(rows[T], xp.least(more))
         going = rows[T] < INF
         if solids.media:
             if not solids.draws:  # in a medium steps end where something may cut it

@@ -4,9 +4,6 @@ import { IDENTITY, invertedMap, stretchesOf } from "./maps.js";
 
 const SMALL_SIDE = 1.7; // of a leaf's box that is worth the asking
 const FREE_BOX = [[-1e30, -1e30, -1e30], [1e30, 1e30, 1e30]];
-const SMOOTH_TOKEN = 1;
-const SUBTRACT_TOKEN = 2;
-const INTERSECT_TOKEN = 3;
 
 /** How much longer a map makes a step at most. */
 const longest = (map) => stretchesOf(map, 3)[1];
@@ -24,18 +21,15 @@ function stretched([kind, ...strengths], radius) {
  * which its world distance changes at most per step of 1 there; a ball (`centre`, `extent`) of the world around it,
  * and a `box` [low, high] behind `outer`.
  * @param {object[]} rows
+ * @param {object[]} joins - of `joinsOf`
  * @param {{slack: number}} network - of a view
  * @param {(row: object) => number[][]} boxOf - the box of a row's leaf
  */
-export function solidBalls(rows, network, boxOf) {
+export function solidBalls(rows, joins, network, boxOf) {
   const deepest = rows.reduce((most, row) => Math.max(most, row.scale * (1 + Math.abs(row.amount))), 0);
-  let smooths = 0, widest = 0; // of the blends from a row on
-  return rows.slice().reverse().map((row) => {
-    if (row.token === SMOOTH_TOKEN) {
-      smooths += 1;
-      widest = Math.max(widest, row.blend);
-    }
-    const blends = widest * (1 + smooths / 4) + (smooths && row.token === SUBTRACT_TOKEN ? deepest : 0);
+  return rows.map((row, i) => {
+    const { widest, count, hidden } = joins[i].seen;
+    const blends = widest * (1 + count / 4) + (hidden ? deepest : 0);
     const radius = 1 + network.slack + Math.abs(row.amount) + blends / row.scale;
     const mapped = row.steps.length > 0 && row.steps[0][0] === "map";
     const outer = mapped ? row.steps[0].slice(1) : IDENTITY, rest = row.steps.slice(mapped ? 1 : 0);
@@ -52,7 +46,7 @@ export function solidBalls(rows, network, boxOf) {
     const wider = [low.map((v) => v - radius + 1), high.map((v) => v + radius - 1)];
     const box = slim && !rest.length ? wider : FREE_BOX;
     return { outer, rest, radius, ball, rate: row.scale * growth, centre, extent, box };
-  }).reverse();
+  });
 }
 
 /** Between which values of across / ahead directions to a ball lie, of those ahead; null where none does. */
@@ -105,21 +99,31 @@ export function cubeOf(from, side) {
 /**
  * Lists of the rows whose balls may be met in each cell, the last row first: of each cell where its list
  * begins and how long it is, then the lists. The first cell has all rows.
- * @param {object[]} rows
+ * @param {object[]} joins - of the rows, of `joinsOf`
  * @param {object[]} balls - of `solidBalls`
  * @param {object[]} groups - of cells
  * @returns {{data: Int32Array, longest: number}} and how long the longest list but the first is
  */
-export function listsOf(rows, balls, groups) {
+export function listsOf(joins, balls, groups) {
   const count = 1 + groups.reduce((sum, group) => sum + group.count, 0);
   const lists = Array.from({ length: count }, () => []), closed = new Uint8Array(count);
-  for (let i = rows.length - 1; i >= 0; i--) {
-    const held = rows[i].token === INTERSECT_TOKEN ? new Uint8Array(count) : null;
+  let holding = []; // rows in groups that have to be where a row is, as it ends outside of them
+  for (let i = joins.length - 1; i >= 0; i--) {
+    const { always, around } = joins[i], held = always && !around ? new Uint8Array(count) : null;
     lists[0].push(i);
+    holding = holding.filter(({ from }) => from <= i);
+    if (always && around) {
+      holding.push({ at: i, from: (joins[i].first ? around.around?.from : around.from) ?? 0 });
+      continue;
+    }
     let first = 1;
     for (const group of groups) {
       group.of(balls[i].centre, balls[i].extent, (at) => {
-        if (!closed[first + at]) lists[first + at].push(i);
+        const list = lists[first + at];
+        if (!closed[first + at]) {
+          for (const { at: row } of holding) if (!(list.at(-1) <= row)) list.push(row);
+          list.push(i);
+        }
         if (held) held[first + at] = 1;
       });
       first += group.count;

@@ -106,7 +106,7 @@ export function normalChain(steps, dimension) {
 }
 
 /** All maps of a chain composedMap, deformations left out. */
-export function mapOfChain(steps) {
+function mapOfChain(steps) {
   const maps = steps.filter((step) => step.rows);
   return maps.length === 0 ? IDENTITY : maps.reduce((inner, step) => composedMap(step.rows, inner), IDENTITY);
 }

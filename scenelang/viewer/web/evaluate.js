@@ -6,8 +6,7 @@ import { bare, equal, kindOf, numbersOf, radians } from "./values.js";
 import { refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
 import { entering, prepared } from "./expressions.js";
 import { MAPS } from "./maps.js";
-import { USUAL_BLEND } from "./bounds.js";
-import { MOST_OBJECTS, rowsOf } from "./graph.js";
+import { MOST_OBJECTS, USUAL_BLEND, rowsOf } from "./graph.js";
 import { stageFrom } from "./stage.js";
 import { checkEye } from "./eye.js";
 
@@ -102,7 +101,7 @@ class SceneRun {
 
 /** What the statements of a block put into their node; `op` and `k` join the next child. */
 class Block {
-  constructor(op = "union", k = USUAL_BLEND) {
+  constructor(op = "union", k = 0) {
     Object.assign(this, { op, k, links: [], steps: [], worn: null, moved: false });
   }
 
@@ -134,8 +133,9 @@ function optionalValue(expr, run) {
   return expr === null || expr === undefined ? () => undefined : prepared(expr, run);
 }
 
-function widthOf(expr, run) {
-  if (expr === null) return () => USUAL_BLEND;
+/** The width of a joint's blend, 0 for a sharp edge. */
+function widthOf(op, expr, run) {
+  if (expr === null) return () => (op === "smooth" ? USUAL_BLEND : 0);
   const get = prepared(expr, run);
   return (slots) => {
     const k = bare(get(slots));
@@ -255,21 +255,21 @@ const STATEMENTS_OF_FORMS = {
     };
   },
   node: ([kind, k, block], run) => {
-    const [width, act] = [widthOf(k, run), actionsOf(block, run)];
     const op = kind === "group" || kind === "chain" ? "union" : kind;
+    const [width, act] = [widthOf(op, k, run), actionsOf(block, run)];
     return (slots, out) => {
-      const inside = new Block(op, op === "union" ? USUAL_BLEND : width(slots));
+      const inside = new Block(op, width(slots));
       act(slots, inside);
       out.add({ links: inside.links, steps: inside.steps, worn: inside.worn });
     };
   },
   join: ([op, k, child], run) => {
-    const [width, act] = [widthOf(k, run), actionOf(child, run)];
+    const [width, act] = [widthOf(op, k, run), actionOf(child, run)];
     return (slots, out) => {
       if (out.links.length > 0) Object.assign(out, { op, k: width(slots) });
       else if (op === "subtract" || op === "intersect") refuse(`\`${op}\` with nothing before it`);
       act(slots, out);
-      Object.assign(out, { op: "union", k: USUAL_BLEND });
+      Object.assign(out, { op: "union", k: 0 });
     };
   },
   module: ([at, hops, args, block], run) => {

@@ -1,7 +1,9 @@
 // Nothing is seen from inside something opaque: the exact fold at the eye; see `passes/check_eye.py`.
 
 import { refuse } from "./values.js";
+import { BEGINS, ENDS, OPERATOR, SMOOTH, SUBTRACT } from "./groups.js";
 
+const NOTHING_THERE = [Infinity, null]; // distance and row
 const DISTANCES = {
   sphere: (x, y, z) => Math.hypot(x, y, z) - 1,
   torus: (x, y, z) => Math.hypot(Math.hypot(x, z) - 0.7, y) - 0.3,
@@ -26,30 +28,53 @@ function carriedBack(steps, point) {
   return [x, y, z];
 }
 
+/** The distance of a blend, and the share of what joins. */
+function blended(depth, distance, k) {
+  if (Math.abs(depth) === Infinity || Math.abs(distance) === Infinity) {
+    return [Math.min(depth, distance), Number(distance < depth)];
+  }
+  const h = Math.min(Math.max(0.5 + (0.5 * (depth - distance)) / k, 0), 1);
+  return [(h === 1 ? distance : depth + h * (distance - depth)) - k * h * (1 - h), h];
+}
+
+/** A fold's distance and holder, [depth, holder], with something that joins. */
+function foldedAt([depth, holder], operator, k, [distance, joins]) {
+  if (operator > SMOOTH) {
+    const cut = operator === SUBTRACT && joins !== null ? -distance : distance;
+    return [k > 0 ? -blended(-depth, -cut, k)[0] : Math.max(depth, cut), holder];
+  }
+  if (operator === SMOOTH) {
+    const [made, h] = blended(depth, distance, k);
+    return [made, h > 0.5 ? joins : holder];
+  }
+  return [Math.min(depth, distance), distance < Math.max(depth, 0) ? joins : holder];
+}
+
+/** What a row has at the eye, as a fold of its own. */
+function leafAt(row, distanceOf, eye) {
+  if (distanceOf === undefined) return NOTHING_THERE;
+  const [x, y, z] = carriedBack(row.steps, eye), f = row.frequency;
+  const bump = row.amount * Math.sin(f * x) * Math.sin(f * y) * Math.sin(f * z);
+  return [(distanceOf(x, y, z) + bump) * row.scale, row];
+}
+
 /** Throws NotLive where the eye is inside an opaque object; what has no formula counts as far away. */
 export function checkEye({ rows, stage }, { geometries, media }) {
-  let [depth, holder] = [Infinity, null];
+  const open = []; // the folds around a group, and how that will join
+  let here = NOTHING_THERE;
   for (const row of rows) {
-    const distanceOf = DISTANCES[geometries[row.shape]];
-    if (distanceOf === undefined) {
-      if (row.token >= 2) depth = Infinity;
-      continue;
+    let [operator, k] = [row.token & OPERATOR, row.blend];
+    if (row.token & BEGINS) {
+      open.push([here, operator, k]);
+      [here, operator, k] = [NOTHING_THERE, 0, 0];
     }
-    const [x, y, z] = carriedBack(row.steps, stage.eye);
-    const f = row.frequency;
-    const bump = row.amount * Math.sin(f * x) * Math.sin(f * y) * Math.sin(f * z);
-    const distance = (distanceOf(x, y, z) + bump) * row.scale;
-    if (row.token === 2) depth = Math.max(depth, -distance);
-    else if (row.token === 3) depth = Math.max(depth, distance);
-    else if (row.token === 1) {
-      const h = Math.min(Math.max(0.5 + (0.5 * (depth - distance)) / row.blend, 0), 1);
-      depth = (h === 1 ? distance : depth + h * (distance - depth)) - row.blend * h * (1 - h);
-      holder = h > 0.5 ? row : holder;
-    } else {
-      holder = distance < Math.max(depth, 0) ? row : holder;
-      depth = Math.min(depth, distance);
+    here = foldedAt(here, operator, k, leafAt(row, DISTANCES[geometries[row.shape]], stage.eye));
+    for (let ends = row.token >> ENDS; ends > 0; ends -= 1) {
+      const [outer, joint, width] = open.pop();
+      here = foldedAt(outer, joint, width, here);
     }
   }
+  const [depth, holder] = here;
   if (depth < 0 && holder !== null && !media.includes(holder.material)) {
     refuse(`the camera is inside object ${holder.object}, a \`${geometries[holder.shape]}\``);
   }

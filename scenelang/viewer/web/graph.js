@@ -1,15 +1,18 @@
 // From a scene's tree to rows: transforms go to the leaves, empty nodes vanish, booleans become one stream.
 //
 // A leaf of the tree is {shape, steps, worn}, a fold {links: [{op, k, node}], steps, worn}; steps are nearest
-// the leaf first. See `scenelang/graph/lower.py`, `passes/drop.py`, `leaves.py` and `linearise.py`.
+// the leaf first, and k is the width of a blend, 0 for none. See `scenelang/graph/lower.py`, `passes/drop.py`,
+// `leaves.py` and `flatten.py`.
 
 import { Wearing, refuse } from "./values.js";
 import { flatMap, invertedMap, usableMap } from "./maps.js";
 import { checkChain, mergedChain, normalChain, scaleOfChain } from "./chain.js";
 import { lookOf } from "./looks.js";
-import { Stream, USUAL_BLEND } from "./bounds.js";
+import { BEGINS, ENDS } from "./groups.js";
 
 export const MOST_OBJECTS = 20000;
+export const USUAL_BLEND = 0.15; // the width of a `smooth`, unless said
+const MOST_OPEN = 15; // groups within each other
 const MOST_ROW_STEPS = 24; // of a row
 const TOKENS = ["union", "smooth", "subtract", "intersect"];
 
@@ -17,10 +20,9 @@ const TOKENS = ["union", "smooth", "subtract", "intersect"];
 export function rowsOf(links, form) {
   const state = { form, objects: 0, looks: new Map(), plain: new Wearing(form.plain, -1, []) };
   const root = lowered({ links, steps: [], worn: null }, [], null, state);
-  const stream = new Stream();
-  if (root?.leaf) stream.push("union", finishedLeaf(root), USUAL_BLEND);
-  else if (root !== null) takeLinks(root.links, stream);
-  return stream.rows.map((row, at) => rowData(row, at, form));
+  const rows = [];
+  if (root !== null) putRows(root.links ? flatLinks(root.links) : [{ op: "union", k: 0, node: root }], 0, rows);
+  return rows.map((row) => rowData(row, form));
 }
 
 /** A node with all its steps in the world, and looks; null where it is empty. */
@@ -30,14 +32,15 @@ function lowered(node, outward, around, state) {
   if (!node.links) return loweredLeaf(node, steps, worn, state);
   const links = [];
   node.links.forEach((link, at) => {
-    if (at > 0 && link.k !== USUAL_BLEND && !state.form.blends) refuse("the model has one width of a blend");
+    const usual = link.k === (link.op === "smooth" ? USUAL_BLEND : 0);
+    if (at > 0 && !usual && !state.form.blends) refuse("the model has one width of a blend");
     const child = lowered(link.node, steps, worn, state);
     if (child === null) {
       if (link.op === "intersect" && at > 0) links.length = 0;
     } else if (links.length > 0) {
       links.push({ op: link.op, k: link.k, node: child });
     } else if (at === 0 || link.op === "union" || link.op === "smooth") {
-      links.push({ op: "union", k: USUAL_BLEND, node: child });
+      links.push({ op: "union", k: 0, node: child });
     }
   });
   if (links.length === 0) return null;
@@ -69,7 +72,6 @@ function loweredLeaf(node, steps, worn, state) {
     look: looks.get(wears),
     number: state.objects,
     form,
-    corners: form.corners[node.shape],
   };
 }
 
@@ -82,58 +84,55 @@ function finishedLeaf(leaf) {
 
 // ---------------------------------------------------------------- the boolean rule
 
-/** Stream links one after the other; those of composites take part where the rule takes them apart. */
-function takeLinks(links, stream) {
-  const todo = [...links].reverse();
-  let smooths = links.filter((link) => link.op === "smooth").length;
-  const put = (more) => {
-    for (let at = more.length - 1; at >= 0; at -= 1) todo.push(more[at]);
-    smooths += more.filter((link) => link.op === "smooth").length;
-  };
-  while (todo.length > 0) {
-    const { op, k, node } = todo.pop();
-    if (op === "smooth") smooths -= 1;
-    if (node.leaf) {
-      stream.push(op, finishedLeaf(node), k);
-    } else if (stream.rows.length === 0) {
-      put(node.links);
-    } else {
-      const core = coreOf(op, node.links);
-      const tail = node.links.slice(core);
-      put(op === "intersect" ? tail : tail.map((link) => ({ op, k: USUAL_BLEND, node: link.node })));
-      if (core === 1) put([{ op, k: USUAL_BLEND, node: node.links[0].node }]);
-      else attachComposite(op, node.links.slice(0, core), stream, smooths);
+/** The links of a fold with composite operands taken apart where that changes nothing. */
+function flatLinks(links) {
+  const flat = [];
+  for (const { op, k, node } of links) {
+    const inner = node.links ? flatLinks(node.links) : [];
+    if (inner.length > 0 && flat.length === 0) {
+      for (const link of inner) flat.push(link);
+      continue;
+    }
+    const core = coreOf(op, k, inner);
+    flat.push({ op, k, node: core > 1 ? { links: inner.slice(0, core) } : inner[0]?.node ?? node });
+    for (const after of inner.slice(core)) {
+      flat.push({ op: op === "intersect" ? after.op : op, k: 0, node: after.node });
     }
   }
+  return flat;
 }
 
 /** How many of the first links of a composite operand have to stay together; 1: none. */
-function coreOf(op, links) {
-  if (op === "smooth") return links.length;
+function coreOf(op, k, links) {
+  if (k > 0) return links.length;
   const apart = op === "intersect" ? ["intersect", "subtract"] : ["union"];
   for (let at = links.length - 1; at > 0; at -= 1) {
-    if (!apart.includes(links[at].op)) return at + 1;
+    if (!apart.includes(links[at].op) || links[at].k > 0) return at + 1;
   }
   return 1;
 }
 
-function attachComposite(op, links, stream, smooths) {
-  if (op !== "union" || smooths > 0) refuse(`several objects as one operand of \`${op}\``);
-  const inner = new Stream();
-  takeLinks(links, inner);
-  if (inner.rows.length === 1) stream.push("union", inner.rows[0].leaf, USUAL_BLEND);
-  else if (!stream.attach(inner)) refuse("several objects in a union that may overlap those before them");
+/** Add the leaves of flat links to rows; `first` is how the group joins that the first of them begins. */
+function putRows(links, depth, rows, first = null) {
+  if (depth > MOST_OPEN) refuse(`operands of several objects in each other deeper than ${MOST_OPEN}`);
+  links.forEach((link, at) => {
+    if (link.node.links) return putRows(link.node.links, depth + 1, rows, link);
+    const { op, k } = (at === 0 && first) || link;
+    const token = TOKENS.indexOf(op) + (at === 0 && first ? BEGINS : 0);
+    return rows.push({ token, k, leaf: finishedLeaf(link.node) });
+  });
+  if (first) rows.at(-1).token += 1 << ENDS;
 }
 
 // ---------------------------------------------------------------- rows
 
-function rowData({ op, leaf, k }, at, { dimension }) {
+function rowData({ token, leaf, k }, { dimension }) {
   const { look, shape, number } = leaf;
   const bump = leaf.steps.find((step) => step.amount !== undefined);
   const steps = wayBack(leaf.steps, dimension);
   if (steps.length > MOST_ROW_STEPS) refuse(`more than ${MOST_ROW_STEPS} steps from the world to an object`);
   return {
-    token: at === 0 ? 0 : TOKENS.indexOf(op),
+    token,
     shape,
     material: look.material,
     steps,
@@ -144,7 +143,7 @@ function rowData({ op, leaf, k }, at, { dimension }) {
     paintSteps: look.paintSteps,
     amount: bump?.amount ?? 0,
     frequency: bump?.frequency ?? 0,
-    blend: op === "smooth" ? k : USUAL_BLEND,
+    blend: k,
     object: number,
   };
 }

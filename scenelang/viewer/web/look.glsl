@@ -6,8 +6,6 @@ uniform sampler2D pictures;
 uniform usampler3D colours;
 #endif
 
-// Colour, the same with plain colours in place of textures', gradient of the distance.
-vec3 seen, even, slope;
 bool worn; // whether there is a texture
 
 #ifdef TEXTURES
@@ -66,59 +64,55 @@ vec3 textured(int row, vec4 paint, vec3 q) {
 void look(ivec2 list, vec3 p, vec3 off) {
   bool touched = false;
   worn = false;
-  state = EMPTY;
-  dense = 0.0;
-  seen = even = slope = vec3(0.0);
+  begin(true);
   for (int i = list.y - 1; i >= zero; i--) {
     int row = listed(list.x + i);
     vec4 head = part(row, HEAD);
     vec3 q = mapped(row, 0, p), g;
-    int token = int(head.x);
-    if (dot(q, q) > part(row, LOW).w) {
+    int flags = int(head.x);
+    bool outside = dot(q, q) > part(row, LOW).w;
 #ifdef OTHERS
-      if (token == INTERSECT) { // nothing is left of what came before
-        touched = worn = false;
-        state = EMPTY;
-        dense = 0.0;
-        seen = even = slope = vec3(0.0);
-      }
-#endif
-      continue;
+    if (outside && (flags & CLIPS) > 0) { // nothing is left of what came before
+      touched = worn = false;
+      begin(true);
     }
+#endif
+#ifdef DEPTH
+    if ((flags & HOLDS) == 0)
+#endif
+    if (outside) continue;
 #ifdef OTHERS
-    if (token >= SUBTRACT && !touched) continue;
+    if ((flags & DRAWS) == 0 && !touched) continue;
 #endif
     touched = true;
+#ifdef DEPTH
+    enter(row);
+    if (outside) {
+      if ((flags & KIND) > SMOOTH) clear(true);
+      continue;
+    }
+#endif
     mat3 way = linear(row, 0);
     q += way * off;
 #ifdef TURNS
     q = turned(part(row, MORE), q, way);
 #endif
-    float d = leaf(row, head, q, g) * head.z, before = state;
-    g = g * way * head.z;
-    int at = token * CELL;
-    float own = d * head.w, past = before * head.w;
-    float take = taking(at, own, past), keep = 1.0 - take;
-    vec4 made = cells[at], line = cells[at + 1] * head.w;
-    float bump = made.y / head.w;
-    state = take * (d * made.x - keep * bump) + keep * before;
-    float rate = take > 0.0 && take < 1.0 ? d * made.x - before - (1.0 - 2.0 * take) * bump : 0.0;
-    slope = (take * made.x + rate * line.x) * g + (keep + rate * line.y) * slope;
-    vec4 own_ = part(row, LOOK);
-    float gate = painting(at, own, past);
-    dense += kind(at, own, past) * (own_.w - dense);
+    float d = leaf(row, head, q, g) * head.z;
+    vec4 own = part(row, LOOK);
+    vec3 plain = own.rgb;
 #ifdef TEXTURES
     vec4 paint = part(row, PAINT);
-    vec3 plain = own_.rgb;
     if (paint.x > 0.5) {
       worn = true;
       plain = 0.4 + 0.6 * fract(vec3(0.618034, 0.754878, 0.569840) * float(row + 1));
-      own_.rgb = textured(row, paint, q);
+      own.rgb = textured(row, paint, q);
     }
-    even += gate * (plain - even);
 #endif
-    seen += gate * (own_.rgb - seen);
+    join(flags & KIND, head.w, d, own.w, g * way * head.z, own.rgb, plain);
   }
+#ifdef DEPTH
+  leave(ALL);
+#endif
 #ifndef TEXTURES
   even = seen;
 #endif

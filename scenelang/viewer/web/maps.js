@@ -39,12 +39,6 @@ export function idleMap(rows) {
   return rows.every((number, at) => number === IDENTITY[at]);
 }
 
-/** A point mapped. */
-export function mappedPoint(rows, [x, y, z]) {
-  const [a, b, c, u, d, e, f, v, g, h, i, w] = rows;
-  return [a * x + b * y + c * z + u, d * x + e * y + f * z + v, g * x + h * y + i * z + w];
-}
-
 /** The smallest and largest singular value of a map of the plane. */
 function flatStretches([a, b, , , c, d]) {
   const largest = 0.5 * (Math.hypot(a + d, c - b) + Math.hypot(a - d, c + b));

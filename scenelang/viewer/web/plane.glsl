@@ -1,11 +1,11 @@
 // The framed network at points of the plane: what renderers/device/kernel.py computes, and which pixels take
 // four samples as renderers/coverage.py says. In front stand sizes and angles.glsl, behind it the decoders.
 
-uniform sampler2D rows; // of each object: four texels, its steps, the place and the steps of its picture
+uniform sampler2D rows; // of each object: four texels, its steps, the place and the steps of its picture; of groups
 uniform sampler2D lists; // of tiles, where each one's begins and its length; then texels of rows, four in one
 uniform sampler2D nodes; // distances of elements
 uniform sampler2D texels; // of pictures
-uniform vec4 cell[4 * (LINES + 2)]; // of each token: lines in distance, state and 1; then candidate, bump
+uniform vec4 cell[KINDS * (LINES + 2)]; // of each kind of join: lines in distance, state and 1; then candidate, bump
 uniform vec4 background; // premultiplied
 uniform vec2 size; // of the frame, pixels
 uniform float px; // side of a pixel, world units; 0: single points
@@ -30,6 +30,8 @@ const float CORNER = 0.36; // pixels from the centre to a sample, a little round
 const float NEAR = 0.85; // pixels: farther from an outline a pixel has one colour
 const float NARROW = 1.0 / 16.0; // of a pixel by a blend's width: above it colours change across the pixel
 const float LEAST = 1e-4; // of a colour, that counts as part of what a point shows
+const int BLENDS = 8, EVERYWHERE = 16, HIDES = 32; // flags of rows, over kinds of joins; as in plane.js
+const int END = 1 << 24; // behind all texels
 const vec2 OFFSETS[5] =
     vec2[](vec2(0), vec2(-0.25, -0.25), vec2(0.25, -0.25), vec2(-0.25, 0.25), vec2(0.25, 0.25));
 
@@ -145,6 +147,81 @@ bool idle(int gate, float narrow, float distance, float state) {
   return true;
 }
 
+// What a point that has met some objects shows.
+float state;
+vec3 rgb;
+// How near to an outline a pixel around the point has more than one colour, world units, 0 for one of its
+// samples; whether it has; whether colours change across it where nothing is seen, and whether a blend shows that.
+float gap;
+bool near, tied, doubtful;
+
+/** How far a colour comes in. */
+float paints(int gate, float narrow, float distance) {
+  float paint = 0.0;
+  for (int k = 1; k <= LINES; k++) paint = max(paint, level(cell[gate + k], narrow, distance, state));
+  return min(paint, 1.0);
+}
+
+/** Note what a pixel's samples may see where an object joins whose outline is `room` about a point at most. */
+void notice(int kind, float narrow, float distance, float paint, float room) {
+  float margin = abs(state / UNIT - distance);
+  near = near || abs(distance) < room;
+  if (kind == SMOOTH) {
+    doubtful = doubtful || (tied && paint > LEAST && paint < 1.0 - LEAST);
+#ifdef PICTURES
+    float width = BLEND / narrow;
+    doubtful = doubtful || (px > NARROW * width && margin < width + CORNER * (px + room / NEAR));
+#endif
+  } else if (kind == UNION) {
+    tied = tied || margin < 2.0 * CORNER * px;
+  }
+}
+
+void join(int gate, float narrow, float distance, float paint, vec3 own) {
+  float take = clamp(level(cell[gate], narrow, distance, state), 0.0, 1.0);
+  vec2 ends = cell[gate + LINES + 1].xy;
+  state += take * (ends.x * distance - state) - take * (1.0 - take) * ends.y / narrow;
+  rgb += paint * (own - rgb);
+  SPEND(3 * (LINES + 1) + 11);
+}
+
+// ------------------------------------------------------------ groups
+
+#ifdef DEPTH
+vec4 below[DEPTH]; // colours and states that open groups will join
+int depth = 0, open = 0; // how many are open, and the texel of the innermost: kind, narrow, last row, around it
+
+/** End groups that an object, or the end, stands behind. */
+void leave(int at) {
+  while (depth > 0) {
+    vec4 group = texel(rows, open);
+    if (float(at) <= group.z) break;
+    int kind = int(group.x), gate = kind * (LINES + 2);
+    float distance = state / UNIT;
+    vec4 outer = below[--depth];
+    vec3 own = rgb;
+    state = outer.a;
+    rgb = outer.rgb;
+    open = int(group.w);
+    float paint = paints(gate, group.y, distance);
+    if (gap > 0.0) notice(kind, group.y, distance, paint, gap);
+    join(gate, group.y, distance, paint, own);
+  }
+}
+
+/** Begin all groups that are not open yet, down to one. */
+void enter(int group) {
+  int more = 0;
+  for (int g = group; g != open; g = int(texel(rows, g).w)) more++;
+  for (; more > 0; more--) {
+    below[depth++] = vec4(rgb, state);
+    state = empty;
+    rgb = vec3(0.0);
+  }
+  open = group;
+}
+#endif
+
 // Of the first objects of a tile what a pixel's middle said: a distance that its samples can do with, too.
 #define KNOWN 32
 const float SKIPPED = 3e38; // it changes nothing
@@ -152,17 +229,12 @@ const float OPEN = 2e38; // its outline is near, or a blend needs it exactly
 float known[KNOWN];
 int first = 0; // the last object that hides all before it
 
-/**
- * Colour and state of a point that has met its objects.
- * @param gap how near to an outline a pixel around the point has more than one colour, world units;
- *     0 for one of its samples
- * @param near whether the pixel has, in which case the answer is of no use
- */
-vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
-  float state = empty;
-  vec3 rgb = vec3(0.0);
-  bool tied = false, doubtful = false, middle = gap > 0.0;
-  near = false;
+/** Let a point meet its objects; where `near` comes true the answer is of no use. */
+void meet(vec2 p, ivec2 span) {
+  state = empty;
+  rgb = vec3(0.0);
+  bool middle = gap > 0.0;
+  near = tied = doubtful = false;
   for (int i = first; i < span.y; i++) {
     float distance = OPEN, room = 0.0;
     if (!middle && px > 0.0 && i < KNOWN) distance = known[i];
@@ -170,10 +242,13 @@ vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
     int at = int(texel(lists, span.x + (i >> 2))[i & 3]);
     vec4 a = texel(rows, at);
     float scale = a.x, narrow = a.y;
-    int token = int(a.z), steps = int(a.w), gate = (token & 3) * (LINES + 2);
-    bool blends = token > 3;
-    token &= 3;
+    int flags = int(a.z), steps = int(a.w), kind = flags & 7, gate = kind * (LINES + 2);
     vec4 c = texel(rows, at + 2), own = texel(rows, at + 3);
+    bool bare = false; // whether its group holds nothing yet
+#ifdef DEPTH
+    leave(at);
+    bare = int(c.w) != open;
+#endif
 
     if (distance == OPEN) {
       // no decoder where the leaf is proved so far away that nothing changes
@@ -184,7 +259,7 @@ vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
       float radius = length(q);
       float least = own.a * max(max(abs(q.x) - b.x, abs(q.y) - b.y), radius - b.z) - room;
       SPEND(8 + 3 * (LINES + 1));
-      bool skipped = least > 0.0 && idle(gate, narrow, least, state);
+      bool skipped = bare ? kind > SMOOTH : least > 0.0 && idle(gate, narrow, least, state);
 #ifndef POINTS
       skipped = skipped || scale * (radius - b.w) > room;
       if (middle && i < KNOWN) known[i] = SKIPPED;
@@ -192,7 +267,7 @@ vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
       if (skipped) continue;
       distance = least;
 #ifndef POINTS
-      if (token != INTERSECT || least < FARTHEST * widest)
+      if ((flags & EVERYWHERE) == 0 || least < FARTHEST * widest)
 #endif
       {
 #ifdef GRIDS
@@ -203,31 +278,22 @@ vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
         distance *= scale;
       }
     }
-
-    float take = clamp(level(cell[gate], narrow, distance, state), 0.0, 1.0), paint = 0.0;
-    for (int k = 1; k <= LINES; k++) paint = max(paint, level(cell[gate + k], narrow, distance, state));
-    paint = min(paint, 1.0);
-    if (middle) {
-      float margin = abs(state / UNIT - distance), off = abs(distance);
-      if (i < KNOWN) known[i] = off < room + (blends ? FARTHER * widest : 0.0) ? OPEN : distance;
-      near = near || off < room;
-      if (token == SMOOTH) {
-        doubtful = doubtful || (tied && paint > LEAST && paint < 1.0 - LEAST);
-#ifdef PICTURES
-        float width = BLEND / narrow;
-        doubtful = doubtful || (px > NARROW * width && margin < width + CORNER * (px + room / NEAR));
+#ifdef DEPTH
+    enter(int(c.w));
 #endif
-      } else if (token == UNION) {
-        tied = tied || margin < 2.0 * CORNER * px;
-        if (!blends && distance < -room) {
-          first = i;
-          near = tied = doubtful = false;
-        }
+
+    float paint = paints(gate, narrow, distance);
+    if (middle) {
+      if (i < KNOWN) {
+        bool exact = abs(distance) < room + ((flags & BLENDS) > 0 ? FARTHER * widest : 0.0);
+        known[i] = exact ? OPEN : distance;
+      }
+      notice(kind, narrow, distance, paint, room);
+      if ((flags & HIDES) > 0 && distance < -room) {
+        first = i;
+        near = tied = doubtful = false;
       }
     }
-    vec2 ends = cell[gate + LINES + 1].xy;
-    state += take * (ends.x * distance - state) - take * (1.0 - take) * ends.y / narrow;
-    SPEND(3 * (LINES + 1) + 8);
 #ifdef PICTURES
     if (c.z > 0.0 && paint > LEAST) {
       // over a pixel, colours of pictures are a mean as they are of four samples
@@ -239,27 +305,29 @@ vec4 met(vec2 p, ivec2 span, float gap, out bool near) {
       }
     }
 #endif
-    rgb += paint * (own.rgb - rgb);
-    SPEND(3);
+    join(gate, narrow, distance, paint, own.rgb);
   }
+#ifdef DEPTH
+  leave(END);
+#endif
   near = near || abs(state) < gap * UNIT || (doubtful && state * SLOPE < 0.5);
-  return vec4(rgb, state);
 }
 
 void main() {
-  bool near;
 #ifdef POINTS
   int number = int(gl_FragCoord.x) + 1024 * int(gl_FragCoord.y);
-  vec4 found = met(texel(points, number).xy, ivec2(texel(lists, 0).xy), 0.0, near);
-  shown = vec4(found.a / UNIT, found.rgb);
+  gap = 0.0;
+  meet(texel(points, number).xy, ivec2(texel(lists, 0).xy));
+  shown = vec4(state / UNIT, rgb);
 #else
   ivec2 at = ivec2(gl_FragCoord.xy) / tile, span = ivec2(texel(lists, at.y * across + at.x).xy);
   vec2 middle = (gl_FragCoord.xy - 0.5 * size) * px;
   vec4 sum = vec4(0.0);
   for (int k = 0; k < most; k++) {
-    vec4 found = met(middle + px * OFFSETS[k], span, k == 0 ? NEAR * px : 0.0, near);
-    float alpha = clamp(0.5 - found.a * SLOPE, 0.0, 1.0);
-    vec4 picture = vec4(found.rgb * alpha, alpha);
+    gap = k == 0 ? NEAR * px : 0.0;
+    meet(middle + px * OFFSETS[k], span);
+    float alpha = clamp(0.5 - state * SLOPE, 0.0, 1.0);
+    vec4 picture = vec4(rgb * alpha, alpha);
     if (k > 0) {
       sum += 0.25 * picture;
     } else if (!near) {

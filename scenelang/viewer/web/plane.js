@@ -2,6 +2,7 @@
 
 import { floats, linked, target, triangle } from "./gl.js";
 import { distances } from "./grids.js";
+import { groupsOf, joinsOf } from "./groups.js";
 import { rateOf, reaches, steepest, tileLists } from "./ways.js";
 
 const WIDE = 1024; // texels of a row of numbers; as in plane.glsl
@@ -69,20 +70,19 @@ function texelsOf([kind, a, b, u, c, d, v]) {
   return kind === "map" ? [a, b, u, 0, c, d, v, steepest(a, b, c, d)] : [a, b, u, rateOf([kind, a, b, u])];
 }
 
-/** Numbers of all rows, and the texel at which each begins; see `rows` of plane.glsl. */
-function packed({ network, materials }, leaves, pictures, { rows }, reach) {
+/** Numbers of all rows and behind them of groups, and the texel at which each row begins; see `rows` of plane.glsl. */
+function packed({ network, materials }, leaves, pictures, { rows }, joins, reach) {
   const [numbers, begins] = [[], []];
-  const last = lastBlend(rows, network);
+  const narrow = ({ blend }) => (blend > 0 ? network.blend / blend : 1);
   rows.forEach((row, i) => {
     const { steps, scale } = row;
-    const paint = network.draws[row.token] ? row.paint : -1; // the others leave colours as they are
+    const paint = joins[i].draws ? row.paint : -1; // the others leave colours as they are
     begins.push(numbers.length / 4);
     const { bounds, far, first, side } = leaves[row.shape];
-    const narrow = row.token === network.tokens.smooth ? network.blend / row.blend : 1;
     const moves = steps.reduce((total, [kind]) => total + (kind === "map" ? 2 : 1), 0);
     const albedo = materials[row.material].albedo;
     const colour = row.colour.map((share, k) => Math.min(Math.max(share * albedo[k], 0), 1));
-    numbers.push(scale, narrow, row.token + 4 * (i <= last), steps.length);
+    numbers.push(scale, narrow(joins[i]), flagsOf(joins[i]), steps.length);
     numbers.push(...bounds, Math.min(reach[i], 1e30));
     numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : 4 + moves, 0);
     numbers.push(...colour, Math.min(far, 1) * scale);
@@ -97,13 +97,23 @@ function packed({ network, materials }, leaves, pictures, { rows }, reach) {
       numbers.push(network.paintSteps.indexOf(name), ...amounts, ...Array(3 - amounts.length).fill(0));
     }
   });
+  const texels = new Map([[null, 0]]);
+  for (const group of groupsOf(joins).groups) {
+    texels.set(group, numbers.length / 4);
+    numbers.push(group.kind, narrow(group), begins[group.to], texels.get(group.around));
+  }
+  joins.forEach(({ around }, i) => { numbers[4 * begins[i] + 11] = texels.get(around); });
   return { numbers, begins };
 }
 
-/** The number of the last object that joins by a blend, -1 for none. */
-function lastBlend(rows, { tokens }) {
-  return rows.reduce((last, { token }, i) => (token === tokens.smooth ? i : last), -1);
+/** How a row joins, as plane.glsl has it. */
+function flagsOf(join) {
+  const far = join.always || (join.seen.hidden && join.operator < 2);
+  return join.kind + 8 * join.seen.blends + 16 * far + 32 * hides(join);
 }
+
+/** Whether nothing is seen of what was before, where a row is solid. */
+const hides = ({ operator, around, seen }) => operator === 0 && around === null && !seen.blends;
 
 /** Tiles' lists as texels: where each begins and how long it is, then texels of rows, four to one. */
 function listed({ starts, objects }, begins) {
@@ -132,6 +142,7 @@ export function planeDrawer(gl, view) {
   const { network } = view;
   const programs = new Map(); // by what they were compiled for
   const shapes = new Set(); // seen so far
+  let depth = 0; // of groups, likewise
   const textures = ["rows", "lists", "nodes", "texels", "points"];
   const held = { rows: floats(gl, new Float32Array(4)), lists: floats(gl, new Float32Array(4)) };
   const kinds = [];
@@ -152,12 +163,14 @@ export function planeDrawer(gl, view) {
     held.texels = sheet(gl, texels, [gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE], 3);
   }
 
-  function compiled(program, define) {
+  function compiled(program, joins, define) {
     for (const { shape } of program.rows) shapes.add(shape);
+    depth = Math.max(depth, groupsOf(joins).depth);
     const used = [...shapes].sort((a, b) => a - b);
-    const key = [define, ...used].join();
+    const defines = [...kinds, ...(depth ? [`DEPTH ${depth}`] : []), ...(define ? [define] : [])];
+    const key = [...defines, ...used].join();
     if (!programs.has(key)) {
-      const found = linked(gl, fragmentText(view, used, [...kinds, ...(define ? [define] : [])]));
+      const found = linked(gl, fragmentText(view, used, defines));
       const place = (name) => gl.getUniformLocation(found, name);
       gl.useProgram(found);
       textures.forEach((name, unit) => gl.uniform1i(place(name), unit));
@@ -168,17 +181,16 @@ export function planeDrawer(gl, view) {
   }
 
   function run(program, { width, height }, define = "") {
-    const { found, place } = compiled(program, define);
+    const joins = joinsOf(program.rows), { found, place } = compiled(program, joins, define);
     const px = 2 / Math.min(width, height);
-    const { reach, widest } = reaches(program.rows, network);
-    const last = lastBlend(program.rows, network);
-    const hides = ({ token }, i) => token === network.tokens.union && i > last;
-    const inner = program.rows.map((row, i) => (hides(row, i) ? leaves[row.shape].inner : 0));
-    const { numbers, begins } = packed(view, leaves, pictures, program, reach);
+    const reach = reaches(program.rows, joins, network);
+    const widest = program.rows.reduce((most, { blend }) => Math.max(most, blend), network.blend);
+    const inner = program.rows.map(({ shape }, i) => (hides(joins[i]) ? leaves[shape].inner : 0));
+    const { numbers, begins } = packed(view, leaves, pictures, program, joins, reach);
     const wanted = 8 * Math.ceil(Math.min(width, height) / 400); // few enough for JavaScript
     const lists = define === "POINTS"
       ? { starts: [0, begins.length], objects: [...begins.keys()], tile: height, across: 1, down: 1 }
-      : tileLists(program.rows, reach, inner, { width, height, tile: wanted, px }, network.draws);
+      : tileLists(program.rows, joins, reach, inner, { width, height, tile: wanted, px });
     floats(gl, new Float32Array(numbers), WIDE, held.rows);
     floats(gl, listed(lists, begins), WIDE, held.lists);
     textures.forEach((name, unit) => {
@@ -213,7 +225,7 @@ export function planeDrawer(gl, view) {
     return found;
   }
 
-  compiled(view.program, ""); // throws where it cannot be
+  compiled(view.program, joinsOf(view.program.rows), ""); // throws where it cannot be
   return {
     draw: (program, size) => run(program, size),
     points(program, p) {

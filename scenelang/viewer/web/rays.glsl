@@ -8,45 +8,63 @@ const int WINDOWS = 16; // of a ray that passes more balls than it keeps
 const int HALVINGS = 16; // of the way on which a medium gives way to a solid
 
 vec3 rayFrom, rayWay;
-vec4 slots[SLOTS]; // the balls that a ray passes: row, -1 less it of one that does not draw; begin, end, rate
+// The balls that a ray passes: row, -1 less it of one that does not draw; begin, end, rate. Less half of one that adds
+// in a group; the rate is less than 0 where what was before ends outside of the ball.
+vec4 slots[SLOTS];
 int slotCount;
 
 // Let a point of the ray meet the objects in whose balls it is.
 void meet(float t) {
-  state = EMPTY;
-  dense = 0.0;
+  begin(false);
   change = EMPTY;
   bool touched = false;
   vec3 p = rayFrom + t * rayWay;
   for (int i = slotCount - 1; i >= zero; i--) {
     vec4 slot = slots[i];
-    if (t < slot.y || t > slot.z) continue;
+    bool outside = t < slot.y || t > slot.z;
+#ifdef DEPTH
+    if (slot.w >= 0.0)
+#endif
+    if (outside) continue;
     int row = int(slot.x);
 #ifdef OTHERS
-    if (row < 0) {
+    if (slot.x < 0.0) {
       if (!touched) continue;
-      row = -1 - row;
+      row = int(-1.0 - slot.x);
     }
 #endif
     touched = true;
     vec4 head = part(row, HEAD);
+    int kind_ = int(head.x) & KIND;
+#ifdef DEPTH
+    enter(row);
+    if (outside) { // nothing is left of what came before
+      if (kind_ > SMOOTH) clear(false);
+      continue;
+    }
+#endif
     vec3 q = mapped(row, 0, p);
 #ifdef TURNS
     q = turned(part(row, MORE), q);
 #endif
-    float d = leaf(row, head, q) * head.z, before = state;
-    int at = int(head.x) * CELL;
-    float take = taking(at, d * head.w, before * head.w), keep = 1.0 - take;
-    vec4 made = cells[at];
-    state = take * (d * made.x - keep * made.y / head.w) + keep * before;
+    float medium = 0.0;
 #ifdef MIXED
-    float medium = part(row, LOOK).w, gap = abs(d);
-    if (int(head.x) == 1) gap = min(gap, abs(before - d) / 2.0);
-    if (abs(dense - medium) > 0.5) change = min(change, gap);
-    dense += kind(at, d * head.w, before * head.w) * (medium - dense);
+    medium = part(row, LOOK).w;
 #endif
+    join(kind_, head.w, leaf(row, head, q) * head.z, medium);
   }
+#ifdef DEPTH
+  leave(ALL);
+#endif
   change = min(change, abs(state));
+}
+
+// From where on a ray needs a ball.
+float needed(vec4 slot) {
+#ifdef DEPTH
+  if (slot.w < 0.0) return -NEVER;
+#endif
+  return slot.y;
 }
 
 // Keep the balls of a list that the ray passes between low and high; returns up to where these are all.
@@ -76,22 +94,29 @@ float gather(ivec2 list, float low, float high) {
       }
     }
     bool some = begin <= end;
+    float name = float(row);
 #ifdef OTHERS
-    int token = int(part(row, HEAD).x);
-    if (token == INTERSECT) { // outside its ball nothing is left of what came before
+    int flags = int(part(row, HEAD).x);
+    if ((flags & CLIPS) > 0) { // outside its ball nothing is left of what came before
       low = some ? begin : NEVER;
       high = some ? end : -NEVER;
     }
-    float name = float(token < SUBTRACT ? row : -1 - row);
-#else
-    float name = float(row);
+    if ((flags & DRAWS) == 0) name = -1.0 - name;
+#endif
+#ifdef DEPTH
+    if ((flags & (DRAWS | ADDS)) == ADDS) name -= 0.5;
+    if ((flags & HOLDS) > 0) {
+      if (!some) begin = NEVER, end = -NEVER;
+      rate = min(-rate, -1e-30);
+    } else
 #endif
     if (!some || begin > sure) continue;
     if (slotCount == SLOTS) { // the farthest has to wait
       int far = 0;
-      for (int j = zero; j < SLOTS; j++) if (slots[j].y > slots[far].y) far = j;
-      sure = min(sure, max(begin, slots[far].y));
-      if (begin >= slots[far].y) continue;
+      for (int j = zero; j < SLOTS; j++) if (needed(slots[j]) > needed(slots[far])) far = j;
+      float mine = needed(vec4(name, begin, end, rate));
+      sure = min(sure, max(mine, needed(slots[far])));
+      if (mine >= needed(slots[far])) continue;
       for (int j = far; j < SLOTS - 1; j++) slots[j] = slots[j + 1];
       slotCount--;
     }
@@ -137,6 +162,9 @@ void march(ivec2 list, vec3 from, vec3 way, float limit) {
           float at = slot.y > t ? slot.y : next;
           if (within && slot.z > t) at = min(at, slot.z);
           if (slot.x >= 0.0 && at <= slot.z) to = min(to, at);
+#ifdef DEPTH
+          if (fract(slot.x) > 0.0 && slot.y > t) to = min(to, slot.y);
+#endif
         }
 #if defined(MEDIA) && defined(OTHERS)
         if (within && to < NEVER) { // in a medium steps end where something may cut it
@@ -156,7 +184,7 @@ void march(ivec2 list, vec3 from, vec3 way, float limit) {
           if (slot.y > next) until = min(until, slot.y);
           else if (slot.z >= next) {
             until = min(until, slot.z);
-            rate = max(rate, slot.w);
+            rate = max(rate, abs(slot.w));
           }
         }
         pace = 1.0 / rate;

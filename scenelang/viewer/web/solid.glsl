@@ -10,18 +10,18 @@ precision highp usampler3D;
 
 // The field of solids. Of what a scene lacks nothing is compiled: SHAPE_i (a geometry), MEDIA, MIXED (with
 // solids), COLOURED (media of several colours), TEXTURES, GRIDS, TURNS, BUMPS, OTHERS (than objects that
-// draw), FAR (points from leaves). SLOTS: balls that a ray keeps.
+// draw), FAR (points from leaves). SLOTS: balls that a ray keeps; DEPTH: groups that are open at once.
 
 const float NEVER = 1e30;
-const int SUBTRACT = 2, INTERSECT = 3;
+const int SMOOTH = 1;
 const int ROW = 13; // numbers of a row, in fours, the first three its map
-const int HEAD = 3; // token, shape, scale, usual width of a blend in widths of its own
+const int HEAD = 3; // kind of join and flags, shape, scale, usual width of a blend in widths of its own
 const int MORE = 4; // amount and frequency of its displacement, where its steps begin, how many
 const int AROUND = 5; // centre and squared radius of a ball of the world around it
 const int LOW = 6; // of its box behind the map; squared radius of its ball there
 const int HIGH = 7; // of its box; rate
 const int LOOK = 8; // colour, medium
-const int PAINT = 9; // kind of texture, where its colour steps begin, how many
+const int PAINT = 9; // kind of texture, where its colour steps begin, how many; its group
 const int PLACE = 10; // two: from the leaf to its picture; where that begins
 const int GRID = 12; // side and first slice of a grid, sides of a texture
 
@@ -179,8 +179,3 @@ float leaf(int row, vec4 head, vec3 q, out vec3 g) {
 #endif
   return d;
 }
-
-// What is at a point, as far as rays ask.
-float state; // distance
-float dense; // whether it is a medium
-float change; // how far the kind of material is sure to stay

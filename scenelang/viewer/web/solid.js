@@ -3,6 +3,7 @@
 import { checkedProgram, floats, linking, triangle, unfiltered } from "./gl.js";
 import { solidElements } from "./elements.js";
 import { cellsOf, cubeOf, listsOf, solidBalls } from "./balls.js";
+import { groupsOf, joinsOf } from "./groups.js";
 
 const ROW_TEXELS = 13; // as the shader has it
 const LIST_WIDTH = 1024;
@@ -20,8 +21,8 @@ function plainColour(view, row) {
   return view.materials[row.material].albedo.map((v, i) => Math.min(1, Math.max(0, v * row.colour[i])));
 }
 
-/** The rows' numbers for the shader: ROW_TEXELS texels a row, then steps of space and of colours. */
-function tableOf(view, rows, balls, elements) {
+/** The rows' numbers for the shader: ROW_TEXELS texels a row, then groups and steps of space and of colours. */
+function tableOf(view, rows, joins, balls, elements) {
   const blocks = [], blank = () => new Float32Array(4 * ROW_TEXELS);
   for (let i = 0; i < rows.length; i++) blocks.push(blank());
   const more = (texels) => { // as many rows as hold some texels; the number of the first
@@ -32,6 +33,10 @@ function tableOf(view, rows, balls, elements) {
     }
     return first;
   };
+  const narrow = ({ blend }) => (blend > 0 ? view.network.blend / blend : 1);
+  const { groups } = groupsOf(joins), places = new Map([[null, 0]]);
+  groups.forEach((group, i) => places.set(group, ROW_TEXELS * blocks.length + i));
+  more(groups.map((group) => [group.kind, narrow(group), group.to, places.get(group.around)]));
   rows.forEach((row, i) => {
     const { outer, rest, ball, rate, centre, extent, box } = balls[i];
     const material = view.materials[row.material];
@@ -40,17 +45,16 @@ function tableOf(view, rows, balls, elements) {
     const paint = row.paint < 0 ? null : elements.paints[row.paint];
     const ops = (paint ? row.paintSteps : []).map(([kind, a, b = 0, c = 0]) => [COLOUR_STEPS[kind], a, b, c]);
     const [a, b, u, c, d, v] = row.place ?? [0, 0, 0, 0, 0, 0], grid = elements.grids[row.shape];
-    const usual = row.token === 1 ? view.network.blend / row.blend : 1;
     const turn = (x) => x - Math.floor(x);
     blocks[i].set([
       ...outer,
-      row.token, row.shape, row.scale, usual,
+      flagsOfSolid(joins[i]), row.shape, row.scale, narrow(joins[i]),
       row.amount, row.frequency, steps.length ? more(steps) : 0, steps.length,
       ...centre, extent * extent * (1 + 1e-5) + 1e-9,
       ...box[0], ball * ball,
       ...box[1], rate,
       ...plainColour(view, row), material.medium,
-      paint ? paint.kind : 0, ops.length ? more(ops) : 0, ops.length, 0,
+      paint ? paint.kind : 0, ops.length ? more(ops) : 0, ops.length, places.get(joins[i].around),
       // to shares of the picture's sides, from its upper left corner
       a / 2, b / 2, turn((u + 1) / 2), paint ? paint.first : 0,
       -c / 2, -d / 2, turn((1 - v) / 2), 0,
@@ -62,8 +66,13 @@ function tableOf(view, rows, balls, elements) {
   return data;
 }
 
+/** How a row joins, as fold.glsl has it. */
+function flagsOfSolid({ kind, draws, always, adds, around }) {
+  return kind + 8 * draws + (always ? (around ? 32 : 16) : 0) + 64 * adds;
+}
+
 /** What the shader has to know of, for some rows and their balls, as names of defines. */
-function featuresOf(view, rows, balls) {
+function featuresOf(view, rows, joins, balls) {
   const media = rows.filter((row) => isMedium(view, row)), has = (holds) => rows.some(holds);
   const colours = new Set(media.map((row) => (row.paint < 0 ? plainColour(view, row).join() : row.object)));
   const shown = [...new Set(rows.map((row) => row.shape))].sort((a, b) => a - b);
@@ -77,7 +86,7 @@ function featuresOf(view, rows, balls) {
     TURNS: balls.some((ball) => ball.rest.length > 0),
     FAR: balls.some((ball) => ball.radius > view.network.far),
     BUMPS: has((row) => row.amount !== 0),
-    OTHERS: has((row) => row.token > 1),
+    OTHERS: joins.some(({ draws }) => !draws),
   }).filter(([, holds]) => holds).map(([name]) => name);
   return [...learned, ...others];
 }
@@ -118,7 +127,7 @@ export function solidDrawer(gl, view) {
   const { network } = view, shaders = new Map(), table = gl.createTexture(), lists = gl.createTexture();
   const elements = solidElements(gl, view);
   const features = new Set(); // and slots only grow, so that frames of an animation share a shader
-  let slots = 8, first = null, ready = {};
+  let slots = 8, depth = 0, first = null, ready = {};
 
   const boxOf = (row) => {
     if (row.shape >= network.geometries) return elements.grids[row.shape].box;
@@ -128,7 +137,8 @@ export function solidDrawer(gl, view) {
 
   /** The shader for what is known and some defines more, compiled once; it may be under way yet. */
   const shaderOf = (names) => {
-    const all = [...features, `SLOTS=${slots}`, ...names], key = all.join();
+    const sizes = [`SLOTS=${slots}`, ...(depth ? [`DEPTH=${depth}`] : [])];
+    const all = [...features, ...sizes, ...names], key = all.join();
     if (!shaders.has(key)) {
       const defines = all.map((name) => `#define ${name}\n`.replace("=", " ")).join("");
       const program = linking(gl, `#version 300 es\n${defines}${view.shader.source}`);
@@ -150,16 +160,17 @@ export function solidDrawer(gl, view) {
   /** Take rows in, and cells for a picture of a size. */
   const prepare = (program, width, height) => {
     if (ready.program === program && ready.width === width && ready.height === height) return;
-    const { rows, stage } = program, balls = solidBalls(rows, network, boxOf);
+    const { rows, stage } = program, joins = joinsOf(rows), balls = solidBalls(rows, joins, network, boxOf);
     const pixel = 2 / Math.min(width, height), near = 1 / Math.tan(stage.fov / 2);
     const tiles = [width, height].map((side) => Math.ceil(side / TILE_SIDE));
     const scale = near / pixel / TILE_SIDE;
     const seen = cellsOf(stage.eye, stage.axes, [scale, scale],
       [width / 2 / TILE_SIDE, height / 2 / TILE_SIDE], tiles);
-    const { data, longest } = listsOf(rows, balls, [seen, ...cubeOf(stage.light, CUBE_SIDE)]);
+    const { data, longest } = listsOf(joins, balls, [seen, ...cubeOf(stage.light, CUBE_SIDE)]);
     wholes(gl, data, lists);
-    floats(gl, tableOf(view, rows, balls, elements), 1024, table);
-    for (const name of featuresOf(view, rows, balls)) features.add(name);
+    floats(gl, tableOf(view, rows, joins, balls, elements), 1024, table);
+    for (const name of featuresOf(view, rows, joins, balls)) features.add(name);
+    depth = Math.max(depth, groupsOf(joins).depth);
     while (slots < Math.min(MOST_SLOTS, longest)) slots *= 2;
     ready = {
       program, width, height, pixel, near, cells: [TILE_SIDE, tiles[0], 1 + seen.count, CUBE_SIDE],

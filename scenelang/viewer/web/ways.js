@@ -71,31 +71,22 @@ function extent(way, x, y, radius) {
   return [length - radius, length + radius];
 }
 
-/**
- * Leaf units from each object's origin beyond which it makes no difference to the picture, Infinity where it
- * concerns every point; and the widest blend, world units.
- */
-export function reaches(rows, { tokens, blend, slack, farther, farthest }) {
-  const reach = new Float64Array(rows.length);
-  let [after, total] = [0, 0]; // of the smooth unions from a row on, the widest and the sum
-  for (let i = rows.length - 1; i >= 0; i--) {
-    const { token, scale } = rows[i];
-    if (token === tokens.smooth) [after, total] = [Math.max(after, rows[i].blend), total + rows[i].blend];
-    const every = token === tokens.intersect || (token === tokens.subtract && after > 0);
-    reach[i] = every ? Infinity : 1 + slack + Math.min(farther * total, farthest * after) / scale;
-  }
-  return { reach, widest: Math.max(blend, after) };
+/** Leaf units from each object's origin beyond which it makes no difference, Infinity where it always may. */
+export function reaches(rows, joins, { slack, farther, farthest }) {
+  return Float64Array.from(joins, ({ always, seen: { hidden, total, widest } }, i) => (
+    always || hidden ? Infinity : 1 + slack + Math.min(farther * total, farthest * widest) / rows[i].scale
+  ));
 }
 
 /**
  * Which objects each tile of a frame meets, in stream order.
  * @param reach - of the rows, as `reaches` has them
  * @param inner - radii of discs of the rows' leaves in which they hide what was before, 0 for none
- * @param draws - of a token, whether it draws something where nothing is
+ * @param joins - of the rows, as `joinsOf` has them
  * @returns {{starts: Int32Array, objects: Int32Array, tile, across, down}} starts: (tiles + 1), tiles from
  *     the lower left corner; they are larger than `tile` where the lists would be too long
  */
-export function tileLists(rows, reach, inner, { width, height, tile, px }, draws) {
+export function tileLists(rows, joins, reach, inner, { width, height, tile, px }) {
   const [across, down] = [Math.ceil(width / tile), Math.ceil(height / tile)];
   const side = tile * px;
   const around = side * Math.SQRT1_2 * (1 + 1e-6);
@@ -105,7 +96,7 @@ export function tileLists(rows, reach, inner, { width, height, tile, px }, draws
   const [tiles, objects] = [[], []];
   const whole = 2 ** Math.ceil(Math.log2(Math.max(across, down)));
   for (let object = 0; object < rows.length; object++) {
-    const { steps, token } = rows[object];
+    const { steps } = rows[object], { draws } = joins[object];
     let [x0, x1, y0, y1] = [0, across - 1, 0, down - 1];
     if (reach[object] < Infinity) {
       const { centre: [x, y], half: [w, h] } = discInWorld(steps, reach[object]);
@@ -130,7 +121,7 @@ export function tileLists(rows, reach, inner, { width, height, tile, px }, draws
         return;
       }
       const at = j * across + i;
-      if (!draws[token] && !drawn[at]) return;
+      if (!draws && !drawn[at]) return;
       if (hides) hidden[at] = tiles.length;
       drawn[at] = 1;
       tiles.push(at);
@@ -138,7 +129,7 @@ export function tileLists(rows, reach, inner, { width, height, tile, px }, draws
     };
     look(0, 0, whole, false);
     if (tiles.length > MOST_PAIRS && whole > 1) {
-      return tileLists(rows, reach, inner, { width, height, tile: 2 * tile, px }, draws);
+      return tileLists(rows, joins, reach, inner, { width, height, tile: 2 * tile, px });
     }
   }
   const starts = new Int32Array(across * down + 1);

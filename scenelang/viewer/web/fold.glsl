@@ -1,0 +1,102 @@
+
+// The fold of the objects that a point meets, and of the groups of the stream that are open there.
+
+const int KIND = 7, DRAWS = 8, CLIPS = 16, HOLDS = 32, ADDS = 64; // of a row's first number; as in solid.js
+const int ALL = 1 << 24; // behind every row
+const float NOTHING = 10.0; // world units: how far away a group is at most for what it joins
+
+// What is at a point, as far as rays ask.
+float state; // distance
+float dense; // whether it is a medium
+float change; // how far the kind of material is sure to stay
+
+// What else is seen of it: colour, the same with plain colours in place of textures', gradient of the distance.
+vec3 seen, even, slope;
+
+// Nothing is there.
+void clear(bool all) {
+  state = EMPTY;
+  dense = 0.0;
+  if (all) seen = even = slope = vec3(0.0);
+}
+
+// Let something join by a kind of the cell, as far as rays ask.
+void join(int kind_, float narrow, float d, float medium) {
+  int at = kind_ * CELL;
+  float before = state, take = taking(at, d * narrow, before * narrow), keep = 1.0 - take;
+  vec4 made = cells[at];
+  state = take * (d * made.x - keep * made.y / narrow) + keep * before;
+#ifdef MIXED
+  float gap = abs(d);
+  if (kind_ == SMOOTH) gap = min(gap, abs(before - d) / 2.0);
+  if (abs(dense - medium) > 0.5) change = min(change, gap);
+  dense += kind(at, d * narrow, before * narrow) * (medium - dense);
+#endif
+}
+
+// The same of all that is seen.
+void join(int kind_, float narrow, float d, float medium, vec3 g, vec3 rgb, vec3 plain) {
+  int at = kind_ * CELL;
+  float before = state, own = d * narrow, past = before * narrow;
+  float take = taking(at, own, past), keep = 1.0 - take;
+  vec4 made = cells[at], line = cells[at + 1] * narrow;
+  float bump = made.y / narrow;
+  state = take * (d * made.x - keep * bump) + keep * before;
+  float rate = take > 0.0 && take < 1.0 ? d * made.x - before - (1.0 - 2.0 * take) * bump : 0.0;
+  slope = (take * made.x + rate * line.x) * g + (keep + rate * line.y) * slope;
+  float gate = painting(at, own, past);
+  dense += kind(at, own, past) * (medium - dense);
+#ifdef TEXTURES
+  even += gate * (plain - even);
+#endif
+  seen += gate * (rgb - seen);
+}
+
+#ifdef DEPTH
+bool looking; // whether all that is seen is asked for
+int depth, open; // how many groups are open, and the part of the innermost: kind, narrow, last row, around it
+struct State { float state, dense; vec3 seen, even, slope; } below[DEPTH]; // what open groups will join
+
+// End groups that a row stands behind.
+void leave(int row) {
+  while (depth > zero) {
+    vec4 group = part(0, open);
+    if (row <= int(group.z)) break;
+    float d = min(state, NOTHING), medium = dense;
+    vec3 g = slope, rgb = seen, plain = even;
+    State outer = below[--depth];
+    state = outer.state;
+    dense = outer.dense;
+    open = int(group.w);
+    if (!looking) {
+      join(int(group.x), group.y, d, medium);
+      continue;
+    }
+    seen = outer.seen;
+    even = outer.even;
+    slope = outer.slope;
+    join(int(group.x), group.y, d, medium, g, rgb, plain);
+  }
+}
+
+// And begin those that it is in.
+void enter(int row) {
+  leave(row);
+  int group = int(part(row, PAINT).w), more = 0;
+  for (int g = group; g != open; g = int(part(0, g).w)) more++;
+  for (; more > zero; more--) {
+    below[depth++] = State(state, dense, seen, even, slope);
+    clear(looking);
+  }
+  open = group;
+}
+#endif
+
+// Begin at a point.
+void begin(bool all) {
+  clear(all);
+#ifdef DEPTH
+  looking = all;
+  depth = open = 0;
+#endif
+}
