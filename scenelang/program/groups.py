@@ -163,6 +163,10 @@ def felt(groups: Groups, widths: Floats) -> Felt:
 
 def _felt_flat(tokens: Index, widths: Floats) -> Felt:
     """`felt` of a stream without groups, all rows at once."""
+    cuts = tokens == INTERSECT
+    if not widths.any():
+        none = np.zeros(len(tokens))
+        return Felt(none, none, none.astype(np.intp), cuts, none > 0)
     blends = np.where(tokens == SMOOTH, widths, 0.0)
     later = (widths[::-1] > 0).cumsum()[::-1]  # blends from each row on, of any operator
     own = (tokens == SUBTRACT) & (widths > 0)
@@ -171,6 +175,6 @@ def _felt_flat(tokens: Index, widths: Floats) -> Felt:
         total=blends[::-1].cumsum()[::-1] + np.where(own, widths, 0.0),
         widest=np.maximum(np.maximum.accumulate(blends[::-1])[::-1], np.where(own, widths, 0.0)),
         blends=(blends[::-1] > 0).cumsum()[::-1] + own,
-        everywhere=(tokens == INTERSECT) | ((tokens == SUBTRACT) & inside),
+        everywhere=cuts | ((tokens == SUBTRACT) & inside),
         inside=inside,
     )

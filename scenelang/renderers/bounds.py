@@ -67,7 +67,10 @@ def shown(
     if nest is None or joins is None:
         gates = _Gates.of(cell, distance, given)
         for part in meetings.slots():
-            own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
+            own = _Operand(
+                Interval(distance.low[part], distance.high[part]),
+                Interval(colours.low[:, part], colours.high[:, part]),
+            )
             shut[part], wide[part] = state.join(slice(part.stop - part.start), own, gates.some(part))
         wide |= given
     else:
@@ -104,9 +107,10 @@ class _Gates(NamedTuple):
 
     def some(self, which: slice | Columns) -> _Gates:
         """Those of some of the operands."""
+        lines, bias, candidate, bump = self.cell
         return _Gates(
-            Cell(*(part[..., which] for part in self.cell)),
-            Interval(*(part[..., which] for part in self.own)),
+            Cell(lines[..., which], bias[:, which], candidate[..., which], bump[:, which]),
+            Interval(self.own.low[:, which], self.own.high[:, which]),
             self.up[:, which],
             self.down[:, which],
             self.given[which],

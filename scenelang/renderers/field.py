@@ -315,8 +315,9 @@ class Field:
             return self._fold_nested(nest, features, memory, cell, colours, trace)[:, : s + 3]
         for part in meetings.slots():
             old = memory[..., : part.stop - part.start]
-            given = Cell(*(each[..., part] for each in cell)), features[..., part], colours[:, part]
-            took = self._took(old, *given, trace is not None)
+            lines, bias, candidate, bump = cell
+            own = Cell(lines[..., part], bias[:, part], candidate[..., part], bump[:, part])
+            took = self._took(old, own, features[..., part], colours[:, part], trace is not None)
             if trace is not None:
                 trace.paint[:, part], trace.margin[:, part] = took
         return memory[:, : s + 3]
