@@ -289,10 +289,7 @@ class Field:
 
     def nesting(self, meetings: Meetings) -> Nesting | None:
         """Which states pairs join, None where no column has a group with a state of its own."""
-        if not self.groups.deepest:
-            return None
-        found = nesting(meetings, self.groups)
-        return found if found.levels > 1 else None
+        return nesting(meetings, self.groups) if self.groups.deepest else None
 
     def fold(self, meetings: Meetings, features: Array, trace: Trace | None = None) -> Array:
         """State and register (groups, S + 3, B) of columns that have met their objects.

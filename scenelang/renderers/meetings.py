@@ -156,42 +156,49 @@ class Nesting(NamedTuple):
     levels: int
 
 
-def nesting(meetings: Meetings, groups: Groups) -> Nesting:
-    """Find which states the pairs of each column join.
+def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
+    """Find which states the pairs of each column join, None where all join the stream's own.
 
     Of a group's rows a column may meet some or none. A group that draws goes on in the state around it where
     that is still empty, so that only those that meet something take a state of their own.
     """
-    count, deepest = len(meetings.columns), groups.deepest
-    cuts = groups.joins > SMOOTH
-    last = np.full((count, deepest), -1)
-    real = np.zeros((count, deepest), bool)  # whether a group that is open has a state of its own
-    every, number = np.arange(count), np.arange(deepest)
+    slots, count = meetings.slots(), len(meetings.columns)
+    paths = groups.path[meetings.pairs.object]
+    same = np.zeros(paths.shape, bool)  # which groups were open at the pair before, too
+    for last, part in zip(slots, slots[1:], strict=False):
+        n = part.stop - part.start
+        same[part] = (paths[part] == paths[last.start : last.start + n]) & (paths[part] >= 0)
+    shared = np.logical_and.accumulate(same, 1).sum(1)
+    number = np.arange(groups.deepest)
+    begins = (number >= shared[:, None]) & (paths >= 0)
+    own = begins & (number == shared[:, None])
+    own[: slots[0].stop if slots else 0] = False  # nothing stands before the first pairs
+    own |= begins & (groups.joins > SMOOTH)[paths]
+    if not own.any():
+        return None
+    fresh = own.any(1) & (groups.tokens[meetings.pairs.object] <= SMOOTH)
+    last_path = np.full((count, groups.deepest), -1)
+    real = np.zeros((count, groups.deepest), bool)  # whether a group that is open has a state of its own
+    every = np.arange(count)
     turns, levels = list[Turn](), 1
-    slots = meetings.slots()
     for at, part in enumerate(slots):
         n = part.stop - part.start
-        objects = meetings.pairs.object[part]
-        path = groups.path[objects]
-        same = (path == last[:n]) & (path >= 0)
-        shared = np.logical_and.accumulate(same, 1).sum(1)
-        before = _closings(every[:n], last, real, shared)
-        begins = (number >= shared[:, None]) & (path >= 0)
-        inner = begins & (cuts[path] | ((number == shared[:, None]) & (at > 0)))
-        real[:n] = np.where(begins, inner, real[:n] & (number < shared[:, None]))
-        last[:n] = path
+        before = _closings(every[:n], last_path, real, shared[part])
+        real[:n] = np.where(begins[part], own[part], real[:n] & (number < shared[part, None]))
+        last_path[:n] = paths[part]
         level = real[:n].sum(1)
         levels = max(levels, int(level.max(initial=0)) + 1)
-        fresh = inner.any(1) & (groups.tokens[objects] <= SMOOTH)
         left = slots[at + 1].stop - slots[at + 1].start if at + 1 < len(slots) else 0
-        after = _closings(every[left:n], last, real, np.zeros(n - left, np.intp))
-        turns.append(Turn(part, level, fresh, before, after))
+        after = _closings(every[left:n], last_path, real, np.zeros(n - left, np.intp))
+        turns.append(Turn(part, level, fresh[part], before, after))
     return Nesting(turns, levels)
 
 
 def _closings(columns: Index, open_groups: Index, real: npt.NDArray[np.bool_], kept: Index) -> list[Closing]:
     """Rounds in which the groups (B, D) of columns (n,) end, but for the outermost ``kept`` (n,) of each."""
-    found = []
+    found = list[Closing]()
+    if not len(columns):
+        return found
     for at in range(open_groups.shape[1] - 1, -1, -1):
         some = columns[(kept <= at) & real[columns, at]]
         if len(some):
