@@ -126,8 +126,8 @@ def proof_text(proof: Record) -> str:
     return (
         f"{proof['scenes']:,} random scenes of {proof['objects']:,} objects and {proof['matrices']:,} "
         f"transforms, {proof['samples']:,} samples, {proof['covered']:,} of them covered; in the streams "
-        f"{words}. "
-        f"The boolean rule refused {proof['refused']:,} more, and {proof['bare']:,} showed too little. "
+        f"{words}, of these {proof['groups']:,} groups. "
+        f"{proof['bare']:,} more showed too little. "
         f"Coverage differs at {differing} samples; {proof['aside']} lay within {proof['edge']:.0e} of an "
         "outline."
     )

@@ -2,7 +2,7 @@
 
 `before/api.json` has each public name of that revision and its parameters: ``/x`` by place alone, ``*x`` by
 name alone, ``...x`` and ``***x`` any number, ``x?`` may be left out; null where it was not a call. `render`'s
-``precision`` went with 8-bit inference.
+``precision`` went with 8-bit inference. `before/trees.safetensors` is the first of format 4, which has groups.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ API: dict[str, str | None] = json.loads((BEFORE / "api.json").read_text("utf-8")
 GONE = {"render": {"precision"}}
 
 
-@pytest.mark.parametrize(("name", "frame"), [("alpha", 2), ("white", 0)])
+@pytest.mark.parametrize(("name", "frame"), [("alpha", 2), ("white", 0), ("trees", 0)])
 def test_saved_programs_are_those_of_today(name: str, frame: int, tmp_path: Path) -> None:
     saved = BEFORE / f"{name}.safetensors"
     loaded = nsg.load_program(saved)

@@ -96,7 +96,7 @@ def _blended(
 ) -> npt.NDArray[np.float32]:
     """The same with the widths of blends that are not the usual one; these are of rows, not of leaves."""
     for at, row in enumerate(rows):
-        if row.k:
+        if row.k and row.op != "union":
             vectors[at, LAYOUTS[manifest.layout].blend] = row.k
     return vectors
 

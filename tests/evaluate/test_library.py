@@ -265,14 +265,17 @@ def test_reserved_names_and_the_users_own_files(tmp_path: Path) -> None:
     assert nsg.loads(fixed, root=tmp_path).nodes
 
 
+NEST = "module m(n) {{ if (n > 0) {{ subtract {{ {level} m(n - 1); }} }} else {{ {inmost} }} }}"
+"""Composites in each other, n deep."""
+
+
 def test_mistakes_in_calls_are_shown_at_the_call() -> None:
     """And so are those of the compiler: nothing in the library is the user's to mend."""
     for text, code, where in (
         ('s.disc("a");', "E0301", "s.disc"),
         ("s.line([0, 0], 3deg);", "E0303", "s.line"),
         ("s.arc(1, 0.1, 0, 9);", "E0302", "s.arc"),
-        ("square {} intersect { star {} s.disc(0.4); }", "E0403", "s.disc"),
-        ("module m() { s.disc_mask(1); } square {} m();", "E0401", "s.disc_mask"),
+        (f"{NEST.format(level='square {}', inmost='s.disc_mask(1);')} m(16);", "E0409", "s.disc_mask"),
     ):
         found = nsg.Diagnostics()
         scene, spans = load_source(SourceFile("a.nsg", IMPORT + text), diagnostics=found)

@@ -3,8 +3,8 @@
 python -m tests.passes.prove --scenes 1000 --out docs/results/passes.json
 
 The reference draws the graph before and after each pass. Samples count where no outline of a leaf or of the
-whole is within `EDGE`, as the language has it. Scenes that the boolean rule refuses are drawn again, and so
-are those of less than two objects and those that cover less than `LEAST` of the samples.
+whole is within `EDGE`, as the language has it. Scenes of less than two objects and those that cover less
+than `LEAST` of the samples are drawn again.
 """
 
 from __future__ import annotations
@@ -66,19 +66,18 @@ class Proof:
 
     Args:
         scenes: that were looked at.
-        refused: that the boolean rule refused, drawn again.
         bare: that showed too little, drawn again.
         samples: looked at in each graph.
         covered: samples of the first graph that show an object.
         aside: samples within `EDGE` of an outline.
         objects, matrices: of all scenes as written.
-        words: how many rows of all streams join by each word.
+        words: how many rows and groups of all streams join by each word.
+        groups: of all streams.
         passes: by name, in order.
         failures: seed and pass where a picture changed.
     """
 
     scenes: int = 0
-    refused: int = 0
     bare: int = 0
     samples: int = 0
     covered: int = 0
@@ -86,12 +85,13 @@ class Proof:
     objects: int = 0
     matrices: int = 0
     words: dict[str, int] = field(default_factory=lambda: dict.fromkeys(TOKENS, 0))
+    groups: int = 0
     passes: dict[str, Tally] = field(default_factory=lambda: {step.name: Tally() for step in PASSES})
     failures: list[str] = field(default_factory=list)
 
 
-def stages(scene: Scene) -> list[tuple[str, Graph]] | None:
-    """The graph as lowered and after each pass; None where the boolean rule refuses the scene.
+def stages(scene: Scene) -> list[tuple[str, Graph]]:
+    """The graph as lowered and after each pass.
 
     Checks report what a model cannot draw, which does not matter here.
     """
@@ -102,7 +102,8 @@ def stages(scene: Scene) -> list[tuple[str, Graph]] | None:
     for step in PASSES:
         graph = step.run(graph, Context(MANIFEST, Diagnostics() if step.name in CHECKS else diagnostics))
         found.append((step.name, graph))
-    return None if diagnostics.errors else found
+    assert not diagnostics.errors
+    return found
 
 
 def nearest_outline(graph: Graph, p: np.ndarray) -> np.ndarray:
@@ -128,12 +129,8 @@ def prove(scenes: int, first: int = 0) -> Proof:
     proof = Proof()
     seed = first
     while proof.scenes < scenes:
-        found = stages(full_scene(seed))
+        _compare(stages(full_scene(seed)), seed, proof)
         seed += 1
-        if found is None:
-            proof.refused += 1
-        else:
-            _compare(found, seed - 1, proof)
     return proof
 
 
@@ -154,8 +151,9 @@ def _compare(found: list[tuple[str, Graph]], seed: int, proof: Proof) -> None:
     proof.aside += int((~clear).sum())
     proof.objects += size["objects"]
     proof.matrices += size["matrices"]
-    for link in found[-1][1].root.links:
-        proof.words[link.op] += 1
+    for row in found[-1][1].rows():
+        proof.words[row.op] += 1
+        proof.groups += row.begins
     for (name, after), less in zip(found[1:], smaller, strict=True):
         if not less["changed"]:
             continue  # the same graph has the same picture

@@ -24,6 +24,7 @@ def holds(proof: Proof, scenes: int) -> None:
     assert proof.scenes == scenes
     assert proof.covered > 0.05 * proof.samples
     assert all(proof.words.values())
+    assert proof.groups > scenes // 5
     assert proof.aside < 1e-3 * proof.samples
     for name in WORKING:
         assert proof.passes[name].changed >= scenes // 50, name
@@ -49,6 +50,7 @@ def test_the_recorded_run_is_whole() -> None:
     recorded = [name for name in record["passes"] if name not in later]
     assert recorded == [step.name for step in PASSES if step.name not in later]
     assert all(record["words"][word] > 100 for word in TOKENS)
+    assert record["groups"] > 100
     for name in WORKING:
         tally = record["passes"][name]
         assert tally["changed"] > 0
@@ -84,10 +86,9 @@ def test_scenes_have_what_passes_look_for() -> None:
     assert '"kind":"twirl","k":0.0' in text
     dropped = twins = 0
     for seed in range(200):
-        found = dict(stages(full_scene(seed)) or ())
-        if found:
-            rows = [(link.node, link.op) for link in found["flatten"].root.links]
-            twins += len(set(rows)) < len(rows)
-            dropped += len(rows) > len(found["drop_hidden"].root.links)
+        found = dict(stages(full_scene(seed)))
+        rows = [(row.leaf, row.op) for row in found["flatten"].rows()]
+        twins += len(set(rows)) < len(rows)
+        dropped += len(rows) > len(found["drop_hidden"].rows())
     assert twins > 5
     assert dropped > 20

@@ -48,12 +48,12 @@ def look(text: str, every: bool = False) -> tuple[list[str], tuple[int, int]]:
         ),
         ("star { rotate(0); } square { rotate(0 * 1); }", [], []),
         ("star { rotate(floor(u / 2) * 1deg); }", [], []),
-        # What the compiler refuses: the second object's bounds reach the first one in the middle.
+        # What the compiler refuses: booleans that nest too deeply in the middle.
         (
-            "star { scale(0.2); translate(4 * u - 2, 0); }\n"
-            "subtract { pentagon { scale(0.3); } square { scale(0.1); } }",
-            ["E0401 20"],
-            ["E0401 15"],
+            "module m(n) { if (n > 0) { subtract { square { scale(n / 20); } m(n - 1); } }\n"
+            "else { subtract { star { scale(0.3); } square { scale(0.1); } } } } m(18 - floor(18 * abs(u - 0.5)));",
+            ["E0409 20"],
+            ["E0409 14"],
         ),
         ("star { scale(0.3); twirl(20 * u); }", ["W0502 20"], ["W0502 16"]),
     ],

@@ -35,7 +35,7 @@ def test_nothing_changed() -> None:
     [
         (lambda h, t: h.update(format=1), "elements in a file of format 1"),
         (lambda h, t: h.update(format=3), "other tensors than a program of format 3"),
-        (lambda h, t: h.update(format=4), "not of format 1 or 2 or 3"),
+        (lambda h, t: h.update(format=5), "not of format 1 or 2 or 3 or 4"),
         (lambda h, t: h.pop("elements"), "list of elements is damaged"),
         (lambda h, t: h.update(elements=[["ring"]]), "list of elements is damaged"),
         (lambda h, t: h.update(elements=[]), "other tensors"),

@@ -126,8 +126,9 @@ def _told(solids: SolidField, found: Meeting) -> Answer:
 @pytest.mark.parametrize("library", ["numpy", "torch"])
 def test_what_is_not_met_changes_nothing(library: str) -> None:
     """Where rays meet some objects of a tree: signs, colours, kinds and owners of the exact field."""
-    count = 0
-    for seed in range(60 if library == "numpy" else 12):
+    count = astray = 0
+    seeds = 60 if library == "numpy" else 12
+    for seed in range(seeds):
         tree, p = tree_of(seed, 2), points(seed, 3000)
         exact = Field(tree_graph(tree)).at(p.astype(float))
         rgb, medium, owner = (np.broadcast_to(v, p.shape) for v in (exact.rgb, exact.medium, exact.owner))
@@ -149,10 +150,10 @@ def test_what_is_not_met_changes_nothing(library: str) -> None:
         wrong = abs(register[:3] - rgb[:, at]).max(0) > 0.02
         wrong |= (register[3] > 0.5) != medium[0, at]
         wrong |= owned != owner[0, at]
-        share = 0.001 if library == "numpy" else 0.03  # leaves are learned
-        assert wrong[inside].sum() <= share * inside.sum() + 1
         count += inside.sum()
-    assert count > 3000
+        astray += wrong[inside].sum()
+    assert count > 50 * seeds
+    assert astray <= (0.001 if library == "numpy" else 0.03) * count  # leaves are learned
 
 
 def test_balls_of_flat_streams_are_what_blends_reach() -> None:
