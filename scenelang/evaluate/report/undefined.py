@@ -15,7 +15,7 @@ from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice, Reporter, Shared, shown_places
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS
+from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, TRANSFORMS
 
 VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of bindings that are values."""
@@ -197,6 +197,8 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
         from scenelang.evaluate.report.habits import call_advice  # only mistakes need it
 
         return call_advice(text, call)
+    if call and text in TRANSFORMS:
+        return f"transforms are statements of a block: square {{ {call.span.text}; }}", None
     words = place.session.vocabulary
     if text in words.materials | words.geometries:
         if span.source.text[span.end : span.end + 1] == "." and text in words.geometries:
