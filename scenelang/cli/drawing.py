@@ -86,11 +86,17 @@ def exact(request: Request, clock: Clock) -> Draw:
     return draw
 
 
-def is_blank(job: Job, image: Image) -> bool:
-    """Whether a picture of something has one colour throughout, and no warning has said so."""
-    drawn = job.program is None or len(job.program.tokens) > 0
-    told = any(d.code == "W0402" for d in job.diagnostics)
-    return drawn and not told and all(bool((abs(row - image[0, 0]) < 0.5 / 255).all()) for row in image)
+def blank(job: Job, image: Image) -> str | None:
+    """The reason why a picture has nothing to see, where no warning has said so."""
+    if any(d.code == "W0402" for d in job.diagnostics):
+        return None
+    if job.program is not None and not len(job.program.tokens):
+        return "no objects to draw: a module draws where it is called, as in part();"
+    if not all(bool((abs(row - image[0, 0]) < 0.5 / 255).all()) for row in image):
+        return None
+    if (image[0, 0] > 1 - 0.5 / 255).all():
+        return "one colour throughout; flat objects are white without a colour, and so is the background"
+    return "one colour throughout: objects in the background's colour, cut away, or smaller than a pixel"
 
 
 def job_outputs(

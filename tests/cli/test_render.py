@@ -260,3 +260,20 @@ def test_a_picture_of_one_colour_is_told(folder: Folder) -> None:
     result = folder.run("render", away, "-o", "b.png", "--size", "16x16")
     assert "W0402" in result.stderr
     assert "throughout" not in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("background(#222); square { scale(0.001); }", "smaller than a pixel"),
+        ("background(#222); subtract { star; star; }", "cut away"),
+        ("background(#222); module part() { star; }", "no objects to draw"),
+        ("group { scale(0.5); }", "no objects to draw"),
+    ],
+)
+def test_why_a_picture_has_one_colour(folder: Folder, text: str, said: str) -> None:
+    """Where the background is not white the reason is another, and a scene may have no objects."""
+    result = folder.run("render", folder.write("a.nsg", text), "-o", "a.png", "--size", "16x16")
+    assert result.exit_code == 0
+    assert said in result.stderr
+    assert "white" not in result.stderr

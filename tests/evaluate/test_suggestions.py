@@ -31,7 +31,7 @@ def mended(text: str, outcome: Outcome) -> str:
         ("background(None);", "background(none);"),
         ("background(null);", "background(none);"),
         ("square { material flat { color(Red); } }", "square { material flat { color(#f00); } }"),
-        ("cube { scale(0.5); }", 'import "std/shapes" as s;\ns.rect() { scale(0.5); }'),
+        ("box { scale(0.5); }", 'import "std/shapes" as s;\ns.rect() { scale(0.5); }'),
         ("square { zoom(0.5); }", "square { scale(0.5); }"),
         ("square { material flat { colour(#d33); } }", "square { material flat { color(#d33); } }"),
         ("intersection { square {} star {} }", "intersect { square {} star {} }"),

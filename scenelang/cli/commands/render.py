@@ -144,11 +144,11 @@ def command(
     """
     from scenelang.cli.animation import Requested, animate, wanted_target
     from scenelang.cli.drawing import (
+        blank,
         check_options,
         check_proof,
         chosen,
         exact,
-        is_blank,
         job_outputs,
         neural,
         proved,
@@ -230,8 +230,8 @@ def command(
                 with clock("outputs"):
                     found = job_outputs(job, outputs, request.model, threads, backend)
             image = draw(job, partial(_part, bar, index, len(ready)))
-            if is_blank(job, image):
-                told.append(f"{path}: {_BLANK}")
+            if (why := blank(job, image)) is not None:
+                told.append(f"{path}: {why}")
             if proofs:
                 told.append(f"{path}: {proofs[-1].told()}")
             if "proof" in outputs:
@@ -249,9 +249,6 @@ def command(
     if verbose:
         click.echo(clock.report(), err=True)
     ctx.exit(code)
-
-
-_BLANK = "one colour throughout; flat objects are white without a colour, and so is the background"
 
 
 def _saved(image: Image, outputs: Outputs, path: Path) -> list[str]:

@@ -135,7 +135,7 @@ def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
     if file.damage and file.damage.holds(name.span):
         # What it stands for is known when its statement reads again.
         binding.kind = "poison"
-        report_rebound(place.report, name, scope.find(name.text))
+        report_rebound(place, name, scope.find(name.text))
     elif earlier is not None:
         message = f"`{name.text}` is already defined in this scope"
         help = "names are bound once; an inner block may bind them anew"

@@ -99,6 +99,8 @@ def bind(
                 hint, fix = did_you_mean(word.text, params, word.span, effort=report.effort)
                 if hint is None and called in foreign_words.ARGUMENTS:
                     hint, fix = instead(word.text, foreign_words.ARGUMENTS[called], params, word.span)
+                if hint is None and word.text in foreign_words.LOOKS and isinstance(definition, nodes.Module):
+                    hint = f"its block has the colour: {called}(…) {{ material flat {{ color(#d33); }} }}"
                 hint = hint or (f"its arguments are {listing(params)}" if params else "it takes no arguments")
                 message = f"`{called}` has no argument `{word.text}`"
                 fail(word.text, message, word.span, hint, fix, "E0206")

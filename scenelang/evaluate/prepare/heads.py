@@ -121,7 +121,17 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         place.report.error("E0205", message, name.span, help=help, labels=place.session.model_label())
         return
     if text in FUNCTIONS:
-        place.report.error("E0213", f"`{text}` is a function, not an object or a module", name.span)
+        help = None
+        if text in ("rgb", "hsv"):
+            from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
+
+            call = stmt.span.text.rstrip("; ")
+            help = (
+                f"write color({call});" if place.kind == "material" else material_advice(place, "color", call)
+            )
+        place.report.error(
+            "E0213", f"`{text}` is a function, not an object or a module", name.span, help=help
+        )
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
     kinds = ("module", *VALUES)
@@ -134,6 +144,10 @@ def _advice(stmt: nodes.Call, place: Place) -> Advice:
     name, text, words = stmt.name, stmt.name.text, place.session.vocabulary
     candidates = _candidates(stmt, place)
     help, fix = did_you_mean(text, candidates, name.span, effort=place.report.effort)
+    if fix is None and text.lower() in foreign_words.STATEMENTS:
+        help = None  # what is known of a word goes before what is only near
+    if place.kind == "object" and text in words.materials:
+        return _lacks_material(stmt)
     if help is None and place.kind in HOLDERS:
         from scenelang.evaluate.report.habits import called_boolean, in_library  # only mistakes need it
 
@@ -159,6 +173,18 @@ def _advice(stmt: nodes.Call, place: Place) -> Advice:
 
         help = drawn(place, words.geometries)
     return help, fix
+
+
+def _lacks_material(stmt: nodes.Call) -> Advice:
+    """`square { flat(#f00); }`: the word `material` is missing."""
+    written = f"material {stmt.name.text}"
+    if stmt.args is None:
+        return f"write {written}", Fix("insert `material`", (Edit(stmt.name.span, written),))
+    colour = stmt.args[0].value.span.text if len(stmt.args) == 1 else "…"
+    written = f"{written} {{ color({colour}); }}"
+    if colour == "…" or stmt.body is not None:
+        return f"write {written}", None
+    return f"write {written}", Fix(f"write `{written}`", (Edit(stmt.span, written),))
 
 
 def _candidates(stmt: nodes.Call, place: Place) -> set[str]:

@@ -13,6 +13,7 @@ def _each_word(meanings: Mapping[str, str]) -> dict[str, str]:
 
 _NO_GRADIENTS: Final = "an object has one colour; for a gradient draw stripes whose colours are mix(a, b, t)"
 
+_UNIT: Final = "glue the unit to the number: 30deg; what is computed is multiplied by 1deg"
 FUNCTIONS: Final = _each_word(
     {
         "pow": "a b -> a ^ b",
@@ -54,7 +55,7 @@ FUNCTIONS: Final = _each_word(
         "float3": "x y z -> [x, y, z]",
         "rgba": "write rgb(r, g, b); colours have no alpha",
         "hsl": "write hsv(h, s, v)",
-        "rad radians": "glue the unit to the number: 30deg; what is computed is multiplied by 1deg",
+        "deg rad turn radians": _UNIT,
         "degrees": "divide by 1deg for a number of degrees",
         "gradient linear_gradient linearGradient radial_gradient radialGradient": _NO_GRADIENTS,
         "concat": "vectors are not joined; write all items into one",
@@ -78,11 +79,14 @@ MATERIALS: Final = _each_word(
 LIBRARIES: Final = ("Math", "math", "np", "numpy")
 """What stands before the names of functions and constants."""
 
-VALUES: Final = {
-    "e": "write exp(1)",
-    "phi": "write (1 + sqrt(5)) / 2",
-    "scene": "objects are drawn where they stand: sphere { scale(0.5); }",
-}
+VALUES: Final = _each_word(
+    {
+        "e": "write exp(1)",
+        "phi": "write (1 + sqrt(5)) / 2",
+        "scene": "objects are drawn where they stand: sphere { scale(0.5); }",
+        "deg rad turn degrees radians": _UNIT,
+    }
+)
 """Constants, in small letters, and what to write."""
 
 NAMES: Final = _each_word(
@@ -126,13 +130,11 @@ WORDS: Final = _each_word(
         "move shift position pos": "translate",
         "turn spin rotation": "rotate",
         "zoom": "scale",
-        "skew": "shear",
         "multmatrix": "matrix",
         "swirl": "twirl",
         "curl": "bend",
         "colour fill tint pigment": "color",
         "greyscale desaturate": "grayscale",
-        "mirror": "flip",
         "intersection": "intersect",
         "difference minus": "subtract",
         "merge add join": "union",
@@ -167,7 +169,17 @@ STATEMENTS: Final = _each_word(
         "shadow shadows castshadow": "whatever is lit throws a shadow",
         "fog mist smoke": "mist is an object: sphere { material volumetric; }",
         "repeat loop times": "loops run over a range or a vector: for (i in 0..<n) { … }",
-        "transform": "write matrix([[…4], […4], […4], […4]]), in rows",
+        "transform": "each transform is a statement: translate(0.5, 0); rotate(30deg);",
+        "skew skewx": "write shear(xy = tan(20deg))",
+        "translatex translate_x movex": "write translate(x, 0)",
+        "translatey translate_y movey": "write translate(0, y)",
+        "translatez translate_z movez": "in space write translate(0, 0, z)",
+        "scalex scale_x": "write scale(x, 1), in space scale(x, 1, 1)",
+        "scaley scale_y": "write scale(1, y), in space scale(1, y, 1)",
+        "scalez scale_z": "in space write scale(1, 1, z)",
+        "fillet round bevel chamfer": "smooth(k = 0.1) { … } rounds where objects meet, subtract(k = 0.1) { … } "
+        "the edge of a cut",
+        "gradient linear_gradient radial_gradient": _NO_GRADIENTS,
         "text": "no model draws text",
         "echo print": "nothing is printed while a scene is made",
         "return": "a function is one expression: fn f(x) = x ^ 2;",
@@ -195,6 +207,13 @@ ARGUMENTS: Final = {
     "light": _COLOUR
     | _each_word({"location pos at from": "position", "intensity strength energy brightness": "power"}),
     "ground": _COLOUR | _each_word({"height level": "y"}),
+    "canvas": {"width": "w", "height": "h"},
+    "subtract": _each_word({"radius r width": "k"}),
+    "intersect": _each_word({"radius r width": "k"}),
+    "smooth": _each_word({"radius r width": "k"}),
     "animate": _each_word({"duration length time": "seconds", "rate framerate frame_rate": "fps"}),
 }
 """Arguments of statements, under another name."""
+
+LOOKS: Final = ("color", "colour", "fill", "stroke", "material", "c")
+"""Arguments that elsewhere give an object its colour."""

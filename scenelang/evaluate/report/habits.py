@@ -238,17 +238,17 @@ SHAPES: Final = {
     **dict.fromkeys(("circle", "disc", "disk", "dot"), Shape("disc(r)", 1, 1, "disc()")),
     **dict.fromkeys(("ellipse", "oval"), Shape("ellipse(rx, ry)", 2, 2)),
     **dict.fromkeys(("ring", "annulus"), Shape("ring(r, width)", 2, 2, "ring()")),
-    **dict.fromkeys(("rect", "rectangle", "box", "cube", "quad"), Shape("rect(w, h)", 1, 2, "rect()")),
+    **dict.fromkeys(("rect", "rectangle", "box", "quad"), Shape("rect(w, h)", 1, 2, "rect()")),
     **dict.fromkeys(
         ("rounded", "rounded_rect", "rounded_rectangle", "roundrect", "rrect"), Shape("rounded(w, h, r)")
     ),
-    **dict.fromkeys(("line", "segment"), Shape("line(a, b, width)", 2, 3)),
-    **dict.fromkeys(("capsule", "stadium"), Shape("capsule(a, b, width)", 2, 3)),
-    **dict.fromkeys(("path", "polyline"), Shape("path(points, width)", 1, 2)),
-    **dict.fromkeys(("polygon", "ngon"), Shape("polygon(n, r)")),
-    **dict.fromkeys(("pie", "sector", "wedge"), Shape("pie(r, from, to)")),
-    "arrow": Shape("arrow(a, b, width)", 2, 3),
-    "arc": Shape("arc(r, width, from, to)"),
+    **dict.fromkeys(("line", "segment"), Shape("line([x, y], [x, y], width)", 2, 3)),
+    **dict.fromkeys(("capsule", "stadium"), Shape("capsule([x, y], [x, y], width)", 2, 3)),
+    **dict.fromkeys(("path", "polyline"), Shape("path([[x, y], [x, y], …], width)", 1, 2)),
+    **dict.fromkeys(("polygon", "ngon"), Shape("polygon(n, r), which is regular")),
+    **dict.fromkeys(("pie", "sector", "wedge"), Shape("pie(r, 0deg, 90deg)")),
+    "arrow": Shape("arrow([x, y], [x, y], width)", 2, 3),
+    "arc": Shape("arc(r, width, 0deg, 90deg)"),
     "parallelogram": Shape("parallelogram(p, a, b)", 3, 3),
     "hexagon": Shape("polygon(6)", bare="polygon(6)"),
     "heptagon": Shape("polygon(7)", bare="polygon(7)"),
@@ -292,6 +292,8 @@ def _edit(stmt: nodes.Call, shape: Shape, alias: str) -> Edit | None:
         end = name.end if stmt.args is None else name.source.text.find(")", name.end) + 1
         return Edit(Span(name.source, name.start, end), f"{alias}.{shape.bare}") if shape.bare else None
     fits = shape.least <= len(stmt.args) <= shape.most and not any(arg.name for arg in stmt.args)
+    first, points = stmt.args[0].value, "[" in shape.call or shape.module == "parallelogram"
+    fits = fits and not isinstance(first, nodes.Number if points else nodes.Vector)
     return Edit(name, f"{alias}.{shape.module}") if fits else None
 
 

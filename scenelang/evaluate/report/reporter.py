@@ -102,6 +102,7 @@ class Reporter(Record, frozen=False):
         site = calls.outside() if calls is not None and library.holds(span.source) else None
         if site is not None:
             labels, fix, span = (Label(span, "which is used here"),), None, site
+            help = help or _called(site)
         elif calls is not None:
             labels = (*labels, *(Label(call, "in this call") for call in islice(calls.outwards(), 2)))
         if self.reported.setdefault((span.source, span), code) != code or self.follows(code, span):
@@ -168,3 +169,12 @@ class Reporter(Record, frozen=False):
     def is_unused(self, name: str, span: Span | None) -> bool:
         """Whether nothing in a text bears a name but its definition at ``span``."""
         return span is not None and len(self.uses(span.source).get(name, ())) == 1
+
+
+def _called(site: Span) -> str | None:
+    """How the module of the library is called that a call names."""
+    from scenelang.evaluate.report.habits import SHAPES  # only mistakes need it
+
+    alias, _, module = site.text.rpartition(".")
+    shape = SHAPES.get(module)
+    return f"it is called {alias}.{shape.call}" if shape is not None and alias else None

@@ -64,4 +64,6 @@ def drawn(place: Place, known: set[str]) -> str:
     said = {n: listing({g for m in models if m.dimension == n for g in m.geometries}) for n in spaces}
     if len(said) == 1:
         return f"there is {said[spaces[0]]}" + (f", and what is {_MESHES}" if spaces == [3] else "")
-    return f"flat scenes draw {said[2]}, solid ones {said[3]}" if said else "no model is at hand"
+    if not said:
+        return "no model is at hand"
+    return f"flat scenes draw {said[2]}, solid ones {said[3]}, and what is {_MESHES}"

@@ -15,7 +15,7 @@ from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice, Reporter, Shared, shown_places
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS
+from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, TRANSFORMS
 
 VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of bindings that are values."""
@@ -197,6 +197,8 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
         from scenelang.evaluate.report.habits import call_advice  # only mistakes need it
 
         return call_advice(text, call)
+    if call and text in TRANSFORMS:
+        return f"transforms are statements of a block: square {{ {call.span.text}; }}", None
     words = place.session.vocabulary
     if text in words.materials | words.geometries:
         if span.source.text[span.end : span.end + 1] == "." and text in words.geometries:
@@ -225,15 +227,31 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
     return help, fix
 
 
-def report_rebound(report: Reporter, name: nodes.Name, known: Binding | None) -> None:
-    """`i = i + 1;` where `i` is bound: that no `let` stands before it is not what is wrong."""
-    start, items = name.span.start, report.diagnostics.items
+def report_rebound(place: Place, name: nodes.Name, known: Binding | None) -> None:
+    """`i = i + 1;` where `i` is bound, `fill = #d33;` in a block: that no `let` stands before it is not wrong."""
+    start, items = name.span.start, place.report.diagnostics.items
     before = name.span.source.text[max(0, start - 20) : start].rstrip()
-    if known is None or known.span is None or before[-1:].isalpha():
+    unused = known is None and place.report.is_unused(name.text, name.span)
+    help = _set_otherwise(place, name.text.lower()) if unused else None
+    if before[-1:].isalpha() or (help is None and (known is None or known.span is None)):
         return  # a `let` does stand there
     for index, d in enumerate(items):
         if d.code == "E0126" and d.span is not None and d.span.start == start:
             from scenelang.syntax.recovery.foreign import ONCE, ONCE_HELP  # only mistakes need it
 
-            message = ONCE.replace("<n>", name.text)
-            items[index] = Diagnostic("E0133", message, name.span, known.labels(), ONCE_HELP)
+            message, labels = ONCE.replace("<n>", name.text), known.labels() if known is not None else ()
+            if help is not None:
+                message = f"`{name.text}` is not set"
+            items[index] = Diagnostic("E0133", message, name.span, labels, help or ONCE_HELP)
+
+
+def _set_otherwise(place: Place, word: str) -> str | None:
+    """How what other languages set as a property is written in a block."""
+    words, meant = place.session.vocabulary, foreign_words.WORDS.get(word, "")
+    if place.kind in ("file", "unknown"):
+        return None
+    if meant in words.material_ops - words.transforms:
+        from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
+
+        return f"write {material_advice(place, meant)}"
+    return f"write {meant}(…);" if meant in words.transforms else foreign_words.STATEMENTS.get(word)
