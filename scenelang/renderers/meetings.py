@@ -8,6 +8,7 @@ with so many objects, and column i is its i-th pair.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -165,7 +166,7 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
     slots, count = meetings.slots(), len(meetings.columns)
     paths = groups.path[meetings.pairs.object]
     same = np.zeros(paths.shape, bool)  # which groups were open at the pair before, too
-    for last, part in zip(slots, slots[1:], strict=False):
+    for last, part in pairwise(slots):
         n = part.stop - part.start
         same[part] = (paths[part] == paths[last.start : last.start + n]) & (paths[part] >= 0)
     shared = np.logical_and.accumulate(same, 1).sum(1)
