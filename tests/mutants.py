@@ -57,14 +57,20 @@ SOLIDS = (
     "tests/lab/test_closed.py", "tests/renderers/test_solids.py", "tests/renderers/trees/test_solid.py",
     "tests/backend/test_solids.py",
 )  # fmt: skip
+TREES = (
+    "tests/renderers/test_groups.py", "tests/passes/test_flatten.py", "tests/proof/test_fold.py",
+    "tests/renderers/trees/test_solid.py",
+)  # fmt: skip
 TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/renderers/solid/*.py": SOLIDS,
     "scenelang/reference/solid/*.py": ("tests/lab/test_closed.py", "tests/reference/test_solid.py"),
     "scenelang/renderers/draw.py": DRAWING,
     "scenelang/renderers/frame*.py": DRAWING,
     "scenelang/renderers/coverage.py": DRAWING,
-    "scenelang/renderers/field.py": DRAWING,
+    "scenelang/renderers/field.py": (*TREES, *DRAWING),
     "scenelang/renderers/network.py": DRAWING,
+    "scenelang/program/groups.py": TREES,
+    "scenelang/renderers/meetings.py": TREES,
     "scenelang/lifting/learned.py": (
         "tests/lifting/test_learned.py",
         "tests/program/test_program_compile.py",

@@ -121,6 +121,13 @@ def test_of_media_there_are_no_slopes() -> None:
     assert drawn.slopes(here(drawn)) is None
 
 
+@pytest.mark.parametrize("inner", ["subtract { star; square { scale(x); } }", "star;"])
+@pytest.mark.parametrize("width", ["", "(k = 0.1 + x)"])
+def test_of_groups_and_cuts_of_a_width_there_are_no_slopes(inner: str, width: str) -> None:
+    drawn = problem(f"param x = 0.1 in 0.05..1; subtract{width} {{ square; {inner} }}")
+    assert (drawn.slopes(here(drawn)) is None) == (inner != "star;" or width != "")
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_residuals_change_as_their_slopes_say(name: str) -> None:
     """From params on, through evaluation, compilation and the levels of the pyramid.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from scenelang.models.manifest import available
 from tests.lsp.client import Client
 from tests.lsp.conftest import SCENE
@@ -86,6 +88,15 @@ def test_signatures_follow_the_argument(client: Client, uri: str) -> None:
 
 
 STAGE = "smooth() { star; }\nchain { square; smooth(k = 0.3)  }\nsmooth(0.2) {  }\nlight(color = );\n"
+
+
+@pytest.mark.parametrize("word", ["subtract", "intersect", "smooth"])
+def test_the_width_of_an_edge(client: Client, uri: str, word: str) -> None:
+    client.replace(uri, f"nsg 1;\nstar;\n{word}(k = 0.3) {{ square; subtract {{ star; pentagon; }} }}\n")
+    assert labels(client, client.at(uri, f"{word}(", len(word) + 1))[0] == "k ="
+    found = client.request("textDocument/signatureHelp", client.at(uri, f"{word}(k = 0.3", len(word) + 7))
+    assert found["signatures"][0]["label"] == f"{word}([k])"
+    assert word in str(client.request("textDocument/hover", client.at(uri, f"{word}(", 1)))
 
 
 def test_the_stage_and_the_width_of_a_blend(client: Client, uri: str) -> None:

@@ -51,7 +51,8 @@ def look(text: str, every: bool = False) -> tuple[list[str], tuple[int, int]]:
         # What the compiler refuses: booleans that nest too deeply in the middle.
         (
             "module m(n) { if (n > 0) { subtract { square { scale(n / 20); } m(n - 1); } }\n"
-            "else { subtract { star { scale(0.3); } square { scale(0.1); } } } } m(18 - floor(18 * abs(u - 0.5)));",
+            "else { subtract { star { scale(0.3); } square { scale(0.1); } } } }\n"
+            "m(18 - floor(18 * abs(u - 0.5)));",
             ["E0409 20"],
             ["E0409 14"],
         ),

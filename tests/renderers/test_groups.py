@@ -18,6 +18,8 @@ from scenelang.program.groups import (
     INTERSECT,
     OPERATOR,
     SMOOTH,
+    SUBTRACT,
+    UNION,
     Groups,
     felt,
     read_groups,
@@ -90,6 +92,15 @@ def test_states_are_those_of_the_recursion(seed: int) -> None:
             assert np.sign(found) == np.sign(wanted)
     assert seen > 0.5 * columns
     assert close > 0.995 * seen
+
+
+def test_a_group_begins_with_its_first_row_as_it_is() -> None:
+    """However far that is: farther than what stands for nothing, too."""
+    program = stars(3, [UNION, INTERSECT | BEGINS, SUBTRACT | 1 << ENDS])
+    field = Field(NETWORK, program.vectors, program.tokens)
+    meetings, _ = meetings_of(Pairs.of(np.zeros(3, np.intp), np.arange(3)))
+    d = np.array([0.2, 3.0, 0.5], np.float32)
+    assert field.fold(meetings, d[None, None])[0, 0, 0] == pytest.approx(3.0, abs=0.01)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -238,3 +249,10 @@ def test_rows_matter_no_farther_than_is_said(seed: int) -> None:
         np.testing.assert_allclose(c[inside], f[inside], rtol=0, atol=1e-9)
         if (raw[: row + 1] == SMOOTH).any():
             continue
+
+
+def test_what_is_cut_out_of_a_rounded_operand_matters_everywhere() -> None:
+    """In a n (b - c) with a width, c changes how deep inside b points are, which a's edge is rounded by."""
+    groups = read_groups(np.array([UNION, INTERSECT | BEGINS, SUBTRACT | 1 << ENDS], np.int8))
+    assert felt(groups, np.array([0.0, 0.1, 0.0])).everywhere.tolist() == [False, True, True]
+    assert felt(groups, np.zeros(3)).everywhere.tolist() == [False, True, False]

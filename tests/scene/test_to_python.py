@@ -111,3 +111,23 @@ def test_colours_by_their_digits() -> None:
     for wrong in ("d33", "#d3", "#dd33333", "#xyz", ""):
         with pytest.raises(ValueError, match="is not a colour"):
             nsg.Color.hex(wrong)
+
+
+TREE = """nsg 1;
+square {}
+subtract(k = 0.1) {
+  star {}
+  intersect(k = 0.05) {
+    square {}
+    chain { star {} subtract(k = 0.2) square {} }
+  }
+}
+"""
+
+
+def test_trees_and_widths_are_the_same_in_text_json_and_python() -> None:
+    scene = nsg.loads(TREE)
+    assert nsg.loads(nsg.format_text(TREE)) == scene
+    for again in (nsg.loads(scene.to_nsg()), nsg.Scene.from_json(scene.to_json()), run(scene.to_python())):
+        assert again == scene
+        assert program_bytes(nsg.compile(again)) == program_bytes(nsg.compile(scene))
