@@ -54,7 +54,7 @@ COMPILING = (
     "tests/animation/test_clip.py", "tests/conformance",
 )  # fmt: skip
 SOLIDS = (
-    "tests/lab/test_closed.py", "tests/renderers/test_solids.py", "tests/renderers/trees/test_solid.py",
+    "tests/backend/test_closed.py", "tests/renderers/test_solids.py", "tests/renderers/trees/test_solid.py",
     "tests/backend/test_solids.py",
 )  # fmt: skip
 TREES = (
@@ -63,7 +63,7 @@ TREES = (
 )  # fmt: skip
 TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/renderers/solid/*.py": SOLIDS,
-    "scenelang/reference/solid/*.py": ("tests/lab/test_closed.py", "tests/reference/test_solid.py"),
+    "scenelang/reference/solid/*.py": ("tests/backend/test_closed.py", "tests/reference/test_solid.py"),
     "scenelang/renderers/draw.py": DRAWING,
     "scenelang/renderers/frame*.py": DRAWING,
     "scenelang/renderers/coverage.py": DRAWING,

@@ -40,7 +40,7 @@ def check_eye(graph: Graph, context: Context) -> Graph:
         x, y, z = eye
         fact = f"the eye at [{x:g}, {y:g}, {z:g}] is inside this `{holder.geometry}`"
         context.diagnostics.add("E0408", fact, holder.span, help="move the camera or the object")
-    elif holder is not None and (through := exp(EXTINCTION * depth)) < _DIM:
+    elif depth < 0.0 and holder is not None and (through := exp(EXTINCTION * depth)) < _DIM:
         x, y, z = eye
         fact = f"the eye at [{x:g}, {y:g}, {z:g}] is deep inside this `{holder.geometry}`, a medium"
         help = f"it lets {through:.2g} of the light through at most: move the camera or the object"

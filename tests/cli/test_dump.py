@@ -113,14 +113,14 @@ def test_scenes_with_mistakes_are_shown_as_far_as_they_go(folder: Folder) -> Non
     assert result.exit_code == 1
     assert "E0201" in result.stderr
     assert result.stdout.startswith("File")
-    refused = folder.write("b.nsg", "subtract { square; intersect { star; pentagon; } }")
+    refused = folder.write("b.nsg", "model \"shapes2d-reading\"; square; subtract { square; star; }")
     result = folder.run("dump", refused, "--after", "lower", "--after", "program")
     assert result.exit_code == 1
     assert result.stdout.startswith("scene 256x256")
 
 
 def test_unknown_stages(folder: Folder) -> None:
-    result = folder.run("dump", folder.write("a.nsg", TEXT), "--after", "linearize")
+    result = folder.run("dump", folder.write("a.nsg", TEXT), "--after", "flaten")
     assert result.exit_code == 2
     assert "Did you mean `flatten`?" in result.stderr
     assert folder.run("graph", "a.nsg", "--after", "syntax").exit_code == 2

@@ -111,7 +111,7 @@ def field(node: Any, outer: list[Any]) -> Callable[[V], State]:
             leaf_distance(node, steps),
         )
         return lambda p: (distance(p), c, medium)
-    parts = [(link.op, link.k, field(link.node, steps)) for link in node.links]
+    parts = [(link.op, link.width, field(link.node, steps)) for link in node.links]
 
     def folded(p: V) -> State:
         big_d, big_c, big_medium = parts[0][2](p) if parts else (math.inf, (0.0, 0.0, 0.0), False)
@@ -127,7 +127,9 @@ def field(node: Any, outer: list[Any]) -> Callable[[V], State]:
                 big_c = plus(big_c, plus(c, big_c, -1.0), h)
                 big_medium = medium if h > 0.5 else big_medium
             else:
-                big_d = max(big_d, -d if op == "subtract" else d)
+                cut = -d if op == "subtract" else d
+                h = min(1.0, max(0.0, 0.5 + 0.5 * (cut - big_d) / k)) if k else float(cut > big_d)
+                big_d = big_d + (cut - big_d) * h + k * h * (1.0 - h)
         return big_d, big_c, big_medium
 
     return folded
