@@ -92,6 +92,7 @@ CASES = (
     ("star { rotate(45°); }", "it is `deg` here", "star { rotate(45deg); }"),
     ("let a = [for (i in 0..3) i]; star { scale(a[1]); }", "draw in a loop: for (i in 0..<n)",
         "for (i in 0..3) { star { translate(i, 0); } }"),
+    ("star { flip(); }", "for an object write scale(-1, 1)", "star { scale(-1, 1); }"),
     ("star { scale(translate(1, 0)); }", "square { translate(1, 0); }", "star { translate(1, 0); }"),
     ("star { material flat { color(hsv(120, 1, 1)); } }", "write 120deg",
         "star { material flat { color(hsv(120deg, 1, 1)); } }"),
