@@ -57,7 +57,9 @@ def color(value: Any, operand: int = 0) -> tuple[float, float, float]:
         help = "write #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)"
         raise unexpected("a colour", value, help, operand, fix="colour")
     if len(value.items) == 4:
-        raise unexpected("a colour of 3 numbers", value, "colours have no alpha: leave the fourth out", operand)
+        raise unexpected(
+            "a colour of 3 numbers", value, "colours have no alpha: leave the fourth out", operand
+        )
     r, g, b = vector(value, 3, operand, "a colour")
     return r, g, b
 

@@ -166,6 +166,7 @@ HABITS: Final = (
     Habit("<node>(<A>, <B>, <C>);", "<node> { <A>; <B>; <C>; }", _ARGUED, _STANDS),
     _unsafe("<node>(<P>);", "BAD_STATEMENT", _ARGUED, _STANDS),
     Habit("<node>()", "<node>", "`<node>` takes no arguments"),
+    _unsafe("group(<P>) {", "group {", "`group` takes no arguments", "a name stands in a comment: // wheels"),
     _unsafe("<node>(<P>) {", "<node> {", "`<node>` takes no arguments", _WIDTH),
     _unsafe("< <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
     _unsafe("< <n> <LINE>", "BAD_STATEMENT", "this is SVG or HTML", _DRAWING),
