@@ -274,6 +274,7 @@ def test_readme_says_how_deep_booleans_nest() -> None:
         text = "star { scale(0.5); }"
         for _ in range(depth):
             text = f"subtract {{ square {{ scale(0.9); }} {text} }}"
-        return {d.code for d in scenelang.check_text(f"subtract {{ square; {text} }}") if d.severity == "error"}
+        found = scenelang.check_text(f"subtract {{ square; {text} }}")
+        return {d.code for d in found if d.severity == "error"}
 
     assert [nested(int(said[1])), nested(int(said[1]) + 1)] == [set(), {"E0409"}]

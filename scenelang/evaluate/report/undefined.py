@@ -233,7 +233,7 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
 
 
 def report_rebound(place: Place, name: nodes.Name, known: Binding | None) -> None:
-    """`i = i + 1;` where `i` is bound, `fill = #d33;` in a block: that no `let` stands before it is not wrong."""
+    """`i = i + 1;` where `i` is bound, `fill = #d33;` in a block: no `let` is missing."""
     start, items = name.span.start, place.report.diagnostics.items
     before = name.span.source.text[max(0, start - 20) : start].rstrip()
     unused = known is None and place.report.is_unused(name.text, name.span)

@@ -169,6 +169,7 @@ HABITS: Final = (
     _unsafe("group(<P>) {", "group {", "`group` takes no arguments", "a name stands in a comment: // wheels"),
     _unsafe("<node>(<P>) {", "<node> {", "`<node>` takes no arguments", _WIDTH),
     _unsafe("< <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
+    _unsafe("< <A>, <B>, <C> > <LINE?> <BLOCK>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
     _unsafe("< <n> <LINE>", "BAD_STATEMENT", "this is SVG or HTML", _DRAWING),
     _unsafe("<n> < <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
     Habit("<call> <rgb|srgb> < <A>, <B>, <C> >", "<call>([<A>, <B>, <C>]);", _BRACKETS),
