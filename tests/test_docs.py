@@ -263,3 +263,18 @@ def test_tables_of_results_are_those_of_the_measurements() -> None:
     command = [sys.executable, ROOT / "docs/make_results.py", "--check"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_readme_says_how_deep_booleans_nest() -> None:
+    """As deep as the page says a scene is without mistakes; one operand within another more is not."""
+    said = re.search(r"Booleans nest up to (\d+) deep", README)
+    assert said is not None
+
+    def nested(depth: int) -> set[str]:
+        text = "star { scale(0.5); }"
+        for _ in range(depth):
+            text = f"subtract {{ square {{ scale(0.9); }} {text} }}"
+        found = scenelang.check_text(f"subtract {{ square; {text} }}")
+        return {d.code for d in found if d.severity == "error"}
+
+    assert [nested(int(said[1])), nested(int(said[1]) + 1)] == [set(), {"E0409"}]

@@ -49,9 +49,15 @@ _SAID = {
     "open_comment": ("", "E0115", "comment is never closed", "a comment ends with `*/`; the rest is skipped"),
     "colour": ("COLOR", "E0118", "`{}` is not a colour", "a colour is `#` and 3 or 6 hexadecimal digits"),
     "name": ("NAME", "E0124", "`{}` is not a name", "names are made of ASCII letters, digits and `_`"),
-    "variable": ("NAME", "E0113", "illegal name `{}`", "names have no `$`"),
+    "variable": (
+        "NAME",
+        "E0113",
+        "illegal name `{}`",
+        "names have no `$`; in place of `$fn` write s.disc(0.3, sides = 64)",
+    ),
 }
 """Slips without a fix: what stands in their place, code, message, help."""
+_LENGTHS = ("px", "em", "rem", "pt", "mm", "cm", "in", "m", "vw", "vh")
 _AFTER_STRING = re.compile(r"[ \t]*+(?:[;)]|as\b|$)", re.MULTILINE)
 """What may follow a string whose end is known though its quote is missing."""
 _ILLEGAL = r"[^\s\w\x21-\x7e]+|[@$\\~`]+|[\s\S]"
@@ -284,14 +290,20 @@ class _Slips:
         elif rest and not rest.startswith((".", "e", "E")):
             message = f"`{rest}` is not a unit"
             if rest in UNIT_ALIASES:
-                fix = value + UNIT_ALIASES[rest]
+                fix, help = value + UNIT_ALIASES[rest], f"it is `{UNIT_ALIASES[rest]}` here"
+            elif rest in _LENGTHS:
+                help = "lengths have no unit: the shorter side of the canvas is 2, its middle 0"
+            elif re.fullmatch("x[0-9]+", rest):
+                help = f"sides are separated by a comma: {value}, {rest[1:]}"
             else:
                 units = ", ".join(f"`{unit}`" for unit in UNITS)
                 help = f"units are {units}; a product is written with `*`"
         self.report.add("E0116", message, start, end, help=help, fix=fix)
 
     def _hash(self, start: int, end: int, text: str) -> None:
-        constant = re.fullmatch(r"#define[ \t]+([A-Za-z_]\w*)[ \t]+([^;/\n]+)", text)
+        constant = re.fullmatch(
+            r"#(?:define|declare|local)[ \t]+([A-Za-z_]\w*)[ \t]*=?[ \t]*([^;/\n]+);?", text
+        )
         if constant:
             bound = f"let {constant[1]} = {constant[2].rstrip()};"
             self.report.add("E0133", "names are bound by `let`", start, end, fix=bound)

@@ -51,6 +51,7 @@ def test_habit(title: str, text: str, meant: str) -> None:
             "let a = 7; // of them\nsquare { scale(a / 7); }",
         ),
         ("#define K 0.5\nsquare { scale(K); }", "E0133", "let K = 0.5;\nsquare { scale(K); }"),
+        ("#declare K = 0.5;\nsquare { scale(K); }", "E0133", "let K = 0.5;\nsquare { scale(K); }"),
     ],
 )
 def test_habit_in_what_is_taken_for_a_comment(text: str, code: str, meant: str | None) -> None:

@@ -121,17 +121,12 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         place.report.error("E0205", message, name.span, help=help, labels=place.session.model_label())
         return
     if text in FUNCTIONS:
-        help = None
-        if text in ("rgb", "hsv"):
-            from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
+        from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
 
-            call = stmt.span.text.rstrip("; ")
-            help = (
-                f"write color({call});" if place.kind == "material" else material_advice(place, "color", call)
-            )
-        place.report.error(
-            "E0213", f"`{text}` is a function, not an object or a module", name.span, help=help
-        )
+        call, inside = stmt.span.text.rstrip("; "), place.kind == "material"
+        written = f"write color({call});" if inside else material_advice(place, "color", call)
+        message = f"`{text}` is a function, not an object or a module"
+        place.report.error("E0213", message, name.span, help=written if text in ("rgb", "hsv") else None)
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
     kinds = ("module", *VALUES)

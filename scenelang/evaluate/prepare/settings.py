@@ -182,6 +182,8 @@ def _camera(session: Session, where: Written, eye: Any, target: Any, fov: Any) -
 
 def _light(session: Session, where: Written, position: Any, power: Any, rgb: Any) -> None:
     place = _given(position, vector, 3, 0, "a point")
+    if power.__class__ is Vec:
+        raise unexpected("a number", power, "the power is second: light([2, 4, 3], 30, #fff)", 1)
     _state(session, where, Light, place, _given(power, number, 1), _given(rgb, _opaque, "colour", 2))
 
 

@@ -60,6 +60,8 @@ def _spec(stmt: nodes.Call, place: Place) -> Spec | None:
 
         help = f"put it into a material's block, as in {material_advice(place, name)}"
         fix = _grouped(stmt, place) or in_material(stmt, place.session, name)
+        if name == "flip":
+            help, fix = "a material's flip() mirrors its texture; for an object write scale(-1, 1)", None
         misplaced(place, span, "`{}` stands outside a material", name, help, fix)
         return None
     if place.kind == "file":

@@ -177,8 +177,8 @@ STATEMENTS: Final = _each_word(
         "scalex scale_x": "write scale(x, 1), in space scale(x, 1, 1)",
         "scaley scale_y": "write scale(1, y), in space scale(1, y, 1)",
         "scalez scale_z": "in space write scale(1, 1, z)",
-        "fillet round bevel chamfer": "smooth(k = 0.1) { … } rounds where objects meet, subtract(k = 0.1) { … } "
-        "the edge of a cut",
+        "fillet round bevel chamfer": "smooth(k = 0.1) { … } rounds where objects meet, "
+        "subtract(k = 0.1) { … } the edge of a cut",
         "gradient linear_gradient radial_gradient": _NO_GRADIENTS,
         "text": "no model draws text",
         "echo print": "nothing is printed while a scene is made",

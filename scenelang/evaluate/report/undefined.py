@@ -209,6 +209,11 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
         written = f"material {text}" + (f" {{ color({colour or '…'}); }}" if call else "")
         whole = Fix(f"write `{written}`", (Edit(call.span if call else span, written),))
         return f"a material is written {written}", whole if colour or not call else None
+    before = span.source.text[max(0, span.start - 20) : span.start].replace(" ", "")
+    if text in ("x", "y", "z") and before.endswith("axis="):
+        return "the axes are X, Y and Z", Fix(f"write `{text.upper()}`", (Edit(span, text.upper()),))
+    if before.strip().endswith("model") and any(text == model.name for model in words.in_use):
+        return "a model is named by a string", Fix("put quotes around it", (Edit(span, f'"{text}"'),))
     if not call and lower in foreign_words.VALUES:
         return foreign_words.VALUES[lower], None
     own = FUNCTIONS if call else (*CONSTANTS, *ANIMATED, "true", "false")
@@ -228,7 +233,7 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
 
 
 def report_rebound(place: Place, name: nodes.Name, known: Binding | None) -> None:
-    """`i = i + 1;` where `i` is bound, `fill = #d33;` in a block: that no `let` stands before it is not wrong."""
+    """`i = i + 1;` where `i` is bound, `fill = #d33;` in a block: no `let` is missing."""
     start, items = name.span.start, place.report.diagnostics.items
     before = name.span.source.text[max(0, start - 20) : start].rstrip()
     unused = known is None and place.report.is_unused(name.text, name.span)

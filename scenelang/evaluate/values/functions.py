@@ -210,7 +210,7 @@ def doubt_hue(h: Any, s: Any, v: Any) -> Problem | None:
     """A warning about the arguments of ``hsv``; its operand is to blame."""
     if h.__class__ is not float or abs(h) <= 2.0:
         return None
-    help = f"a bare hue is in turns: for degrees write {show(h)}deg, multiply what is computed by 1deg; or take % 1"
+    help = f"a bare hue is in turns: write {show(h)}deg, multiply what is computed by 1deg, or take % 1"
     return Problem("W0302", f"a hue of {show(h)} turns", help, operand=0)
 
 

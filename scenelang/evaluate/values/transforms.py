@@ -56,6 +56,10 @@ def color(value: Any, operand: int = 0) -> tuple[float, float, float]:
     if value.__class__ is not Vec:
         help = "write #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)"
         raise unexpected("a colour", value, help, operand, fix="colour")
+    if len(value.items) == 4:
+        raise unexpected(
+            "a colour of 3 numbers", value, "colours have no alpha: leave the fourth out", operand
+        )
     r, g, b = vector(value, 3, operand, "a colour")
     return r, g, b
 
@@ -82,7 +86,8 @@ def _scale(x: Any, y: Any, z: Any) -> Scale:
     factors = [number(x, 0), number(y, 1), 1.0 if z is None else number(z, 2)]
     for index, factor in enumerate(factors):
         if factor == 0.0:
-            raise Problem("E0312", "a scale by 0 flattens what it moves", operand=index)
+            help = "decimals stand behind a point, as in 0.5"
+            raise Problem("E0312", "a scale by 0 flattens what it moves", help, operand=index)
     return make(Scale, {"kind": "scale", "x": factors[0], "y": factors[1], "z": factors[2]})
 
 

@@ -52,6 +52,14 @@ ONCE_HELP: Final = "names keep their values; bind another one with let, or count
 _BRACKETS: Final = "vectors stand in brackets"
 _WIDTH: Final = "the width of a blend stands with `smooth`, `subtract` or `intersect`: smooth(k = 0.3) { … }"
 _BLOCKS: Final = "write camera(eye = [0, 1, 6]); light(position = [2, 4, 3]); sphere { translate(0, 1, 0); }"
+_HOLDS: Final = "the loop stands in its block: <node> { square; for (i in 0..3) { star; } }"
+_NAMED: Final = "a material is named by `let`"
+_CAMERA: Final = "write camera(eye = [0, 1, 6], target = [0, 0, 0]);"
+_DRAWING: Final = "a drawing becomes a shape: scenelang learn drawing.svg -o zoo.safetensors"
+_LISTED: Final = "vectors are not made by loops"
+_WRITTEN: Final = (
+    "write the items out, or draw in a loop: for (i in 0..<n) { s.disc(0.1) { translate(i, 0); } }"
+)
 _COMMAS: Final = "`,` between statements"
 _JOINED: Final = "objects are joined by words"
 _ARGUED: Final = "`<node>` takes no objects as arguments"
@@ -83,12 +91,24 @@ HABITS: Final = (
     Habit("<elif> <E>: <BODY>", "<elif> (<E>) { <BODY> }", _BRACES),
     Habit("<elif> <E> {", "<elif> (<E>) {", _PARENTHESES, "it is `else if (…) { … }` here", "E0107"),
     Habit("<A> if <C> else <B>", "<C> ? <A> : <B>", "`if` does not choose between values"),
+    _unsafe(
+        "for (<i>, <v> in <E>)",
+        "for (<i> in <E>)",
+        "a loop has one name",
+        "count with for (<i> in 0..<len(v)) and take v[<i>]",
+    ),
+    _unsafe("<node> <for|if> <LINE> {", "BAD_HEAD {", "`<node>` joins no loop", _HOLDS),
+    _unsafe("<node>(<P>) <for|if> <LINE> {", "BAD_HEAD {", "`<node>` joins no loop", _HOLDS),
+    _unsafe(
+        "let (<P>) <LINE?>", "BAD_HEAD", "`let` has no parentheses", "write let x = 1; before what uses it"
+    ),
     # functions and modules
     Habit("<fn> <f>(<PARAMS?>) { return <E> <;?> }", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     Habit("<fn> <f>(<PARAMS?>): return <LINE> <;?>", "fn <f>(<PARAMS>) = <LINE>;", _FUNCTION),
     _unsafe("def <f>(<P?>): <BODY>", "BAD_STATEMENT", _BRACES, "write module <f>() { … }"),
     Habit("<fn> <f>(<PARAMS?>) <=|-> > <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     _unsafe("<fn> <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, "write fn <f>(x) = x ^ 2;"),
+    _unsafe("<fn> <f>(<P?>) = <BLOCK> <;?>", "BAD_STATEMENT", _FUNCTION, "write fn <f>(x) = x ^ 2;"),
     _unsafe(
         "void <f>(<P?>) <BLOCK>",
         "BAD_STATEMENT",
@@ -134,6 +154,9 @@ HABITS: Final = (
     Habit("<object>().<call>(<P?>);", "<object> { <call>(<P>); }", _METHOD),
     _unsafe("<object>().<LINE> <;?>", "BAD_STATEMENT", _METHOD, "square { scale(0.5); translate(1, 0); }"),
     Habit("<n> <o> }", "<n>; <o>; }", "missing `;`", code="E0102"),
+    Habit("<difference|minus|without> <o>", "subtract <o>", "it is `subtract` here"),
+    Habit("<blend|smin> <o>", "smooth <o>", "it is `smooth` here"),
+    Habit("intersection <o>", "intersect <o>", "it is `intersect` here"),
     Habit("<n> - <o>;", "subtract { <n>; <o>; }", _JOINED),
     Habit("<n> + <o>;", "union { <n>; <o>; }", _JOINED),
     Habit("<n>, <o> }", "<n>; <o>; }", _COMMAS),
@@ -143,8 +166,11 @@ HABITS: Final = (
     Habit("<node>(<A>, <B>, <C>);", "<node> { <A>; <B>; <C>; }", _ARGUED, _STANDS),
     _unsafe("<node>(<P>);", "BAD_STATEMENT", _ARGUED, _STANDS),
     Habit("<node>()", "<node>", "`<node>` takes no arguments"),
+    _unsafe("group(<P>) {", "group {", "`group` takes no arguments", "a name stands in a comment: // wheels"),
     _unsafe("<node>(<P>) {", "<node> {", "`<node>` takes no arguments", _WIDTH),
     _unsafe("< <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
+    _unsafe("< <A>, <B>, <C> > <LINE?> <BLOCK>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
+    _unsafe("< <n> <LINE>", "BAD_STATEMENT", "this is SVG or HTML", _DRAWING),
     _unsafe("<n> < <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
     Habit("<call> <rgb|srgb> < <A>, <B>, <C> >", "<call>([<A>, <B>, <C>]);", _BRACKETS),
     Habit("<call> <rgb|srgb> < <A>, <B>, <C> >;", "<call>([<A>, <B>, <C>]);", _BRACKETS),
@@ -160,6 +186,11 @@ HABITS: Final = (
     _unsafe("material <n>(<A>, <P>);", "material <n>;", _ARGUMENTS, _COLOUR),
     Habit("material <n>(color = <E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
     Habit("material <n>(<E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
+    Habit("material <m> = <n> <BLOCK> <;?>", "let <m> = material <n> <BLOCK>;", _NAMED),
+    Habit("material <n> <VALUES>;", "material <n> { color(<VALUES>); }", _OPERATIONS),
+    _unsafe(
+        "<location|look_at|angle> [<A>] <LINE?> <;?>", "BAD_STATEMENT", "a camera has arguments", _CAMERA
+    ),
     Habit("material <n> <,?> color(<E>);", "material <n> { color(<E>); }", _OPERATIONS),
     Habit("<let> <m> = material <n>();", "let <m> = material <n>;", _ARGUMENTS),
     _unsafe("<let> <m> = material <n>(<A>, <P>);", "let <m> = material <n>;", _ARGUMENTS, _COLOUR),
@@ -168,8 +199,8 @@ HABITS: Final = (
     Habit("material = <n>;", "material <n>;", "`material` is not set"),
     Habit("material(<n>)", "material <n>", "a material's name stands without parentheses"),
     # expressions
-    _unsafe("[for <E>]", "BAD_EXPRESSION", "vectors are not made by loops", "write the items out"),
-    _unsafe("[<E> for <F>]", "BAD_EXPRESSION", "vectors are not made by loops", "write the items out"),
+    _unsafe("[for <E>]", "BAD_EXPRESSION", _LISTED, _WRITTEN),
+    _unsafe("[<E> for <F>]", "BAD_EXPRESSION", _LISTED, _WRITTEN),
     Habit("[<A>:<S>:<B>]", "<A>..<B> step <S>", _RANGE),
     Habit("[<A>:<B>]", "<A>..<B>", _RANGE),
     Habit("(<A>, <E>)", "[<A>, <E>]", _BRACKETS),
@@ -180,6 +211,8 @@ HABITS: Final = (
     Habit("canvas(<A> x <B>);", "canvas(<A>, <B>);", "sides are separated by a comma"),
     Habit("import <library> <LINE?> <;?>", "", _IMPORT),
     Habit("from <library> import <LINE> <;?>", "", _IMPORT),
+    Habit("import <n> from <A>;", "import <A> as <n>;", "the path comes first"),
+    _unsafe("import <n>.<m>;", "BAD_STATEMENT", _PATH, _IMPORTED),
     _unsafe("import <n>;", "BAD_STATEMENT", _PATH, _IMPORTED),
     _unsafe("from <n> import <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
     _unsafe("import <A>;", "import <A> as s;", "missing `as` and a name", _IMPORTED, "E0126"),

@@ -23,7 +23,16 @@ _SOLID: Final = frozenset(("sphere", "torus"))
 """What is drawn in two and in three dimensions; the scene of a text tells which materials there are."""
 
 _MOVES: Final = {*TRANSFORMS, "color"}
-_ELSEWHERE: Final = ("mirror", "resize", "offset", "multmatrix", "linear_extrude", "rotate_extrude", "hull")
+_ELSEWHERE: Final = {
+    "mirror": "write scale(-1, 1); in its block",
+    "resize": "write scale(sx, sy); in its block, in factors",
+    "offset": "outlines are not offset",
+    "multmatrix": "write matrix([[…4], […4], […4], […4]]); in its block",
+    "linear_extrude": "a 2D scene is not extruded",
+    "rotate_extrude": "a 2D scene is not extruded",
+    "hull": "there is no hull; smooth { … } blends objects into each other",
+}
+"""What OpenSCAD writes before objects, and what there is instead."""
 _PREFIXES: Final = _MOVES.union(_ELSEWHERE)
 
 _INSIDE: Final = (
@@ -165,7 +174,10 @@ class Habits:
         # Among other transforms it lacks its `;`, and what follows is a material.
         among = first > 0 and mistakes.head(tokens, first - 1) in _PREFIXES
         fix = None if among else self._moved_inside(calls, child)
-        self.report.add("E0133", message, start, end, help=_INSIDE, fix=fix)
+        help = next(
+            (_ELSEWHERE[word] for call, _ in calls if (word := tokens.text(call)) in _ELSEWHERE), _INSIDE
+        )
+        self.report.add("E0133", message, start, end, help=help, fix=fix)
         tokens.replace(first, child - first, [])
         return True
 
