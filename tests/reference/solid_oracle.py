@@ -111,7 +111,7 @@ def field(node: Any, outer: list[Any]) -> Callable[[V], State]:
             leaf_distance(node, steps),
         )
         return lambda p: (distance(p), c, medium)
-    parts = [(link.op, link.k, field(link.node, steps)) for link in node.links]
+    parts = [(link.op, link.width, field(link.node, steps)) for link in node.links]
 
     def folded(p: V) -> State:
         big_d, big_c, big_medium = parts[0][2](p) if parts else (math.inf, (0.0, 0.0, 0.0), False)
