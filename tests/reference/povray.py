@@ -161,7 +161,7 @@ def cells(root: Fold, formulas: Formulas) -> list[tuple[str, Leaf]]:
         leaf: Any = link.node
         steps = leaf.steps
         if link.op == "smooth":
-            distance = formulas.blended(distance, formulas.leaf(leaf, steps), link.k)
+            distance = formulas.blended(distance, formulas.leaf(leaf, steps), link.width)
             found = [(isosurface(distance), found[0][1])]
             continue
         if all(isinstance(step, Affine) for step in steps):
