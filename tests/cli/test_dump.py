@@ -113,7 +113,7 @@ def test_scenes_with_mistakes_are_shown_as_far_as_they_go(folder: Folder) -> Non
     assert result.exit_code == 1
     assert "E0201" in result.stderr
     assert result.stdout.startswith("File")
-    refused = folder.write("b.nsg", "model \"shapes2d-reading\"; square; subtract { square; star; }")
+    refused = folder.write("b.nsg", 'model "shapes2d-reading"; square; subtract { square; star; }')
     result = folder.run("dump", refused, "--after", "lower", "--after", "program")
     assert result.exit_code == 1
     assert result.stdout.startswith("scene 256x256")

@@ -173,7 +173,7 @@ def test_gradients_are_differences_and_bounded_within_reach(geometry: str) -> No
             moved(*rng.uniform(-1, 1, 3).tolist()),
         ]
         steps = [Displace(0.1, 6.0), *(kinds[i] for i in rng.integers(0, 5, 5)), scaled(0.3)]
-        body = Body(leaf(geometry, "diffuse", GOLD), steps, 0.0)
+        body = Body(leaf(geometry, "diffuse", GOLD), tuple(steps), 0.0)
         p = rng.uniform(-1, 1, (3, 1000))
         h = 1e-7
         differences = [(body.distance(p + h * e)[0] - body.distance(p - h * e)[0]) / (2 * h) for e in AXES]

@@ -98,7 +98,7 @@ def random_programs(make, count: int) -> list[Program]:
             p = program(make(seed), (24, 26))
         except nsg.SceneError:
             continue
-        if len(p) > 1 and np.ptp(SLOW.picture(p.vectors, p.tokens, (12, 13))) > 0.2:
+        if len(p) > 1 and not p.extended and np.ptp(SLOW.picture(p.vectors, p.tokens, (12, 13))) > 0.2:
             found.append(p)
         if len(found) == count:
             break

@@ -91,7 +91,7 @@ def test_where_they_do_not_hold_rays_are_marched(objects: list[Object]) -> None:
     touched = lengths(field([MIST])) > 0  # others may pass one ball alone
     asked, marched = lengths(field(objects))[touched], lengths(field(objects, marching()))[touched]
     assert (marched > 0).sum() > 300
-    assert (asked == marched).all()
+    np.testing.assert_allclose(asked, marched, rtol=0, atol=1e-5)  # batches round differently
 
 
 def test_random_weights_draw_other_light_and_none_march() -> None:

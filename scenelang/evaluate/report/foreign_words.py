@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
+from scenelang.records import Record
+
 
 def _each_word(meanings: Mapping[str, str]) -> dict[str, str]:
     """A table by each of the words that share a meaning."""
@@ -217,3 +219,45 @@ ARGUMENTS: Final = {
 
 LOOKS: Final = ("color", "colour", "fill", "stroke", "material", "c")
 """Arguments that elsewhere give an object its colour."""
+
+
+class Shape(Record):
+    """A module of ``std/shapes``.
+
+    Args:
+        call: how it is called, for people.
+        least, most: how many arguments without a name it takes; of others nothing is known.
+        bare: what stands for a call without any, if that means something.
+    """
+
+    call: str
+    least: int = 0
+    most: int = 0
+    bare: str = ""
+
+    @property
+    def module(self) -> str:
+        return self.call.partition("(")[0]
+
+
+SHAPES: Final = {
+    **dict.fromkeys(("circle", "disc", "disk", "dot"), Shape("disc(r)", 1, 1, "disc()")),
+    **dict.fromkeys(("ellipse", "oval"), Shape("ellipse(rx, ry)", 2, 2)),
+    **dict.fromkeys(("ring", "annulus"), Shape("ring(r, width)", 2, 2, "ring()")),
+    **dict.fromkeys(("rect", "rectangle", "box", "quad"), Shape("rect(w, h)", 1, 2, "rect()")),
+    **dict.fromkeys(
+        ("rounded", "rounded_rect", "rounded_rectangle", "roundrect", "rrect"), Shape("rounded(w, h, r)")
+    ),
+    **dict.fromkeys(("line", "segment"), Shape("line([x, y], [x, y], width)", 2, 3)),
+    **dict.fromkeys(("capsule", "stadium"), Shape("capsule([x, y], [x, y], width)", 2, 3)),
+    **dict.fromkeys(("path", "polyline"), Shape("path([[x, y], [x, y], …], width)", 1, 2)),
+    **dict.fromkeys(("polygon", "ngon"), Shape("polygon(n, r), which is regular")),
+    **dict.fromkeys(("pie", "sector", "wedge"), Shape("pie(r, 0deg, 90deg)")),
+    "arrow": Shape("arrow([x, y], [x, y], width)", 2, 3),
+    "arc": Shape("arc(r, width, 0deg, 90deg)"),
+    "parallelogram": Shape("parallelogram(p, a, b)", 3, 3),
+    "hexagon": Shape("polygon(6)", bare="polygon(6)"),
+    "heptagon": Shape("polygon(7)", bare="polygon(7)"),
+    "octagon": Shape("polygon(8)", bare="polygon(8)"),
+}
+"""Names of shapes, in small letters."""

@@ -11,11 +11,11 @@ from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.report import foreign_words
+from scenelang.evaluate.report.foreign_words import SHAPES, Shape
 from scenelang.evaluate.report.reporter import Advice
 from scenelang.evaluate.report.spaces import likely_material, likely_models
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.value import COMPONENTS, Problem
-from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.syntax import nodes
 from scenelang.words import TRANSFORMS
@@ -213,48 +213,6 @@ def as_group(stmt: nodes.Call, session: Session) -> Fix | None:
 
 
 _LEAVES: Final = frozenset(("square", "triangle", "pentagon"))  # what the library is made of
-
-
-class Shape(Record):
-    """A module of ``std/shapes``.
-
-    Args:
-        call: how it is called, for people.
-        least, most: how many arguments without a name it takes; of others nothing is known.
-        bare: what stands for a call without any, if that means something.
-    """
-
-    call: str
-    least: int = 0
-    most: int = 0
-    bare: str = ""
-
-    @property
-    def module(self) -> str:
-        return self.call.partition("(")[0]
-
-
-SHAPES: Final = {
-    **dict.fromkeys(("circle", "disc", "disk", "dot"), Shape("disc(r)", 1, 1, "disc()")),
-    **dict.fromkeys(("ellipse", "oval"), Shape("ellipse(rx, ry)", 2, 2)),
-    **dict.fromkeys(("ring", "annulus"), Shape("ring(r, width)", 2, 2, "ring()")),
-    **dict.fromkeys(("rect", "rectangle", "box", "quad"), Shape("rect(w, h)", 1, 2, "rect()")),
-    **dict.fromkeys(
-        ("rounded", "rounded_rect", "rounded_rectangle", "roundrect", "rrect"), Shape("rounded(w, h, r)")
-    ),
-    **dict.fromkeys(("line", "segment"), Shape("line([x, y], [x, y], width)", 2, 3)),
-    **dict.fromkeys(("capsule", "stadium"), Shape("capsule([x, y], [x, y], width)", 2, 3)),
-    **dict.fromkeys(("path", "polyline"), Shape("path([[x, y], [x, y], …], width)", 1, 2)),
-    **dict.fromkeys(("polygon", "ngon"), Shape("polygon(n, r), which is regular")),
-    **dict.fromkeys(("pie", "sector", "wedge"), Shape("pie(r, 0deg, 90deg)")),
-    "arrow": Shape("arrow([x, y], [x, y], width)", 2, 3),
-    "arc": Shape("arc(r, width, 0deg, 90deg)"),
-    "parallelogram": Shape("parallelogram(p, a, b)", 3, 3),
-    "hexagon": Shape("polygon(6)", bare="polygon(6)"),
-    "heptagon": Shape("polygon(7)", bare="polygon(7)"),
-    "octagon": Shape("polygon(8)", bare="polygon(8)"),
-}
-"""Names of shapes, in small letters."""
 
 
 def in_library(stmt: nodes.Call, place: Place) -> tuple[str | None, Fix | None]:

@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 import pytest
 import torch
-from scenelang.backend.closed import ClosedSolids
 
+from scenelang.backend.closed import ClosedSolids
 from scenelang.graph.nodes import Fold
 from scenelang.graph.stage import Light, Stage
 from scenelang.reference.solid.field import Field
