@@ -147,7 +147,7 @@ def unknown_member(
     def advise() -> Advice:
         help, fix = did_you_mean(rest, known, last, effort=place.report.effort)
         if help is None and library.holds(exported.source):
-            from scenelang.evaluate.report.habits import SHAPES  # only mistakes need it
+            from scenelang.evaluate.report.foreign_words import SHAPES  # only mistakes need it
 
             shape = SHAPES.get(rest.lower())
             if shape is not None and shape.module in known:
