@@ -25,7 +25,17 @@ from scenelang.lab.designs.phases import LongConfig, LongPhase, read_long
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, exact_vectors, pictures, random_scenes
 from scenelang.lab.designs.ramps import CARRIED, carry_frames
 from scenelang.lab.designs.students import StreamingStudent, StudentConfig
-from scenelang.lab.designs.windows import REACH, cut, distances, draw, grid, inside, prefixes, windows
+from scenelang.lab.designs.windows import (
+    REACH,
+    cut,
+    distances,
+    draw,
+    grid,
+    inside,
+    maps,
+    prefixes,
+    windows,
+)
 from scenelang.reference.field import carry_back, distance_scale, leaf_distance
 from scenelang.renderers.reading import ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
@@ -81,7 +91,7 @@ def test_prefixes_are_the_pictures_of_shorter_streams() -> None:
         torch.testing.assert_close(found[:, count - 1], pictures(scenes, 8), atol=1e-6, rtol=0)
 
 
-def test_windows_are_parts_of_whole_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_windows_are_parts_of_whole_pictures() -> None:
     torch.manual_seed(2)
     student = StreamingStudent(
         StudentConfig("streaming", "exact", streaming=StreamingConfig(resolution=32, width=1 / 64))
@@ -91,16 +101,12 @@ def test_windows_are_parts_of_whole_pictures(monkeypatch: pytest.MonkeyPatch) ->
     assert corner.shape == (9, 2)
     assert not (corner % 4).any()
     corner[:2] = torch.tensor([[0, 0], [24, 24]])
-    level, maps = student.renderer.stages["32"], []
-    whole = level.states
-    monkeypatch.setattr(type(level), "states", lambda self, m, *rest: maps.append(m) or whole(m, *rest))
     with torch.no_grad():
-        draw(student, scenes, 32, None, 0, halves=False)
-        draw(student, scenes, 32, corner, 8, halves=False)
+        found = [maps(student, scenes, 32, c, w, halves=False) for c, w in ((None, 0), (corner, 8))]
     exact, part = prefixes(scenes, *grid(9, 32), 32), prefixes(scenes, *grid(9, 32, corner, 8), 8)
     for b, (row, column) in enumerate(corner.tolist()):
         at = (..., slice(row, row + 8), slice(column, column + 8))
-        torch.testing.assert_close(maps[1][b], maps[0][b][at], atol=1e-6, rtol=1e-5)
+        torch.testing.assert_close(found[1][b], found[0][b][at], atol=1e-6, rtol=1e-5)
         torch.testing.assert_close(part[b], exact[b][at], atol=1e-6, rtol=0)
 
 
@@ -119,7 +125,7 @@ def test_a_picture_is_the_renderers() -> None:
     )
     scenes = some(4)
     with torch.no_grad():
-        found = draw(student, scenes, 8, None, 0, halves=False)
+        found = draw(student, scenes, 8, maps(student, scenes, 8, None, 0, halves=False), halves=False)
         for count in range(1, 5):
             scenes.count = torch.full((4,), count)
             torch.testing.assert_close(found[:, count - 1], student.image(scenes, 8), atol=1e-5, rtol=1e-4)
@@ -132,7 +138,10 @@ def test_halves_are_near() -> None:
     )
     scenes = some(2)
     with torch.no_grad():
-        found, exact = (draw(student, scenes, 16, None, 0, halves=halves) for halves in (True, False))
+        found, exact = (
+            draw(student, scenes, 16, maps(student, scenes, 16, None, 0, halves=halves), halves=halves)
+            for halves in (True, False)
+        )
     assert 0 < float((found - exact).abs().max()) < 0.05
 
 
@@ -211,7 +220,7 @@ def test_lpips_of_one_prefix_is_added(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_maps_are_asked_for_distances_of_single_objects(tmp_path: Path) -> None:
     """It trains deconvolutions and leaves cells as they are; the readout goes into checkpoints only."""
-    phase = LongPhase(60, 16, 5e-3, side=8, window=8, alone=True)
+    phase = LongPhase(60, 16, 5e-3, side=8, window=8, alone=1.0, drawn=False)
     training = LongTraining(config("exact", phase), tmp_path)
     cells = training.student.state_dict()["renderer.stages.8.cell.gates.weight"].clone()
     losses = list(training.run())
@@ -220,6 +229,11 @@ def test_maps_are_asked_for_distances_of_single_objects(tmp_path: Path) -> None:
     again = LongTraining(training.config, tmp_path)
     assert torch.equal(again.readouts["8"].weight, training.readouts["8"].weight)
     assert not training.curve
+    plain, both = LongPhase(1, 4, 1e-3, side=8), LongPhase(1, 4, 1e-3, side=8, alone=0.5)
+    likelihood, more = (
+        next(LongTraining(config("exact", p), tmp_path / str(p.alone)).run()) for p in (plain, both)
+    )
+    assert more > likelihood
     export_long(again, "x", tmp_path / "w.safetensors")
     assert not [name for name in load_tensors(tmp_path / "w.safetensors")[0] if "readout" in name]
 

@@ -129,7 +129,7 @@ class LongTraining:
             self._average()
             self.step, self.loss = self.step + 1, loss.item()
             due = self.step % self.config.every == 0 or self.step == self.steps
-            if due and not phase.alone:
+            if due and phase.drawn:
                 spent = self.seconds + time.process_time() - started
                 psnr = round(self.measure(), 3)
                 self.curve.append(Point(self.step, round(spent, 1), self.measured_side, psnr))
@@ -186,7 +186,7 @@ class LongTraining:
             self.side = phase.side
 
     def _loss(self, phase: LongPhase) -> Tensor:
-        data = replace(self.config.data, objects=1) if phase.alone else self.config.data
+        data = self.config.data if phase.drawn else replace(self.config.data, objects=1)
         scenes = random_scenes(phase.scenes, data, self.generator)
         if phase.side == 0:
             return self._lifting_loss(scenes)
@@ -201,21 +201,23 @@ class LongTraining:
         side, window, halves = phase.side, phase.window, self.config.halves
         corner = windows(scenes, side, window, self.generator) if window else None
         x, y = grid(phase.scenes, side, corner, window)
+        seen, alone = maps(self.student, scenes, side, corner, window, halves=halves), torch.zeros(())
         if phase.alone:
-            seen = maps(self.student, scenes, side, corner, window, halves=halves).float()
-            told: Tensor = self.readouts[str(side)](seen.flatten(0, 1))
+            told: Tensor = self.readouts[str(side)](seen.flatten(0, 1).float())
             gap = told - distances(scenes, x, y, window or side).flatten(0, 1)
-            return len(REACH) * gap.square().mean()
+            alone = phase.alone * len(REACH) * gap.square().mean()
+        if not phase.drawn:
+            return alone
         exact = prefixes(scenes, x, y, window or side)
-        found = draw(self.student, scenes, side, corner, window, halves=halves)
+        found = draw(self.student, scenes, side, seen, halves=halves)
         error = (found - exact).square().flatten(2).mean(2)  # (B, N)
         likelihood = (error + FLOOR).log().mean() if phase.variance == "own" else 20 * error.mean()
         if not phase.perceptual:
-            return likelihood
+            return likelihood + alone
         assert self._perceptual is not None
         which = torch.arange(phase.scenes), scenes.count - 1
         distance: Tensor = self._perceptual(found[which], exact[which])
-        return likelihood + phase.perceptual * distance
+        return likelihood + alone + phase.perceptual * distance
 
     def _lifting_loss(self, scenes: Scenes) -> Tensor:
         """Squared error of a learned lifting's vectors against exact ones, of which it has the length."""

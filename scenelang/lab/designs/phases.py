@@ -25,9 +25,9 @@ class LongPhase:
     window: int = 0  # side of a window of a picture that is drawn, a multiple of 4; 0 draws all of it
     # variance of the likelihood: `one` for all pictures, or each picture's `own`, at its maximum
     variance: Literal["one", "own"] = "one"
-    # ask for the distances of single objects, of their feature maps by a linear readout that is not kept; a
-    # tenth of the work of drawing
-    alone: bool = False
+    # weight of the distances of single objects, of their feature maps by a linear readout that is not kept
+    alone: float = 0.0
+    drawn: bool = True  # else single objects are all that is asked for, which is a fifth of the work
     perceptual: float = 0.0  # weight of LPIPS beside the likelihood, of one prefix of each stream
 
 

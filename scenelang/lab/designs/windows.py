@@ -85,11 +85,8 @@ def maps(
     return x.reshape(*vectors.shape[:2], *x.shape[1:])
 
 
-def draw(
-    student: StreamingStudent, scenes: Scenes, side: int, corner: Tensor | None, window: int, *, halves: bool
-) -> Tensor:
-    """What the student draws of all prefixes (B, N, 3, W, W), in windows or whole."""
-    found = maps(student, scenes, side, corner, window, halves=halves)
+def draw(student: StreamingStudent, scenes: Scenes, side: int, found: Tensor, *, halves: bool) -> Tensor:
+    """What the student draws of all prefixes (B, N, 3, W, W), of what `maps` found."""
     level: Any = student.renderer.stages[str(side)]
     marks = one_hot(scenes.tokens, len(TOKENS)).float()
     with torch.autocast("cpu", torch.bfloat16, enabled=halves):
