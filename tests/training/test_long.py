@@ -16,10 +16,11 @@ import numpy as np
 import pytest
 import torch
 
+import scenelang as nsg
 from scenelang.graph.steps import Affine, Warp
 from scenelang.lab.designs import long
 from scenelang.lab.designs.encoders import LiftingConfig
-from scenelang.lab.designs.export import export_long
+from scenelang.lab.designs.export import export_long, trained_model
 from scenelang.lab.designs.long import LongTraining
 from scenelang.lab.designs.phases import LongConfig, LongPhase, read_long
 from scenelang.lab.designs.pictures import PictureConfig, Scenes, exact_vectors, pictures, random_scenes
@@ -36,6 +37,7 @@ from scenelang.lab.designs.windows import (
     prefixes,
     windows,
 )
+from scenelang.measure.scenes import draw_scene
 from scenelang.reference.field import carry_back, distance_scale, leaf_distance
 from scenelang.renderers.reading import ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
@@ -254,6 +256,33 @@ def test_distances_are_those_of_the_definition() -> None:
             d = leaf_distance(GEOMETRIES[int(scenes.leaf[b, n])], q) * distance_scale(chain[2:])
             parts.append(np.tanh(d[0] / np.array(REACH)))
         np.testing.assert_allclose(found[b, n, :, row, column].numpy(), np.mean(parts, 0), atol=1e-3)
+
+
+@pytest.mark.parametrize("lifting", ["exact", "learned"])
+def test_weights_draw_scenes_as_they_were_trained_to(lifting: str, tmp_path: Path) -> None:
+    """Through the compiler, on a canvas that the shipped model of the name does not draw."""
+    training = LongTraining(config(lifting, LongPhase(1, 2, 1e-3, side=8)), tmp_path)
+    list(training.run())
+    export_long(training, "shapes2d-streaming", tmp_path / "w.safetensors")
+    model = trained_model(tmp_path / "w.safetensors")
+    side = nsg.Object(geometry="star", transforms=(nsg.Scale(x=0.4, y=0.3), nsg.Translate(x=0.2, y=-0.1)))
+    program, picture = draw_scene(model, nsg.Scene(canvas=(8, 8), nodes=(side,)))
+    assert len(program) == 1
+    affine = torch.tensor([[0.4, 0, 0, 0.2], [0, 0.3, 0, -0.1], [0, 0, 1, 0], [0, 0, 0, 1]])
+    scenes = Scenes(
+        leaf=torch.tensor([[GEOMETRIES.index("star")]]),
+        twirl=torch.zeros(1, 1),
+        bend=torch.zeros(1, 1),
+        affine=affine.view(1, 1, 4, 4),
+        rgb=torch.ones(1, 1, 3),
+        tokens=torch.zeros(1, 1, dtype=torch.int64),
+        count=torch.ones(1, dtype=torch.int64),
+    )
+    if lifting == "learned":  # training lifts by twirls and bends of nothing too, the compiler does not
+        return
+    with torch.no_grad():
+        exact = training.averaged.image(scenes, 8)[0].permute(1, 2, 0).clamp(0, 1)
+    np.testing.assert_allclose(np.asarray(picture)[..., :3], exact.numpy(), atol=5e-3)
 
 
 def test_reading_learns_too(tmp_path: Path) -> None:

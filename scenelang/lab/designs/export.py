@@ -58,16 +58,18 @@ def export_long(training: LongTraining, model: str, path: Path) -> None:
 
 
 def trained_model(path: Path) -> Model:
-    """What draws with exported weights, whatever ships under their model's name; compiles as `shapes2d`."""
+    """What draws with exported weights, whatever ships under their model's name.
+
+    Scenes are compiled as for `shapes2d`, or of a learned lifting as for `shapes2d-reading`: on any canvas.
+    """
     data = read_regular(path, MOST_BYTES)
     header = open_weights(data).header
     student = header["config"]["student"]
     side = student["streaming"]["resolution"]
     sizes = ((side, side),) if student["renderer"] == "streaming" else ()
     manifest = replace(
-        load_manifest("shapes2d"),
+        load_manifest("shapes2d" if student["lifting"] == "exact" else "shapes2d-reading"),
         renderer=student["renderer"],
-        lifting=student["lifting"],
         sizes=sizes,
         white=True,
     )
