@@ -41,6 +41,7 @@ class Case:
 
     index: int  # in its set
     last: str  # the word that joins the last object of the stream
+    objects: int  # of its stream
     figures: dict[str, float]  # psnr and psnr_uncapped (dB), ssim, flip
 
 
@@ -138,6 +139,10 @@ def evaluate_set(
             for word in (*TOKENS, "all_union")
             if any(c.last == word for c in cases)
         },
+        "by_objects": {
+            str(count): _summary([c for c in cases if c.objects == count])
+            for count in sorted({c.objects for c in cases})
+        },
     }
     return summary, worst
 
@@ -149,7 +154,12 @@ def _case(
     program, picture = draw_scene(model, scene, threads)
     exact = exact_of(scene, model.manifest, kept)
     uncapped = psnr(over_white(picture), over_white(exact), UNCAPPED_DB)
-    return Case(index, _last_word(program.tokens), {**compare(picture, exact), "psnr_uncapped": uncapped})
+    return Case(
+        index,
+        _last_word(program.tokens),
+        len(program),
+        {**compare(picture, exact), "psnr_uncapped": uncapped},
+    )
 
 
 def _case_of(asked: tuple[str, str, int, int | None, int]) -> Case:

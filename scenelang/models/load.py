@@ -104,7 +104,7 @@ def _streaming(config: dict[str, Any], manifest: Manifest, size: int) -> Streami
     if manifest.sizes != ((known.resolution, known.resolution),):
         raise ModelError(f"a network for {known.resolution} pixels, which the manifest does not say")
     filters = known.filters(known.resolution)
-    if 4 * 25 * (2 * filters + 4) * 4 * filters > size:
+    if 2 * 25 * (2 * filters + 4) * 4 * filters > size:  # in half precision
         raise ModelError("a network larger than its file")
     return Streaming(known)
 

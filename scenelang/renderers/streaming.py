@@ -35,11 +35,13 @@ class StreamingConfig:
         vector: numbers D of an object.
         resolution: pixels along a side, a power of two from 4 to 512.
         width: share of the filters of Table 3; 1 is the paper's network.
+        most: filters of a level at most.
     """
 
     vector: int = 64
     resolution: int = 32
     width: float = 1.0
+    most: int = 256
 
     def __post_init__(self) -> None:
         if self.resolution not in FILTERS or self.resolution < SMALLEST:
@@ -49,7 +51,7 @@ class StreamingConfig:
 
     def filters(self, resolution: int) -> int:
         """Filters F of a level."""
-        return max(4, round(FILTERS[resolution] * self.width))
+        return min(self.most, max(4, round(FILTERS[resolution] * self.width)))
 
     @property
     def levels(self) -> tuple[int, ...]:
@@ -76,9 +78,10 @@ class ConvLSTM(nn.Module):
     def forward(self, x: Tensor, state: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
         """One object: (B, inputs, R, R) and (hidden, cell), each (B, F, R, R), to the next pair."""
         hidden, cell = state
-        i, f, o, g = self.gates(torch.cat([x, hidden], 1)).chunk(4, 1)  # each (B, F, R, R)
+        gates = self.gates(torch.cat([x, hidden], 1)).to(cell.dtype)  # sums stay exact where maps are halves
+        i, f, o, g = gates.chunk(4, 1)  # each (B, F, R, R)
         cell = f.sigmoid() * cell + i.sigmoid() * g.tanh()
-        return o.sigmoid() * cell.tanh(), cell
+        return (o.sigmoid() * cell.tanh()).to(x.dtype), cell
 
 
 class Level(nn.Module):
@@ -98,6 +101,28 @@ class Level(nn.Module):
         assert isinstance(last, nn.Conv2d)
         assert last.bias is not None
         nn.init.ones_(last.bias)  # pictures are over white
+
+    def states(self, maps: Tensor, marks: Tensor, count: Tensor | None = None) -> list[Tensor]:
+        """Hidden maps (B, F, R, R) after each object of a stream.
+
+        Args:
+            maps: of the objects (B, N, F, R, R).
+            marks: tokens as one of four (B, N, 4).
+            count: as `Streaming.forward` takes it.
+        """
+        hidden = torch.zeros_like(maps[:, 0])
+        cell = torch.zeros_like(hidden, dtype=marks.dtype)
+        found = []
+        for i in range(maps.shape[1]):
+            mark = marks[:, i, :, None, None].to(maps.dtype).expand(-1, -1, *maps.shape[3:])
+            after = self.cell(torch.cat([maps[:, i], mark], 1), (hidden, cell))
+            if count is None:
+                hidden, cell = after
+            else:
+                used = (i < count)[:, None, None, None]
+                hidden, cell = (torch.where(used, a, b) for a, b in zip(after, (hidden, cell), strict=True))
+            found.append(hidden)
+        return found
 
 
 class Streaming(nn.Module):
@@ -173,17 +198,6 @@ class Streaming(nn.Module):
     def _level(self, resolution: int, x: Tensor, marks: Tensor, count: Tensor | None) -> Tensor:
         level = self.stages[str(resolution)]
         assert isinstance(level, Level)
-        b, n, _ = marks.shape
-        maps = x.view(b, n, *x.shape[1:])  # (B, N, F, R, R)
-        zero = torch.zeros_like(maps[:, 0])
-        hidden, cell = zero, zero
-        for i in range(n):
-            mark = marks[:, i, :, None, None].expand(-1, -1, resolution, resolution)
-            after = level.cell(torch.cat([maps[:, i], mark], 1), (hidden, cell))
-            if count is None:
-                hidden, cell = after
-            else:
-                used = (i < count)[:, None, None, None]
-                hidden, cell = (torch.where(used, a, b) for a, b in zip(after, (hidden, cell), strict=True))
-        image: Tensor = level.pixels(hidden)
+        maps = x.view(*marks.shape[:2], *x.shape[1:])  # (B, N, F, R, R)
+        image: Tensor = level.pixels(level.states(maps, marks, count)[-1])
         return image

@@ -63,6 +63,10 @@ def unpack_training(
                 for k in ("step", "exp_avg", "exp_avg_sq")
                 if f"adam.{i}.{k}" in tensors
             }
+            for k in state.keys() - {
+                "step"
+            }:  # a fused optimiser takes averages for laid out as the parameter is
+                state[k] = torch.empty_like(parameter).copy_(state[k])
             if state:
                 optimiser.state[parameter].update(state)
         scenes.set_state(tensors["random"].cpu())

@@ -136,3 +136,19 @@ def test_sizes_are_checked() -> None:
     with pytest.raises(ValueError, match="share"):
         StreamingConfig(width=2.0)
     assert StreamingConfig(resolution=512).filters(512) == FILTERS[512]
+
+
+def test_filters_may_be_cut_to_as_many_on_all_levels() -> None:
+    config = StreamingConfig(resolution=512, width=1 / 4, most=32)
+    assert [config.filters(r) for r in config.levels] == [32] * 6 + [16, 8, 8]
+
+
+def test_a_cell_on_halves_keeps_its_sums() -> None:
+    torch.manual_seed(1)
+    level = Streaming(StreamingConfig(resolution=8, width=1 / 32)).stages["8"]
+    maps, marks = torch.randn(2, 3, 8, 8, 8), torch.eye(4)[torch.randint(0, 4, (2, 3))]
+    with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
+        cell = level.cell((torch.randn(2, 12, 8, 8).bfloat16()), (maps[:, 0].bfloat16(), maps[:, 1]))[1]
+        states = level.states(maps.bfloat16(), marks)  # type: ignore[union-attr,operator]
+    assert cell.dtype == torch.float32
+    assert [state.dtype for state in states] == [torch.bfloat16] * 3

@@ -12,7 +12,7 @@ import torch
 
 from scenelang.models.load import load_model
 from scenelang.renderers.network import FramedConfig
-from scenelang.training.checkpoint import load_tensors
+from scenelang.training.checkpoint import load_tensors, pack_training, unpack_training
 from scenelang.training.config import Phase, TrainConfig, read_config
 from scenelang.training.loop import train
 from scenelang.training.scenes import GEOMETRIES, Batch, SceneConfig, random_batch
@@ -168,3 +168,28 @@ def test_a_phase_has_a_rate_of_its_own(tmp_path: Path) -> None:
     one, _ = load_tensors(tmp_path / "one" / "weights.safetensors")
     two, _ = load_tensors(tmp_path / "two" / "weights.safetensors")
     assert all(torch.equal(one[name], two[name]) for name in one)
+
+
+def test_a_fused_optimiser_goes_on_in_the_layout_of_its_parameters() -> None:
+    """Its averages are read as they lie, so they must lie as the parameters do."""
+
+    def made() -> tuple[torch.nn.Conv2d, torch.optim.Adam]:
+        torch.manual_seed(1)
+        network = torch.nn.Conv2d(3, 4, 3).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        return network, torch.optim.Adam(network.parameters(), lr=0.1, fused=True)
+
+    def step(network: torch.nn.Conv2d, optimiser: torch.optim.Adam, seed: int) -> None:
+        x = torch.randn(2, 3, 5, 5, generator=torch.Generator().manual_seed(seed))
+        optimiser.zero_grad()
+        network(x).square().sum().backward()
+        optimiser.step()
+
+    network, optimiser = made()
+    step(network, optimiser, 1)
+    packed = pack_training(network, optimiser, torch.Generator())
+    kept = {name: tensor.clone(memory_format=torch.contiguous_format) for name, tensor in packed.items()}
+    step(network, optimiser, 2)
+    other, again = made()
+    unpack_training(kept, other, again, torch.Generator())
+    step(other, again, 2)
+    assert torch.equal(other.weight, network.weight)

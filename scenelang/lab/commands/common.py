@@ -87,4 +87,8 @@ def model_to_measure(name: str, weights: Path | None) -> Model:
     from scenelang.models.manifest import available
 
     check_names("model", [name], available())
+    if weights is not None and name in ("shapes2d-streaming", "shapes2d-reading"):
+        from scenelang.lab.designs.export import trained_model
+
+        return trained_model(weights)
     return load_model(name, path=weights)
