@@ -50,6 +50,7 @@ GIVEN = {
     "three times the size": "a quantity that is varied",
     "All of them learn 16 scenes": "on what they were trained",
     "thinner than 0.01": "the language's definition",
+    "falls under 40 dB": "the limit of warnings",
     "940,000 steps of up to 32 pictures": "the paper's training",
     "each of 16 pictures": "the paper's training",
 }

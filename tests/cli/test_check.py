@@ -31,10 +31,10 @@ def test_every_mistake_with_a_caret(folder: Folder) -> None:
 
 
 def test_what_the_passes_find(folder: Folder) -> None:
-    text = "subtract { square {} intersect { star {} pentagon {} } }"
+    text = 'model "shapes2d-reading"; square {} subtract { square {} star {} }'
     result = folder.run("check", folder.write("a.nsg", text), "--format", "concise")
     assert result.exit_code == 1
-    assert "error[E0402]" in result.stdout
+    assert "error[E0513]" in result.stdout
 
 
 def test_strict_counts_warnings(folder: Folder) -> None:
