@@ -253,7 +253,7 @@ def test_distances_are_those_of_the_definition() -> None:
                 Affine(tuple(scenes.affine[b, n].double().flatten()[:12].tolist())),
             ]
             q = carry_back(chain, np.array([[x], [y]]))
-            d = leaf_distance(GEOMETRIES[int(scenes.leaf[b, n])], q) * distance_scale(chain[2:])
+            d = leaf_distance(GEOMETRIES[int(scenes.leaf[b, n])], q) * distance_scale(tuple(chain[2:]))
             parts.append(np.tanh(d[0] / np.array(REACH)))
         np.testing.assert_allclose(found[b, n, :, row, column].numpy(), np.mean(parts, 0), atol=1e-3)
 
