@@ -84,7 +84,7 @@ class Trace:
                     left[at][:, columns[some]] = below * paint[:, some]
                     left[at - 1][:, columns[some]] = below * (1.0 - paint[:, some])
 
-        for part, level, _, before, after in reversed(nest.turns):
+        for part, level, _, _, before, after in reversed(nest.turns):
             opened(after)
             paint = self.paint[:, part]
             for at in np.unique(level).tolist():
@@ -373,7 +373,7 @@ class Field:
             for plane, new in zip(stack, values, strict=True):
                 xp.put(plane, index, new)
 
-        for part, level, _, before, after in nest.turns:
+        for part, level, _, _, before, after in nest.turns:
             close(before)
             index = xp.array(level * count + np.arange(len(level)), self.like)
             old = xp.take(stack, index)

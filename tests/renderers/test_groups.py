@@ -256,3 +256,26 @@ def test_what_is_cut_out_of_a_rounded_operand_matters_everywhere() -> None:
     groups = read_groups(np.array([UNION, INTERSECT | BEGINS, SUBTRACT | 1 << ENDS], np.int8))
     assert felt(groups, np.array([0.0, 0.1, 0.0])).everywhere.tolist() == [False, True, True]
     assert felt(groups, np.zeros(3)).everywhere.tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("anchored", [True, False])
+def test_what_is_intersected_is_taken_where_nothing_of_the_group_is_near(
+    anchored: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A group's later rows may hide its first one in a block, and be out of reach in a smaller one."""
+    scene = nsg.loads(
+        "canvas(256, 256); intersect { square { scale(1.2); material flat { color(#36c); } } union {"
+        " star { scale(0.5); translate(0.6, -0.6); } pentagon { scale(0.45); translate(-0.4, 0.3); }"
+        " triangle { scale(0.4); translate(-0.5, -0.5); } star { scale(0.3); translate(0.2, 0.6); } } }"
+    )
+    program = nsg.compile(scene)
+    field = Field(NETWORK, program.vectors, program.tokens)
+    monkeypatch.setattr("scenelang.renderers.coverage.ENOUGH", 0)
+    if not anchored:
+        monkeypatch.setattr("scenelang.renderers.meetings.INTERSECT", -2)
+    white = np.ones(3, np.float32)
+    pruned, whole = (
+        Coverage(field, skip=skip).tile((256, 256), range(256), "four", white).picture
+        for skip in (True, False)
+    )
+    assert (abs(pruned - whole).max() < 1 / 255) == anchored
