@@ -21,7 +21,7 @@ from scenelang.program.groups import read_groups
 from scenelang.program.program import Program
 from scenelang.renderers.draw import draw_objects
 from scenelang.renderers.solid.field import SolidField
-from scenelang.renderers.solid.network import SolidArrays, Wanted
+from scenelang.renderers.solid.network import EMPTY, SolidArrays, Wanted
 from scenelang.viewer.script import script
 from scenelang.viewer.view import view_of
 from tests.browser import watched
@@ -230,7 +230,11 @@ def check_points(page: Any, program: Program, inside: int = 500, near: float = n
     found, known = np.frombuffer(data, np.float32).reshape(-1, 5), field_at(program, points)
     assert (known[:, 0] < 0).sum() > inside
     seen = known[:, 0] < near
+    # on the border of a ball nothing may have been met, by the last bits
+    border = seen & ((found[:, 0] == EMPTY) != (known[:, 0] == EMPTY))
+    assert border.sum() <= 2
+    seen &= ~border
     np.testing.assert_allclose(found[seen, 0], known[seen, 0], atol=1e-4)
-    assert (found[~seen, 0] > near - 1e-3).all()
+    assert (found[~seen & ~border, 0] > near - 1e-3).all()
     # a colour gives way to another within 0.001 of distance, and so follows its last bits
     assert (abs(found - known)[seen].max(1) > 1e-4).mean() < 1e-3
