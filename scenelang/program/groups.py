@@ -130,6 +130,12 @@ class Felt(NamedTuple):
     inside: Mask
 
 
+def anchored(groups: Groups) -> Mask:
+    """Which rows (N,) lie in a group that is intersected: where none of its rows is met, all is cut away."""
+    cuts = np.append(groups.joins == INTERSECT, False)  # of no group, too
+    return np.asarray(cuts[groups.path].any(1))
+
+
 def felt(groups: Groups, widths: Floats) -> Felt:
     """Find how far rows matter; `widths` are those of their blends (N,), as `widths_of` their operators.
 

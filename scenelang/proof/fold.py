@@ -79,7 +79,7 @@ def enclosed(
     """
     count, pairs = len(meetings.columns), len(joins.tokens)
     shut, opened = np.empty((2, pairs), bool)
-    hidden, around = np.zeros((2, count * (1 if nest is None else nest.levels)), bool)
+    hidden = np.zeros(count * (1 if nest is None else nest.levels), bool)
     state = _State.empty(len(hidden))
     if nest is None or groups is None:
         for part in meetings.slots():
@@ -101,19 +101,19 @@ def enclosed(
         def reopen(closings: list[Closing]) -> None:
             for _ in closings:
                 top, below, (closed, wide) = done.pop()
-                hidden[top] = around[top] = hidden[below] | closed
+                hidden[top] = hidden[below] | closed
                 hidden[below] |= wide
 
-        for part, level, fresh, _, before, after in nest.turns:
+        for part, level, fresh, before, after in nest.turns:
             close(before)
             own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
             places, how = level * count + np.arange(len(level)), joins.some(part)._replace(fresh=fresh)
             shut[part], opened[part] = state.join(places, *own, how)
             close(after)
-        for part, level, _, anchors, before, after in reversed(nest.turns):
+        for part, level, _, before, after in reversed(nest.turns):
             reopen(after)
             places = level * count + np.arange(len(level))
-            shut[part] |= np.where(anchors, around[places], hidden[places])
+            shut[part] |= hidden[places]
             hidden[places] |= opened[part]
             reopen(before)
     (low, high), (first, last) = (tuple(side[..., :count] for side in pair) for pair in state)

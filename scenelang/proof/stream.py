@@ -11,7 +11,7 @@ from scenelang.lifting.exact import lift_many
 from scenelang.lifting.layout import PLANE_LAYOUT as LAYOUT
 from scenelang.models.manifest import Manifest
 from scenelang.program.emit import tokens_of
-from scenelang.program.groups import felt, read_groups, widths_of
+from scenelang.program.groups import anchored, felt, read_groups, widths_of
 from scenelang.proof.errors import Errors
 from scenelang.proof.fold import NOTHING, Enclosure, Floats, Joins
 from scenelang.proof.rounding import EPS, written
@@ -52,7 +52,7 @@ class Stream:
         raw = np.array([TOKENS[row.op] for row in rows], np.intp)
         widths = widths_of(raw, np.array([row.k for row in rows]))
         seen = felt(groups, widths)
-        reach = np.where(seen.everywhere, np.inf, 1.0 + seen.total / self.frames.scale)
+        reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + seen.total / self.frames.scale)
         objects, far = written(lowered.root), np.hypot(*graph.canvas) / min(graph.canvas)
         leaves = [objects[leaf.number] for leaf in self._leaves]
         own = list(zip(leaves, reach.tolist(), strict=True))

@@ -208,25 +208,25 @@ def _nested(
 
     fresh = np.concatenate([turn.fresh for turn in nest.turns])
     gates = _Gates.of(cell, distance, given | fresh)
-    for part, level, _, _, before, after in nest.turns:
+    for part, level, _, before, after in nest.turns:
         close(before)
         own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
         places = level * blocks + np.arange(len(level))
         shut[part], wide[part] = state.join(places, own, gates.some(part))
         close(after)
     wide |= given
-    hidden, around = np.zeros((2, nest.levels * blocks), bool)  # behind a group, or within it, too
+    hidden = np.zeros(nest.levels * blocks, bool)
 
     def reopen(closings: list[Closing]) -> None:
         for _ in closings:
             top, below, (closed, opened) = done.pop()
-            hidden[top] = around[top] = hidden[below] | closed
+            hidden[top] = hidden[below] | closed
             hidden[below] |= opened
 
-    for part, level, _, anchors, before, after in reversed(nest.turns):
+    for part, level, _, before, after in reversed(nest.turns):
         reopen(after)
         places = level * blocks + np.arange(len(level))
-        shut[part] |= np.where(anchors, around[places], hidden[places])
+        shut[part] |= hidden[places]
         hidden[places] |= wide[part]
         reopen(before)
 

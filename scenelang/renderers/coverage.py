@@ -311,7 +311,7 @@ def _owners(xp: Arrays, nest: Nesting, trace: Trace, painted: np.ndarray, object
             own[level - 1, :, columns] = np.where(here, top, own[level - 1, :, columns])
             own[level, :, columns] = 0
 
-    for part, level, _, _, before, after in nest.turns:
+    for part, level, _, before, after in nest.turns:
         close(len(before))
         columns = np.arange(len(level))
         mine = objects[part][:, None] + 1

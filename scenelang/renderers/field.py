@@ -18,6 +18,7 @@ from scenelang.program.groups import (
     OPERATOR,
     SMOOTH,
     UNION,
+    anchored,
     felt,
     read_groups,
     widths_of,
@@ -84,7 +85,7 @@ class Trace:
                     left[at][:, columns[some]] = below * paint[:, some]
                     left[at - 1][:, columns[some]] = below * (1.0 - paint[:, some])
 
-        for part, level, _, _, before, after in reversed(nest.turns):
+        for part, level, _, before, after in reversed(nest.turns):
             opened(after)
             paint = self.paint[:, part]
             for at in np.unique(level).tolist():
@@ -169,7 +170,8 @@ class Field:
         seen = felt(groups, widths)
         self.widest = max([BLEND, *seen.widest.tolist()])
         beyond = np.minimum(FARTHER * seen.total, FARTHEST * seen.widest) / self.frames.scale
-        self.reach = np.where(seen.everywhere, np.inf, 1.0 + SLACK + beyond)
+        # in a block a row may hide all before it in its group, and be out of reach in a part of the block
+        self.reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + SLACK + beyond)
         operators = [*self.tokens.tolist(), *groups.joins.tolist()]
         blends = [*np.where(groups.first, 0.0, widths).tolist(), *self.group_widths.tolist()]
         kinds, which = _numbered(list(zip(operators, blends, strict=True)))
@@ -373,7 +375,7 @@ class Field:
             for plane, new in zip(stack, values, strict=True):
                 xp.put(plane, index, new)
 
-        for part, level, _, _, before, after in nest.turns:
+        for part, level, _, before, after in nest.turns:
             close(before)
             index = xp.array(level * count + np.arange(len(level)), self.like)
             old = xp.take(stack, index)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.program.groups import INTERSECT, SMOOTH, Groups
+from scenelang.program.groups import SMOOTH, Groups
 
 Index = npt.NDArray[np.intp]
 
@@ -135,15 +135,12 @@ class Turn(NamedTuple):
         part: where its pairs lie.
         level: (n,) of the states that its pairs join; 0 is the stream's own.
         fresh: (n,) whether an object begins its state as it is.
-        anchors: (n,) whether it is the first of a group that is intersected, which takes all where nothing of
-            the group is near; so it stays, though others of its group hide it.
         before, after: groups that end before the slot, and behind it where columns end, in rounds.
     """
 
     part: slice
     level: Index
     fresh: npt.NDArray[np.bool_]
-    anchors: npt.NDArray[np.bool_]
     before: list[Closing]
     after: list[Closing]
 
@@ -181,9 +178,6 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
     if not own.any():
         return None
     fresh = own.any(1) & (groups.tokens[meetings.pairs.object] <= SMOOTH)
-    anchors = np.zeros(len(groups.tokens), bool)
-    anchors[groups.rows[groups.joins == INTERSECT]] = True
-    anchors = anchors[meetings.pairs.object]
     last_path = np.full((count, groups.deepest), -1)
     real = np.zeros((count, groups.deepest), bool)  # whether a group that is open has a state of its own
     every = np.arange(count)
@@ -197,7 +191,7 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
         levels = max(levels, int(level.max(initial=0)) + 1)
         left = slots[at + 1].stop - slots[at + 1].start if at + 1 < len(slots) else 0
         after = _closings(every[left:n], last_path, real, np.zeros(n - left, np.intp))
-        turns.append(Turn(part, level, fresh[part], anchors[part], before, after))
+        turns.append(Turn(part, level, fresh[part], before, after))
     return Nesting(turns, levels)
 
 

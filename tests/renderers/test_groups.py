@@ -272,7 +272,9 @@ def test_what_is_intersected_is_taken_where_nothing_of_the_group_is_near(
     field = Field(NETWORK, program.vectors, program.tokens)
     monkeypatch.setattr("scenelang.renderers.coverage.ENOUGH", 0)
     if not anchored:
-        monkeypatch.setattr("scenelang.renderers.meetings.INTERSECT", -2)
+        field.reach = np.where(
+            np.isinf(field.reach) & (field.tokens == 0) & ~field.groups.first, 1.02, field.reach
+        )
     white = np.ones(3, np.float32)
     pruned, whole = (
         Coverage(field, skip=skip).tile((256, 256), range(256), "four", white).picture

@@ -159,7 +159,7 @@ def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.nda
         for columns, groups, level in closings:
             found.append((columns, 2 * count + groups, level - 1, np.full(len(columns), len(found))))
 
-    for part, level, fresh, _, before, after in nest.turns:
+    for part, level, fresh, before, after in nest.turns:
         close(before)
         rows = meetings.pairs.object[part] + count * fresh
         found.append((np.arange(len(level)), rows, level, np.full(len(level), len(found))))
