@@ -180,7 +180,7 @@ def closed_forms(model: str) -> ClosedPlane | ClosedSolids:
 
 
 def field_of(program: Program, exact: bool) -> FramedArrays | SolidArrays:
-    """What answers for distances and colours of a Program: formulas, or its network.
+    """Source of a Program's distances and colours: formulas, or its network.
 
     Raises:
         KeyError: there is no such model.

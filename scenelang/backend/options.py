@@ -8,7 +8,7 @@ from typing import Literal
 
 Backend = Literal["neural", "reference"]
 Still = Literal["neural", "exact", "reference"]
-"""What draws a single picture."""
+"""Backends that draw a single picture."""
 Device = Literal["auto", "cpu", "cuda"]
 Samples = Literal["adaptive", "four", "quick", "one", "draft"]
 """Of a pixel, as `scenelang.backend.render.render` says."""

@@ -144,7 +144,7 @@ def given(
     size: tuple[int, int] | None,
     backend: Still,
 ) -> tuple[Program | Scene, Spans | None]:
-    """What a backend draws: the reference a Scene, the network a Program; raises as `render`.
+    """Input of a backend: a Scene for the reference, a Program for the network; raises as `render`.
 
     With a Scene of a file comes where its nodes were written.
     """

@@ -46,7 +46,7 @@ class Later(Record):
     everywhere: bool = False
 
     def of(self, op: Combine, width: float) -> Later:
-        """What sees the operand of an operator, itself included.
+        """Blends that see the operand of an operator, itself included.
 
         Of an intersection that is what sees all that stands before it, and with a width how deep inside its
         operand points are. A subtraction with a width changes what lies within that of its operand.
@@ -57,7 +57,7 @@ class Later(Record):
         return self._wider(width, self.inside or op == "smooth", everywhere)
 
     def before(self, op: Combine, width: float) -> Later:
-        """What sees all that an operator joins its operand to, itself included."""
+        """Blends that see all that an operator joins its operand to, itself included."""
         if not width:
             return self
         if op == "smooth":

@@ -120,7 +120,7 @@ def _unseen(graph: Graph, leaf: Leaf) -> tuple[str, Span | None, str]:
 
 
 def _units(graph: Graph, pixels: bool) -> str:
-    """What the canvas shows, and how to write in pixels where those were likely meant."""
+    """Extent of the canvas, and how to write in pixels where those were likely meant."""
     width, height = graph.canvas
     side = min(width, height)
     shown = f"the canvas shows x from {-width / side:.3g} to {width / side:.3g}, y from {-height / side:.3g} "

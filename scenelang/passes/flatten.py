@@ -63,7 +63,7 @@ def _flat(fold: Fold, children: list[Node]) -> Node:
 
 
 def _core(link: Link, operand: Fold) -> int:
-    """How many of the first links of a composite operand have to stay together; 1: none."""
+    """Number of first links of a composite operand that have to stay together; 1: none."""
     if link.width:
         return len(operand.links)
     apart = ("intersect", "subtract") if link.op == "intersect" else ("union",)

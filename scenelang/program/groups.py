@@ -112,7 +112,7 @@ def widths_of(operators: Index, blends: npt.NDArray[np.floating]) -> Floats:
 
 
 class Felt(NamedTuple):
-    """How far beyond its leaf each of N rows matters to what is seen, as `scenelang.graph.bounds.Later`.
+    """Distances beyond leaves at which N rows matter to what is seen, as `scenelang.graph.bounds.Later`.
 
     Args:
         total: (N,) world units: widths of the blends that see the row, its own and those of its groups too.
@@ -131,7 +131,7 @@ class Felt(NamedTuple):
 
 
 def anchored(groups: Groups) -> Mask:
-    """Which rows (N,) lie in a group that is intersected: where none of its rows is met, all is cut away."""
+    """Find rows (N,) in a group that is intersected: where none of its rows is met, all is cut away."""
     cuts = np.append(groups.joins == INTERSECT, False)  # of no group, too
     return np.asarray(cuts[groups.path].any(1))
 

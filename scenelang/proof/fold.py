@@ -39,7 +39,7 @@ class Enclosed(NamedTuple):
 
 
 class Joins(NamedTuple):
-    """How P operands join.
+    """Ways in which P operands join.
 
     Args:
         tokens: operators.
@@ -54,7 +54,7 @@ class Joins(NamedTuple):
     fresh: Mask
 
     def some(self, which: slice | Index) -> Joins:
-        """Those of some of them."""
+        """Select some of them."""
         return Joins(self.tokens[which], self.widths[which], self.free[which], self.fresh[which])
 
 
@@ -138,7 +138,7 @@ class _State(NamedTuple):
         return cls(Enclosure(*np.full((2, count), NOTHING)), Enclosure(*np.zeros((2, 3, count))))
 
     def at(self, columns: Index) -> tuple[Enclosure, Enclosure]:
-        """What it is in some columns."""
+        """Return distances and colours in some columns."""
         return tuple(Enclosure(low[..., columns], high[..., columns]) for low, high in self)  # type: ignore[return-value]
 
     def clear(self, columns: Index) -> None:

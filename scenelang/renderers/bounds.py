@@ -106,7 +106,7 @@ class _Gates(NamedTuple):
         return cls(cell, own, up[:, 1], down[:, 1], given)
 
     def some(self, which: slice | Columns) -> _Gates:
-        """Those of some of the operands."""
+        """Select some of the operands."""
         lines, bias, candidate, bump = self.cell
         return _Gates(
             Cell(lines[..., which], bias[:, which], candidate[..., which], bump[:, which]),
@@ -118,7 +118,7 @@ class _Gates(NamedTuple):
 
 
 class _Operand(NamedTuple):
-    """What joins a state in n columns: its distance (n,) and colour (3, n)."""
+    """Operand of a state in n columns: its distance (n,) and colour (3, n)."""
 
     distance: Interval
     colour: Interval
@@ -138,7 +138,7 @@ class _State(NamedTuple):
         )
 
     def at(self, columns: Columns) -> _Operand:
-        """What it is in some columns, as an operand."""
+        """Return its distances and colours in some columns, as an operand."""
         parts = ((low[..., columns], high[..., columns]) for low, high in self)
         return _Operand(*(Interval(*part) for part in parts))
 

@@ -290,7 +290,7 @@ class Field:
         return path, joins[path], np.append(self.group_widths, -1.0)[path]
 
     def nesting(self, meetings: Meetings) -> Nesting | None:
-        """Which states pairs join, None where no column has a group with a state of its own."""
+        """Find the states that pairs join, None where no column has a group with a state of its own."""
         return nesting(meetings, self.groups) if self.groups.deepest else None
 
     def fold(self, meetings: Meetings, features: Array, trace: Trace | None = None) -> Array:

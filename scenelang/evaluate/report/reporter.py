@@ -172,7 +172,7 @@ class Reporter(Record, frozen=False):
 
 
 def _called(site: Span) -> str | None:
-    """How the module of the library is called that a call names."""
+    """Usage line of the library's module that a call names."""
     from scenelang.evaluate.report.foreign_words import SHAPES  # only mistakes need it
 
     alias, _, module = site.text.rpartition(".")

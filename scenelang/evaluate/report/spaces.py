@@ -36,14 +36,14 @@ def likely_material(session: Session, source: SourceFile) -> str | None:
 
 
 def material_advice(place: Place, name: str, argument: str = "…") -> str:
-    """How an operation on a colour is written, in the material of what a text draws if that is known."""
+    """Text of an operation on a colour, in the material of what a text draws if that is known."""
     material = likely_material(place.session, place.file.source)
     written = f"material {material or 'flat'} {{ {name}({argument}); }}"
     return written if material else f"{written}, in space material diffuse"
 
 
 def unknown_material(name: nodes.Name, place: Place, known: set[str]) -> Advice:
-    """What may have been meant by a name in the place of a material."""
+    """Likely meaning of a name in the place of a material."""
     session, source, span, lower = place.session, place.file.source, name.span, name.text.lower()
     models = likely_models(session, source)
     there = known & {look for model in models for look in model.looks} or known
@@ -58,7 +58,7 @@ def unknown_material(name: nodes.Name, place: Place, known: set[str]) -> Advice:
 
 
 def drawn(place: Place, known: set[str]) -> str:
-    """What there is to draw, of the plane or in space."""
+    """Shapes that can be drawn, in the plane or in space."""
     models = [m for m in likely_models(place.session, place.file.source) if known.intersection(m.geometries)]
     spaces = sorted({model.dimension for model in models})
     said = {n: listing({g for m in models if m.dimension == n for g in m.geometries}) for n in spaces}

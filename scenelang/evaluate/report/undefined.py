@@ -251,7 +251,7 @@ def report_rebound(place: Place, name: nodes.Name, known: Binding | None) -> Non
 
 
 def _set_otherwise(place: Place, word: str) -> str | None:
-    """How what other languages set as a property is written in a block."""
+    """Statement for a property that other languages set in a block."""
     words, meant = place.session.vocabulary, foreign_words.WORDS.get(word, "")
     if place.kind in ("file", "unknown"):
         return None

@@ -171,7 +171,7 @@ def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.nda
 
 
 def _cell_at(field: Field) -> int:
-    """Where in a row of the kernel its cell begins: behind the way to the leaf, scale and colour."""
+    """Place in a row of the kernel at which its cell begins: behind the way to the leaf, scale and colour."""
     return int(field.layout.inner_warps.stop - field.layout.frame.start + 4)
 
 

@@ -108,7 +108,7 @@ def showing(groups: Groups) -> Mask:
 
 
 def _under(groups: Groups, operator: int) -> Mask:
-    """Which rows (N,) an operator joins, or a group around them."""
+    """Find rows (N,) that an operator joins, or a group around them."""
     found = groups.tokens == operator
     for path in groups.path.T:
         found = found | ((path >= 0) & (groups.joins[path] == operator))
