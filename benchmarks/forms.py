@@ -123,7 +123,7 @@ def written(image: Image.Image, form: str, **options: object) -> bytes:
 def forms_of(path: Path) -> tuple[str, Found]:
     """The kind of a file, and what there is of it."""
     data, suffix = path.read_bytes(), path.suffix.lower()
-    if suffix in pictures.MOST_OF:
+    if suffix in pictures.MOST_OF_PICTURE:
         return "pictures", picture_forms(pictures.read_picture(data).colours)
     shape = shape_in(data, suffix, "auto", 0)
     assert isinstance(shape, Mesh)

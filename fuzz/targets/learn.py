@@ -12,8 +12,9 @@ from PIL import Image
 from fuzz import trees
 from fuzz.target import Target, hold
 from scenelang.elements.zoo import read_zoo
-from scenelang.fitting.making import MOST_OF, make
+from scenelang.fitting.making import make
 from scenelang.fitting.mesh import FitError
+from scenelang.fitting.parts import MOST_OF
 
 KINDS = tuple(MOST_OF)
 

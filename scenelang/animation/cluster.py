@@ -18,7 +18,7 @@ from scenelang.cluster import AHEAD, Link
 from scenelang.program.program import Program, program_bytes
 
 if TYPE_CHECKING:
-    from distributed import Future
+    from distributed import Future as Task
 
 BATCH_S: Final = 0.25  # of drawing in a batch, beside which a task's own milliseconds are little
 MOST_BATCH: Final = 64
@@ -34,7 +34,7 @@ class Cluster:
         self.batches = 0  # sent so far
         self._batch: list[tuple[bytes, Errand]] = []
         self._each_s = BATCH_S  # a frame, as far as is known
-        self._under_way: dict[Future[Any], list[Errand]] = {}
+        self._under_way: dict[Task[Any], list[Errand]] = {}
 
     @property
     def count(self) -> int:

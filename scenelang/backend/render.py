@@ -13,7 +13,7 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.scene.schema import Scene
 
 if TYPE_CHECKING:
-    from scenelang.fitting.ladder import Shape
+    from scenelang.fitting.mesh import Shape
     from scenelang.graph.lower import Spans
     from scenelang.graph.nodes import Graph
     from scenelang.image import Image

@@ -15,7 +15,7 @@ from scenelang.elements.groups import Painted
 from scenelang.fitting.mesh import FitError, needed
 from scenelang.fitting.outline import Layer, Outline, traced, winding
 
-MOST_OF: Final = dict.fromkeys((".svg", ".png", ".jpg", ".jpeg"), 10 << 20)  # bytes of a file
+MOST_OF_DRAWING: Final = dict.fromkeys((".svg", ".png", ".jpg", ".jpeg"), 10 << 20)  # bytes of a file
 _CURVE: Final = 48  # edges of a curve
 _PAINT: Final = re.compile(r"""url\(\s*['"]?#([^)'"\s]+)['"]?\s*\)[^;"}]*""")  # and what is meant without it
 _OPACITY: Final = re.compile(r"(?<![-\w])opacity\s*:\s*([^;]*)")

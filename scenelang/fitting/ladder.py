@@ -11,14 +11,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from scenelang.elements.element import MOST_SIDE, Element
 from scenelang.elements.pyramid import Grid, packed, refine, unpacked
-from scenelang.fitting.mesh import Points
+from scenelang.fitting.mesh import Points, Shape
 from scenelang.fitting.settle import settled
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.grid import GridShape
@@ -33,28 +33,6 @@ LONG_S: Final = 240.0  # of processor time, into which the grids of a shape fit 
 DEARER: Final = 4.0  # at most, a grid than the one before
 THIN: Final = 0.02  # share of a surface that may be too thin for a grid
 NEAR: Final = {2: 1e-4, 3: 1.5e-4}  # mean distance off that is near enough, by dimension
-
-
-class Shape(Protocol):
-    """What is to be made an element, in the unit ball or disc."""
-
-    @property
-    def dimension(self) -> int:
-        """2 or 3."""
-
-    @property
-    def centre(self) -> tuple[float, ...]:
-        """Of the ball, in the file's own coordinates."""
-
-    @property
-    def size(self) -> float:
-        """Radius of the ball there."""
-
-    def distances(self, p: Points) -> Points:
-        """Signed distances (M,) of points (M, d), negative inside."""
-
-    def surface(self, count: int) -> tuple[Points, Points, float]:
-        """Points (K, d) of the surface, ``count`` at most, outward normals, and what share is too thin."""
 
 
 class Rung(NamedTuple):

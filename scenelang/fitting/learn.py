@@ -16,9 +16,9 @@ from scenelang.elements.zoo import MOST_BYTES, Zoo, read_zoo, zoo_bytes
 from scenelang.files import NotWritten, output_place, read_regular, write_output
 from scenelang.fitting.apart import CPU_S, LIBRARIES, Apart, Asked, Hear, made_apart
 from scenelang.fitting.beside import files_beside
-from scenelang.fitting.making import MOST_OF, Wish
+from scenelang.fitting.making import Wish
 from scenelang.fitting.mesh import FitError
-from scenelang.fitting.parts import said
+from scenelang.fitting.parts import MOST_OF, said
 from scenelang.tensors import TensorError
 
 Progress = Callable[[str, float, float], None]

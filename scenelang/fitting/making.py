@@ -13,13 +13,11 @@ from typing import Any, Final, Literal, NamedTuple
 from scenelang.diagnostics.suggest import plural
 from scenelang.elements.element import TEXELS, Element
 from scenelang.elements.zoo import is_said, zoo_bytes
-from scenelang.fitting import drawing, parts, picture, solids
+from scenelang.fitting import parts, picture
 from scenelang.fitting.colours import fit_colours
-from scenelang.fitting.ladder import NEAR, THIN, Rung, Shape, fit
-from scenelang.fitting.mesh import FitError, Mesh, Sign
+from scenelang.fitting.ladder import NEAR, THIN, Rung, fit
+from scenelang.fitting.mesh import FitError, Mesh, Shape, Sign
 
-MOST_OF: Final = {**solids.MOST_OF, **drawing.MOST_OF, **picture.MOST_OF}
-"""Bytes of a file, by the suffixes that are read."""
 SEEN: Final = 960  # pixels across which a solid is thought of, to say how small its details may be
 COARSER: Final = 2.0  # times as far as the whole a part may be off, in its own radii
 
@@ -72,7 +70,7 @@ class Wish:
 
     def paints(self, suffix: str) -> bool:
         """Whether files of a suffix become textures."""
-        return self.pictures == "texture" and suffix.lower() in picture.MOST_OF
+        return self.pictures == "texture" and suffix.lower() in picture.MOST_OF_PICTURE
 
     def made(self, element: Element, about: dict[str, str | float]) -> bool:
         """Whether an element is what would be made again."""

@@ -11,15 +11,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Final, Literal
+from typing import Any, ClassVar, Final, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from scenelang.diagnostics.suggest import plural
-from scenelang.fitting.looks import Look
+from scenelang.fitting.looks import Look, Points
 
-Points = npt.NDArray[np.float64]  # (M, 3)
 Sign = Literal["auto", "winding", "closed"]
 MOST_TRIANGLES: Final = 4_000_000
 _ENCLOSED: Final = 0.5  # share of a surface that has to have an inside
@@ -30,6 +29,28 @@ _TOUCHING: Final = 1e-6  # leaf units from a surface to where its normals are th
 
 class FitError(ValueError):
     """What cannot be made an element, or which scene cannot be fitted to a picture, and why."""
+
+
+class Shape(Protocol):
+    """What is to be made an element, in the unit ball or disc."""
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+
+    @property
+    def centre(self) -> tuple[float, ...]:
+        """Of the ball, in the file's own coordinates."""
+
+    @property
+    def size(self) -> float:
+        """Radius of the ball there."""
+
+    def distances(self, p: Points) -> Points:
+        """Signed distances (M,) of points (M, d), negative inside."""
+
+    def surface(self, count: int) -> tuple[Points, Points, float]:
+        """Points (K, d) of the surface, ``count`` at most, outward normals, and what share is too thin."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,8 @@ from typing import Final
 
 from scenelang.elements.element import Element
 from scenelang.files import read_regular
-from scenelang.fitting.ladder import Shape
-from scenelang.fitting.making import MOST_OF
-from scenelang.fitting.mesh import FitError
-from scenelang.fitting.parts import shape_in
+from scenelang.fitting.mesh import FitError, Shape
+from scenelang.fitting.parts import MOST_OF, shape_in
 from scenelang.graph.nodes import Graph, leaves
 from scenelang.scene import library
 from scenelang.scene.schema import Scene

@@ -12,13 +12,14 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from scenelang.elements.groups import MOST_PARTS, Group, Painted, Part
-from scenelang.fitting import drawing, solids
-from scenelang.fitting.ladder import Shape
+from scenelang.fitting import drawing, picture, solids
 from scenelang.fitting.looks import Look
-from scenelang.fitting.mesh import FitError, Mesh, Points, Sign
+from scenelang.fitting.mesh import FitError, Mesh, Points, Shape, Sign
 from scenelang.fitting.outline import Outline
 from scenelang.fitting.solids import Solid
 
+MOST_OF: Final = {**solids.MOST_OF_MESH, **drawing.MOST_OF_DRAWING, **picture.MOST_OF_PICTURE}
+"""Bytes of a file, by the suffixes that are read."""
 _ALIKE: Final = 1e-4  # of a part's size: how far its points may lie off those of a copy
 
 
@@ -49,7 +50,7 @@ def brought(
         files: those that it names, as `scenelang.fitting.beside` finds them.
         apart: whether its parts are elements of their own; if left out, those of drawings are.
     """
-    if suffix in drawing.MOST_OF:
+    if suffix in drawing.MOST_OF_DRAWING:
         return drawn_parts(drawing.read_outline(data, suffix), name, apart)
     found, notes = solids.read_solids(data, suffix, files)
     made = solid_parts(found, name, sign, bool(apart))
@@ -58,7 +59,7 @@ def brought(
 
 def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
     """A part by its number, or the whole for 0."""
-    if suffix in drawing.MOST_OF:
+    if suffix in drawing.MOST_OF_DRAWING:
         drawn = drawing.read_outline(data, suffix)
         if number == 0:
             return drawn

@@ -22,7 +22,7 @@ from scenelang.elements.picture import painted, texels
 from scenelang.elements.still import frame_of
 from scenelang.fitting.mesh import FitError
 
-MOST_OF: Final = dict.fromkeys((".png", ".jpg", ".jpeg"), 32 << 20)  # bytes of a file
+MOST_OF_PICTURE: Final = dict.fromkeys((".png", ".jpg", ".jpeg"), 32 << 20)  # bytes of a file
 MOST_PIXELS: Final = 50_000_000
 MOST_DECODED: Final = 1_000_000_000  # pixels times the scans of a JPEG, each of which goes over all of them
 NEAR_COLOUR: Final = 0.01  # root mean square off that is near enough: 40 dB

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scenelang.fitting.looks import Look, joined, look_of, white
 from scenelang.fitting.mesh import MOST_TRIANGLES, FitError, Mesh, Points, Sign, mesh_of, needed
 
-MOST_OF: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
+MOST_OF_MESH: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
 _MOST_PIECES: Final = (
     10_000  # objects, groups and changes of material of a file; nodes and primitives of glTF
 )
@@ -53,7 +53,7 @@ def whole(solids: Sequence[Solid], sign: Sign = "auto") -> Mesh:
 def read_solids(
     data: bytes, suffix: str, files: Mapping[str, bytes] | None = None
 ) -> tuple[list[Solid], list[str]]:
-    """The solids in the bytes of a file with a suffix of `MOST_OF`, and what there is to say of it.
+    """The solids in the bytes of a file with a suffix of `MOST_OF_MESH`, and what there is to say of it.
 
     Args:
         files: materials and textures by the names that it has for them; if left out, looks are not read.

@@ -8,10 +8,10 @@ far, for a thin object.
 
 from __future__ import annotations
 
-from scenelang.graph.nodes import BLEND, Leaf
+from scenelang.graph.nodes import Leaf
 from scenelang.graph.space import Box, Space
 from scenelang.records import Record
-from scenelang.words import Combine
+from scenelang.words import BLEND, Combine
 
 
 def leaf_box(leaf: Leaf, level: float, space: Space) -> Box:

@@ -20,8 +20,7 @@ from scenelang.graph.space import Box, Space
 from scenelang.graph.stage import Stage
 from scenelang.graph.steps import Step
 from scenelang.records import Record
-from scenelang.words import BLEND as BLEND
-from scenelang.words import Combine
+from scenelang.words import BLEND, Combine
 
 MOST_OPEN = 15  # groups of a stream within each other: a token has four bits for how many end
 BELOW = 1e-3  # world units below the ground that count as seen: more than a renderer's step behind a surface

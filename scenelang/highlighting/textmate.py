@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable
 from typing import Any, Final
 
-from scenelang import words
+from scenelang import words as nsg
 from scenelang.highlighting.lexer import OPERATORS, WORDS
 from scenelang.syntax.tables import tables
 
@@ -46,7 +46,7 @@ def _named(word: str, scope: str, what: str = NAME) -> dict[str, Any]:
     return {"match": rf"\b({word})\s+({what})", "captures": captures}
 
 
-_UNITS: Final = _any(words.UNITS)
+_UNITS: Final = _any(nsg.UNITS)
 _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
     "comments": [
         {

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.graph.nodes import BLEND, Leaf, Node
+from scenelang.graph.nodes import Leaf, Node
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.reference.textures import colour_at
-from scenelang.words import TOKENS
+from scenelang.words import BLEND, TOKENS
 
 Array = Any  # numpy array or torch tensor
 

@@ -18,7 +18,8 @@ from scenelang.elements.picture import painted, texels
 from scenelang.elements.pyramid import packed, refine
 from scenelang.evaluate.evaluation import loads
 from scenelang.files import write_whole
-from scenelang.fitting.ladder import Shape, fit
+from scenelang.fitting.ladder import fit
+from scenelang.fitting.mesh import Shape
 from scenelang.fitting.originals import originals_of
 from scenelang.fitting.picture import Picture, fit_picture
 from scenelang.graph.lower import lower
