@@ -13,8 +13,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.fitting.looks import Look, joined, look_of, white
-from scenelang.fitting.mesh import MOST_TRIANGLES, FitError, Mesh, Points, Sign, mesh_of, needed
+from scenelang.fitting.looks import Look, Points, joined, look_of, white
+from scenelang.fitting.mesh import MOST_TRIANGLES, FitError, Mesh, Sign, mesh_of, needed
 
 MOST_OF_MESH: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
 _MOST_PIECES: Final = (

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenelang.graph.affine import composed
 from scenelang.graph.looks import Look
-from scenelang.graph.nodes import BLEND, Fold, Leaf, Link, Move, Node
+from scenelang.graph.nodes import Fold, Leaf, Link, Move, Node
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
 from scenelang.lifting.exact import inverse_frame
 from scenelang.lifting.layout import SOLID_LAYOUT as LAYOUT
@@ -19,7 +19,7 @@ from scenelang.models.weights import shipped_weights
 from scenelang.program.paints import Paint
 from scenelang.renderers.solid.field import SolidField
 from scenelang.renderers.solid.network import SolidArrays, SolidNetwork
-from scenelang.words import TOKENS, Combine
+from scenelang.words import BLEND, TOKENS, Combine
 
 LEAVES, MATERIALS = ("sphere", "torus"), ("diffuse", "volumetric")
 

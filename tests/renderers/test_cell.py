@@ -5,10 +5,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from scenelang.graph.nodes import BLEND
 from scenelang.reference.field import fold
 from scenelang.renderers.framed import Framed
 from scenelang.renderers.network import TOKENS, FramedConfig
+from scenelang.words import BLEND
 
 STEEP = 1e7
 
