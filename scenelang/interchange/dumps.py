@@ -55,20 +55,20 @@ def tree_text(file: nodes.File) -> str:
 def _lines(node: Any, margin: str, label: str) -> Iterator[str]:
     words: list[str] = []
     inside: list[tuple[str, Any]] = []
-    for field in fields(node):
-        value = getattr(node, field.name)
-        if isinstance(value, Span) or value in (None, (), False, "") or field.name == "is_integer":
+    for each in fields(node):
+        value = getattr(node, each.name)
+        if isinstance(value, Span) or value in (None, (), False, "") or each.name == "is_integer":
             continue
         if isinstance(value, nodes.Name):
-            words.append(value.text if field.name == "name" else f"{field.name}={value.text}")
+            words.append(value.text if each.name == "name" else f"{each.name}={value.text}")
         elif hasattr(value, "__dataclass_fields__"):
-            inside.append((f"{field.name}: ", value))
+            inside.append((f"{each.name}: ", value))
         elif isinstance(value, tuple) and hasattr(value[0], "__dataclass_fields__"):
-            one = len(value) == 1 and field.name not in ("statements", "items")
-            inside += [(f"{field.name}: " if one else "", item) for item in value]
+            one = len(value) == 1 and each.name not in ("statements", "items")
+            inside += [(f"{each.name}: " if one else "", item) for item in value]
         else:
             words.append(
-                repr(value) if isinstance(value, str) and field.name == "value" else _word(field.name, value)
+                repr(value) if isinstance(value, str) and each.name == "value" else _word(each.name, value)
             )
     line, column = node.span.locate()[0]
     said = " ".join([f"{label}{type(node).__name__}", *words])
