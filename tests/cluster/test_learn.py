@@ -20,13 +20,13 @@ from PIL import Image
 pytest.importorskip("igl")
 trimesh = pytest.importorskip("trimesh")
 
-import scenelang as nsg  # noqa: E402
-from scenelang import cluster  # noqa: E402
-from scenelang.cluster import GivenUp, Link  # noqa: E402
-from scenelang.elements.zoo import load_zoo  # noqa: E402
-from scenelang.fitting import learn as learning  # noqa: E402
-from scenelang.fitting.apart import LIBRARIES  # noqa: E402
-from tests.cluster.machines import started  # noqa: E402
+import scenelang as nsg
+from scenelang import cluster
+from scenelang.cluster import GivenUp, Link
+from scenelang.elements.zoo import load_zoo
+from scenelang.fitting import learn as learning
+from scenelang.fitting.apart import LIBRARIES
+from tests.cluster.machines import started
 
 FILES = ["ball.ply", "star.svg", "tent.obj"]
 TENT = "mtllib tent.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl tex\n"

@@ -15,10 +15,10 @@ from PIL import Image
 pytest.importorskip("igl")
 trimesh = pytest.importorskip("trimesh")
 
-from scenelang.fitting import beside  # noqa: E402
-from scenelang.fitting.beside import files_beside  # noqa: E402
-from scenelang.fitting.solids import read_solids, whole  # noqa: E402
-from tests.fitting.test_looks import ONE, PICTURE, by_hand, made  # noqa: E402
+from scenelang.fitting import beside
+from scenelang.fitting.beside import files_beside
+from scenelang.fitting.solids import read_solids, whole
+from tests.fitting.test_looks import ONE, PICTURE, by_hand, made
 
 POINTS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.3 0.6\n"
 FACES = "usemtl red\nf 1/1 3/1 2/1\nf 1/1 2/1 4/1\nusemtl tex\nf 2/1 3/1 4/1\nf 1/1 4/1 3/1\n"

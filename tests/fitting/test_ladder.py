@@ -8,10 +8,10 @@ import pytest
 pytest.importorskip("igl")
 trimesh = pytest.importorskip("trimesh")
 
-from scenelang.fitting import ladder  # noqa: E402
-from scenelang.fitting.ladder import fit, measured  # noqa: E402
-from scenelang.fitting.mesh import Mesh, mesh_of  # noqa: E402
-from tests.elements.shapes import element, torus  # noqa: E402
+from scenelang.fitting import ladder
+from scenelang.fitting.ladder import fit, measured
+from scenelang.fitting.mesh import Mesh, mesh_of
+from tests.elements.shapes import element, torus
 
 
 @pytest.fixture(scope="module")

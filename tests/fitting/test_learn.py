@@ -15,13 +15,13 @@ from PIL import Image
 pytest.importorskip("igl")
 trimesh = pytest.importorskip("trimesh")
 
-import scenelang as nsg  # noqa: E402
-from scenelang.cli.main import cli  # noqa: E402
-from scenelang.elements.zoo import load_zoo  # noqa: E402
-from scenelang.fitting import learn as learning  # noqa: E402
-from scenelang.fitting.learn import learn  # noqa: E402
-from scenelang.fitting.making import Wish  # noqa: E402
-from scenelang.fitting.mesh import FitError  # noqa: E402
+import scenelang as nsg
+from scenelang.cli.main import cli
+from scenelang.elements.zoo import load_zoo
+from scenelang.fitting import learn as learning
+from scenelang.fitting.learn import learn
+from scenelang.fitting.making import Wish
+from scenelang.fitting.mesh import FitError
 
 
 @pytest.fixture

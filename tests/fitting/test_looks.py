@@ -11,13 +11,13 @@ from PIL import Image
 pytest.importorskip("igl")
 trimesh = pytest.importorskip("trimesh")
 
-from scenelang.elements.colours import unpacked  # noqa: E402
-from scenelang.elements.picture import texels  # noqa: E402
-from scenelang.fitting.colours import fit_colours  # noqa: E402
-from scenelang.fitting.looks import Look, white  # noqa: E402
-from scenelang.fitting.mesh import Mesh, mesh_of  # noqa: E402
-from scenelang.fitting.solids import read_solids, whole  # noqa: E402
-from scenelang.image import decoded, encoded  # noqa: E402
+from scenelang.elements.colours import unpacked
+from scenelang.elements.picture import texels
+from scenelang.fitting.colours import fit_colours
+from scenelang.fitting.looks import Look, white
+from scenelang.fitting.mesh import Mesh, mesh_of
+from scenelang.fitting.solids import read_solids, whole
+from scenelang.image import decoded, encoded
 
 PICTURE = np.random.default_rng(3).integers(0, 256, (3, 5, 3), np.uint8)
 ONE = np.zeros(1, int)

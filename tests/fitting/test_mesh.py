@@ -11,8 +11,8 @@ import pytest
 pytest.importorskip("igl")
 trimesh = pytest.importorskip("trimesh")
 
-from scenelang.fitting.mesh import FitError, Sign, mesh_of  # noqa: E402
-from scenelang.fitting.solids import read_solids, whole  # noqa: E402
+from scenelang.fitting.mesh import FitError, Sign, mesh_of
+from scenelang.fitting.solids import read_solids, whole
 
 
 def arrays(mesh: Any) -> tuple[np.ndarray, np.ndarray]:

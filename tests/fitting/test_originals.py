@@ -12,15 +12,15 @@ pytest.importorskip("igl")
 pytest.importorskip("svgelements")
 trimesh = pytest.importorskip("trimesh")
 
-import scenelang as nsg  # noqa: E402
-from scenelang.backend.render import exact_graph  # noqa: E402
-from scenelang.elements.zoo import load_zoo, zoo_bytes  # noqa: E402
-from scenelang.fitting.learn import learn  # noqa: E402
-from scenelang.fitting.making import Wish  # noqa: E402
-from scenelang.fitting.mesh import mesh_of  # noqa: E402
-from scenelang.fitting.originals import FOLDER  # noqa: E402
-from scenelang.reference.image import reference_image  # noqa: E402
-from tests.pictures import psnr_db  # noqa: E402
+import scenelang as nsg
+from scenelang.backend.render import exact_graph
+from scenelang.elements.zoo import load_zoo, zoo_bytes
+from scenelang.fitting.learn import learn
+from scenelang.fitting.making import Wish
+from scenelang.fitting.mesh import mesh_of
+from scenelang.fitting.originals import FOLDER
+from scenelang.reference.image import reference_image
+from tests.pictures import psnr_db
 
 CUBE = 3**-0.5  # half a side of the one in the unit ball
 SQUARE = '<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0H10V10H0Z"/></svg>'

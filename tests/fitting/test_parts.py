@@ -13,13 +13,13 @@ import pytest
 pytest.importorskip("igl")
 trimesh = pytest.importorskip("trimesh")
 
-from scenelang.elements.groups import Part  # noqa: E402
-from scenelang.elements.zoo import load_zoo  # noqa: E402
-from scenelang.fitting import making, parts  # noqa: E402
-from scenelang.fitting.learn import learn  # noqa: E402
-from scenelang.fitting.making import Wish  # noqa: E402
-from scenelang.fitting.mesh import FitError, Mesh  # noqa: E402
-from scenelang.fitting.solids import read_solids, whole  # noqa: E402
+from scenelang.elements.groups import Part
+from scenelang.elements.zoo import load_zoo
+from scenelang.fitting import making, parts
+from scenelang.fitting.learn import learn
+from scenelang.fitting.making import Wish
+from scenelang.fitting.mesh import FitError, Mesh
+from scenelang.fitting.solids import read_solids, whole
 
 RED, BLUE = [255, 0, 0, 255], [0, 0, 255, 255]
 

@@ -37,7 +37,7 @@ torch = pytest.importorskip("torch")
 HERE = "cuda" if torch.cuda.is_available() else "cpu"
 os.environ["TRITON_INTERPRET"] = "01"[HERE == "cpu"]  # is read when Triton is imported
 pytest.importorskip("triton")
-from scenelang.renderers.device import draw as device  # noqa: E402
+from scenelang.renderers.device import draw as device
 
 EQUAL = 1 / 255
 """Of a channel; by the interpreter none is off by more than 0.0001."""
