@@ -12,10 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.program.groups import INTERSECT, SMOOTH, SUBTRACT, UNION
-from scenelang.renderers.meetings import Closing, Index, Meetings, Nesting
+from scenelang.renderers.meetings import Index, Mask, Meetings, Nesting, Turn, flat_nesting
 
 Floats = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 NOTHING = 1e200  # world units: the distance before the first object, beyond all blends
 
 
@@ -45,17 +44,15 @@ class Joins(NamedTuple):
         tokens: operators.
         widths: of their blends, 0 for sharp edges.
         free: whether no blend follows: what is outside, and how deep inside the rest, is all one.
-        fresh: whether they begin a state as they are.
     """
 
     tokens: Index
     widths: Floats
     free: Mask
-    fresh: Mask
 
     def some(self, which: slice | Index) -> Joins:
         """Select some of them."""
-        return Joins(self.tokens[which], self.widths[which], self.free[which], self.fresh[which])
+        return Joins(self.tokens[which], self.widths[which], self.free[which])
 
 
 def enclosed(
@@ -79,43 +76,22 @@ def enclosed(
     """
     count, pairs = len(meetings.columns), len(joins.tokens)
     shut, opened = np.empty((2, pairs), bool)
-    hidden = np.zeros(count * (1 if nest is None else nest.levels), bool)
-    state = _State.empty(len(hidden))
-    if nest is None or groups is None:
-        for part in meetings.slots():
-            own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
-            shut[part], opened[part] = state.join(slice(part.stop - part.start), *own, joins.some(part))
-        for part in reversed(meetings.slots()):
-            n = part.stop - part.start
-            shut[part] |= hidden[:n]
-            hidden[:n] |= opened[part]
-    else:
-        done = []  # of groups that ended, round by round: where they join, and what came of it
+    if nest is None:
+        nest = flat_nesting(meetings)
+    state = _State.empty(count * nest.levels)
 
-        def close(closings: list[Closing]) -> None:
-            for columns, ended, level in closings:
-                top, below = level * count + columns, (level - 1) * count + columns
-                done.append((top, below, state.join(below, *state.at(top), groups.some(ended))))
-                state.clear(top)
+    def pair(turn: Turn, places: Index) -> tuple[Mask, Mask]:
+        part = turn.part
+        own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
+        return state.join(places, *own, joins.some(part), turn.fresh)
 
-        def reopen(closings: list[Closing]) -> None:
-            for _ in closings:
-                top, below, (closed, wide) = done.pop()
-                hidden[top] = hidden[below] | closed
-                hidden[below] |= wide
+    def group(top: Index, below: Index, ended: Index) -> tuple[Mask, Mask]:
+        assert groups is not None
+        joined = state.join(below, *state.at(top), groups.some(ended), np.zeros(len(top), bool))
+        state.clear(top)
+        return joined
 
-        for part, level, fresh, before, after in nest.turns:
-            close(before)
-            own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
-            places, how = level * count + np.arange(len(level)), joins.some(part)._replace(fresh=fresh)
-            shut[part], opened[part] = state.join(places, *own, how)
-            close(after)
-        for part, level, _, before, after in reversed(nest.turns):
-            reopen(after)
-            places = level * count + np.arange(len(level))
-            shut[part] |= hidden[places]
-            hidden[places] |= opened[part]
-            reopen(before)
+    nest.fold(count, shut, opened, pair, group)
     (low, high), (first, last) = (tuple(side[..., :count] for side in pair) for pair in state)
     if len(behind) > 3:
         first, last = (np.vstack([c, np.ones(count)]) for c in (first, last))
@@ -147,10 +123,10 @@ class _State(NamedTuple):
             side[columns], colour[:, columns] = NOTHING, 0.0
 
     def join(
-        self, columns: Index | slice, distance: Enclosure, colour: Enclosure, how: Joins
+        self, columns: Index | slice, distance: Enclosure, colour: Enclosure, how: Joins, fresh: Mask
     ) -> tuple[Mask, Mask]:
-        """Take in n operands; which change nothing (n,), and which leave nothing else (n,)."""
-        (d, e), (token, k, free, fresh) = distance, how
+        """Take in n operands, ``fresh`` ones as they are; which change nothing, which leave nothing else."""
+        (d, e), (token, k, free) = distance, how
         a, b = self.distance.low[columns].copy(), self.distance.high[columns].copy()
         union = token == UNION
         # the object's share of the colour; of a union all or none

@@ -59,12 +59,12 @@ class Stream:
         self.rounding = np.array([leaf.misplaced(within, far) for leaf, within in own])
         self.rounding += EPS * widths.sum() / self.frames.scale
         self.reach = reach + self.rounding
-        free, never = ~seen.inside & (seen.blends == 0), np.zeros(len(rows), bool)
+        free = ~seen.inside & (seen.blends == 0)
         self.rounds = widths > 0
-        self.joins = Joins(groups.tokens, np.where(groups.first, 0.0, widths), free, never)
+        self.joins = Joins(groups.tokens, np.where(groups.first, 0.0, widths), free)
         first = groups.rows
         # what follows a group follows its first row, and the group's own blend does
-        self.group_joins = Joins(groups.joins, widths[first], free[first], never[first])
+        self.group_joins = Joins(groups.joins, widths[first], free[first])
         names = [leaf.geometry for leaf in self._leaves]
         self._known = {name: errors for name, errors in known.items() if name not in graph.elements}
         self.unknown = tuple(sorted(set(names) - self._known.keys()))

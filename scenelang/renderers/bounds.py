@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.renderers.meetings import Closing, Meetings, Nesting
+from scenelang.renderers.meetings import Mask, Meetings, Nesting, Turn
 from scenelang.renderers.network import Cell
 
 Floats = npt.NDArray[np.float32]
@@ -36,8 +36,8 @@ class Shown:
     """
 
     picture: Interval
-    shut: npt.NDArray[np.bool_]
-    open: npt.NDArray[np.bool_]
+    shut: Mask
+    open: Mask
 
 
 def shown(
@@ -74,7 +74,22 @@ def shown(
             shut[part], wide[part] = state.join(slice(part.stop - part.start), own, gates.some(part))
         wide |= given
     else:
-        _nested(state, blocks, nest, joins, distance, colours, cell, given, empty, shut, wide)
+        fresh = np.concatenate([turn.fresh for turn in nest.turns])
+        gates = _Gates.of(cell, distance, given | fresh)
+
+        def pair(turn: Turn, places: Columns) -> tuple[Mask, Mask]:
+            part = turn.part
+            own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
+            keeps, hides = state.join(places, own, gates.some(part))
+            return keeps, hides | given[part]
+
+        def group(top: Columns, below: Columns, ended: Columns) -> tuple[Mask, Mask]:
+            operand, cells = state.at(top), Cell(*(x[..., ended] for x in joins))
+            joined = state.join(below, operand, _Gates.of(cells, operand.distance, np.zeros(len(top), bool)))
+            state.clear(top, empty)
+            return joined
+
+        nest.fold(blocks, shut, wide, pair, group)
     low, high = (side[:blocks] for side in state.distance)
     covered = Interval((0.5 - slope * high).clip(0.0, 1.0), (0.5 - slope * low).clip(0.0, 1.0))
     sides = zip(state.colour, covered, strict=True)
@@ -92,10 +107,10 @@ class _Gates(NamedTuple):
     own: Interval
     up: Floats
     down: Floats
-    given: npt.NDArray[np.bool_]
+    given: Mask
 
     @classmethod
-    def of(cls, cell: Cell, d: Interval, given: npt.NDArray[np.bool_]) -> _Gates:
+    def of(cls, cell: Cell, d: Interval, given: Mask) -> _Gates:
         # ends are never averaged, as a wide interval's middle would swallow the digits of its nearer end
         up, down = np.maximum(cell.lines, 0.0), np.minimum(cell.lines, 0.0)
         own = Interval(
@@ -147,9 +162,7 @@ class _State(NamedTuple):
         for side, colour in zip(self.distance, self.colour, strict=True):
             side[columns], colour[:, columns] = distance, 0.0
 
-    def join(
-        self, columns: Columns | slice, operand: _Operand, gates: _Gates
-    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    def join(self, columns: Columns | slice, operand: _Operand, gates: _Gates) -> tuple[Mask, Mask]:
         """Take in an operand; whether it changes nothing (n,), and whether nothing else is left (n,)."""
         d, own_colour = operand
         low, high = self.distance.low[columns], self.distance.high[columns]
@@ -175,60 +188,6 @@ class _State(NamedTuple):
             more = c - now
             side[:, columns] = now + choose(paint.low * more, paint.high * more)
         return ~takes & (paint.high <= 0), ~keeps & (paint.low >= 1)
-
-
-def _nested(
-    state: _State,
-    blocks: int,
-    nest: Nesting,
-    joins: Cell,
-    distance: Interval,
-    colours: Interval,
-    cell: Cell,
-    given: npt.NDArray[np.bool_],
-    empty: float,
-    shut: npt.NDArray[np.bool_],
-    wide: npt.NDArray[np.bool_],
-) -> None:
-    """Fold with a stack of states; fills in which pairs are shut, hidden ones too, and which are open.
-
-    Args:
-        state: levels of so many blocks, one after the other.
-    """
-    done = []  # of groups that ended, round by round: where they join, and what came of it
-
-    def close(closings: list[Closing]) -> None:
-        for columns, groups, level in closings:
-            top, below = level * blocks + columns, (level - 1) * blocks + columns
-            operand = state.at(top)
-            cells = Cell(*(part[..., groups] for part in joins))
-            gates = _Gates.of(cells, operand.distance, np.zeros(len(columns), bool))
-            done.append((top, below, state.join(below, operand, gates)))
-            state.clear(top, empty)
-
-    fresh = np.concatenate([turn.fresh for turn in nest.turns])
-    gates = _Gates.of(cell, distance, given | fresh)
-    for part, level, _, before, after in nest.turns:
-        close(before)
-        own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
-        places = level * blocks + np.arange(len(level))
-        shut[part], wide[part] = state.join(places, own, gates.some(part))
-        close(after)
-    wide |= given
-    hidden = np.zeros(nest.levels * blocks, bool)
-
-    def reopen(closings: list[Closing]) -> None:
-        for _ in closings:
-            top, below, (closed, opened) = done.pop()
-            hidden[top] = hidden[below] | closed
-            hidden[below] |= opened
-
-    for part, level, _, before, after in reversed(nest.turns):
-        reopen(after)
-        places = level * blocks + np.arange(len(level))
-        shut[part] |= hidden[places]
-        hidden[places] |= wide[part]
-        reopen(before)
 
 
 def _capped(x: Interval, factor: Floats, most: Floats) -> Interval:

@@ -7,6 +7,7 @@ with so many objects, and column i is its i-th pair.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -17,6 +18,7 @@ import numpy.typing as npt
 from scenelang.program.groups import SMOOTH, Groups
 
 Index = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +34,8 @@ class Pairs:
 
     block: Index
     object: Index
-    open: npt.NDArray[np.bool_]
-    far: npt.NDArray[np.bool_]
+    open: Mask
+    far: Mask
     rate: npt.NDArray[np.float64]
 
     def __len__(self) -> int:
@@ -140,7 +142,7 @@ class Turn(NamedTuple):
 
     part: slice
     level: Index
-    fresh: npt.NDArray[np.bool_]
+    fresh: Mask
     before: list[Closing]
     after: list[Closing]
 
@@ -155,6 +157,56 @@ class Nesting(NamedTuple):
 
     turns: list[Turn]
     levels: int
+
+    def fold(
+        self,
+        blocks: int,
+        shut: Mask,
+        opened: Mask,
+        pair: Callable[[Turn, Index], tuple[Mask, Mask]],
+        group: Callable[[Index, Index, Index], tuple[Mask, Mask]],
+    ) -> None:
+        """Fold pairs and groups; fill in which pairs change nothing or are hidden, and which hide the rest.
+
+        Args:
+            blocks: columns of the meetings; level l of column i is state ``l * blocks + i``.
+            shut, opened: (P,) of the pairs, filled in.
+            pair: takes a turn's pairs into states (n,); returns whether each changes nothing, and whether
+                nothing else is left.
+            group: takes states (n,) into others, as groups of these numbers end, and empties them; returns
+                the same.
+        """
+        done = []  # of groups that ended, round by round: where they join, and what came of it
+
+        def close(closings: list[Closing]) -> None:
+            for columns, ended, level in closings:
+                top, below = level * blocks + columns, (level - 1) * blocks + columns
+                done.append((top, below, group(top, below, ended)))
+
+        for turn in self.turns:
+            close(turn.before)
+            shut[turn.part], opened[turn.part] = pair(turn, turn.level * blocks + np.arange(len(turn.level)))
+            close(turn.after)
+        hidden = np.zeros(self.levels * blocks, bool)
+
+        def reopen(closings: list[Closing]) -> None:
+            for _ in closings:
+                top, below, (closed, wide) = done.pop()
+                hidden[top] = hidden[below] | closed
+                hidden[below] |= wide
+
+        for part, level, _, before, after in reversed(self.turns):
+            reopen(after)
+            places = level * blocks + np.arange(len(level))
+            shut[part] |= hidden[places]
+            hidden[places] |= opened[part]
+            reopen(before)
+
+
+def flat_nesting(meetings: Meetings) -> Nesting:
+    """Return the nesting of a stream without groups: all pairs join the stream's own state."""
+    sizes = [(part, part.stop - part.start) for part in meetings.slots()]
+    return Nesting([Turn(p, np.zeros(n, np.intp), np.zeros(n, bool), [], []) for p, n in sizes], 1)
 
 
 def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
@@ -195,7 +247,7 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
     return Nesting(turns, levels)
 
 
-def _closings(columns: Index, open_groups: Index, real: npt.NDArray[np.bool_], kept: Index) -> list[Closing]:
+def _closings(columns: Index, open_groups: Index, real: Mask, kept: Index) -> list[Closing]:
     """Rounds in which the groups (B, D) of columns (n,) end, but for the outermost ``kept`` (n,) of each."""
     found = list[Closing]()
     if not len(columns):

@@ -48,7 +48,7 @@ def test_no_sample_leaves_its_interval(seed: int, kind: str, behind: Array) -> N
     meetings, source = meetings_of(Pairs(block, np.arange(len(block)), never, never, rise))
     some = Enclosure((middle - rise)[source], (middle + rise)[source])
     own = np.where(groups.first, 0.0, widths)
-    joins, first = Joins(groups.tokens, own, np.concatenate(free), never).some(source), groups.rows
+    joins, first = Joins(groups.tokens, own, np.concatenate(free)).some(source), groups.rows
     nest = nesting(meetings, groups) if deepest else None
     if not deepest:
         joins = joins._replace(free=~blended(meetings, (widths > 0)[source]))
@@ -59,7 +59,7 @@ def test_no_sample_leaves_its_interval(seed: int, kind: str, behind: Array) -> N
         joins,
         behind,
         nest,
-        Joins(groups.joins, widths[first], np.concatenate(free)[first], never[first]),
+        Joins(groups.joins, widths[first], np.concatenate(free)[first]),
     )
     left = np.empty(len(block), bool)
     left[source] = told.left
