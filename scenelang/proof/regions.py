@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenelang.proof.fold import NOTHING, Enclosure, Floats, Mask, blended, enclosed
+from scenelang.proof.fold import NOTHING, Enclosure, Floats, blended, enclosed
 from scenelang.proof.stream import Stream
-from scenelang.renderers.meetings import Index, Pairs, meetings_of, nesting
+from scenelang.renderers.meetings import Index, Mask, Pairs, meetings_of, nesting
 from scenelang.renderers.raster import raster
 
 SIDES = 16, 8, 4, 2, 1  # of regions, samples: two along a side of a pixel
