@@ -23,6 +23,9 @@ TIMES = {
 }
 LOAD = Figure(max(at("element-speed", "load_ms").values()))
 SMALL, LARGE = "solids3d/meshes3d", "solids3d-256/meshes3d"
+SEARCH = read("fit-search")
+OURS, CMA = (SEARCH["ways"][way] for way in ("ours", "cma"))
+FEWER = Figure(OURS["median"]["frames"] / CMA["median"]["frames"])
 KEY = {what: at("play", f"{what}_ms") for what in ("median", "slowest")}
 STEPS, BATCH, BACKWARD = 940_000, 16, 3  # of the paper's training; a step's time by a frame's
 YEARS = at("models/shapes2d/frontier", "streaming_ms") * (1e-3 * BACKWARD * BATCH * STEPS / 3600 / 24 / 365)
@@ -123,6 +126,8 @@ CLAIMS = [
     f"it takes {KEY['median']:.0f} ms from the press of a key to the network's changed picture of "
     f"`chain.nsg` at 256², where {at('play', 'load'):.1f} processes want the {at('play', 'cores')} cores: "
     f"the median of {at('play', 'keys')} keys; the slowest key took {KEY['slowest']:.0f} ms",
+    f"{Figure(CMA['found'])} of {Figure(SEARCH['scenes'])} scenes of six params are found, with the sequence "
+    f"{Figure(OURS['found'])}, in {FEWER:.1f} of the pictures",
     f"that is {YEARS:.1f} years of one core",
 ]
 GIVEN = {
