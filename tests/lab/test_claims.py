@@ -10,7 +10,15 @@ from types import ModuleType
 import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = {"architecture.md", "measurements.md", "viewer.md", "README.md", "index.md", "elements.md"}
+PAGES = {
+    "architecture.md",
+    "drawing.md",
+    "elements.md",
+    "index.md",
+    "measurements.md",
+    "README.md",
+    "viewer.md",
+}
 
 
 @pytest.fixture(scope="module", autouse=True)
