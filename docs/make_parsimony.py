@@ -1,8 +1,7 @@
-"""Tables of what passes, skipping and each part of the renderer save, from records.
+"""Tables of what passes and skipping save, from records.
 
-`plans.json` is what `scenelang lab plans examples/*.nsg` wrote, `experiments/parts.json` what
-`scenelang lab experiment parts` did, and `passes.json` what `python -m tests.passes.prove` did.
-docs/make_pictures.py draws the chart.
+`plans.json` is what `scenelang lab plans examples/*.nsg` wrote, and `passes.json` what
+`python -m tests.passes.prove` did.
 """
 
 from __future__ import annotations
@@ -12,25 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scenelang.lab.parsimony import (
-    WAYS,
-    verdict,
-    whole_psnr,
-    whole_runs,
-)
+from scenelang.lab.parsimony import WAYS
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results"
-PARTS = {
-    "no register": "the colour gate and its register; colour lies in eight more numbers of LSTM state",
-    "no distance scale": "the factor that turns leaf units into world units",
-    "no frame": "leaf coordinates; the decoder meets the world's, and the geometry vector picks its weights",
-    "token as input": "a set of weights for each token; the token is a further input",
-    "hidden layer": "nothing; the gates get 16 rectified linear units more, as those of the first cell had",
-    "never forced": "steps that start from the exact state, with which streams are learned at first",
-    "pictures alone": "the asking for distances; colour and coverage alone train it",
-}
-WORDS = {"pays": "it pays", "no difference": "no difference", "costs": "better without"}
 Record = Mapping[str, Any]
 
 
@@ -44,38 +28,6 @@ def read(name: str) -> Record | None:
     """A record, or None where it was not made yet."""
     path = RESULTS / f"{name}.json"
     return json.loads(path.read_text("utf-8")) if path.exists() else None
-
-
-def parts_text(parts: Record | None) -> str:
-    """What each part buys: a table, and the chart."""
-    if parts is None:
-        return "*Not measured yet.*"
-    mean, spread = whole_psnr(parts)
-    blends, apart = whole_psnr(parts, blends=True)
-    whole = whole_runs(parts)[0]
-    seeds = len(whole_runs(parts))
-    rows = [["nothing", *_figures(whole), "", f"{whole['blends']:.1f}", "", ""]]
-    for run in parts["runs"]:
-        if run["group"] == "parts":
-            found = verdict(run, parts)
-            taken = f"**{run['name']}**: {PARTS[run['name']]}"
-            changes = f"{found.change:+.1f}", f"{run['blends']:.1f}", f"{found.blends:+.1f}"
-            rows.append([taken, *_figures(run), *changes, WORDS[found.word]])
-    figures = "parameters", "steps", "PSNR, dB", "5th percentile", "change", "blends, dB", "change"
-    head = ("taken away", *figures, "the part")
-    about = (
-        f"{parts['budget_s']:.0f} s of processor time each, seed {parts['seed']}, {whole['scenes']} unseen "
-        f"scenes at {whole['resolution']}², revision `{parts['revision'][:9]}`, {parts['machine']}. "
-        f"The whole renderer with {seeds} seeds: {mean:.1f} dB, {spread:.1f} dB apart; scenes of smooth "
-        f"unions alone {blends:.1f} dB, {apart:.1f} dB apart. Changes are from these means."
-    )
-    chart = "![PSNR without each part, and by each size](pictures/parts.png)"
-    return "\n\n".join([markdown(head, rows), about, chart])
-
-
-def _figures(run: Record) -> list[str]:
-    p = run["psnr"]
-    return [f"{run['parameters']:,}", f"{run['steps']:,}", f"{p['mean']:.1f}", f"{p['p5']:.1f}"]
 
 
 def passes_text(proof: Record, plans: Record) -> str:
@@ -156,7 +108,6 @@ def _told(text: Callable[..., str], *names: str) -> Callable[[], str]:
 
 
 BLOCKS: dict[str, Callable[[], str]] = {
-    "parts": _told(parts_text, "experiments/parts"),
     "ways": _told(ways_text, "plans"),
     "passes": _told(passes_text, "passes", "plans"),
     "passes-proof": _told(proof_text, "passes"),

@@ -2,9 +2,6 @@
 
 python docs/make_results.py            writes the page
 python docs/make_results.py --check    fails where it is out of date
-
-What `scenelang lab eval` measured lies in docs/results/, what `scenelang lab experiment` did in
-docs/results/experiments/; charts and strips of the latter are drawn by `scenelang lab chart`.
 """
 
 from __future__ import annotations
@@ -24,8 +21,7 @@ import make_parsimony
 import reported
 import sizes
 
-from scenelang.lab.experiments.runs import EXPERIMENTS as RUNNABLE
-from scenelang.lab.experiments.tables import markdown, table_of
+from scenelang.lab.experiments.tables import markdown
 
 HERE = Path(__file__).parent
 WHAT = {
@@ -46,7 +42,6 @@ WHAT = {
     "large": "three times the size",
 }
 PAGE = HERE / "measurements.md"
-EXPERIMENTS = ("overfit", "compare")
 
 
 SOLIDS = {
@@ -101,28 +96,6 @@ def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
     return f"{markdown(heads, rows)}\n\n{said}"
 
 
-def experiment(name: str) -> Callable[[], str]:
-    """The table of an experiment, with what it was run with."""
-
-    def block() -> str:
-        path = HERE / "results" / "experiments" / f"{name}.json"
-        if not path.exists():
-            return "*Not measured yet.*"
-        found = json.loads(path.read_text())
-        scenes, side = found["runs"][0]["scenes"], found["runs"][0]["resolution"]
-        seconds = found["budget_s"]
-        command = f"{seconds:g} s of processor time each"  # of an experiment that is no longer run
-        if name in RUNNABLE:
-            command = f"`scenelang lab experiment {name} --budget {seconds / 60:g}`"
-        said = (
-            f"{command}: {scenes} scenes at {side}², seed {found['seed']}, {found['device']}, "
-            f"{found['threads']} thread, torch {found['torch']}, revision `{found['revision'][:8]}`"
-        )
-        return f"{table_of(found)}\n\n{said}"
-
-    return block
-
-
 def smallest_run() -> str:
     """What everything took at its smallest, and most of it."""
     path = HERE / "results" / "all.json"
@@ -150,7 +123,6 @@ BLOCKS: dict[str, Callable[[], str]] = {
     **reported.BLOCKS,
     **sizes.BLOCKS,
     "all": smallest_run,
-    **{name: experiment(name) for name in EXPERIMENTS},
 }
 """What stands between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``."""
 

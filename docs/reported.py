@@ -48,12 +48,10 @@ STABILITY = (
 )
 COMMANDS = (
     ("accuracy", "shapes2d", "textures2d/textures2d", "solids3d/solids3d", "solids3d/shadows"),
-    ("networks", "codes-textures", "codes-meshes"),
     ("stability", "stability", "stability-textures2d", "stability-solids3d"),
     ("speed", "models/shapes2d/frontier", "models/solids3d/frontier", "unions-rivals", "solid-rivals"),
     ("promises", "frontier-verified", "frontier-verified-solids"),
     ("passes", "passes", "plans"),
-    ("parts", "experiments/parts"),
 )
 UNSAID = {
     "textures2d/textures2d": "scenelang lab eval textures2d --set textures2d --scenes {scenes}",
@@ -63,7 +61,6 @@ UNSAID = {
     "solid-rivals": "python -m benchmarks.solids",
     "stability": "scenelang lab stability shapes2d --scenes {scenes}",
     "stability-textures2d": "scenelang lab stability textures2d --only texels --scenes {scenes}",
-    "experiments/parts": "scenelang lab experiment parts --budget 3",
     "plans": "scenelang lab plans examples/*.nsg",
     "passes": "python -m tests.passes.prove --scenes {scenes}",
 }

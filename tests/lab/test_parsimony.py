@@ -126,22 +126,6 @@ def test_the_chart_is_drawn() -> None:
     assert low != high
 
 
-def test_the_table_of_parts() -> None:
-    parts = measured({"framed": 40, "no register": 31.25, "decoder 8": 36.0})
-    text = SCRIPT.parts_text(parts)
-    rows = [line for line in text.splitlines() if line.startswith("| ")]
-    assert len(rows) == 2 + len(SCRIPT.PARTS)  # the head, the whole renderer, each part
-    (row,) = (line for line in rows if "no register" in line)
-    # 31.25 less 39.6, the mean over seeds
-    assert row.endswith("| 31.2 | 23.2 | -8.4 | 28.2 | -8.4 | it pays |")
-    assert "39.6 dB, 0.8 dB apart" in text
-
-
-def test_every_part_is_described() -> None:
-    names = {name for name, group, _ in ablation_runs(60, 1) if group == "parts"}
-    assert names == set(SCRIPT.PARTS)
-
-
 def test_a_plan_of_an_example() -> None:
     plan = example_plan(EXAMPLES / "hello.nsg")
     assert plan["file"] == "hello.nsg"
