@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from figures import read
-from sizes import PAPER
 
 from scenelang.lab.charts import FAINT, INK, LINE, WARN, figure_png, pyplot
+from scenelang.lab.experiments import paper
 
+PAPER = {"textures": paper.MATERIAL_SIZES, "meshes": paper.GEOMETRY_SIZES}
 THEIRS, OURS = "#8a97a3", "#2f9e63"
 COLOURS = {"element": OURS, "grid, 8 bits": WARN, "grid, 16 bits": "#e0a030", "triangles": LINE}
 COLOURS |= {"JPEG": LINE, "smaller picture": WARN, "palette, PNG": "#e0a030"}

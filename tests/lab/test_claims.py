@@ -12,15 +12,12 @@ import pytest
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {
     "architecture.md",
-    "results.md",
-    "proof.md",
-    "report.md",
-    "viewer.md",
-    "README.md",
-    "index.md",
+    "drawing.md",
     "elements.md",
-    "parsimony.md",
-    "frontier.md",
+    "index.md",
+    "measurements.md",
+    "README.md",
+    "viewer.md",
 }
 
 

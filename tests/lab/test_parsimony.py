@@ -126,29 +126,6 @@ def test_the_chart_is_drawn() -> None:
     assert low != high
 
 
-def test_tables_of_parts_and_sizes() -> None:
-    parts = measured({"framed": 40, "no register": 31.25, "decoder 8": 36.0})
-    text = SCRIPT.parts_text(parts)
-    rows = [line for line in text.splitlines() if line.startswith("| ")]
-    assert len(rows) == 2 + len(SCRIPT.PARTS)  # the head, the whole renderer, each part
-    (row,) = (line for line in rows if "no register" in line)
-    # 31.25 less 39.6, the mean over seeds
-    assert row.endswith("| 31.2 | 23.2 | -8.4 | 28.2 | -8.4 | it pays |")
-    assert "39.6 dB, 0.8 dB apart" in text
-    sizes = SCRIPT.sizes_text(parts)
-    shown = [line.split(" | ")[0] for line in sizes.splitlines() if "decoder" in line]
-    assert shown == [f"| decoder width {v}" for v in (8, 16)] + [
-        "| decoder width **32**",
-        "| decoder width 64",
-    ]
-    assert "| 36.0 | 28.0 | -3.6 |" in sizes
-
-
-def test_every_part_is_described() -> None:
-    names = {name for name, group, _ in ablation_runs(60, 1) if group == "parts"}
-    assert names == set(SCRIPT.PARTS)
-
-
 def test_a_plan_of_an_example() -> None:
     plan = example_plan(EXAMPLES / "hello.nsg")
     assert plan["file"] == "hello.nsg"
@@ -174,12 +151,6 @@ def test_examples_are_measured_and_told() -> None:
     found = measure_examples([EXAMPLES / "logo.nsg"], lambda plan: seen.append(plan["file"]))
     assert seen == ["logo.nsg"]
     assert json.loads(json.dumps(found)) == found
-    (row,) = (line for line in SCRIPT.examples_text(found).splitlines() if "logo" in line)
-    cells = [cell.strip() for cell in row.strip("|").split("|")]
-    plan = found["plans"][0]
-    assert cells[0] == "[logo](../examples/logo.nsg)"
-    assert cells[1] == f"{plan['stages'][0]['objects']} → {plan['rows']}"
-    assert cells[-2] == f"{plan['drawing']['psnr']:.1f}"
     assert "1.0 × | 1.0 ×" in SCRIPT.ways_text(found)
 
 
@@ -196,15 +167,7 @@ def test_what_passes_took_away_is_counted() -> None:
     assert rows[3] == "| `drop_hidden` | 1,200 | 0 | 2 | 2 | 2 | 0 |"
 
 
-def test_the_page_says_what_the_records_say() -> None:
-    """`python docs/make_parsimony.py` would change nothing, and every example of the plane is in it."""
-    page = (ROOT / "docs/parsimony.md").read_text("utf-8")
-    assert SCRIPT.filled(page, SCRIPT.tables()) == page
+def test_every_example_of_the_plane_is_in_the_plans() -> None:
     plans = json.loads((ROOT / "docs/results/plans.json").read_text("utf-8"))["plans"]
     flat = {path.name for path in EXAMPLES.glob("*.nsg") if nsg.compile(nsg.load(path)).stage is None}
     assert {plan["file"] for plan in plans} >= flat
-
-
-def test_a_page_without_a_place_is_refused() -> None:
-    with pytest.raises(ValueError, match="no place for parts"):
-        SCRIPT.filled("nothing", {"parts": "text"})
