@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from scenelang.backend.options import DEFAULT, How
 from scenelang.cli.inputs import Input, Request, merged, read_input, unused_defines
 from scenelang.cli.main import describe
 from scenelang.cli.progress import Clock
 from scenelang.cli.say import say_diagnostics, say_trouble
 from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.span import SourceFile
 from scenelang.diagnostics.suggest import plural
 from scenelang.graph.nodes import Graph, Leaf, nodes
 from scenelang.models.choose import why_chosen
@@ -26,6 +26,7 @@ from scenelang.program.compile import compile_scene
 
 if TYPE_CHECKING:
     from scenelang.program.program import Program
+    from scenelang.scene.schema import Scene
 
 PROGRAM = ".safetensors"
 STAGES = ("syntax", "scene", "lower", *(step.name for step in PASSES), "program")
@@ -48,6 +49,7 @@ class Job:
     """One input, ready to be drawn or with the reason why not."""
 
     name: str  # as the user wrote it
+    how: How = DEFAULT  # how it is drawn
     source: Input | None = None  # the scene, where there is one
     trouble: str | None = None  # why a compiled program cannot be drawn
     program: Program | None = None  # what the network draws
@@ -60,65 +62,56 @@ class Job:
         """What was found in a scene."""
         return self.source.diagnostics.items if self.source is not None else []
 
+    @property
+    def scene(self) -> Scene | None:
+        """The scene, where there is one without errors."""
+        return self.source.scene if self.source is not None else None
+
     def failed(self, strict: bool = False) -> bool:
         """Whether there is nothing to draw."""
         return self.trouble is not None or any(d.severity == "error" or strict for d in self.diagnostics)
 
 
-def prepare(
-    name: str,
-    request: Request,
-    clock: Clock,
-    *,
-    compiled: bool = True,
-    verbose: bool = False,
-    source: SourceFile | None = None,
-) -> Job:
-    """Read an input, a scene, ``-`` or a compiled program, and compile it if it is a scene.
-
-    Args:
-        compiled: whether a scene has to be compiled to be drawn.
-        verbose: keep the graphs, and make notes of what the passes did.
-        source: the scene's text, where it was read before.
+def compiled(job: Job, request: Request, clock: Clock, graphs: bool = False) -> None:
+    """Compile the scene of a job, if it has one and is not drawn by the reference; ``graphs`` are kept.
 
     Raises:
-        OSError: the input cannot be read, or a model has no weights.
+        OSError: a model has no weights.
     """
-    if name.endswith(PROGRAM):
-        return _stored(name, request, clock)
-    found = read_input(name, request, clock, source)
-    job = Job(name, found)
-    if found.scene is not None and compiled:
-        with suppress(SceneError), clock("compile"):  # its diagnostics are the input's
-            job.program = compile_scene(
-                found.scene,
-                spans=found.spans,
-                diagnostics=found.diagnostics,
-                model=request.model,
-                after=job.graphs.__setitem__ if verbose else None,
-            )
-            why = why_chosen(found.scene, request.model is not None)
-            job.notes = [*program_notes(job.program, why), *_pass_notes(job.graphs)]
-    return job
+    found, model = job.source, request.source.model
+    if found is None or found.scene is None or job.how.backend == "reference":
+        return
+    with suppress(SceneError), clock("compile"):  # its diagnostics are the input's
+        job.program = compile_scene(
+            found.scene,
+            spans=found.spans,
+            diagnostics=found.diagnostics,
+            model=model,
+            after=job.graphs.__setitem__ if graphs else None,
+        )
+        why = why_chosen(found.scene, model is not None)
+        job.notes = [*program_notes(job.program, why), *_pass_notes(job.graphs)]
 
 
 def prepare_all(
     files: Sequence[str],
     request: Request,
     clock: Clock,
+    how: How = DEFAULT,
     *,
     strict: bool = False,
-    compiled: bool = True,
-    verbose: bool = False,
-    source: SourceFile | None = None,
-    refusal: Callable[[Job], str | None] = lambda _: None,
+    graphs: bool = False,
+    stored: str | None = None,
+    first: Input | None = None,
 ) -> tuple[list[Job | None], int]:
     """Every input read and compiled, None where it cannot be read; reports mistakes.
 
     Args:
+        how: how they are drawn.
         strict: warnings count as errors.
-        compiled, verbose, source: as of `prepare`.
-        refusal: why a job is none for this command, if it is not.
+        graphs: keep the graphs, and make notes of what the passes did.
+        stored: why compiled programs are refused, if they are.
+        first: the only one, where it was read before.
 
     Returns:
         The jobs, and the exit code so far: 1 where a scene has mistakes, 2 where a file cannot be read.
@@ -127,13 +120,17 @@ def prepare_all(
     code = 0
     for name in files:
         try:
-            job = prepare(name, request, clock, compiled=compiled, verbose=verbose, source=source)
+            if name.endswith(PROGRAM):
+                job = _stored(name, request, clock, how)
+                job.trouble = stored or job.trouble
+            else:
+                job = Job(name, how, first or read_input(name, request, clock))
+                compiled(job, request, clock, graphs)
         except OSError as error:
             say_trouble(describe(error))
             jobs.append(None)
             code = 2
             continue
-        job.trouble = refusal(job) or job.trouble
         if job.trouble is not None:
             say_trouble(f"{name}: {job.trouble}")
         jobs.append(job)
@@ -154,34 +151,39 @@ def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> tu
     """
     if name.endswith(PROGRAM):
         raise click.UsageError(f"`{name}` is a compiled program already.")
-    job = prepare(name, request, clock or Clock(), verbose=True)
-    assert job.source is not None
+    clock = clock or Clock()
+    found = read_input(name, request, clock)
+    job = Job(name, source=found)
+    compiled(job, request, clock, graphs=True)
     job.diagnostics.extend(unused_defines(request))
     say_diagnostics(job.diagnostics)
-    return job, job.source
+    return job, found
 
 
-def _stored(name: str, request: Request, clock: Clock) -> Job:
+def _stored(name: str, request: Request, clock: Clock, how: How) -> Job:
     from scenelang.program.program import ProgramError
     from scenelang.program.reading import load_program
 
+    job, size, model = Job(name, how), request.source.size, request.source.model
     try:
         with clock("load program"):
             program = load_program(Path(name))
     except ProgramError as error:
-        return Job(name, trouble=str(error))
-    if request.model not in (None, program.model):
-        return Job(name, trouble=f"compiled for model `{program.model}`, not `{request.model}`")
-    if request.frame:
-        return Job(name, trouble=f"a program is a single frame, and --frame asks for {request.frame}")
-    if request.size is not None:
-        (width, height), (old_width, old_height) = request.size, program.canvas
+        job.trouble = str(error)
+        return job
+    if model not in (None, program.model):
+        job.trouble = f"compiled for model `{program.model}`, not `{model}`"
+    elif request.frame:
+        job.trouble = f"a program is a single frame, and --frame asks for {request.frame}"
+    elif size is not None:
+        (width, height), (old_width, old_height) = size, program.canvas
         if width * old_height != height * old_width:
             old = f"the {old_width}x{old_height} it was compiled for"
             advice = "objects outside it are gone: compile the scene again"
-            return Job(name, trouble=f"{width}x{height} has another shape than {old}; {advice}")
-        program = replace(program, canvas=request.size)
-    return Job(name, program=program, notes=program_notes(program, "named by the program"))
+            job.trouble = f"{width}x{height} has another shape than {old}; {advice}"
+        program = replace(program, canvas=size)
+    job.program, job.notes = program, program_notes(program, "named by the program")
+    return job
 
 
 def program_notes(program: Program, why: str) -> list[str]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from scenelang.backend.render import render
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.evaluation import Evaluation, read_scene
+from scenelang.evaluate.evaluation import Evaluation, Source
 from scenelang.files import write_output
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
@@ -21,7 +21,6 @@ from scenelang.program.program import Program, ProgramError
 from scenelang.program.reading import load_program
 from scenelang.scene import library
 from scenelang.scene.schema import Scene
-from scenelang.syntax import parse
 from scenelang.viewer.form import form_of
 from scenelang.viewer.page import control_rows, page, plain
 from scenelang.viewer.view import View, view_of
@@ -96,7 +95,11 @@ def viewed(
     evaluation = None
     path = None if isinstance(source, Scene | Program) else Path(source)
     if path is not None and path.suffix != PROGRAM:
-        scene, evaluation = _evaluated(path, params, model, root)
+        found = Diagnostics()
+        evaluation = Source(path, params=params, model=model, root=root).evaluation(found)
+        scene = evaluation.run(0)[0]
+        if scene is None or found.errors:
+            raise SceneError(found)
     elif params or root is not None:
         raise ValueError("params and root are for files of scenes")
     if scene is not None:
@@ -178,19 +181,3 @@ def _shown(name: str, first: str) -> str:
     """What a page calls a file: by its place beside the scene's, and of others only their names."""
     place = os.path.relpath(name, os.path.dirname(first)).replace(os.sep, "/")
     return Path(name).name if place.startswith("../") else place
-
-
-def _evaluated(
-    path: Path, params: Mapping[str, Any] | None, model: str | None, root: str | os.PathLike[str] | None
-) -> tuple[Scene, Evaluation]:
-    found = Diagnostics()
-    source = read_scene(path, found)
-    if source is None:
-        raise SceneError(found)
-    evaluation = Evaluation(
-        parse(source, found), diagnostics=found, defines=params, model=model, root=root, path=path
-    )
-    scene, _ = evaluation.run(0)
-    if scene is None or found.errors:
-        raise SceneError(found)
-    return scene, evaluation

@@ -43,16 +43,12 @@ def test_formulas_in_place_of_the_network(folder: Folder) -> None:
     assert "formulas in the network's place" in done.stderr
     assert (np.abs(picture("a.png") - picture("b.png")).max(-1) > 1).sum() <= 2
     for options, why in (
-        (("--device", "cuda"), "processors only"),
+        (("--device", "cuda"), "not by device cuda"),
         (("--prove",), "leave out --backend exact"),
     ):
         refused = folder.run("render", name, "-o", "c.png", "--backend", "exact", *options)
         assert refused.exit_code == 2
         assert why in " ".join(refused.stderr.split())
-    moving = folder.write("b.nsg", "animate(1, 3);" + GOOD)
-    refused = folder.run("render", moving, "-o", "c.gif", "--backend", "exact")
-    assert refused.exit_code == 2
-    assert "for single pictures" in refused.stderr
 
 
 def test_formats_and_sizes(folder: Folder) -> None:
