@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from scenelang.backend.options import DEFAULT, How, RenderError
-from scenelang.cli.jobs import Job, program_notes
+from scenelang.cli.inputs import Input
+from scenelang.cli.jobs import program_notes
 from scenelang.cli.progress import Clock
 from scenelang.cli.say import say_trouble
 from scenelang.diagnostics.error import SceneError
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from scenelang.program.program import Program
 
 
-def draw_job(job: Job, model: str | None, clock: Clock, progress: Callable[[float], None]) -> Image:
+def draw_job(job: Input, model: str | None, clock: Clock, progress: Callable[[float], None]) -> Image:
     """Draw a job as it says, and note what it took.
 
     Args:
@@ -34,10 +35,9 @@ def draw_job(job: Job, model: str | None, clock: Clock, progress: Callable[[floa
 
     how, program = job.how, job.program
     if how.backend == "reference":
-        assert job.source is not None
-        assert job.source.scene is not None
+        assert job.scene is not None
         with clock("draw"):
-            image = draw_exact(job.source.scene, spans=job.source.spans, model=model, progress=progress)
+            image = draw_exact(job.scene, spans=job.spans, model=model, progress=progress)
         job.notes.append("drew the exact picture, four samples a pixel")
         return image
     from scenelang.backend.small import choose_drawer
@@ -68,7 +68,7 @@ def draw_job(job: Job, model: str | None, clock: Clock, progress: Callable[[floa
     return drawing.image
 
 
-def blank(job: Job, image: Image) -> str | None:
+def blank(job: Input, image: Image) -> str | None:
     """The reason why a picture has nothing to see, where no warning has said so."""
     if any(d.code == "W0402" for d in job.diagnostics):
         return None
@@ -84,7 +84,7 @@ def blank(job: Job, image: Image) -> str | None:
 # ---------------------------------------------------------------- by the frontier
 
 
-def choose_all(jobs: list[Job], limits: Limits, model: str | None, clock: Clock) -> list[Job]:
+def choose_all(jobs: list[Input], limits: Limits, model: str | None, clock: Clock) -> list[Input]:
     """Those of the jobs that the frontier draws well and fast enough, as it chooses; reports the others.
 
     Args:
@@ -111,7 +111,7 @@ def choose_all(jobs: list[Job], limits: Limits, model: str | None, clock: Clock)
     return able
 
 
-def _choose(job: Job, limits: Limits, model: str | None, here_ms: float) -> None:
+def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> None:
     """Choose how to draw a job, and compile it for the model that does; raises `NothingFits`."""
     from scenelang.measure.choose import NothingFits, machine_scale
     from scenelang.measure.frontier import load_frontier
@@ -140,7 +140,7 @@ def _choose(job: Job, limits: Limits, model: str | None, here_ms: float) -> None
 
 
 def _chosen(
-    frontier: Frontier, job: Job, program: Program, limits: Limits, model: str | None, scale: float
+    frontier: Frontier, job: Input, program: Program, limits: Limits, model: str | None, scale: float
 ) -> tuple[Choice, Program]:
     """The best choice whose model draws the scene without further warnings, and its Program."""
     from scenelang.backend.load import load_of
@@ -165,7 +165,7 @@ def _chosen(
         found = [offer for offer in found if offer.point.model != point.model]
 
 
-def _refusal(point: Point, job: Job, program: Program, model: str | None) -> str | None:
+def _refusal(point: Point, job: Input, program: Program, model: str | None) -> str | None:
     """Why a point is not in question."""
     from scenelang.backend.render import exact_graph
     from scenelang.measure.choose import refusal
@@ -184,18 +184,17 @@ def _refusal(point: Point, job: Job, program: Program, model: str | None) -> str
     return refusal(point, manifest, job.scene, program.model if job.scene is None else None)
 
 
-def _compiled(job: Job, program: Program, point: Point) -> Program | str:
+def _compiled(job: Input, program: Program, point: Point) -> Program | str:
     """The Program for a point's model; the reason where it cannot draw the scene as promised."""
     if point.model in (None, program.model):
         return program
     from scenelang.diagnostics.diagnostic import Diagnostics
     from scenelang.program.compile import compile_scene
 
-    assert job.source is not None
-    assert job.source.scene is not None
+    assert job.scene is not None
     found = Diagnostics()
     try:
-        made = compile_scene(job.source.scene, spans=job.source.spans, diagnostics=found, model=point.model)
+        made = compile_scene(job.scene, spans=job.spans, diagnostics=found, model=point.model)
     except SceneError:
         return found.errors[0].message
     told = {d.code for d in job.diagnostics}

@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from scenelang.backend.options import DEFAULT, How
 from scenelang.cli.progress import Clock
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile
@@ -19,6 +20,10 @@ from scenelang.records import Record
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap
 from scenelang.syntax import nodes
+
+if TYPE_CHECKING:
+    from scenelang.graph.nodes import Graph
+    from scenelang.program.program import Program
 
 STDIN = "-"
 JSON = ".json"
@@ -38,13 +43,24 @@ class Request(Record):
 
 
 class Input(Record, frozen=False):
-    """A scene as it was read."""
+    """A scene or a compiled program that the command line names, and what is made of it."""
 
+    name: str  # as the user wrote it
+    how: How = DEFAULT  # how it is drawn
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)  # what was found so far
+    trouble: str | None = None  # why a compiled program cannot be drawn
     tree: nodes.File | None = None  # None if it is not text
+    evaluation: Evaluation | None = None  # runs its other frames; None for JSON
     scene: Scene | None = None  # None if it has errors
     spans: SpanMap = field(default_factory=SpanMap)  # where its nodes were written
-    diagnostics: Diagnostics = field(default_factory=Diagnostics)  # what was found so far
-    evaluation: Evaluation | None = None  # runs its other frames; None for JSON
+    program: Program | None = None  # what the network draws
+    # the graph after `lower` and each pass, in order
+    graphs: dict[str, Graph] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)  # what to say about it on `-v`
+
+    def failed(self, strict: bool = False) -> bool:
+        """Whether there is nothing to draw."""
+        return self.trouble is not None or any(d.severity == "error" or strict for d in self.diagnostics)
 
 
 def stem_of(name: str) -> str:
@@ -65,13 +81,17 @@ def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
 
 
 def read_input(
-    name: str, request: Request, clock: Clock | None = None, text: SourceFile | None = None
+    name: str,
+    request: Request,
+    clock: Clock | None = None,
+    how: How = DEFAULT,
+    text: SourceFile | None = None,
 ) -> Input:
     """Read one scene: text is evaluated, JSON (by its suffix, or `{` first in standard input) just read.
 
     ``text`` is what it holds, where that was read before. Raises `OSError` where it cannot be opened.
     """
-    clock, found, frame = clock or Clock(), Input(), request.frame or 0
+    clock, found, frame = clock or Clock(), Input(name, how), request.frame or 0
     text = text or read_text(name, found.diagnostics)
     if text is None:
         return found

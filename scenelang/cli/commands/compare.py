@@ -37,8 +37,8 @@ def command(ctx: click.Context, scene: str, out: Path | None, request: Request, 
 
     need_metrics()
     target = out if out is not None else composed(Path(f"{stem_of(scene)}-compare.png"))
-    job, found = prepare_scene(scene, request)
-    if job.program is None or found.scene is None or job.failed():
+    job = prepare_scene(scene, request)
+    if job.program is None or job.scene is None or job.failed():
         ctx.exit(1)
     from scenelang.backend.neural import choose_device
     from scenelang.backend.render import draw, draw_exact
@@ -48,8 +48,8 @@ def command(ctx: click.Context, scene: str, out: Path | None, request: Request, 
     with Bar() as bar:
         exact = over_white(
             draw_exact(
-                found.scene,
-                spans=found.spans,
+                job.scene,
+                spans=job.spans,
                 model=request.source.model,
                 progress=lambda share: bar("drawing the exact picture", share, 1),
             )

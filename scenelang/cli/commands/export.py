@@ -57,11 +57,9 @@ def command(
     for job, path in zip(jobs, paths, strict=True):
         if job is None or job.failed(strict) or job.program is None:
             continue
-        found = job.source
-        scene, evaluation = (None, None) if found is None else (found.scene, found.evaluation)
         try:
             with clock("view"):
-                view = scene_view(job.program, scene, evaluation, title=title or stem_of(job.name))
+                view = scene_view(job.program, job.scene, job.evaluation, title=title or stem_of(job.name))
         except ProgramError as error:
             say_trouble(f"{job.name}: {error}")
             code = 2

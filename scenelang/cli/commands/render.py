@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from scenelang.backend.options import How
-    from scenelang.cli.inputs import Request
-    from scenelang.cli.jobs import Job
+    from scenelang.cli.inputs import Input, Request
     from scenelang.image import Image
     from scenelang.outputs import Output, Outputs
 
@@ -142,7 +141,7 @@ def command(
     if len(files) == 1 and request.frame is None and not files[0].endswith(PROGRAM):
         target = film.target(files[0], out)
         if target is not None:
-            found = read_input(files[0], request, clock)
+            found = read_input(files[0], request, clock, how)
             if moves(found, target, film, out):
                 if limits or more.prove:
                     what = "a proof is" if more.prove else "--max-ms and --max-flip are"
@@ -190,7 +189,7 @@ class _More(NamedTuple):
 
 
 def _draw(
-    job: Job, path: Path, more: _More, model: str | None, clock: Clock, progress: Callable[[float], None]
+    job: Input, path: Path, more: _More, model: str | None, clock: Clock, progress: Callable[[float], None]
 ) -> list[str]:
     """Draw a job to a file; lines about it."""
     from scenelang.backend.outputs import outputs_of
@@ -201,8 +200,7 @@ def _draw(
     found, drawn, proof = Outputs(), job.scene if job.how.backend == "reference" else job.program, None
     if more.outputs and drawn is not None:  # before the picture: what it lacks is said at once
         with clock("outputs"):
-            spans = job.source.spans if job.source is not None else None
-            found = outputs_of(drawn, more.outputs, job.how, spans=spans, model=model)
+            found = outputs_of(drawn, more.outputs, job.how, spans=job.spans, model=model)
     if more.prove and job.program is not None:
         with clock("prove"):
             image, proof = prove_drawn(
