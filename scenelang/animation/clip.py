@@ -11,8 +11,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scenelang.animation.timing import FrameRange, FramesError
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
+from scenelang.diagnostics.suggest import plural
 from scenelang.evaluate.evaluation import Evaluation, Source
 from scenelang.graph.lower import Memory
 from scenelang.scene.schema import Animation, Scene, same_nodes
@@ -127,6 +129,17 @@ class Clip:
         """Number of frames, at least 1."""
         given = self._evaluation
         return len(given.scenes) if isinstance(given, Given) else self.animation.frames
+
+    def numbers(self, frames: FrameRange) -> range:
+        """The numbers of the frames that are asked for; raises `SceneError` where some are not there."""
+        animation = self.animation
+        try:
+            return frames.among(animation.frames)
+        except FramesError as error:
+            count = plural(animation.frames, "frame")
+            help = f"{animation.seconds:g} s at {animation.fps:g} frames a second make {count}"
+            self.diagnostics.add("E0337", str(error), None, help=help)
+            raise SceneError(self.diagnostics) from None
 
     def shot(self, number: int) -> Shot:
         """Evaluate a frame; raises `SceneError` if it has errors."""

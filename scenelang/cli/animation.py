@@ -112,7 +112,7 @@ def animate(
         Trouble: a file cannot be written.
     """
     from scenelang.animation.painting import Painter
-    from scenelang.animation.run import make, ready
+    from scenelang.animation.run import make
 
     started, told = time.perf_counter(), found.diagnostics
     drawn = found.evaluation or ((found.scene,) if found.scene is not None else ())
@@ -122,7 +122,7 @@ def animate(
     clip = Clip(drawn, told, model=model)
     numbers = None
     with suppress(SceneError):  # its diagnostics are told
-        numbers = frames_of(clip, film)
+        numbers = clip.numbers(film.frames)
     if numbers is None or (told.items and strict):
         say_diagnostics(told)
         return 1
@@ -130,7 +130,6 @@ def animate(
         what = f"`{out}` is one file; numbered pictures such as frame-%04d.png have outputs"
         raise click.UsageError(f"{what}.")
     check_outputs([target.file(number) for number in numbers], outputs)
-    ready(target)
     try:
         with Bar() as bar:
             made = make(
@@ -161,18 +160,6 @@ def animate(
     for line in made.lines() if verbose else ():
         click.echo(f"  {line}", err=True)
     return 0
-
-
-def frames_of(clip: Clip, film: Film) -> range | None:
-    """The numbers of the frames that are asked for; None after a report that some are not there."""
-    animation = clip.animation
-    try:
-        return film.frames.among(animation.frames)
-    except FramesError as error:
-        count = plural(animation.frames, "frame")
-        help = f"{animation.seconds:g} s at {animation.fps:g} frames a second make {count}"
-        clip.diagnostics.add("E0337", str(error), None, help=help)
-        return None
 
 
 def summary(made: RenderResult, seconds: float) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.backend.options import DEFAULT, How, RenderError
+from scenelang.backend.options import DEFAULT, How
 from scenelang.cli.inputs import Input
 from scenelang.cli.jobs import program_notes
 from scenelang.cli.progress import Clock
@@ -144,12 +144,12 @@ def _chosen(
 ) -> tuple[Choice, Program]:
     """The best choice whose model draws the scene without further warnings, and its Program."""
     from scenelang.backend.load import load_of
-    from scenelang.measure.choose import choose, offers
+    from scenelang.measure.choose import choose, offers, refusal
 
     refused: dict[str, str] = {}
     able = []
     for point in frontier.points:
-        why = _refusal(point, job, program, model)
+        why = refusal(point, job.scene, program, model)
         if why is None:
             able.append(point)
         elif point.offered:  # the others are for charts only
@@ -163,25 +163,6 @@ def _chosen(
             return choice, compiled
         refused |= {o.point.name: compiled for o in found if o.point.model == point.model}
         found = [offer for offer in found if offer.point.model != point.model]
-
-
-def _refusal(point: Point, job: Input, program: Program, model: str | None) -> str | None:
-    """Why a point is not in question."""
-    from scenelang.backend.render import exact_graph
-    from scenelang.measure.choose import refusal
-    from scenelang.models.manifest import available, load_manifest
-
-    if model is not None and point.model != model:
-        return f"--model {model}"
-    if point.model is not None and point.model not in available():
-        return "not installed"
-    if point.backend == "reference" and job.scene is not None and job.scene.elements:
-        try:
-            exact_graph(job.scene, model=program.model)
-        except RenderError as error:  # an element has no original
-            return str(error)
-    manifest = load_manifest(point.model) if point.model is not None else None
-    return refusal(point, manifest, job.scene, program.model if job.scene is None else None)
 
 
 def _compiled(job: Input, program: Program, point: Point) -> Program | str:

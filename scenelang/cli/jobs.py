@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -17,29 +17,13 @@ from scenelang.cli.main import describe
 from scenelang.cli.progress import Clock
 from scenelang.cli.say import say_diagnostics, say_trouble
 from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.suggest import plural
-from scenelang.graph.nodes import Graph, Leaf, nodes
 from scenelang.models.choose import why_chosen
-from scenelang.passes import PASSES
 from scenelang.program.compile import compile_scene
 
 if TYPE_CHECKING:
     from scenelang.program.program import Program
 
 PROGRAM = ".safetensors"
-STAGES = ("syntax", "scene", "lower", *(step.name for step in PASSES), "program")
-"""Of the compiler, in order: the syntax tree, the scene, the graph after each pass, the program."""
-
-
-def check_stages(wanted: Collection[str], known: Collection[str] = STAGES) -> None:
-    """Raise `click.UsageError` for names that are none of the stages."""
-    for name in wanted:
-        if name not in known:
-            from difflib import get_close_matches
-
-            near = get_close_matches(name, known, 1)
-            advice = f" Did you mean `{near[0]}`?" if near else ""
-            raise click.UsageError(f"No stage `{name}`.{advice} There are {', '.join(known)}.")
 
 
 def compile_input(found: Input, request: Request, clock: Clock, graphs: bool = False) -> None:
@@ -60,7 +44,7 @@ def compile_input(found: Input, request: Request, clock: Clock, graphs: bool = F
             after=found.graphs.__setitem__ if graphs else None,
         )
         why = why_chosen(found.scene, model is not None)
-        found.notes = [*program_notes(found.program, why), *_pass_notes(found.graphs)]
+        found.notes = program_notes(found.program, why)
 
 
 def prepare_all(
@@ -79,7 +63,7 @@ def prepare_all(
     Args:
         how: how they are drawn.
         strict: warnings count as errors.
-        graphs: keep the graphs, and make notes of what the passes did.
+        graphs: keep the graph after each pass.
         stored: why compiled programs are refused, if they are.
         first: the only one, where it was read before.
 
@@ -174,16 +158,3 @@ def _counts(counts: dict[str, int]) -> str:
     """`` (2 star, 1 square)``, or nothing."""
     listed = ", ".join(f"{number} {name}" for name, number in counts.items())
     return f" ({listed})" if listed else ""
-
-
-def _pass_notes(graphs: dict[str, Graph]) -> Iterator[str]:
-    """A line for each pass that changed the number of objects, folds or moves."""
-    before = None
-    for name, graph in graphs.items():
-        found = list(nodes(graph.root))
-        objects = sum(isinstance(node, Leaf) for node in found)
-        counts = (objects, len(found) - objects, sum(len(node.moves) for node in found))
-        if counts != before:
-            told = ", ".join(map(plural, counts, ("object", "fold", "move")))
-            yield f"{name if before else 'as written'}: {told}"
-        before = counts

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Final
 from scenelang.animation.clip import Clip
 from scenelang.animation.painting import Drawable, Painter
 from scenelang.animation.run import make
-from scenelang.animation.timing import FrameRange, FramesError
+from scenelang.animation.timing import FrameRange
 from scenelang.backend.options import How
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
@@ -111,11 +111,7 @@ class Easel:
     def _draw(self, found: Diagnostics, outcome: Outcome, before: Stamps) -> None:
         started = time.perf_counter()
         clip = self._open(found)
-        try:
-            numbers = self.frames.among(clip.animation.frames)
-        except FramesError as error:
-            found.add("E0337", str(error), None)
-            raise SceneError(found) from None
+        numbers = clip.numbers(self.frames)
         painter = Painter(clip, self.how, self._kept)
         if self.target is not None and self.target.kind == "video" and not clip.animates:
             found.add("E0337", f"`{self.out}` is for animations, and the scene has no animate(…)", None)

@@ -23,10 +23,6 @@ group { star { scale(k); material flat { color(#d33); } } translate(0.1, 0); rot
 STAGES = ["syntax", "scene", "lower", *(step.name for step in PASSES), "program"]
 
 
-def test_the_stages(folder: Folder) -> None:
-    assert folder.run("dump", folder.write("a.nsg", TEXT), "--after", "help").stdout.split() == STAGES
-
-
 def test_graphs_change_on_the_way(folder: Folder) -> None:
     result = folder.run("dump", folder.write("a.nsg", TEXT), "--after", "lower", "--after", "flatten")
     assert result.exit_code == 0
@@ -122,7 +118,7 @@ def test_scenes_with_mistakes_are_shown_as_far_as_they_go(folder: Folder) -> Non
 def test_unknown_stages(folder: Folder) -> None:
     result = folder.run("dump", folder.write("a.nsg", TEXT), "--after", "flaten")
     assert result.exit_code == 2
-    assert "Did you mean `flatten`?" in result.stderr
+    assert "'flatten'" in result.stderr
     assert folder.run("dump", "a.nsg", "--after", "syntax", "--format", "mmd").exit_code == 2
 
 

@@ -15,6 +15,7 @@ from scenelang.cli import options
 from scenelang.cli.main import Trouble
 from scenelang.cli.say import put_out
 from scenelang.diagnostics.suggest import plural
+from scenelang.passes import PASSES
 from scenelang.words import COMBINE
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 Kind = Literal["text", "json", "mmd", "dot", "svg", "png"]
 _DRAWN: Final = ("mmd", "dot", "svg", "png")
+STAGES: Final = ("syntax", "scene", "lower", *(step.name for step in PASSES), "program")
 _PATIENCE_S: Final = 60
 
 
@@ -32,7 +34,7 @@ _PATIENCE_S: Final = 60
     "--after",
     "stages",
     multiple=True,
-    metavar="STAGE",
+    type=click.Choice(STAGES),
     help="Stage or pass to show; may be given several times. By default program, with --diff all, and of "
     "drawings scene.",
 )
@@ -71,9 +73,9 @@ def command(
 ) -> None:
     """Show what a scene is after stages of the compiler, or draw its graph.
 
-    FILE is a scene, or - for standard input. The stages are syntax (the tree), scene, lower (the graph as
-    written), the passes in their order (`--after help` lists them) and program. A scene with mistakes is
-    shown as far as it goes; then the exit code is 1.
+    FILE is a scene, or - for standard input. The stages are in order syntax (the tree), scene, lower (the
+    graph as written), the passes and program. A scene with mistakes is shown as far as it goes; then the exit
+    code is 1.
 
     Drawings show transforms, materials and booleans; large scenes are cut, and a box says how many nodes are
     left out.
@@ -83,11 +85,8 @@ def command(
     steps and evaluations of the network), the parameters, the time of a frame, and the error against the
     exact picture.
     """
-    from scenelang.cli.jobs import STAGES, check_stages, prepare_scene
+    from scenelang.cli.jobs import prepare_scene
 
-    if stages == ("help",):
-        click.echo("\n".join(STAGES))
-        return
     suffix = Path(out or "").suffix[1:].lower()
     form = kind or (suffix if suffix in _DRAWN else "text")
     drawn = form in _DRAWN
@@ -95,7 +94,8 @@ def command(
         raise click.UsageError("--costs is of the whole scene; leave out --after, --diff and drawings.")
     if drawn and (diff or len(stages) > 1):
         raise click.UsageError("A drawing is of one stage, with --after.")
-    check_stages(stages, STAGES[1:] if drawn else STAGES)
+    if drawn and "syntax" in stages:
+        raise click.UsageError("The syntax tree has no drawing.")
     dot = _find_dot(form) if form in ("svg", "png") else None
     job = prepare_scene(file, request)
     if (costs or drawn) and (job.scene is None or job.program is None or job.failed()):

@@ -159,7 +159,7 @@ def command(
         does = "a proof is of a scene" if more.prove else "the reference draws scenes"
         refused = f"{does}; a program keeps only what the network needs"
     every, code = prepare_all(
-        files, request, clock, how, strict=strict, graphs=verbose or more.prove, stored=refused, first=found
+        files, request, clock, how, strict=strict, graphs=more.prove, stored=refused, first=found
     )
     able = [(job, path) for job, path in zip(every, paths, strict=True) if job and not job.failed(strict)]
     if limits and able:
