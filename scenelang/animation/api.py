@@ -145,8 +145,8 @@ def _opened(
         raise ValueError("neither a path nor Scenes to draw")
     if params is not None or root is not None:
         raise ValueError("params and root are for files; Scenes have their values")
-    sized = scenes if size is None else tuple(scene.sized(size) for scene in scenes)
-    return Clip(sized, model=model, fps=fps)
+    scenes = scenes if size is None else tuple(scene.sized(size) for scene in scenes)
+    return Clip(tuple(scene.of_model(model) for scene in scenes), fps=fps)
 
 
 def _numbers(clip: Clip, frames: Frames) -> range:

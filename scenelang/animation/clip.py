@@ -69,7 +69,6 @@ class Clip:
     Args:
         source: the scene, one that is prepared, or its frames.
         diagnostics: collects what is found, in each frame; a mistake in any frame ends the clip.
-        model: name of the model to draw with, instead of that of Scenes; a `Source` has its own.
         fps: frames a second, instead of those of the first Scene's animation.
         reuse: keep what frames share; without it each frame is worked out by itself.
 
@@ -83,12 +82,11 @@ class Clip:
         source: Source | Evaluation | tuple[Scene, ...],
         diagnostics: Diagnostics | None = None,
         *,
-        model: str | None = None,
         fps: float | None = None,
         reuse: bool = True,
     ) -> None:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
-        self.model, self.reuse = source.model if isinstance(source, Source) else model, reuse
+        self.reuse = reuse
         self._evaluation: Evaluation | Given = (
             source.evaluation(self.diagnostics, replays=reuse)
             if isinstance(source, Source)
@@ -155,7 +153,7 @@ class Clip:
         if self.reuse and self._last is not None and same_nodes(self._last[0].scene, shot.scene):
             return self._last[1]
         program = compile_scene(
-            shot.scene, spans=shot.spans, diagnostics=self.diagnostics, model=self.model, memory=self._memory
+            shot.scene, spans=shot.spans, diagnostics=self.diagnostics, memory=self._memory
         )
         self._last = shot, program
         return program

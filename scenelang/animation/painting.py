@@ -66,7 +66,7 @@ class Painter:
     def _picture(self, shot: Shot, single: bool) -> Drawable:
         if self.how.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})
-            key = frame_key("reference", _version("scenelang"), self.clip.model, scene.to_json())
+            key = frame_key("reference", _version("scenelang"), scene.to_json())
             return Drawable(shot.number, key, shot, None)
         program = self.clip.program(shot)
         place = self._place(program, single)
@@ -104,7 +104,7 @@ class Painter:
         if frame.program is None:
             from scenelang.backend.render import draw_exact
 
-            return draw_exact(frame.shot.scene, spans=frame.shot.spans, model=self.clip.model)
+            return draw_exact(frame.shot.scene, spans=frame.shot.spans)
         from scenelang.backend.render import draw
         from scenelang.renderers.draw import Kept
 
@@ -134,7 +134,7 @@ class Painter:
         from scenelang.image import packed
 
         shot, drawn = frame.shot, frame.program or frame.shot.scene
-        found = outputs_of(drawn, self.outputs, self.how, spans=shot.spans, model=self.clip.model)
+        found = outputs_of(drawn, self.outputs, self.how, spans=shot.spans)
         return packed(self.draw(frame, progress), found, file)
 
 

@@ -59,18 +59,17 @@ def outputs_of(
     how: How,
     *,
     spans: Spans | None = None,
-    model: str | None = None,
 ) -> Outputs:
     """Outputs of what a backend draws, a proof aside; raises as `render_outputs`.
 
     Args:
-        spans, model: of a Scene: where its nodes were written, and the model that names are taken from.
+        spans: where the nodes of a Scene were written.
     """
     wanted = tuple([name for name in wanted if name != "proof"])
     if not wanted:
         return Outputs()
     if isinstance(drawn, Scene):
-        return _exact(drawn, wanted, spans, model)
+        return _exact(drawn, wanted, spans)
     return _neural(drawn, wanted, how)
 
 
@@ -96,13 +95,13 @@ def _neural(program: Program, wanted: Sequence[Output], how: How) -> Outputs:
     return found.only(wanted, _sources(program.numbers, program.objects, program.places))
 
 
-def _exact(scene: Scene, wanted: Sequence[Output], spans: Spans | None, model: str | None) -> Outputs:
+def _exact(scene: Scene, wanted: Sequence[Output], spans: Spans | None) -> Outputs:
     """Outputs of a scene by the exact definition."""
     from scenelang.graph.nodes import leaves
     from scenelang.program.emit import places_of
     from scenelang.reference.outputs import graph_outputs
 
-    graph, brought = exact_graph(scene, spans, model)
+    graph, brought = exact_graph(scene, spans)
     _check(wanted, graph.stage is None)
     try:
         found = graph_outputs(graph, brought)

@@ -21,15 +21,13 @@ if TYPE_CHECKING:
     from scenelang.renderers.draw import Drawing, Kept
 
 
-def exact_graph(
-    scene: Scene, spans: Spans | None = None, model: str | None = None
-) -> tuple[Graph, dict[str, Shape]]:
+def exact_graph(scene: Scene, spans: Spans | None = None) -> tuple[Graph, dict[str, Shape]]:
     """The graph of a scene as written, and true shapes of its elements; raises as `draw_exact`."""
     from scenelang.graph.lower import lower
     from scenelang.program.compile import find_model
 
     found = Diagnostics()
-    manifest = find_model(scene, found, model=model, spans=spans)
+    manifest = find_model(scene, found, spans=spans)
     graph = lower(scene, manifest, spans, found) if manifest is not None else None
     if graph is None or found.errors:
         raise SceneError(found)
@@ -48,13 +46,11 @@ def draw_exact(
     scene: Scene,
     *,
     spans: Spans | None = None,
-    model: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Image:
     """Draw a scene by the exact definition, from its graph as written, before any pass.
 
     Args:
-        model: take names from this model instead of the one the scene names.
         progress: called with the share done, in [0, 1].
 
     Raises:
@@ -63,7 +59,7 @@ def draw_exact(
     """
     from scenelang.reference.image import reference_image
 
-    graph, brought = exact_graph(scene, spans, model)
+    graph, brought = exact_graph(scene, spans)
     try:
         return reference_image(graph, brought=brought, progress=progress or (lambda _: None))
     except ValueError as error:

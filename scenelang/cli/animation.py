@@ -94,7 +94,6 @@ def animate(
     how: How,
     out: str,
     outputs: tuple[Output, ...],
-    model: str | None,
     strict: bool,
     verbose: bool,
 ) -> int:
@@ -104,7 +103,6 @@ def animate(
         found: the scene.
         out: the target, as the user wrote it.
         outputs: to write beside each picture.
-        model: to draw with, instead of the scene's.
         strict: count warnings as errors.
         verbose: say where the time went.
 
@@ -119,7 +117,7 @@ def animate(
     if told.errors or not drawn:
         say_diagnostics(told)
         return 1
-    clip = Clip(drawn, told, model=model)
+    clip = Clip(drawn, told)
     numbers = None
     with suppress(SceneError):  # its diagnostics are told
         numbers = clip.numbers(film.frames)

@@ -68,7 +68,7 @@ class Scenes(Record, frozen=False):
         for name, source in sources.items():
             found = read_input(name, request, text=source)
             facts = found.tree, found.evaluation, found.scene, found.spans, found.diagnostics
-            self.unseen += check_evaluated(*facts, model=given.model, frames=self.frames)
+            self.unseen += check_evaluated(*facts, frames=self.frames)
             parts.append(found.diagnostics.items)
         parts.append(unused_defines(request))
         every = merged(parts)

@@ -23,13 +23,8 @@ if TYPE_CHECKING:
     from scenelang.program.program import Program
 
 
-def draw_job(job: Input, model: str | None, clock: Clock, progress: Callable[[float], None]) -> Image:
-    """Draw a job as it says, and note what it took.
-
-    Args:
-        model: that the exact definition takes names from, instead of the scene's.
-        progress: called with the share done, in [0, 1].
-    """
+def draw_job(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
+    """Draw a job as it says, and note what it took; ``progress`` is called with the share done, in [0, 1]."""
     from scenelang.backend.options import threads_for
     from scenelang.backend.render import draw, draw_exact
 
@@ -37,7 +32,7 @@ def draw_job(job: Input, model: str | None, clock: Clock, progress: Callable[[fl
     if how.backend == "reference":
         assert job.scene is not None
         with clock("draw"):
-            image = draw_exact(job.scene, spans=job.spans, model=model, progress=progress)
+            image = draw_exact(job.scene, spans=job.spans, progress=progress)
         job.notes.append("drew the exact picture, four samples a pixel")
         return image
     from scenelang.backend.small import choose_drawer

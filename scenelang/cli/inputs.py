@@ -106,8 +106,11 @@ def read_input(
         with clock("read"):
             folder = Path(source.root or Path(name).parent)
             scene, spans = load_json(text, Scene, found.diagnostics, folder)
-            if scene is not None and source.size is not None:
-                scene = scene.sized(source.size)
+            if scene is not None and (source.size or source.model):
+                made = (scene if source.size is None else scene.sized(source.size)).of_model(source.model)
+                if spans.span(scene) is not None:
+                    spans.copy(scene, made)
+                scene = made
     else:
         with clock("parse"):
             source = source.parsed(found.diagnostics)

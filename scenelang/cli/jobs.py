@@ -32,7 +32,6 @@ def compile_input(found: Input, request: Request, clock: Clock, graphs: bool = F
     Raises:
         OSError: a model has no weights.
     """
-    model = request.source.model
     if found.scene is None or found.how.backend == "reference":
         return
     with suppress(SceneError), clock("compile"):  # its diagnostics are the input's
@@ -40,10 +39,9 @@ def compile_input(found: Input, request: Request, clock: Clock, graphs: bool = F
             found.scene,
             spans=found.spans,
             diagnostics=found.diagnostics,
-            model=model,
             after=found.graphs.__setitem__ if graphs else None,
         )
-        why = why_chosen(found.scene, model is not None)
+        why = why_chosen(found.scene, request.source.model is not None)
         found.notes = program_notes(found.program, why)
 
 

@@ -46,7 +46,7 @@ class Source(Record):
         tree: the text, parsed.
         params: values for params: text as after ``-D NAME=``, or Python values. `Defines` may be shared by
             several evaluations; the caller then reports what none of them used.
-        model: name of the model to use, instead of the one that the file names.
+        model: name of the model to use, instead of the one that the file names; the Scene names it then.
         root: folder that imports cannot leave; by default that of ``path``.
         size: canvas in pixels (width, height), instead of the scene's.
         fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
@@ -155,7 +155,7 @@ class Evaluation:
     ) -> None:
         assert source.tree is not None
         self.file = file = source.tree
-        self.diagnostics, self._size = diagnostics, source.size
+        self.diagnostics, self._size, self._model = diagnostics, source.size, source.model
         self.animates = any(isinstance(s, nodes.Call) and s.name.text == "animate" for s in file.statements)
         self._errors = len(diagnostics.errors)
         self._steps = self._objects = 0
@@ -234,7 +234,7 @@ class Evaluation:
         settings, chosen = session.settings, session.vocabulary.chosen
         fields = {
             "version": 1,
-            "model": chosen.name if chosen else None,
+            "model": self._model or (chosen.name if chosen else None),
             "canvas": settings.canvas,
             "background": settings.background,
             **{word: settings.stage.get(word, "default") for word in STAGE},

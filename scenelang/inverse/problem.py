@@ -73,7 +73,7 @@ class Moment(Record, frozen=False):
         """What draws the scene of values on a canvas; None where there is none, for which see `trouble`."""
         try:
             scene = self.evaluated(values)[1]
-            return compile_scene(scene.sized(canvas), model=self.source.model)
+            return compile_scene(scene.sized(canvas))
         except SceneError as error:
             self.trouble = error.diagnostics
             return None

@@ -108,9 +108,9 @@ def check(
     if parsed:
         find_unused(file, found)
         if scene is not None:
-            manifest = check_compiles(scene, spans, found, model=model, after=after)
+            manifest = check_compiles(scene, spans, found, after=after)
         frame = 1
-        check_frames(evaluation, found, first=scene, model=model, after=after)
+        check_frames(evaluation, found, first=scene, after=after)
         after("frames")
     wanted = frozenset(evaluation.wanted)
     return Checked(file.span.source, in_file_order(found.items), wanted, seen, manifest)

@@ -84,7 +84,7 @@ def refusal(point: Point, scene: Scene | None, program: Program, only: str | Non
     if point.model is None:
         try:
             if scene.elements:
-                exact_graph(scene, model=program.model)
+                exact_graph(scene)
         except RenderError as error:  # an element has no original
             return str(error)
         return None

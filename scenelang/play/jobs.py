@@ -209,9 +209,9 @@ def _exact(job: Job, clip: Clip) -> Image:
     """The exact picture; the last one is kept, for figures and differences of it."""
     shot = _shot(clip, job["frame"])
     _check_size(shot.scene.canvas)
-    key = f"{clip.model} {shot.scene.to_json()}"
+    key = shot.scene.to_json()
     if key not in _EXACT:
-        image = draw_exact(shot.scene, spans=shot.spans, model=clip.model)
+        image = draw_exact(shot.scene, spans=shot.spans)
         _EXACT.clear()
         _EXACT[key] = image
     return _EXACT[key]

@@ -35,7 +35,6 @@ def check_compiles(
     spans: Spans | None,
     diagnostics: Diagnostics,
     *,
-    model: str | None = None,
     after: After | None = None,
     memory: Memory | None = None,
 ) -> Manifest | None:
@@ -43,10 +42,9 @@ def check_compiles(
 
     Args:
         spans: where its nodes were written, None if it did not come from text.
-        model: draw with this model instead of the scene's.
         after, memory: as for `check_scene`.
     """
-    manifest = find_model(scene, diagnostics, model=model, spans=spans)
+    manifest = find_model(scene, diagnostics, spans=spans)
     if manifest is not None:
         check_scene(scene, spans, diagnostics, manifest, after, memory=memory)
     return manifest
@@ -57,7 +55,6 @@ def check_frames(
     diagnostics: Diagnostics,
     *,
     first: Scene | None = None,
-    model: str | None = None,
     every: bool = False,
     after: After | None = None,
 ) -> tuple[int, int]:
@@ -70,7 +67,7 @@ def check_frames(
         evaluation: has run frame 0.
         diagnostics: those of the evaluation; receives what frame 0 did not have, with the frame's number.
         first: the scene of frame 0, None if it has errors.
-        model, after: as for `check_compiles`.
+        after: as for `check_compiles`.
         every: look at all frames, instead of the second, the middle and the last one.
     """
     count, looked, last, memory = evaluation.frames, 1, first, Memory()
@@ -83,7 +80,7 @@ def check_frames(
         if scene is None or (last is not None and same_nodes(scene, last)):
             continue
         last, found = scene, Diagnostics()
-        check_compiles(scene, spans, found, model=model, after=after, memory=memory)
+        check_compiles(scene, spans, found, after=after, memory=memory)
         known = {d.code for d in diagnostics}
         name_frame(found, 0, frame)
         for d in found:
@@ -100,7 +97,6 @@ def check_evaluated(
     spans: Spans | None,
     diagnostics: Diagnostics,
     *,
-    model: str | None = None,
     frames: Frames = "some",
 ) -> int:
     """What there is to say of a scene beyond its evaluation.
@@ -116,11 +112,9 @@ def check_evaluated(
     """
     left = 0
     if scene is not None:
-        check_compiles(scene, spans, diagnostics, model=model)
+        check_compiles(scene, spans, diagnostics)
     if evaluation is not None and frames != "one":
-        looked, wanted = check_frames(
-            evaluation, diagnostics, first=scene, model=model, every=frames == "all"
-        )
+        looked, wanted = check_frames(evaluation, diagnostics, first=scene, every=frames == "all")
         left = wanted - looked
     if tree is not None and not diagnostics.errors:
         find_unused(tree, diagnostics)  # a name that is misspelt where it is used is not a second mistake
@@ -205,6 +199,6 @@ def _look(source: Source, all_frames: bool) -> Diagnostics:
         scene, spans = evaluation.run(0)
         frames: Frames = "all" if all_frames else "some"
         scene = None if found.errors else scene
-        check_evaluated(source.tree, evaluation, scene, spans, found, model=source.model, frames=frames)
+        check_evaluated(source.tree, evaluation, scene, spans, found, frames=frames)
     found.items[:] = in_file_order(found.items)
     return found

@@ -22,7 +22,7 @@ class Variants(Clip):
 
     def __init__(self, source: Source, rows: Rows, frame: int, diagnostics: Diagnostics) -> None:
         self._source, self._rows, self._frame = source, rows, frame
-        super().__init__(source.evaluation(diagnostics), diagnostics, model=source.model)
+        super().__init__(source.evaluation(diagnostics), diagnostics)
         self._memory = None  # no object is that of another row
 
     def shot(self, number: int) -> Shot:

@@ -50,7 +50,6 @@ def command(ctx: click.Context, scene: str, out: Path | None, request: Request, 
             draw_exact(
                 job.scene,
                 spans=job.spans,
-                model=request.source.model,
                 progress=lambda share: bar("drawing the exact picture", share, 1),
             )
         )

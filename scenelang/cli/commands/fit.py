@@ -176,7 +176,7 @@ def command(
         found.sheet().save(compare)
     if animate is not None:
         still = [found.way[0]] * 4, [found.way[-1]] * 8  # long enough to be looked at
-        render(still[0] + list(found.way) + still[1], animate, fps=8, model=model)
+        render(still[0] + list(found.way) + still[1], animate, fps=8)
     for line in found.told():
         click.echo(line, err=out == "-")
     if not found.done:

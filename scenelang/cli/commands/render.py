@@ -137,7 +137,7 @@ def command(
         other = "--max-ms and --max-flip" if limits else f"--backend {how.backend}, whose pictures are exact"
         raise click.UsageError(f"A proof is of what the scene's model draws; leave out {other}.")
     request = replace(request, source=replace(request.source, fps=fps))
-    model, clock, found = request.source.model, Clock(), None
+    clock, found = Clock(), None
     if len(files) == 1 and request.frame is None and not files[0].endswith(PROGRAM):
         target = film.target(files[0], out)
         if target is not None:
@@ -147,7 +147,7 @@ def command(
                     what = "a proof is" if more.prove else "--max-ms and --max-flip are"
                     raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")
                 found.diagnostics.items += unused_defines(request)
-                ctx.exit(animate(found, target, film, how, out, outputs, model, strict, verbose))
+                ctx.exit(animate(found, target, film, how, out, outputs, strict, verbose))
     elif film.certain:
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
     if cluster is not None:
@@ -163,13 +163,13 @@ def command(
     )
     able = [(job, path) for job, path in zip(every, paths, strict=True) if job and not job.failed(strict)]
     if limits and able:
-        chosen = choose_all([job for job, _ in able], limits, model, clock)
+        chosen = choose_all([job for job, _ in able], limits, request.source.model, clock)
         code = code if len(chosen) == len(able) else 2
         able = [(job, path) for job, path in able if job in chosen]
     told: list[str] = []
     with Bar() as bar:
         for index, (job, path) in enumerate(able):
-            told += _draw(job, path, more, model, clock, partial(_part, bar, index, len(able)))
+            told += _draw(job, path, more, clock, partial(_part, bar, index, len(able)))
             if verbose:
                 lines = "".join(f"\n  {note}" for note in job.notes)
                 click.echo(f"{job.name} -> {path}{lines}", err=True)
@@ -188,9 +188,7 @@ class _More(NamedTuple):
     redraw: bool
 
 
-def _draw(
-    job: Input, path: Path, more: _More, model: str | None, clock: Clock, progress: Callable[[float], None]
-) -> list[str]:
+def _draw(job: Input, path: Path, more: _More, clock: Clock, progress: Callable[[float], None]) -> list[str]:
     """Draw a job to a file; lines about it."""
     from scenelang.backend.outputs import outputs_of
     from scenelang.backend.prove import prove_drawn
@@ -200,14 +198,14 @@ def _draw(
     found, drawn, proof = Outputs(), job.scene if job.how.backend == "reference" else job.program, None
     if more.outputs and drawn is not None:  # before the picture: what it lacks is said at once
         with clock("outputs"):
-            found = outputs_of(drawn, more.outputs, job.how, spans=job.spans, model=model)
+            found = outputs_of(drawn, more.outputs, job.how, spans=job.spans)
     if more.prove and job.program is not None:
         with clock("prove"):
             image, proof = prove_drawn(
-                job.graphs, job.program.model, lambda: draw_job(job, model, clock, progress), more.redraw
+                job.graphs, job.program.model, lambda: draw_job(job, clock, progress), more.redraw
             )
     else:
-        image = draw_job(job, model, clock, progress)
+        image = draw_job(job, clock, progress)
     told = [] if (why := blank(job, image)) is None else [f"{path}: {why}"]
     if proof is not None:
         told.append(f"{path}: {proof.told()}")
