@@ -136,7 +136,7 @@ def command(
     animate: str | None,
     seed: int,
     budget: float,
-    frame: int,
+    frame: int | None,
     model: str | None,
     root: str | None,
 ) -> None:
@@ -161,7 +161,7 @@ def command(
         with Bar() as bar:
             found = fit(
                 scene, target, params=wanted, start=start, fixed=defines.values, mask=mask, crop=crop,
-                background=background, model=model, root=root, frame=frame, seed=seed, budget_s=budget,
+                background=background, model=model, root=root, frame=frame or 0, seed=seed, budget_s=budget,
                 progress=bar,
             )  # fmt: skip
     except SceneError as error:
