@@ -77,7 +77,7 @@ class Painter:
         return Drawable(shot.number, key, shot, program, place)
 
     def _place(self, program: Program, single: bool) -> str:
-        """Who draws a Program: numpy, or a torch device."""
+        """The library or device that draws a Program: numpy, or a torch device."""
         how = self.how
         if single or program.stage is not None or how.backend == "exact":
             from scenelang.backend.small import choose_drawer

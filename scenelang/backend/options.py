@@ -30,7 +30,7 @@ class Options(Care, total=False):
 
 
 class How(NamedTuple):
-    """How pictures are drawn: stills, films, sweeps and what is watched.
+    """A way to draw pictures, alike for stills, films, sweeps and what is watched.
 
     The command line has an option for each field, with the line of `HELP`.
 
@@ -75,7 +75,7 @@ class How(NamedTuple):
 
     @property
     def care(self) -> Care:
-        """What renderers take."""
+        """The fields that renderers take."""
         return cast("Care", {name: getattr(self, name) for name in Care.__annotations__})
 
 
@@ -89,7 +89,7 @@ HELP: Final = {
     "samples": "Samples of a pixel: four near outlines, four everywhere, four near strong outlines (solids), "
     "one, with hard edges, or one for each 2 x 2 pixels.",
 }
-"""What `--help` says of each field of `How`."""
+"""The line of `--help` for each field of `How`."""
 
 
 KEEP_BYTES = 256 << 20

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class Film(Record):
-    """What the command line says about animations alone."""
+    """Options of the command line for animations alone."""
 
     range: str | None = None  # `--frames`; None for all
     fps: float | None = None  # frames a second instead of the scene's
@@ -54,7 +54,7 @@ class Film(Record):
             raise click.BadParameter(str(error), param_hint="--frames") from None
 
     def target(self, name: str, out: str) -> Target | None:
-        """Where the animation of a scene goes if it has one; None where ``out`` is a single picture.
+        """The file or folder of a scene's animation, if it has one; None where ``out`` is a single picture.
 
         Raises `click.UsageError` where frames are asked for all the same.
         """
@@ -67,7 +67,7 @@ class Film(Record):
 
 
 def moves(found: Input, target: Target, film: Film, out: str) -> bool:
-    """Whether a scene is drawn as an animation, and not as one picture; reports where it cannot be.
+    """True where a scene is drawn as an animation and not as one picture; reports where it cannot be.
 
     Raises `click.UsageError` where ``out`` cannot hold a picture.
     """

@@ -80,7 +80,7 @@ def blank(job: Input, image: Image) -> str | None:
 
 
 def choose_all(jobs: list[Input], limits: Limits, model: str | None, clock: Clock) -> list[Input]:
-    """Those of the jobs that the frontier draws well and fast enough, as it chooses; reports the others.
+    """Have the frontier choose how to draw; return the jobs that it draws as asked and report the others.
 
     Args:
         model: the only one to choose, where it is given.

@@ -30,7 +30,7 @@ JSON = ".json"
 
 
 class Request(Record):
-    """What the command line says about every scene."""
+    """Options of the command line that hold for every scene."""
 
     source: Source  # all but its text; values for params are shared by all scenes
     frame: int | None = None  # of an animation, to be drawn as a picture
@@ -59,7 +59,7 @@ class Input(Record, frozen=False):
     notes: list[str] = field(default_factory=list)  # what to say about it on `-v`
 
     def failed(self, strict: bool = False) -> bool:
-        """Whether there is nothing to draw."""
+        """True where there is nothing to draw."""
         return self.trouble is not None or any(d.severity == "error" or strict for d in self.diagnostics)
 
 

@@ -156,7 +156,7 @@ verbose = click.option("-v", "--verbose", is_flag=True, help="Say what was compi
 
 
 def request(command: Callable[..., Any]) -> Callable[..., Any]:
-    """How scenes are read: -D, --size, --frame, --model and --root, handed over as a `Request`."""
+    """Options to read scenes by, -D, --size, --frame, --model and --root, handed over as a `Request`."""
 
     @define
     @size

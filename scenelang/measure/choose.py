@@ -64,7 +64,7 @@ def error_scale(canvas: tuple[int, int], objects: int) -> float:
 
 
 def refusal(point: Point, scene: Scene | None, program: Program, only: str | None = None) -> str | None:
-    """Why a point cannot draw a scene; None if it can.
+    """Reason why a point cannot draw a scene; None if it can.
 
     Args:
         scene: None of a compiled program, which is drawn by its own model.

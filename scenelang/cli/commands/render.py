@@ -181,7 +181,7 @@ def command(
 
 
 class _More(NamedTuple):
-    """What is wanted besides a picture."""
+    """Wishes besides a picture."""
 
     outputs: tuple[Output, ...]
     prove: bool
