@@ -17,10 +17,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from scenelang.animation.clip import open_clip
+from scenelang.animation.clip import Clip
 from scenelang.animation.painting import Painter
+from scenelang.backend.options import How
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.evaluate.evaluation import load_scene
+from scenelang.evaluate.evaluation import Source
 from scenelang.program.compile import compile_scene
 
 T = TypeVar("T")
@@ -53,7 +54,7 @@ def timed(work: Callable[[], T]) -> tuple[float, T]:
 
 def measure(name: str, path: Path, most: int) -> None:
     """Print the figures of one scene."""
-    together, alone = Painter(open_clip(path), threads=1), Painter(open_clip(path, reuse=False), threads=1)
+    together, alone = (Painter(Clip(Source(path), reuse=reuse), How(threads=1)) for reuse in (True, False))
     clip = together.clip
     frames = range(min(most, clip.animation.frames))
     times: dict[str, list[float]] = {"compile alone": [], "compile": [], "draw alone": [], "draw": []}
@@ -61,7 +62,7 @@ def measure(name: str, path: Path, most: int) -> None:
     for number in frames:
 
         def by_itself(number: int = number) -> object:
-            scene, spans = load_scene(path, diagnostics=Diagnostics(), frame=number)
+            scene, spans = Source(path).scene(Diagnostics(), number)
             assert scene is not None
             return compile_scene(scene, spans=spans)
 

@@ -192,13 +192,13 @@ def many(folder: Path, frames: int) -> dict[str, Any]:
         found |= {f"worker {at}": psutil.Process(worker.pid) for at, worker in enumerate(workers)}
         mine = psutil.Process()
         for at in range(8 * WORKERS):  # loads what drawing needs
-            helper.submit(programs[at], Errand(str(put / f"{at}.png"), None, 1, ()))
+            helper.submit(programs[at], Errand(str(put / f"{at}.png"), "numpy", 1))
         while helper.waiting:
             helper.take()
         before = {name: processor_s(process) for name, process in found.items()}
         client_s, started = time.process_time(), time.perf_counter()
         for at in range(frames):
-            helper.submit(programs[at % 100], Errand(str(put / f"{at}.png"), None, 1, ()))
+            helper.submit(programs[at % 100], Errand(str(put / f"{at}.png"), "numpy", 1))
             if at % few == few - 1:
                 sizes = {"client": mine.memory_info().rss, "scheduler": found["scheduler"].memory_info().rss}
                 memory.append({"frames": at + 1, **{name: size / 2**20 for name, size in sizes.items()}})

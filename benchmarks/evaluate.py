@@ -12,7 +12,7 @@ import time
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import evaluate
+from scenelang.evaluate.evaluation import Source
 from scenelang.syntax import parse
 
 BODY = (
@@ -40,7 +40,7 @@ def measure(kind: str, count: int) -> None:
     start = time.perf_counter()
     file = parse(source, found)
     parsed = time.perf_counter()
-    scene, _ = evaluate(file, diagnostics=found)
+    scene, _ = Source(tree=file).scene(found)
     done = time.perf_counter()
     assert scene is not None
     assert len(scene.nodes) == count

@@ -27,6 +27,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 from scenelang.cli.main import Commands, cli
+from scenelang.evaluate.evaluation import Source
 from scenelang.viewer.export import viewed
 from scenelang.viewer.page import control_rows
 from scenelang.viewer.page import page as page_of
@@ -98,12 +99,12 @@ def live_scenes() -> dict[str, str | Path]:
 def view_of_scene(scene: str | Path) -> View:
     """What a page draws of a text or a file."""
     if isinstance(scene, Path):
-        return viewed(scene, root=ROOT / "examples")[0]
+        return viewed(Source(scene, root=ROOT / "examples"), scene.stem)[0]
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(ROOT / "examples", folder, dirs_exist_ok=True)  # some import from there
         path = Path(folder, "scene.nsg")
         path.write_text(scene, "utf-8")
-        return viewed(path)[0]
+        return viewed(Source(path), path.stem)[0]
 
 
 def commands_page() -> str:

@@ -18,6 +18,7 @@ from scenelang.diagnostics.render_machine import render_github, render_json, ren
 from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile
 from scenelang.elements.zoo import read_zoo
+from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.session import Defines
 from scenelang.formatting import format_text
 from scenelang.interchange.gltf import import_gltf
@@ -77,7 +78,7 @@ class Pump:
 
 
 def _scenes(name: str, scene: str) -> Scenes:
-    found = Scenes(Request(Defines({})))
+    found = Scenes(Request(Source(params=Defines({}))))
     found.sources[name] = SourceFile(name, scene)
     return found
 

@@ -18,7 +18,7 @@ import pytest
 import scenelang
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import Source
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import check_scene
 from scenelang.program.compile import find_model
@@ -69,7 +69,7 @@ def test_scenes_give_what_the_page_says(block: Block) -> None:
     """A block of ``nsg`` has no errors, one of ``nsg E0402 …`` those that it names."""
     found = Diagnostics()
     source = SourceFile(str(block), block.text)
-    scene, spans = load_source(source, diagnostics=found, root=ROOT / "examples")
+    scene, spans = Source(text=source, root=ROOT / "examples").scene(found)
     if scene is not None:
         manifest = find_model(scene, found, spans=spans)
         if manifest is not None:

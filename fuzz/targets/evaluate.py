@@ -126,8 +126,8 @@ def _outside(scene_text: str) -> tuple[dict[str, str], int]:
 
 def _evaluate(scene_text: str, values: dict[str, str], frame: int) -> tuple[Scene | None, Diagnostics]:
     found = Diagnostics()
-    scene, _ = evaluating.load_source(
-        SourceFile("fuzz.nsg", scene_text), diagnostics=found, defines=values, root=root(), frame=frame
+    scene, _ = evaluating.Source(text=SourceFile("fuzz.nsg", scene_text), params=values, root=root()).scene(
+        found, frame
     )
     return scene, found
 

@@ -24,7 +24,7 @@ from scenelang.backend.options import RenderError
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source, loads
+from scenelang.evaluate.evaluation import Source, loads
 from scenelang.models import weights
 from scenelang.models.load import Model, load_network
 from scenelang.models.manifest import ROOT, Manifest, load_manifest
@@ -60,7 +60,7 @@ def _check_manifest(data: bytes) -> None:
     hold(Manifest.from_json(json.dumps(told)) == manifest, "manifest to JSON and back")
     for text in (SCENE, WORDS, f'model "{MODEL}"; star {{ }}'):
         found = Diagnostics()
-        scene, spans = load_source(SourceFile("fuzz.nsg", text), diagnostics=found, models=[manifest])
+        scene, spans = Source(text=SourceFile("fuzz.nsg", text), models=[manifest]).scene(found)
         if scene is not None:
             try:
                 check_scene(scene, spans, found, manifest, None)

@@ -5,26 +5,27 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
-from scenelang.animation.clip import Clip, open_clip
+from scenelang.animation.clip import Clip
 from scenelang.animation.painting import Painter
 from scenelang.animation.run import Progress, RenderResult, make
 from scenelang.animation.targets import find_target
 from scenelang.animation.timing import FrameRange
+from scenelang.backend.options import How, Options
+from scenelang.evaluate.evaluation import Source
 from scenelang.scene.schema import Scene
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
-    from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
 
 Frames = range | str | None
-Source = str | os.PathLike[str] | Scene | Iterable[Scene]
+Drawn = str | os.PathLike[str] | Scene | Iterable[Scene]
 
 
 def render_frames(
-    path: Source,
+    path: Drawn,
     *,
     frames: Frames = None,
     fps: float | None = None,
@@ -32,9 +33,7 @@ def render_frames(
     params: Mapping[str, Any] | None = None,
     model: str | None = None,
     root: str | os.PathLike[str] | None = None,
-    backend: Backend = "neural",
-    device: Device = "auto",
-    threads: int | None = None,
+    **how: Unpack[Options],
 ) -> Iterator[Image]:
     """Draw the frames of a scene file, or Scenes, one after another; no picture is held.
 
@@ -51,7 +50,7 @@ def render_frames(
         params: values for a file's params, as for `scenelang.load`.
         model: draw with this model instead of the one that the file names.
         root: folder that imports cannot leave; by default the file's.
-        backend, device, threads: as for `scenelang.render`.
+        **how: as for `scenelang.render`.
 
     Yields:
         Pictures, float32 (H, W, 3) or, where the background is none, (H, W, 4).
@@ -64,7 +63,7 @@ def render_frames(
         ValueError: an argument is none of the above, or says something of a file where Scenes are given.
     """
     clip = _opened(path, fps, size, params, model, root)
-    painter = Painter(clip, backend, device, threads)
+    painter = Painter(clip, How(**how).checked())
     last: tuple[str, Image] | None = None
     for number in _numbers(clip, frames):
         frame = painter.prepare(clip.shot(number))
@@ -74,7 +73,7 @@ def render_frames(
 
 
 def animate(
-    path: Source,
+    path: Drawn,
     out: str | os.PathLike[str],
     *,
     frames: Frames = None,
@@ -83,14 +82,12 @@ def animate(
     params: Mapping[str, Any] | None = None,
     model: str | None = None,
     root: str | os.PathLike[str] | None = None,
-    backend: Backend = "neural",
-    device: Device = "auto",
-    threads: int | None = None,
     jobs: int | None = None,
     cluster: str | None = None,
     palette: Palette = "auto",
     dither: bool = False,
     progress: Callable[[Progress], None] = lambda _: None,
+    **how: Unpack[Options],
 ) -> RenderResult:
     """Draw a scene file or Scenes to an animation; a call that was interrupted goes on where it stopped.
 
@@ -98,12 +95,13 @@ def animate(
         path: the scene file, or Scenes, one a frame.
         out: a file whose suffix names the format (.gif, .webp, .apng, .mp4, .mov, .mkv, .webm), numbered
             pictures (``frame-%04d.png``), or a folder that ends in a slash or is there.
-        frames, fps, size, params, model, root, backend, device, threads: as for `render_frames`.
+        frames, fps, size, params, model, root: as for `render_frames`.
         jobs: processes that draw; by default this one, and others where they pay.
         cluster: address of a dask scheduler whose workers draw, or ``"local"``; needs the extra ``dask``.
         palette: of a GIF: ``"global"``, ``"frame"``, or the one that is exact if one is (``"auto"``).
         dither: dither what a GIF's palette lacks.
         progress: called with how far it is, from any thread.
+        **how: as for `scenelang.render`.
 
     Returns:
         What was written.
@@ -117,7 +115,7 @@ def animate(
     clip = _opened(path, fps, size, params, model, root)
     if target.kind != "sequence":
         _ = clip.animation  # what is wrong with it is said before anything is drawn
-    painter = Painter(clip, backend, device, threads)
+    painter = Painter(clip, How(**how).checked())
     return make(
         painter,
         target,
@@ -131,7 +129,7 @@ def animate(
 
 
 def _opened(
-    path: Source,
+    path: Drawn,
     fps: float | None,
     size: tuple[int, int] | None,
     params: Mapping[str, Any] | None,
@@ -141,15 +139,14 @@ def _opened(
     if fps is not None and not 0 < fps < float("inf"):
         raise ValueError(f"{fps} frames a second, where a number above 0 is needed")
     if isinstance(path, str | os.PathLike):
-        folder = None if root is None else Path(root)
-        return open_clip(path, defines=params, model=model, root=folder, size=size, fps=fps)
+        return Clip(Source(path, params=params, model=model, root=root, size=size, fps=fps))
     scenes = (path,) if isinstance(path, Scene) else tuple(path) if isinstance(path, Iterable) else ()
     if not scenes or not all(isinstance(scene, Scene) for scene in scenes):
         raise ValueError("neither a path nor Scenes to draw")
     if params is not None or root is not None:
         raise ValueError("params and root are for files; Scenes have their values")
-    sized = scenes if size is None else tuple(scene.sized(size) for scene in scenes)
-    return Clip(sized, model=model, fps=fps)
+    scenes = scenes if size is None else tuple(scene.sized(size) for scene in scenes)
+    return Clip(tuple(scene.of_model(model) for scene in scenes), fps=fps)
 
 
 def _numbers(clip: Clip, frames: Frames) -> range:

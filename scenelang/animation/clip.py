@@ -6,23 +6,19 @@ reach, and where its nodes are those of the frame before, so is its Program.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from scenelang.animation.timing import FrameRange, FramesError
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.evaluate.evaluation import Evaluation
-from scenelang.evaluate.loader import Unreadable, read_source
-from scenelang.evaluate.session import Defines
+from scenelang.diagnostics.suggest import plural
+from scenelang.evaluate.evaluation import Evaluation, Source
 from scenelang.graph.lower import Memory
 from scenelang.scene.schema import Animation, Scene, same_nodes
 from scenelang.scene.spans import SpanMap
-from scenelang.syntax import parse
 
 if TYPE_CHECKING:
     from scenelang.program.program import Program
@@ -71,48 +67,32 @@ class Clip:
     """A scene to be evaluated and compiled frame by frame, or Scenes that are its frames.
 
     Args:
+        source: the scene, one that is prepared, or its frames.
         diagnostics: collects what is found, in each frame; a mistake in any frame ends the clip.
-        model: name of the model to draw with, instead of the scene's.
-        root: folder that imports cannot leave; by default that of ``path``, where the text was read from.
-        size: canvas in pixels, instead of the scene's.
-        fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
-            seconds × fps frames, and t and u follow.
-        texts: what imported files hold, by their resolved paths, instead of what is on the disk.
+        fps: frames a second, instead of those of the first Scene's animation.
         reuse: keep what frames share; without it each frame is worked out by itself.
+
+    Raises:
+        SceneError: the scene's file is not text.
+        OSError: it cannot be opened.
     """
 
     def __init__(
         self,
-        source: SourceFile | tuple[Scene, ...] | Evaluation,
-        *,
-        path: Path | None = None,
+        source: Source | Evaluation | tuple[Scene, ...],
         diagnostics: Diagnostics | None = None,
-        defines: Mapping[str, Any] | Defines | None = None,
-        model: str | None = None,
-        root: Path | None = None,
-        size: tuple[int, int] | None = None,
+        *,
         fps: float | None = None,
-        texts: Mapping[Path, str] | None = None,
         reuse: bool = True,
     ) -> None:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
-        self.model, self.size, self.reuse = model, size, reuse
+        self.reuse = reuse
         self._evaluation: Evaluation | Given = (
-            source
-            if isinstance(source, Evaluation)
+            source.evaluation(self.diagnostics, replays=reuse)
+            if isinstance(source, Source)
             else Given(source, fps)
             if isinstance(source, tuple)
-            else Evaluation(
-                parse(source, self.diagnostics),
-                diagnostics=self.diagnostics,
-                defines=defines,
-                model=model,
-                root=root,
-                path=path,
-                fps=fps,
-                texts=texts,
-                replays=reuse,
-            )
+            else source
         )
         self._last: tuple[Shot, Program] | None = None
         self._memory = Memory() if reuse else None
@@ -148,16 +128,22 @@ class Clip:
         given = self._evaluation
         return len(given.scenes) if isinstance(given, Given) else self.animation.frames
 
+    def numbers(self, frames: FrameRange) -> range:
+        """The numbers of the frames that are asked for; raises `SceneError` where some are not there."""
+        animation = self.animation
+        try:
+            return frames.among(animation.frames)
+        except FramesError as error:
+            count = plural(animation.frames, "frame")
+            help = f"{animation.seconds:g} s at {animation.fps:g} frames a second make {count}"
+            self.diagnostics.add("E0337", str(error), None, help=help)
+            raise SceneError(self.diagnostics) from None
+
     def shot(self, number: int) -> Shot:
         """Evaluate a frame; raises `SceneError` if it has errors."""
         scene, spans = self._evaluation.run(number)
         if scene is None or self.diagnostics.errors:
             raise SceneError(self.diagnostics)
-        if self.size is not None:
-            sized = scene.sized(self.size)
-            if spans.span(scene) is not None:
-                spans.copy(scene, sized)
-            scene = sized
         return Shot(number, scene, spans)
 
     def program(self, shot: Shot) -> Program:
@@ -167,20 +153,7 @@ class Clip:
         if self.reuse and self._last is not None and same_nodes(self._last[0].scene, shot.scene):
             return self._last[1]
         program = compile_scene(
-            shot.scene, spans=shot.spans, diagnostics=self.diagnostics, model=self.model, memory=self._memory
+            shot.scene, spans=shot.spans, diagnostics=self.diagnostics, memory=self._memory
         )
         self._last = shot, program
         return program
-
-
-def open_clip(path: str | os.PathLike[str], **options: Any) -> Clip:
-    """A clip of a scene file; ``options`` as for `Clip`. Raises `SceneError` where it is not text."""
-    where = Path(path)
-    name = os.fspath(path)
-    try:
-        source = read_source(where, name)
-    except Unreadable as error:
-        found = options.get("diagnostics") or Diagnostics()
-        found.add(error.code, f"cannot read `{where.name}`: {error}", Span(SourceFile(name, ""), 0, 0))
-        raise SceneError(found) from None
-    return Clip(source, path=where, **options)

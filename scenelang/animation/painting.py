@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, get_args
+from typing import TYPE_CHECKING, NamedTuple
 
 from scenelang.animation.clip import Clip, Shot
 from scenelang.animation.store import frame_key
+from scenelang.backend.options import DEFAULT, How
 
 if TYPE_CHECKING:
-    from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
     from scenelang.outputs import Output
     from scenelang.program.program import Program
@@ -33,7 +33,7 @@ class Drawable:
     key: str  # digest of all that decides its pixels
     shot: Shot  # the frame
     program: Program | None  # what the network draws; None for the reference
-    small: bool = False  # whether numpy draws it
+    place: str = "cpu"  # who draws it: numpy, or a torch device
 
 
 @dataclass(slots=True)
@@ -41,21 +41,12 @@ class Painter:
     """Draws a clip's frames."""
 
     clip: Clip  # the animation
-    backend: Backend = "neural"
-    device: Device = "auto"  # where the network runs
-    threads: int | None = None  # tiles drawn at the same time; by default as for `scenelang.render`
+    how: How = DEFAULT  # how they are drawn
     # the picture before, of which what is the same is taken over
     kept: Kept | None = field(default=None, repr=False)
     outputs: tuple[Output, ...] = ()  # beside each picture
     single: bool = False  # draw each as it is drawn by itself: small ones by numpy
     load_s: float = 0.0  # what loading torch took
-
-    def __post_init__(self) -> None:
-        from scenelang.backend.options import Backend
-
-        if self.backend not in get_args(Backend):
-            known = " and ".join(f"`{name}`" for name in get_args(Backend))
-            raise ValueError(f"unknown backend `{self.backend}` of animations; there are {known}")
 
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
         """Compile a frame and say what its files depend on; raises as `Clip.program`, or `RenderError`.
@@ -73,37 +64,37 @@ class Painter:
         return replace(found, key=frame_key(found.key, self.outputs, *places))
 
     def _picture(self, shot: Shot, single: bool) -> Drawable:
-        if self.backend == "reference":
+        if self.how.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})
-            key = frame_key("reference", _version("scenelang"), self.clip.model, scene.to_json())
+            key = frame_key("reference", _version("scenelang"), scene.to_json())
             return Drawable(shot.number, key, shot, None)
         program = self.clip.program(shot)
-        if single or program.stage is not None:
+        place = self._place(program, single)
+        library = place if place == "numpy" else "torch"
+        cores = () if place == "numpy" and program.stage is None else (self.split(program),)
+        way = self.how.backend, *self.how.care.values()
+        key = frame_key(place, _version("scenelang"), _version(library), *way, *cores, program.digest())
+        return Drawable(shot.number, key, shot, program, place)
+
+    def _place(self, program: Program, single: bool) -> str:
+        """The library or device that draws a Program: numpy, or a torch device."""
+        how = self.how
+        if single or program.stage is not None or how.backend == "exact":
             from scenelang.backend.small import choose_drawer
 
-            if choose_drawer(program, self.device).library == "numpy":
-                cores = () if program.stage is None else (self.split(program),)
-                key = frame_key("numpy", _version("scenelang"), _version("numpy"), *cores, program.digest())
-                return Drawable(shot.number, key, shot, program, small=True)
-        key = frame_key(
-            "neural",
-            *(_version("scenelang"), _version("torch"), self.place, self.split(program), program.digest()),
-        )
-        return Drawable(shot.number, key, shot, program)
-
-    @property
-    def place(self) -> str:
-        """The torch device."""
+            drawer = choose_drawer(program, how.device, how.samples, exact=how.backend == "exact")
+            if drawer.library == "numpy":
+                return "numpy"
         started = time.perf_counter()
         from scenelang.backend.neural import choose_device
 
         self.load_s += time.perf_counter() - started
-        return choose_device(self.device)
+        return choose_device(how.device)
 
     def split(self, program: Program) -> int:
         """How many threads a picture is split for, which shows in the last bits of its pixels."""
-        if self.threads is not None:
-            return self.threads
+        if self.how.threads is not None:
+            return self.how.threads
         from scenelang.backend.options import threads_for
 
         return threads_for(program.canvas)
@@ -113,13 +104,17 @@ class Painter:
         if frame.program is None:
             from scenelang.backend.render import draw_exact
 
-            return draw_exact(frame.shot.scene, spans=frame.shot.spans, model=self.clip.model)
+            return draw_exact(frame.shot.scene, spans=frame.shot.spans)
+        from scenelang.backend.render import draw
         from scenelang.renderers.draw import Kept
 
         if self.kept is None and self.clip.reuse:
             self.kept = Kept()
-        place, split = None if frame.small else self.place, self.split(frame.program)
-        return paint(frame.program, place, threads=split, split=split, kept=self.kept, progress=progress)
+        split = self.split(frame.program)
+        how = self.how._replace(threads=split)
+        return draw(
+            frame.program, how, place=frame.place, split=split, kept=self.kept, progress=progress
+        ).image
 
     def draft(self, frame: Drawable) -> Image | None:
         """A coarse picture of solids in the frame's size, for about a twentieth of the work; else None."""
@@ -131,20 +126,15 @@ class Painter:
 
         width, height = program.canvas
         coarse = replace(program, canvas=(-(-width // DRAFT), -(-height // DRAFT)))
-        return enlarged(draw_small(coarse, samples="one", threads=self.threads).image, program.canvas)
+        return enlarged(draw_small(coarse, samples="one", threads=self.how.threads).image, program.canvas)
 
     def files(self, frame: Drawable, file: Path, progress: Progress | None = None) -> dict[Path, bytes]:
         """What the picture's file holds and those of its outputs; raises as `scenelang.render_outputs`."""
-        from scenelang.backend.outputs import exact_outputs, neural_outputs
+        from scenelang.backend.outputs import outputs_of
         from scenelang.image import packed
-        from scenelang.outputs import Outputs
 
-        found = Outputs()
-        if self.outputs and frame.program is not None:
-            found = neural_outputs(frame.program, self.outputs, self.threads)
-        elif self.outputs:
-            shot, model = frame.shot, self.clip.model
-            found = exact_outputs(shot.scene, self.outputs, spans=shot.spans, model=model)
+        shot, drawn = frame.shot, frame.program or frame.shot.scene
+        found = outputs_of(drawn, self.outputs, self.how, spans=shot.spans)
         return packed(self.draw(frame, progress), found, file)
 
 
@@ -152,45 +142,18 @@ class Errand(NamedTuple):
     """A frame that another process draws, by one thread; its fields are what JSON holds."""
 
     file: str  # where its picture goes, which names the format
-    place: str | None  # torch device, or None for numpy
+    place: str  # numpy, or a torch device
     split: int  # threads that the picture is split for
-    outputs: tuple[Output, ...]  # beside it
+    outputs: tuple[Output, ...] = ()  # beside it
+    how: How = DEFAULT  # how it is drawn
 
     def run(self, program: bytes, kept: Kept) -> dict[Path, bytes]:
         """What the files of a Program's bytes hold; raises as `scenelang.render_outputs`."""
-        from scenelang.backend.outputs import neural_outputs
+        from scenelang.backend.outputs import outputs_of
+        from scenelang.backend.render import draw
         from scenelang.image import packed
-        from scenelang.outputs import Outputs
         from scenelang.program.reading import parse_program
 
-        if self.place is not None:
-            from scenelang.backend.neural import choose_device
-
-            choose_device(self.place)
-        read = parse_program(program)
-        found = neural_outputs(read, self.outputs, 1) if self.outputs else Outputs()
-        image = paint(read, self.place, threads=1, split=self.split, kept=kept)
-        return packed(image, found, Path(self.file))
-
-
-def paint(
-    program: Program,
-    place: str | None,
-    *,
-    threads: int,
-    split: int,
-    kept: Kept | None,
-    progress: Progress | None = None,
-) -> Image:
-    """Draw a Program on a torch device, or by numpy where that is None.
-
-    The picture is split for so many threads, of which so many draw at the same time.
-    """
-    if place is None:
-        from scenelang.backend.small import draw_small
-
-        return draw_small(program, kept=kept, progress=progress, threads=threads, split=split).image
-    from scenelang.backend.neural import draw_program, open_model
-
-    model = open_model(program.model, place)
-    return draw_program(program, model, threads=threads, split=split, kept=kept, progress=progress).image
+        read, how = parse_program(program), How(*self.how)._replace(threads=1)
+        image = draw(read, how, place=self.place, split=self.split, kept=kept).image
+        return packed(image, outputs_of(read, self.outputs, how), Path(self.file))

@@ -155,7 +155,7 @@ def make(
     if target.kind != "sequence" and not _FPS[0] <= (fps := painter.clip.animation.fps) <= _FPS[1]:
         least, most = _FPS
         raise RenderError(f"a film of {fps:g} frames a second, where {least:g} to {most:,.0f} can be written")
-    if cluster is not None and painter.backend == "reference":
+    if cluster is not None and painter.how.backend == "reference":
         raise RenderError("a cluster draws by the network, and the reference is asked for")
     suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
     made = RenderResult([], len(numbers))
@@ -258,8 +258,8 @@ class _Run:
         if self.others is None:
             self.others = self._helpers(frame, total - index)
         if self.others is not None and frame.program is not None:
-            place = None if frame.small else painter.place
-            errand = Errand(str(file), place, painter.split(frame.program), painter.outputs)
+            split = painter.split(frame.program)
+            errand = Errand(str(file), frame.place, split, painter.outputs, painter.how)
             self.others.submit(frame.program, errand)
         else:
             share = partial(_part, self.progress, index, total)
@@ -274,11 +274,11 @@ class _Run:
 
             return Cluster(self.cluster)
         painter, jobs = self.painter, self.jobs
-        if frame.program is None or jobs == 1 or not (frame.small or painter.place == "cpu"):
+        if frame.program is None or jobs == 1 or frame.place == "cuda":
             return None
         if jobs is None:
             drawn = self.made.drawn
-            if painter.threads is not None or usable_cores() < 2 or drawn < _TRIED:
+            if painter.how.threads is not None or usable_cores() < 2 or drawn < _TRIED:
                 return None
             if self.spent_s / drawn * left <= WORTH_S:
                 return None

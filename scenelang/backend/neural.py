@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from typing import Unpack
 
 from scenelang.backend.options import RenderError
 
@@ -17,7 +18,7 @@ try:
     import torch
 except ModuleNotFoundError as error:
     raise RenderError("this is drawn by torch, which is not installed; pip install torch") from error
-from scenelang.backend.options import Samples, keep_memory, threads_for
+from scenelang.backend.options import Care, keep_memory, threads_for
 from scenelang.backend.options import usable_cores as usable_cores
 from scenelang.elements.element import credit_of
 from scenelang.models.load import Model, ModelError, Network, load_model, place_of
@@ -86,7 +87,7 @@ def _one_torch_thread() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def _by_kernel(network: Network, program: Program, samples: Samples) -> Drawing | None:
+def _by_kernel(network: Network, program: Program, care: Care) -> Drawing | None:
     """The picture by one kernel, None where that cannot draw it: of solids, or on a CPU."""
     if not isinstance(network, Framed) or place_of(network).type != "cuda":
         return None
@@ -94,7 +95,7 @@ def _by_kernel(network: Network, program: Program, samples: Samples) -> Drawing 
         from scenelang.renderers.device.draw import draw_on_device, ready
     except ModuleNotFoundError:  # Triton comes with builds of torch for CUDA on Linux
         return None
-    return draw_on_device(network, program, samples) if ready() else None
+    return draw_on_device(network, program, **care) if ready() else None
 
 
 def draw_program(
@@ -104,9 +105,9 @@ def draw_program(
     threads: int | None = None,
     split: int | None = None,
     kept: Kept | None = None,
-    samples: Samples = "adaptive",
     skip: bool = True,
     progress: Callable[[float], None] | None = None,
+    **care: Unpack[Care],
 ) -> Drawing:
     """Draw a Program.
 
@@ -116,9 +117,9 @@ def draw_program(
         threads: tiles drawn at the same time; by default as `threads_for` says.
         split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
-        samples: of a pixel, as in `scenelang.render`, with framed and solids' renderers.
         skip: leave out points that an object cannot reach; without it no pixel measured differed by 0.001.
         progress: called with the share done, in [0, 1], from any thread.
+        **care: ``samples``, as of `How`, with framed and solids' renderers.
 
     Raises:
         RenderError: the Program was compiled for another model or other weights, its vectors are not
@@ -134,7 +135,7 @@ def draw_program(
         try:
             program.check_weights(model.digest)
             if isinstance(network, Framed | Solids):
-                drawing = _by_kernel(network, program, samples) if skip else None
+                drawing = _by_kernel(network, program, care) if skip else None
                 if drawing is not None and progress is not None:
                     progress(1.0)
                 drawing = drawing or draw_objects(
@@ -144,12 +145,12 @@ def draw_program(
                     split=split,
                     kept=kept,
                     skip=skip,
-                    samples=samples,
                     progress=progress,
+                    **care,
                 )
                 drawing.image.credit = credit_of(program.elements)
                 return drawing
-            if samples != "adaptive":
+            if (samples := care.get("samples", "adaptive")) != "adaptive":
                 raise RenderError(f"model `{name}` samples pixels in one way only, not `{samples}`")
             torch.set_num_threads(threads)
             return draw_whole(network, program, progress=progress)

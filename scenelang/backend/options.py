@@ -4,18 +4,92 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Literal
+from typing import Final, Literal, NamedTuple, TypedDict, cast, get_args
 
-Backend = Literal["neural", "reference"]
-Still = Literal["neural", "exact", "reference"]
-"""Backends that draw a single picture."""
+Backend = Literal["neural", "exact", "reference"]
 Device = Literal["auto", "cpu", "cuda"]
 Samples = Literal["adaptive", "four", "quick", "one", "draft"]
-"""Of a pixel, as `scenelang.backend.render.render` says."""
 
 
 class RenderError(Exception):
     """Nothing can be drawn: no such device, no fitting weights, or a Program where a Scene is needed."""
+
+
+class Care(TypedDict, total=False):
+    """Fields of `How` that renderers take by these names, whichever library they use."""
+
+    samples: Samples
+
+
+class Options(Care, total=False):
+    """Fields of `How`, as calls take them by name."""
+
+    backend: Backend
+    device: Device
+    threads: int | None
+
+
+class How(NamedTuple):
+    """A way to draw pictures, alike for stills, films, sweeps and what is watched.
+
+    The command line has an option for each field, with the line of `HELP`.
+
+    Args:
+        backend: ``"neural"`` draws with the trained network, ``"exact"`` with formulas of the shapes in its
+            place, all else alike, and ``"reference"`` a Scene by the exact definition, which knows no boolean
+            rule and none of a model's limits.
+        device: where torch runs the network, whatever the picture's size; with ``"auto"`` numpy draws solids
+            and small stills, and torch others on CUDA where there is any.
+        threads: tiles drawn at the same time; by default one for each 131,072 pixels, but no more than there
+            are usable cores. Numpy draws the plane in one.
+        samples: of a pixel: ``"four"`` as the language defines, ``"adaptive"``, four near outlines and one
+            elsewhere (on CUDA four in the plane), which looks the same, ``"one"``, which is faster and has
+            hard edges, or ``"draft"``, one for each 2 x 2 pixels, enlarged. ``"quick"`` is ``"adaptive"``
+            with less care for solids: steps that may pass what is thinner than 0.04, as those of ``"one"``
+            and ``"draft"`` may.
+    """
+
+    backend: Backend = "neural"
+    device: Device = "auto"
+    threads: int | None = None
+    samples: Samples = "adaptive"
+
+    def checked(self) -> How:
+        """The same.
+
+        Raises:
+            ValueError: a value is none of those above.
+            RenderError: two of them exclude each other.
+        """
+        for name, known in CHOICES.items():
+            if (value := getattr(self, name)) not in known:
+                ways = ", ".join(f"`{way}`" for way in known)
+                raise ValueError(f"unknown {name} `{value}`; there are {ways}")
+        if self.threads is not None and self.threads < 1:
+            raise ValueError(f"{self.threads} threads, where at least 1 is needed")
+        if self.backend == "reference" and self.samples != "adaptive":
+            raise RenderError("the reference always takes four samples a pixel")
+        if self.backend == "exact" and self.device == "cuda":
+            raise RenderError("formulas are computed by numpy, not by device cuda")
+        return self
+
+    @property
+    def care(self) -> Care:
+        """The fields that renderers take."""
+        return cast("Care", {name: getattr(self, name) for name in Care.__annotations__})
+
+
+DEFAULT: Final = How()
+CHOICES: Final = {"backend": get_args(Backend), "device": get_args(Device), "samples": get_args(Samples)}
+HELP: Final = {
+    "backend": "Draw with the trained network, with formulas of the shapes in its place (exact), or by the "
+    "exact definition, which is slow (reference).",
+    "device": "Device of torch; auto is CUDA where there is any, and numpy for solids or a small picture.",
+    "threads": "Number of threads on the CPU.",
+    "samples": "Samples of a pixel: four near outlines, four everywhere, four near strong outlines (solids), "
+    "one, with hard edges, or one for each 2 x 2 pixels.",
+}
+"""The line of `--help` for each field of `How`."""
 
 
 KEEP_BYTES = 256 << 20

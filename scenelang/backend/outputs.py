@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, get_args
 
-from scenelang.backend.options import RenderError, Still, keep_memory, threads_for
+from scenelang.backend.options import Backend, How, RenderError, keep_memory, threads_for
 from scenelang.backend.render import exact_graph, given
 from scenelang.outputs import PLANE, Output, Outputs, Source
 from scenelang.scene.schema import Scene
@@ -21,7 +21,7 @@ def render_outputs(
     outputs: Sequence[Output],
     *,
     size: tuple[int, int] | None = None,
-    backend: Still = "neural",
+    backend: Backend = "neural",
     threads: int | None = None,
 ) -> Outputs:
     """Depth, normals, objects and alpha of a picture, for compositing; numpy computes them.
@@ -48,16 +48,33 @@ def render_outputs(
     for name in outputs:
         if name not in known:
             raise ValueError(f"unknown output `{name}`; there are {', '.join(known)}")
+    how = How(backend, threads=threads).checked()
     found, spans = given(program_or_scene, size, backend)
-    if isinstance(found, Scene):
-        return exact_outputs(found, outputs, spans=spans)
-    return neural_outputs(found, outputs, threads, exact=backend == "exact")
+    return outputs_of(found, outputs, how, spans=spans)
 
 
-def neural_outputs(
-    program: Program, wanted: Sequence[Output], threads: int | None = None, *, exact: bool = False
+def outputs_of(
+    drawn: Program | Scene,
+    wanted: Sequence[Output],
+    how: How,
+    *,
+    spans: Spans | None = None,
 ) -> Outputs:
-    """Outputs of a Program by its network, or by formulas in its place; raises as `render_outputs`."""
+    """Outputs of what a backend draws, a proof aside; raises as `render_outputs`.
+
+    Args:
+        spans: where the nodes of a Scene were written.
+    """
+    wanted = tuple([name for name in wanted if name != "proof"])
+    if not wanted:
+        return Outputs()
+    if isinstance(drawn, Scene):
+        return _exact(drawn, wanted, spans)
+    return _neural(drawn, wanted, how)
+
+
+def _neural(program: Program, wanted: Sequence[Output], how: How) -> Outputs:
+    """Outputs of a Program by its network, or by formulas in its place."""
     from scenelang.backend.closed import field_of
     from scenelang.models.manifest import load_manifest
     from scenelang.models.weights import ModelError
@@ -69,9 +86,8 @@ def neural_outputs(
         if load_manifest(program.model).renderer not in ("framed", "solid"):
             raise RenderError(f"model `{program.model}` draws colours only")
         keep_memory()
-        found = program_outputs(
-            field_of(program, exact), program, threads=threads or threads_for(program.canvas)
-        )
+        field = field_of(program, how.backend == "exact")
+        found = program_outputs(field, program, threads=how.threads or threads_for(program.canvas))
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
     except (ModelError, ProgramError) as error:
@@ -79,15 +95,13 @@ def neural_outputs(
     return found.only(wanted, _sources(program.numbers, program.objects, program.places))
 
 
-def exact_outputs(
-    scene: Scene, wanted: Sequence[Output], *, spans: Spans | None = None, model: str | None = None
-) -> Outputs:
-    """Outputs of a scene by the exact definition; raises as `render_outputs`."""
+def _exact(scene: Scene, wanted: Sequence[Output], spans: Spans | None) -> Outputs:
+    """Outputs of a scene by the exact definition."""
     from scenelang.graph.nodes import leaves
     from scenelang.program.emit import places_of
     from scenelang.reference.outputs import graph_outputs
 
-    graph, brought = exact_graph(scene, spans, model)
+    graph, brought = exact_graph(scene, spans)
     _check(wanted, graph.stage is None)
     try:
         found = graph_outputs(graph, brought)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
-from scenelang.backend.options import Device, RenderError, Samples, keep_memory
+from scenelang.backend.options import How, Options, RenderError, keep_memory
 from scenelang.outputs import Proof
 from scenelang.scene.schema import Scene
 
@@ -21,9 +21,7 @@ def prove(
     *,
     redraw: bool = False,
     size: tuple[int, int] | None = None,
-    device: Device = "auto",
-    threads: int | None = None,
-    samples: Samples = "adaptive",
+    **how: Unpack[Options],
 ) -> tuple[Image, Proof]:
     """Draw a Scene of the plane, and prove how far each pixel is from the exact picture at most.
 
@@ -32,7 +30,7 @@ def prove(
         image: its picture, whoever drew it; by default it is drawn by the network, as `render` does.
         redraw: draw pixels again that are not proved right to 1/255. Then all are, but where an element may
             be seen, and where a sample lies on an outline to the last digits.
-        size, device, threads, samples: as for `render`.
+        size, **how: as for `render`; the backend is the network.
 
     Returns:
         The picture, and bounds of its pixels.
@@ -42,20 +40,22 @@ def prove(
         RenderError: nothing is proved of such pictures (solids, models with a learned lifting), the picture
             is of another size, or it cannot be drawn.
     """
-    from scenelang.backend.render import render
+    from scenelang.backend.render import draw
     from scenelang.diagnostics.diagnostic import Diagnostics
     from scenelang.evaluate.evaluation import opened
     from scenelang.program.compile import compile_scene
 
+    way = How(**how).checked()
+    if way.backend != "neural":
+        raise RenderError(f"a proof is of what the network draws, and backend {way.backend} is exact")
     graphs: dict[str, Graph] = {}
     found = Diagnostics()
     scene, spans = opened(scene, found, size)
     program = compile_scene(scene, spans=spans, diagnostics=found, after=graphs.__setitem__)
 
-    def draw() -> Image:
-        return render(program, device=device, threads=threads, samples=samples) if image is None else image
-
-    return prove_drawn(graphs, program.model, draw, redraw)
+    return prove_drawn(
+        graphs, program.model, lambda: draw(program, way).image if image is None else image, redraw
+    )
 
 
 def prove_drawn(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Unpack
 
-from scenelang.backend.options import Device, RenderError, Samples, Still
+from scenelang.backend.options import DEFAULT, Backend, How, Options, RenderError
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.scene.schema import Scene
@@ -18,17 +18,16 @@ if TYPE_CHECKING:
     from scenelang.graph.nodes import Graph
     from scenelang.image import Image
     from scenelang.program.program import Program
+    from scenelang.renderers.draw import Drawing, Kept
 
 
-def exact_graph(
-    scene: Scene, spans: Spans | None = None, model: str | None = None
-) -> tuple[Graph, dict[str, Shape]]:
+def exact_graph(scene: Scene, spans: Spans | None = None) -> tuple[Graph, dict[str, Shape]]:
     """The graph of a scene as written, and true shapes of its elements; raises as `draw_exact`."""
     from scenelang.graph.lower import lower
     from scenelang.program.compile import find_model
 
     found = Diagnostics()
-    manifest = find_model(scene, found, model=model, spans=spans)
+    manifest = find_model(scene, found, spans=spans)
     graph = lower(scene, manifest, spans, found) if manifest is not None else None
     if graph is None or found.errors:
         raise SceneError(found)
@@ -47,13 +46,11 @@ def draw_exact(
     scene: Scene,
     *,
     spans: Spans | None = None,
-    model: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Image:
     """Draw a scene by the exact definition, from its graph as written, before any pass.
 
     Args:
-        model: take names from this model instead of the one the scene names.
         progress: called with the share done, in [0, 1].
 
     Raises:
@@ -62,22 +59,62 @@ def draw_exact(
     """
     from scenelang.reference.image import reference_image
 
-    graph, brought = exact_graph(scene, spans, model)
+    graph, brought = exact_graph(scene, spans)
     try:
         return reference_image(graph, brought=brought, progress=progress or (lambda _: None))
     except ValueError as error:
         raise RenderError(str(error)) from None
 
 
+def draw(
+    program: Program,
+    how: How = DEFAULT,
+    *,
+    place: str | None = None,
+    split: int | None = None,
+    kept: Kept | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Drawing:
+    """Draw a Program by the library that fits.
+
+    Args:
+        how: with a backend that draws Programs.
+        place: ``"numpy"`` or a torch device; by default numpy for solids and small pictures, else
+            ``how.device``.
+        split: threads that the picture is split for, which shows in the last bits; by default as many as
+            draw.
+        kept: the picture before this one, of which tiles that show the same are taken over.
+        progress: called with the share done, in [0, 1], from any thread.
+
+    Raises:
+        RenderError: as `render`.
+    """
+    if place is None:
+        from scenelang.backend.small import choose_drawer
+
+        drawer = choose_drawer(program, how.device, how.samples, exact=how.backend == "exact")
+        place = drawer.library if drawer.library == "numpy" else how.device
+    if place == "numpy":
+        from scenelang.backend.small import draw_small
+
+        exact = how.backend == "exact"
+        return draw_small(
+            program, threads=how.threads, split=split, kept=kept, progress=progress, exact=exact, **how.care
+        )
+    from scenelang.backend.neural import choose_device, draw_program, open_model
+
+    model = open_model(program.model, choose_device(place))
+    return draw_program(
+        program, model, threads=how.threads, split=split, kept=kept, progress=progress, **how.care
+    )
+
+
 def render(
     program_or_scene: Program | Scene | str | os.PathLike[str],
     *,
     size: tuple[int, int] | None = None,
-    backend: Still = "neural",
-    device: Device = "auto",
-    threads: int | None = None,
-    samples: Samples = "adaptive",
     progress: Callable[[float], None] | None = None,
+    **how: Unpack[Options],
 ) -> Image:
     """Draw a Program, a Scene, which is compiled first, or the file of either.
 
@@ -90,19 +127,8 @@ def render(
         program_or_scene: what to draw; a scene's file is read as by `scenelang.load`, a Program's ends in
             ``.safetensors``.
         size: canvas in pixels instead of the Scene's; a Program is compiled for its own.
-        backend: ``"neural"`` draws with the trained network, ``"exact"`` with formulas of the shapes in its
-            place, all else alike, and ``"reference"`` a Scene by the exact definition, which knows no boolean
-            rule and none of a model's limits.
-        device: where torch runs the network, whatever the picture's size; with ``"auto"`` numpy draws small
-            pictures, and torch others on CUDA where there is any.
-        threads: tiles drawn at the same time; by default one for each 131,072 pixels, but no more than there
-            are usable cores. Numpy draws the plane in one.
-        samples: of a pixel: ``"four"`` as the language defines, ``"adaptive"``, four near outlines and one
-            elsewhere (on CUDA four in the plane), which looks the same, ``"one"``, which is faster and has
-            hard edges, or ``"draft"``, one for each 2 x 2 pixels, enlarged. ``"quick"`` is ``"adaptive"``
-            with less care for solids: steps that may pass what is thinner than 0.04, as those of ``"one"``
-            and ``"draft"`` may.
         progress: called with the share done, in [0, 1], from any thread.
+        **how: ``backend``, ``device``, ``threads`` and ``samples``; see `scenelang.backend.options.How`.
 
     Returns:
         The picture, float32 (H, W, 3), or (H, W, 4) where the background is none.
@@ -116,42 +142,24 @@ def render(
             original of an element.
         ValueError, TypeError: an argument is none of the above.
     """
-    if samples not in get_args(Samples):
-        ways = ", ".join(f"`{way}`" for way in get_args(Samples))
-        raise ValueError(f"unknown samples `{samples}`; there are {ways}")
-    if threads is not None and threads < 1:
-        raise ValueError(f"{threads} threads, where at least 1 is needed")
-    if backend == "reference" and samples != "adaptive":
-        raise RenderError("the reference always takes four samples a pixel")
-    program, spans = given(program_or_scene, size, backend)
-    if isinstance(program, Scene):
-        return draw_exact(program, spans=spans, progress=progress)
-    from scenelang.backend.small import choose_drawer, draw_small
-
-    if backend == "exact" and device == "cuda":
-        raise RenderError("formulas are computed by numpy, not by device cuda")
-    exact, library = backend == "exact", choose_drawer(program, device, samples).library
-    if exact or library == "numpy":
-        return draw_small(program, samples=samples, progress=progress, threads=threads, exact=exact).image
-    from scenelang.backend.neural import choose_device, draw_program, open_model
-
-    model = open_model(program.model, choose_device(device))
-    return draw_program(program, model, threads=threads, samples=samples, progress=progress).image
+    way = How(**how).checked()
+    found, spans = given(program_or_scene, size, way.backend)
+    if isinstance(found, Scene):
+        return draw_exact(found, spans=spans, progress=progress)
+    return draw(found, way, progress=progress).image
 
 
 def given(
     program_or_scene: Program | Scene | str | os.PathLike[str],
     size: tuple[int, int] | None,
-    backend: Still,
+    backend: Backend,
 ) -> tuple[Program | Scene, Spans | None]:
-    """Input of a backend: a Scene for the reference, a Program for the network; raises as `render`.
+    """Input of a backend: a Scene for the reference, a Program for the others; raises as `render`.
 
     With a Scene of a file comes where its nodes were written.
     """
     from scenelang.program.program import Program
 
-    if backend not in get_args(Still):
-        raise ValueError(f"unknown backend `{backend}`; there are `neural`, `exact` and `reference`")
     found = program_or_scene
     if isinstance(found, str | os.PathLike) and Path(found).suffix == ".safetensors":
         from scenelang.program.reading import load_program

@@ -8,11 +8,11 @@ the Program and never measured while drawing: the same Program is always drawn b
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, Unpack
 
 from scenelang.backend.closed import field_of
 from scenelang.backend.load import load_of
-from scenelang.backend.options import Device, RenderError, Samples, keep_memory, threads_for
+from scenelang.backend.options import Care, Device, RenderError, Samples, keep_memory, threads_for
 from scenelang.elements.element import credit_of
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError
@@ -37,12 +37,20 @@ class Drawer(NamedTuple):
     why: str
 
 
-def choose_drawer(program: Program, device: Device = "auto", samples: Samples = "adaptive") -> Drawer:
+def choose_drawer(
+    program: Program, device: Device = "auto", samples: Samples = "adaptive", *, exact: bool = False
+) -> Drawer:
     """Who draws a single picture: a function of the Program, and of where a caller wants it drawn.
+
+    Args:
+        device, samples: as of `How`.
+        exact: whether formulas take the network's place.
 
     Raises:
         RenderError: there is no such model.
     """
+    if exact:
+        return Drawer("numpy", "formulas in the network's place")
     if device != "auto":
         return Drawer("torch", f"asked for by device {device}")
     try:
@@ -68,21 +76,21 @@ def work_ms(program: Program, samples: Samples = "adaptive") -> float:
 def draw_small(
     program: Program,
     *,
-    samples: Samples = "adaptive",
     kept: Kept | None = None,
     progress: Callable[[float], None] | None = None,
     threads: int | None = None,
     split: int | None = None,
     exact: bool = False,
+    **care: Unpack[Care],
 ) -> Drawing:
     """Draw a Program by numpy, on one core, or solids, if they are large, on several.
 
     Args:
         program: of any size, for a model with a framed or a solids' network.
-        samples: of a pixel, as in `scenelang.render`.
         kept: the picture before this one, of which tiles that show the same are taken over.
         threads, split: of solids, as for `scenelang.backend.neural.draw_program`.
         exact: ask formulas in place of the network.
+        **care: ``samples``, as of `How`.
 
     Raises:
         RenderError: its model's weights are missing, it was compiled for others or by no compiler, or there
@@ -99,8 +107,8 @@ def draw_small(
             threads=threads or threads_for(program.canvas),
             split=split,
             kept=kept,
-            samples=samples,
             progress=progress,
+            **care,
         )
     except (ModelError, ProgramError) as error:
         raise RenderError(str(error)) from None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,41 +13,32 @@ from rich.filesize import decimal
 from scenelang.animation.clip import Clip
 from scenelang.animation.targets import PICTURES, Target, TargetError, find_target, is_animation
 from scenelang.animation.timing import FrameRange, FramesError
-from scenelang.cli.inputs import STDIN, Request, read_text, stem_of, unused_defines
+from scenelang.cli.inputs import Input, stem_of
 from scenelang.cli.main import Trouble, describe
 from scenelang.cli.outputs import check_outputs
 from scenelang.cli.progress import Bar
 from scenelang.cli.say import say_diagnostics
-from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.span import SourceFile
 from scenelang.diagnostics.suggest import listing, plural
+from scenelang.records import Record
 
 if TYPE_CHECKING:
     from scenelang.animation.gif import Palette
     from scenelang.animation.run import RenderResult
-    from scenelang.backend.options import Backend, Device
+    from scenelang.backend.options import How
     from scenelang.outputs import Output
 
 
-@dataclass(frozen=True, slots=True)
-class Requested:
-    """What the command line says about animations."""
+class Film(Record):
+    """Options of the command line for animations alone."""
 
-    range: str | None  # `--frames`; None for all
-    fps: float | None  # frames a second instead of the scene's
+    range: str | None = None  # `--frames`; None for all
+    fps: float | None = None  # frames a second instead of the scene's
     jobs: int | None = None  # processes that draw
     cluster: str | None = None  # whose workers draw
     # of a GIF
     palette: Palette = "auto"
     dither: bool = False
-    # how frames are drawn
-    backend: Backend = "neural"
-    device: Device = "auto"
-    threads: int | None = None
-    strict: bool = False  # count warnings as errors
-    verbose: bool = False  # say where the time went
-    outputs: tuple[Output, ...] = ()  # beside each picture
 
     @property
     def certain(self) -> bool:
@@ -63,125 +53,109 @@ class Requested:
         except FramesError as error:
             raise click.BadParameter(str(error), param_hint="--frames") from None
 
+    def target(self, name: str, out: str) -> Target | None:
+        """The file or folder of a scene's animation, if it has one; None where ``out`` is a single picture.
 
-def wanted_target(name: str, out: str, wanted: Requested) -> Target | None:
-    """Where the animation of a scene goes if it has one; None where ``out`` is a single picture.
+        Raises `click.UsageError` where frames are asked for all the same.
+        """
+        if not (is_animation(out) or out.endswith(("/", "\\")) or Path(out).is_dir() or self.certain):
+            return None
+        try:
+            return find_target(out, stem_of(name))
+        except TargetError as error:
+            raise click.UsageError(f"{error}.") from None
 
-    Raises `click.UsageError` where frames are asked for all the same.
+
+def moves(found: Input, target: Target, film: Film, out: str) -> bool:
+    """True where a scene is drawn as an animation and not as one picture; reports where it cannot be.
+
+    Raises `click.UsageError` where ``out`` cannot hold a picture.
     """
-    folder = out.endswith(("/", "\\")) or Path(out).is_dir()
-    if not (is_animation(out) or folder or wanted.certain):
-        return None
-    try:
-        return find_target(out, stem_of(name))
-    except TargetError as error:
-        raise click.UsageError(f"{error}.") from None
-
-
-def still_picture(clip: Clip, target: Target, wanted: Requested, out: str) -> bool:
-    """Whether a scene without an animation is drawn as one picture; reports where it cannot be.
-
-    Raises `click.UsageError` where ``out`` cannot hold one.
-    """
-    if clip.animates:
-        return False
-    if wanted.certain:
-        which = "--frames" if wanted.frames != FrameRange() else "--fps"
-        clip.diagnostics.add("E0337", f"{which} for a scene without animate(…)", None)
-        return False
-    if target.kind == "sequence" and "%" not in out:
+    if found.diagnostics.errors or (found.evaluation is not None and found.evaluation.animates):
         return True
-    if target.kind == "sequence" or target.path.suffix.lower() in PICTURES:
-        return target.kind != "sequence"
+    if film.certain:
+        which = "--frames" if film.frames != FrameRange() else "--fps"
+        found.diagnostics.add("E0337", f"{which} for a scene without animate(…)", None)
+        return True
+    if target.kind == "sequence":
+        return "%" in out
+    if target.path.suffix.lower() in PICTURES:
+        return True
     suffixes = listing(sorted(PICTURES))
     raise click.UsageError(
         f"`{out}` is for animations, and the scene has no animate(…); {suffixes} hold a picture too."
     )
 
 
-def frames_of(clip: Clip, wanted: Requested) -> range | None:
-    """The numbers of the frames that are asked for; None after a report that some are not there."""
-    try:
-        return wanted.frames.among(clip.animation.frames)
-    except FramesError as error:
-        animation = clip.animation
-        count = plural(animation.frames, "frame")
-        help = f"{animation.seconds:g} s at {animation.fps:g} frames a second make {count}"
-        clip.diagnostics.add("E0337", str(error), None, help=help)
-        return None
+def animate(
+    found: Input,
+    target: Target,
+    film: Film,
+    how: How,
+    out: str,
+    outputs: tuple[Output, ...],
+    strict: bool,
+    verbose: bool,
+) -> int:
+    """Draw an animation and give the exit code.
 
-
-def animate(name: str, out: str, target: Target, request: Request, wanted: Requested) -> int | SourceFile:
-    """Draw an animation; the exit code, or the scene's text if it is to be drawn as one picture.
+    Args:
+        found: the scene.
+        out: the target, as the user wrote it.
+        outputs: to write beside each picture.
+        strict: count warnings as errors.
+        verbose: say where the time went.
 
     Raises:
-        OSError: the scene cannot be read.
         Trouble: a file cannot be written.
     """
     from scenelang.animation.painting import Painter
-    from scenelang.animation.run import make, ready
+    from scenelang.animation.run import make
 
-    started = time.perf_counter()
-    found = Diagnostics()
-    source = read_text(name, found)
-    if source is None:
-        say_diagnostics(found)
+    started, told = time.perf_counter(), found.diagnostics
+    drawn = found.evaluation or ((found.scene,) if found.scene is not None else ())
+    if told.errors or not drawn:
+        say_diagnostics(told)
         return 1
-    path = None if name == STDIN else Path(name)
-    root = request.root if request.root is not None else "." if path is None else None
-    clip = Clip(
-        source,
-        path=path,
-        diagnostics=found,
-        defines=request.defines,
-        model=request.model,
-        root=None if root is None else Path(root),
-        size=request.size,
-        fps=wanted.fps,
-    )
-    with suppress(SceneError):  # its diagnostics are `found`
-        _ = clip.first
-    if not found.errors and still_picture(clip, target, wanted, out):
-        return source
-    found.items.extend(unused_defines(request))
-    numbers = frames_of(clip, wanted) if not found.errors else None
-    if numbers is None or found.errors or (found.items and wanted.strict):
-        say_diagnostics(found)
+    clip = Clip(drawn, told)
+    numbers = None
+    with suppress(SceneError):  # its diagnostics are told
+        numbers = clip.numbers(film.frames)
+    if numbers is None or (told.items and strict):
+        say_diagnostics(told)
         return 1
-    if wanted.outputs and target.kind != "sequence":
+    if outputs and target.kind != "sequence":
         what = f"`{out}` is one file; numbered pictures such as frame-%04d.png have outputs"
         raise click.UsageError(f"{what}.")
-    check_outputs([target.file(number) for number in numbers], wanted.outputs)
-    ready(target)
-    painter = Painter(clip, wanted.backend, wanted.device, wanted.threads, outputs=wanted.outputs)
+    check_outputs([target.file(number) for number in numbers], outputs)
     try:
         with Bar() as bar:
             made = make(
-                painter,
+                Painter(clip, how, outputs=outputs),
                 target,
                 numbers,
-                jobs=wanted.jobs,
-                cluster=wanted.cluster,
-                palette=wanted.palette,
-                dither=wanted.dither,
-                strict=wanted.strict,
+                jobs=film.jobs,
+                cluster=film.cluster,
+                palette=film.palette,
+                dither=film.dither,
+                strict=strict,
                 progress=lambda now: bar(now.told, now.done, now.total),
             )
     except SceneError:
-        say_diagnostics(found)
+        say_diagnostics(told)
         return 1
     except KeyboardInterrupt:
         if target.work.exists():
-            told = f"\nframes are kept in `{target.work}`; the same command goes on with the rest"
-            click.echo(told, err=True)
+            kept = f"\nframes are kept in `{target.work}`; the same command goes on with the rest"
+            click.echo(kept, err=True)
         raise
     except OSError as error:
         raise Trouble(f"cannot write `{out}`: {describe(error)}") from None
-    say_diagnostics(found)
+    say_diagnostics(told)
     click.echo(summary(made, time.perf_counter() - started), err=True)
     if (others := strays(target, made)) is not None:
         click.echo(f"note: {others}", err=True)
-    for line in made.lines() if wanted.verbose else ():
+    for line in made.lines() if verbose else ():
         click.echo(f"  {line}", err=True)
     return 0
 

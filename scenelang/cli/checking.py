@@ -61,12 +61,14 @@ class Scenes(Record, frozen=False):
 
     def _check(self, sources: Mapping[str, SourceFile], texts: Mapping[Path, str]) -> Diagnostics:
         # Values from outside remember which params they met, so each round needs its own.
-        request = replace(self.request, defines=Defines(self.request.defines.values), texts=texts)
+        given = self.request.source
+        own = replace(given, params=Defines(given.values), texts=texts)
+        request = replace(self.request, source=own)
         parts, self.unseen = [self.unread.items], 0
         for name, source in sources.items():
-            found = read_input(name, request, source=source)
+            found = read_input(name, request, text=source)
             facts = found.tree, found.evaluation, found.scene, found.spans, found.diagnostics
-            self.unseen += check_evaluated(*facts, model=request.model, frames=self.frames)
+            self.unseen += check_evaluated(*facts, frames=self.frames)
             parts.append(found.diagnostics.items)
         parts.append(unused_defines(request))
         every = merged(parts)

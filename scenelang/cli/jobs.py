@@ -3,149 +3,98 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from scenelang.backend.options import DEFAULT, How
 from scenelang.cli.inputs import Input, Request, merged, read_input, unused_defines
 from scenelang.cli.main import describe
 from scenelang.cli.progress import Clock
 from scenelang.cli.say import say_diagnostics, say_trouble
-from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.span import SourceFile
-from scenelang.diagnostics.suggest import plural
-from scenelang.graph.nodes import Graph, Leaf, nodes
 from scenelang.models.choose import why_chosen
-from scenelang.passes import PASSES
 from scenelang.program.compile import compile_scene
 
 if TYPE_CHECKING:
     from scenelang.program.program import Program
 
 PROGRAM = ".safetensors"
-STAGES = ("syntax", "scene", "lower", *(step.name for step in PASSES), "program")
-"""Of the compiler, in order: the syntax tree, the scene, the graph after each pass, the program."""
 
 
-def check_stages(wanted: Collection[str], known: Collection[str] = STAGES) -> None:
-    """Raise `click.UsageError` for names that are none of the stages."""
-    for name in wanted:
-        if name not in known:
-            from difflib import get_close_matches
-
-            near = get_close_matches(name, known, 1)
-            advice = f" Did you mean `{near[0]}`?" if near else ""
-            raise click.UsageError(f"No stage `{name}`.{advice} There are {', '.join(known)}.")
-
-
-@dataclass(slots=True)
-class Job:
-    """One input, ready to be drawn or with the reason why not."""
-
-    name: str  # as the user wrote it
-    source: Input | None = None  # the scene, where there is one
-    trouble: str | None = None  # why a compiled program cannot be drawn
-    program: Program | None = None  # what the network draws
-    # the graph after `lower` and each pass, in order
-    graphs: dict[str, Graph] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)  # what to say about it on `-v`
-
-    @property
-    def diagnostics(self) -> list[Diagnostic]:
-        """What was found in a scene."""
-        return self.source.diagnostics.items if self.source is not None else []
-
-    def failed(self, strict: bool = False) -> bool:
-        """Whether there is nothing to draw."""
-        return self.trouble is not None or any(d.severity == "error" or strict for d in self.diagnostics)
-
-
-def prepare(
-    name: str,
-    request: Request,
-    clock: Clock,
-    *,
-    compiled: bool = True,
-    verbose: bool = False,
-    source: SourceFile | None = None,
-) -> Job:
-    """Read an input, a scene, ``-`` or a compiled program, and compile it if it is a scene.
-
-    Args:
-        compiled: whether a scene has to be compiled to be drawn.
-        verbose: keep the graphs, and make notes of what the passes did.
-        source: the scene's text, where it was read before.
+def compile_input(found: Input, request: Request, clock: Clock, graphs: bool = False) -> None:
+    """Compile a scene, if it is one without errors that is not drawn by the reference; ``graphs`` are kept.
 
     Raises:
-        OSError: the input cannot be read, or a model has no weights.
+        OSError: a model has no weights.
     """
-    if name.endswith(PROGRAM):
-        return _stored(name, request, clock)
-    found = read_input(name, request, clock, source)
-    job = Job(name, found)
-    if found.scene is not None and compiled:
-        with suppress(SceneError), clock("compile"):  # its diagnostics are the input's
-            job.program = compile_scene(
-                found.scene,
-                spans=found.spans,
-                diagnostics=found.diagnostics,
-                model=request.model,
-                after=job.graphs.__setitem__ if verbose else None,
-            )
-            why = why_chosen(found.scene, request.model is not None)
-            job.notes = [*program_notes(job.program, why), *_pass_notes(job.graphs)]
-    return job
+    if found.scene is None or found.how.backend == "reference":
+        return
+    with suppress(SceneError), clock("compile"):  # its diagnostics are the input's
+        found.program = compile_scene(
+            found.scene,
+            spans=found.spans,
+            diagnostics=found.diagnostics,
+            after=found.graphs.__setitem__ if graphs else None,
+        )
+        why = why_chosen(found.scene, request.source.model is not None)
+        found.notes = program_notes(found.program, why)
 
 
 def prepare_all(
     files: Sequence[str],
     request: Request,
     clock: Clock,
+    how: How = DEFAULT,
     *,
     strict: bool = False,
-    compiled: bool = True,
-    verbose: bool = False,
-    source: SourceFile | None = None,
-    refusal: Callable[[Job], str | None] = lambda _: None,
-) -> tuple[list[Job | None], int]:
+    graphs: bool = False,
+    stored: str | None = None,
+    first: Input | None = None,
+) -> tuple[list[Input | None], int]:
     """Every input read and compiled, None where it cannot be read; reports mistakes.
 
     Args:
+        how: how they are drawn.
         strict: warnings count as errors.
-        compiled, verbose, source: as of `prepare`.
-        refusal: why a job is none for this command, if it is not.
+        graphs: keep the graph after each pass.
+        stored: why compiled programs are refused, if they are.
+        first: the only one, where it was read before.
 
     Returns:
-        The jobs, and the exit code so far: 1 where a scene has mistakes, 2 where a file cannot be read.
+        The inputs, and the exit code so far: 1 where a scene has mistakes, 2 where a file cannot be read.
     """
-    jobs: list[Job | None] = []
+    inputs: list[Input | None] = []
     code = 0
     for name in files:
         try:
-            job = prepare(name, request, clock, compiled=compiled, verbose=verbose, source=source)
+            if name.endswith(PROGRAM):
+                found = _stored(name, request, clock, how)
+                found.trouble = stored or found.trouble
+            else:
+                found = first or read_input(name, request, clock, how)
+                compile_input(found, request, clock, graphs)
         except OSError as error:
             say_trouble(describe(error))
-            jobs.append(None)
+            inputs.append(None)
             code = 2
             continue
-        job.trouble = refusal(job) or job.trouble
-        if job.trouble is not None:
-            say_trouble(f"{name}: {job.trouble}")
-        jobs.append(job)
-    read = [job for job in jobs if job is not None]
+        if found.trouble is not None:
+            say_trouble(f"{name}: {found.trouble}")
+        inputs.append(found)
+    read = [found for found in inputs if found is not None]
     unused = unused_defines(request) if read else []
-    say_diagnostics(merged([*(job.diagnostics for job in read), unused]))
+    say_diagnostics(merged([*(found.diagnostics.items for found in read), unused]))
     if unused:
-        return [None] * len(jobs), max(code, 1)
-    return jobs, max(code, int(any(job.failed(strict) for job in read)))
+        return [None] * len(inputs), max(code, 1)
+    return inputs, max(code, int(any(found.failed(strict) for found in read)))
 
 
-def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> tuple[Job, Input]:
+def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> Input:
     """Compile the one scene of a command, keep its graphs and report its mistakes.
 
     Raises:
@@ -154,34 +103,38 @@ def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> tu
     """
     if name.endswith(PROGRAM):
         raise click.UsageError(f"`{name}` is a compiled program already.")
-    job = prepare(name, request, clock or Clock(), verbose=True)
-    assert job.source is not None
-    job.diagnostics.extend(unused_defines(request))
-    say_diagnostics(job.diagnostics)
-    return job, job.source
+    clock = clock or Clock()
+    found = read_input(name, request, clock)
+    compile_input(found, request, clock, graphs=True)
+    found.diagnostics.items.extend(unused_defines(request))
+    say_diagnostics(found.diagnostics)
+    return found
 
 
-def _stored(name: str, request: Request, clock: Clock) -> Job:
+def _stored(name: str, request: Request, clock: Clock, how: How) -> Input:
     from scenelang.program.program import ProgramError
     from scenelang.program.reading import load_program
 
+    found, size, model = Input(name, how), request.source.size, request.source.model
     try:
         with clock("load program"):
             program = load_program(Path(name))
     except ProgramError as error:
-        return Job(name, trouble=str(error))
-    if request.model not in (None, program.model):
-        return Job(name, trouble=f"compiled for model `{program.model}`, not `{request.model}`")
-    if request.frame:
-        return Job(name, trouble=f"a program is a single frame, and --frame asks for {request.frame}")
-    if request.size is not None:
-        (width, height), (old_width, old_height) = request.size, program.canvas
+        found.trouble = str(error)
+        return found
+    if model not in (None, program.model):
+        found.trouble = f"compiled for model `{program.model}`, not `{model}`"
+    elif request.frame:
+        found.trouble = f"a program is a single frame, and --frame asks for {request.frame}"
+    elif size is not None:
+        (width, height), (old_width, old_height) = size, program.canvas
         if width * old_height != height * old_width:
             old = f"the {old_width}x{old_height} it was compiled for"
             advice = "objects outside it are gone: compile the scene again"
-            return Job(name, trouble=f"{width}x{height} has another shape than {old}; {advice}")
-        program = replace(program, canvas=request.size)
-    return Job(name, program=program, notes=program_notes(program, "named by the program"))
+            found.trouble = f"{width}x{height} has another shape than {old}; {advice}"
+        program = replace(program, canvas=size)
+    found.program, found.notes = program, program_notes(program, "named by the program")
+    return found
 
 
 def program_notes(program: Program, why: str) -> list[str]:
@@ -203,16 +156,3 @@ def _counts(counts: dict[str, int]) -> str:
     """`` (2 star, 1 square)``, or nothing."""
     listed = ", ".join(f"{number} {name}" for name, number in counts.items())
     return f" ({listed})" if listed else ""
-
-
-def _pass_notes(graphs: dict[str, Graph]) -> Iterator[str]:
-    """A line for each pass that changed the number of objects, folds or moves."""
-    before = None
-    for name, graph in graphs.items():
-        found = list(nodes(graph.root))
-        objects = sum(isinstance(node, Leaf) for node in found)
-        counts = (objects, len(found) - objects, sum(len(node.moves) for node in found))
-        if counts != before:
-            told = ", ".join(map(plural, counts, ("object", "fold", "move")))
-            yield f"{name if before else 'as written'}: {told}"
-        before = counts

@@ -34,9 +34,7 @@ COMMANDS: Final = {
     "compile": "Compile a scene to a program.",
     "compare": "Draw a scene beside its exact picture.",
     "fit": "Find the params of a scene from a picture.",
-    "explain-plan": "Say what drawing a scene takes.",
-    "dump": "Show what a scene is after each stage.",
-    "graph": "Draw the graph of a scene.",
+    "dump": "Show or draw what a scene is after each stage, and what it costs.",
     "models": "List models, or tell about one.",
     "learn": "Make meshes and drawings elements of scenes.",
     "train": "Train a model's weights.",
@@ -45,13 +43,15 @@ COMMANDS: Final = {
 GROUPS: Final = {
     "Draw": "render sweep play export watch",
     "Write": "check fmt explain convert import learn fit",
-    "Measure": "compare explain-plan models",
-    "Develop": "compile graph schema lsp lab",
+    "Measure": "compare dump models",
+    "Develop": "compile schema lsp lab",
 }
 """Commands as `--help` lists them; those for the development of scenelang itself it leaves out."""
 ELSEWHERE: Final = {"sweep": "scenelang.cli.sweep", "lab": "scenelang.lab.commands"}
 """Commands whose modules do not lie among the others; nothing else here knows of the laboratory."""
-MOVED: Final = {name: f"lab {name}" for name in ("eval", "frontier", "stability", "experiment", "chart")}
+MOVED: Final = {"explain-plan": "dump --costs", "graph": "dump --format mmd"} | {
+    name: f"lab {name}" for name in ("eval", "frontier", "stability", "experiment", "chart")
+}
 INTERRUPTED: Final = 130  # as shells report it
 
 

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from scenelang.backend.options import CHOICES, HELP, How
+
 if TYPE_CHECKING:
     from scenelang.evaluate.session import Defines
 
-Backend = Literal["neural", "reference"]
-Still = Literal["neural", "exact", "reference"]
-Device = Literal["auto", "cpu", "cuda"]
 Color = Literal["auto", "always", "never"]
 
 
@@ -110,18 +109,15 @@ size = click.option(
     "--size", metavar="WxH", callback=_size, help="Canvas size in pixels instead of the scene's."
 )
 frame = click.option(
-    "--frame", type=click.IntRange(0), default=0, metavar="N", help="Frame of the animation, from 0."
+    "--frame",
+    type=click.IntRange(0),
+    metavar="N",
+    help="Frame of the animation, from 0; as a picture, which is drawn alone.",
 )
 frames = click.option(
     "--frames",
     metavar="A..B",
     help="Frames of an animation to draw: 0..23, 0..<24, 12.. to the end, or 7.",
-)
-still = click.option(
-    "--frame",
-    type=click.IntRange(0),
-    metavar="N",
-    help="Draw one frame of an animation, from 0, as a picture.",
 )
 fps = click.option(
     "--fps",
@@ -136,9 +132,6 @@ color = choice(
     help="Colour what is printed; auto does so on terminals, unless NO_COLOR is set.",
 )
 strict = click.option("--strict", is_flag=True, help="Count warnings as errors.")
-backend = choice(
-    "--backend", words="neural reference", help="Draw with the trained network, or by the exact definition."
-)
 originals = click.option(
     "--originals",
     type=click.Path(exists=True, file_okay=False),
@@ -148,12 +141,6 @@ originals = click.option(
     help="Folder with the files that elements were made from, which exact pictures need; by "
     "default that of the elements.",
 )
-device = choice(
-    "--device",
-    words="auto cpu cuda",
-    help="Device of torch; auto is CUDA where there is any, and numpy for solids or a small picture.",
-)
-threads = click.option("--threads", type=click.IntRange(1), metavar="N", help="Number of threads on the CPU.")
 jobs = click.option(
     "--jobs",
     type=click.IntRange(1, 256),
@@ -169,7 +156,7 @@ verbose = click.option("-v", "--verbose", is_flag=True, help="Say what was compi
 
 
 def request(command: Callable[..., Any]) -> Callable[..., Any]:
-    """How one scene is read: -D, --size, --frame, --model and --root, handed over as a `Request`."""
+    """Options to read scenes by, -D, --size, --frame, --model and --root, handed over as a `Request`."""
 
     @define
     @size
@@ -179,8 +166,37 @@ def request(command: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(command)
     def with_request(*arguments: Any, **given: Any) -> Any:
         from scenelang.cli.inputs import Request
+        from scenelang.evaluate.evaluation import Source
 
-        own = {name: given.pop(name) for name in ("defines", "model", "root", "frame", "size")}
-        return command(*arguments, request=Request(**own), **given)
+        frame, params = given.pop("frame"), given.pop("defines")
+        own = {name: given.pop(name) for name in ("model", "root", "size")}
+        return command(*arguments, request=Request(Source(params=params, **own), frame), **given)
 
     return with_request
+
+
+def _field(name: str) -> Callable[..., Any]:
+    """The option for a field of `How`."""
+    if name in CHOICES:
+        return choice(f"--{name}", words=" ".join(CHOICES[name]), help=HELP[name])
+    return click.option(f"--{name}", type=click.IntRange(1), metavar="N", help=HELP[name])
+
+
+device, threads = _field("device"), _field("threads")
+
+
+def drawing(*names: str) -> Callable[..., Any]:
+    """Options for these fields of `How`, all by default, handed over as ``how``."""
+    fields = names or How._fields
+
+    def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def with_how(*arguments: Any, **given: Any) -> Any:
+            how = How(**{name: given.pop(name) for name in fields})
+            return command(*arguments, how=how.checked(), **given)
+
+        for name in reversed(fields):
+            with_how = _field(name)(with_how)
+        return with_how
+
+    return with_options

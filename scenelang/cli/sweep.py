@@ -16,7 +16,8 @@ from scenelang.cli.say import say_diagnostics
 from scenelang.diagnostics.suggest import plural
 
 if TYPE_CHECKING:
-    from scenelang.evaluate.session import Defines
+    from scenelang.backend.options import How
+    from scenelang.cli.inputs import Request
     from scenelang.sweep.api import Kind, Sweep
 
 BESIDE = ("depth", "normal", "object", "alpha", "scene", "program")
@@ -80,16 +81,10 @@ def _random(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) 
 )
 @click.option("--sheet", metavar="FILE", help="Write a picture of all pictures, small.")
 @click.option("--table", metavar="FILE", help="Write a copy of the table, .csv or .parquet.")
-@options.define
-@options.size
-@options.frame
-@options.model
-@options.backend
-@options.device
-@options.threads
+@options.request
+@options.drawing()
 @options.jobs
 @options.cluster
-@options.root
 @options.verbose
 @click.pass_context
 def command(
@@ -103,16 +98,10 @@ def command(
     outputs: tuple[Kind, ...],
     sheet: str | None,
     table: str | None,
-    defines: Defines,
-    size: tuple[int, int] | None,
-    frame: int,
-    model: str | None,
-    backend: options.Backend,
-    device: options.Device,
-    threads: int | None,
+    request: Request,
+    how: How,
     jobs: int | None,
     cluster: str | None,
-    root: str | None,
     verbose: bool,
 ) -> None:
     """Draw SCENE with many values of its params.
@@ -130,9 +119,8 @@ def command(
     try:
         with Bar() as bar:
             made = render_many(
-                scene, out, grid=grid, random=random, count=count, seed=seed, params=defines.values,
-                outputs=outputs, table=table, sheet=sheet, frame=frame, size=size, model=model, root=root,
-                backend=backend, device=device, threads=threads, jobs=jobs, cluster=cluster,
+                scene, out, grid=grid, random=random, count=count, seed=seed, outputs=outputs, table=table,
+                sheet=sheet, jobs=jobs, cluster=cluster, **request.named(), **how._asdict(),
                 progress=lambda now: bar(now.told, now.done, now.total),
             )  # fmt: skip
     except (ParamError, TargetError) as error:
@@ -148,19 +136,19 @@ def command(
     ctx.exit(1 if made.errors else 0)
 
 
-def _say(sweep: Sweep, seconds: float) -> None:
+def _say(done: Sweep, seconds: float) -> None:
     """What came of it."""
-    say_diagnostics(sweep.warnings)
-    for number, errors in sweep.failed.items():
-        values = zip(sweep.names, sweep.lines[number].values, strict=True)
+    say_diagnostics(done.warnings)
+    for number, errors in done.failed.items():
+        values = zip(done.names, done.lines[number].values, strict=True)
         click.echo(f"row {number}: {', '.join(f'{name}={value}' for name, value in values)}", err=True)
         say_diagnostics(errors)
-    made = sweep.made
-    parts = [plural(len(sweep.lines) - sweep.errors, "picture")]
-    if sweep.errors:
-        parts.append(f"{plural(sweep.errors, 'row')} whose values give no scene")
+    made = done.made
+    parts = [plural(len(done.lines) - done.errors, "picture")]
+    if done.errors:
+        parts.append(f"{plural(done.errors, 'row')} whose values give no scene")
     if made.resumed:
         parts.append(f"{made.resumed:,} kept from a run before")
-    if same := made.frames - sweep.errors - made.drawn - made.resumed:
+    if same := made.frames - done.errors - made.drawn - made.resumed:
         parts.append(f"{same:,} the same as others")
-    click.echo(f"{sweep.table}: {', '.join(parts)}, {seconds:.1f} s", err=True)
+    click.echo(f"{done.table}: {', '.join(parts)}, {seconds:.1f} s", err=True)

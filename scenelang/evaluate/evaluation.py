@@ -7,11 +7,11 @@ what they find and go on. A Scene comes out only where nothing is wrong.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
@@ -27,37 +27,116 @@ from scenelang.evaluate.prepare import EXPRESSIONS, STATEMENTS
 from scenelang.evaluate.prepare.blocks import Body
 from scenelang.evaluate.prepare.settings import prepare_file
 from scenelang.evaluate.report.reporter import Reporter
-from scenelang.evaluate.session import Defines, Inputs, Session
+from scenelang.evaluate.session import Defines, Session, Watch
 from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
+from scenelang.models.manifest import Manifest
+from scenelang.records import Record
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap, Written
 from scenelang.syntax import nodes, parse
 from scenelang.words import STAGE
 
 
-def evaluate(
-    file: nodes.File, *, diagnostics: Diagnostics, **inputs: Unpack[Inputs]
-) -> tuple[Scene | None, SpanMap]:
-    """Evaluate a syntax tree.
+class Source(Record):
+    """A scene as text and what holds for it from outside; one of the first three is enough.
 
     Args:
-        file: the tree.
-        diagnostics: where mistakes go.
-        **inputs: what else there is; see `Inputs`.
-
-    Returns:
-        The Scene, or None if anything is wrong, and where its nodes were written.
+        path: the file, as a user wrote it; imports are found from there.
+        text: what the file holds, or a text that is in no file.
+        tree: the text, parsed.
+        params: values for params: text as after ``-D NAME=``, or Python values. `Defines` may be shared by
+            several evaluations; the caller then reports what none of them used.
+        model: name of the model to use, instead of the one that the file names; the Scene names it then.
+        root: folder that imports cannot leave; by default that of ``path``.
+        size: canvas in pixels (width, height), instead of the scene's.
+        fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
+            seconds × fps frames, and t and u follow.
+        texts: what imported files hold, by their resolved paths, instead of what is on the disk.
+        models: manifests that names are taken from; by default those of all shipped models.
     """
-    return Evaluation(file, diagnostics=diagnostics, **inputs).run(inputs.get("frame", 0))
+
+    path: str | os.PathLike[str] | None = None
+    text: SourceFile | None = None
+    tree: nodes.File | None = None
+    params: Mapping[str, Any] | Defines | None = None
+    model: str | None = None
+    root: str | os.PathLike[str] | None = None
+    size: tuple[int, int] | None = None
+    fps: float | None = None
+    texts: Mapping[Path, str] | None = None
+    models: Iterable[Manifest] | None = None
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Values for params, by name."""
+        return dict((self.params.values if isinstance(self.params, Defines) else self.params) or {})
+
+    def parsed(self, diagnostics: Diagnostics) -> Source:
+        """The same with its text and tree; mistakes of the syntax are reported once, here.
+
+        Raises:
+            SceneError: the file is not text.
+            OSError: it cannot be opened.
+        """
+        if self.tree is not None:
+            return self
+        text = self.text
+        if text is None:
+            name = os.fspath(self.path or "")
+            try:
+                text = read_source(Path(name), name)
+            except Unreadable as error:
+                report_unreadable(name, error, diagnostics)
+                raise SceneError(diagnostics) from None
+        return replace(self, text=text, tree=parse(text, diagnostics))
+
+    def evaluation(
+        self,
+        diagnostics: Diagnostics,
+        *,
+        frame: int = 0,
+        replays: bool = False,
+        watch: Watch | None = None,
+    ) -> Evaluation:
+        """Prepare the scene; arguments as for `Evaluation`, and raises as `parsed`."""
+        return Evaluation(self.parsed(diagnostics), diagnostics, frame=frame, replays=replays, watch=watch)
+
+    def scene(self, diagnostics: Diagnostics, frame: int = 0) -> tuple[Scene | None, SpanMap]:
+        """Evaluate one frame.
+
+        Args:
+            diagnostics: where mistakes go, in the order of the text.
+
+        Returns:
+            The Scene, or None if anything is wrong with it, and where its nodes were written.
+
+        Raises:
+            OSError: the file cannot be opened.
+            ValueError: ``size`` is not a canvas.
+        """
+        before, start = len(diagnostics.errors), len(diagnostics)
+        try:
+            scene, spans = self.evaluation(diagnostics, frame=frame).run(frame)
+        except SceneError:
+            return None, SpanMap()
+        diagnostics.items[start:] = in_file_order(diagnostics.items[start:])
+        return (scene if len(diagnostics.errors) == before else None), spans
+
+
+def report_unreadable(name: str, error: Unreadable, diagnostics: Diagnostics) -> None:
+    """Report that a file is not text."""
+    diagnostics.add(error.code, f"cannot read `{name}`: {error}", Span(SourceFile(name, ""), 0, 0))
 
 
 class Evaluation:
     """A file prepared once, to be run for any number of frames.
 
     Args:
-        file: the tree.
+        source: the scene; its text is parsed.
         diagnostics: where mistakes go; each is reported for the first frame that has it.
-        **inputs: what else there is; see `Inputs`.
+        frame: the first frame that is run, from 0.
+        replays: run what no frame changes once.
+        watch: shown every name's value and every node; see `Session`.
 
     Attributes:
         wanted: all files that it imports, also those that are not there.
@@ -65,26 +144,37 @@ class Evaluation:
         context: its names, and the values they had in the last run.
     """
 
-    def __init__(self, file: nodes.File, *, diagnostics: Diagnostics, **inputs: Unpack[Inputs]) -> None:
-        self.file, self.diagnostics = file, diagnostics
+    def __init__(
+        self,
+        source: Source,
+        diagnostics: Diagnostics,
+        *,
+        frame: int = 0,
+        replays: bool = False,
+        watch: Watch | None = None,
+    ) -> None:
+        assert source.tree is not None
+        self.file = file = source.tree
+        self.diagnostics, self._size, self._model = diagnostics, source.size, source.model
         self.animates = any(isinstance(s, nodes.Call) and s.name.text == "animate" for s in file.statements)
         self._errors = len(diagnostics.errors)
         self._steps = self._objects = 0
         self._session = session = Session(
             Reporter(diagnostics),
-            _choose(file, vocabulary(inputs.get("models")), inputs.get("model"), diagnostics),
+            _choose(file, vocabulary(source.models), source.model, diagnostics),
             EXPRESSIONS,
             STATEMENTS,
-            inputs.get("frame", 0),
-            inputs.get("fps"),
-            replays=inputs.get("replays", False) and self.animates,
-            watch=inputs.get("watch"),
+            frame,
+            source.fps,
+            replays=replays and self.animates,
+            watch=watch,
         )
-        path, root, defines = inputs.get("path"), inputs.get("root"), inputs.get("defines")
-        path = path.resolve() if path is not None else None
-        folder = Path(root).resolve() if root is not None else path.parent if path is not None else None
-        loader = Loader(folder, [path] if path is not None else [], texts=inputs.get("texts") or {})
-        self.inputs = given = defines if isinstance(defines, Defines) else Defines(defines or {})
+        path = None if source.path is None else Path(source.path).resolve()
+        folder = path.parent if path is not None else None
+        folder = folder if source.root is None else Path(source.root).resolve()
+        loader = Loader(folder, [path] if path is not None else [], texts=source.texts or {})
+        params = source.params
+        self.inputs = given = params if isinstance(params, Defines) else Defines(params or {})
         self.context = FileContext(file.span.source, session, loader, given, path)
         self._body: Body | None = None
         if not self.animates:
@@ -92,7 +182,7 @@ class Evaluation:
         with deep_stack(), suppress(Halt):
             self._body = prepare_file(self.context, file)
             given.lost |= self.context.damage.words
-            if given is not defines:
+            if given is not params:
                 given.report_unused(diagnostics)
         self.wanted = tuple(loader.wanted)
         self.sources = (file.span.source, *(imported.span.source for imported in loader.parsed.values()))
@@ -144,7 +234,7 @@ class Evaluation:
         settings, chosen = session.settings, session.vocabulary.chosen
         fields = {
             "version": 1,
-            "model": chosen.name if chosen else None,
+            "model": self._model or (chosen.name if chosen else None),
             "canvas": settings.canvas,
             "background": settings.background,
             **{word: settings.stage.get(word, "default") for word in STAGE},
@@ -153,6 +243,7 @@ class Evaluation:
             "nodes": tuple(out.children),
         }
         scene = make(Scene, fields)
+        scene = scene if self._size is None else scene.sized(self._size)
         written = settings.given.get("model")
         if written is not None:
             session.spans.record(scene, Written(written, written))
@@ -172,46 +263,6 @@ def _choose(file: nodes.File, words: Vocabulary, model: str | None, diagnostics:
         help = f"there is {listing(m.name for m in words.models)}"
         diagnostics.add("E0210", f"unknown model `{name}`", None, help=help)
     return chosen or Vocabulary(words.models, blind=True)
-
-
-def load_scene(
-    path: str | os.PathLike[str], /, *, diagnostics: Diagnostics, **inputs: Unpack[Inputs]
-) -> tuple[Scene | None, SpanMap]:
-    """Read, parse and evaluate a scene file; arguments as for `evaluate`.
-
-    Raises:
-        OSError: the file cannot be opened.
-    """
-    inputs["path"] = Path(path)
-    source = read_scene(path, diagnostics)
-    if source is None:
-        return None, SpanMap()
-    return load_source(source, diagnostics=diagnostics, **inputs)
-
-
-def read_scene(path: str | os.PathLike[str], diagnostics: Diagnostics) -> SourceFile | None:
-    """The text of a scene file; None, and a diagnostic, where it is not text.
-
-    Raises:
-        OSError: the file cannot be opened.
-    """
-    where = Path(path)
-    try:
-        return read_source(where, os.fspath(path))
-    except Unreadable as error:
-        empty = SourceFile(os.fspath(path), "")
-        diagnostics.add(error.code, f"cannot read `{where.name}`: {error}", Span(empty, 0, 0))
-        return None
-
-
-def load_source(
-    source: SourceFile, *, diagnostics: Diagnostics, **inputs: Unpack[Inputs]
-) -> tuple[Scene | None, SpanMap]:
-    """Parse and evaluate scene text; arguments as for `evaluate`."""
-    before, start = len(diagnostics.errors), len(diagnostics)
-    scene, spans = evaluate(parse(source, diagnostics), diagnostics=diagnostics, **inputs)
-    diagnostics.items[start:] = in_file_order(diagnostics.items[start:])
-    return (scene if len(diagnostics.errors) == before else None), spans
 
 
 def name_frame(diagnostics: Diagnostics, since: int, frame: int) -> None:
@@ -267,10 +318,9 @@ def load(
         OSError: the file cannot be opened.
     """
     found = diagnostics if diagnostics is not None else Diagnostics()
-    scene, _ = load_scene(
-        path, diagnostics=found, defines={**(params or {}), **values}, root=root, model=model, frame=frame
-    )
-    return _sound(scene, found, size)
+    given = {**(params or {}), **values}
+    scene, _ = Source(path, params=given, model=model, root=root, size=size).scene(found, frame)
+    return _sound(scene, found)
 
 
 def loads(
@@ -292,15 +342,9 @@ def loads(
         name: what diagnostics call it.
     """
     found = diagnostics if diagnostics is not None else Diagnostics()
-    scene, _ = load_source(
-        SourceFile(name, text),
-        diagnostics=found,
-        defines={**(params or {}), **values},
-        root=root,
-        model=model,
-        frame=frame,
-    )
-    return _sound(scene, found, size)
+    given = {**(params or {}), **values}
+    source = Source(text=SourceFile(name, text), params=given, model=model, root=root, size=size)
+    return _sound(source.scene(found, frame)[0], found)
 
 
 def opened(
@@ -314,14 +358,14 @@ def opened(
         ValueError, OSError: as `load`.
     """
     if isinstance(given, Scene):
-        return _sound(given, diagnostics, size), None
+        return given if size is None else given.sized(size), None
     if not isinstance(given, str | os.PathLike):
         raise TypeError(f"{type(given).__name__} where a Scene or the path of one is needed")
-    scene, spans = load_scene(given, diagnostics=diagnostics)
-    return _sound(scene, diagnostics, size), spans
+    scene, spans = Source(given, size=size).scene(diagnostics)
+    return _sound(scene, diagnostics), spans
 
 
-def _sound(scene: Scene | None, found: Diagnostics, size: tuple[int, int] | None) -> Scene:
+def _sound(scene: Scene | None, found: Diagnostics) -> Scene:
     if scene is None:
         raise SceneError(found)
-    return scene if size is None else scene.sized(size)
+    return scene

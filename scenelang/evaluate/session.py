@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Label
 from scenelang.diagnostics.span import SourceFile, Span
@@ -15,7 +14,6 @@ from scenelang.evaluate.limits import MAX_OBJECTS, MAX_PARTS, MAX_STEPS, Halt
 from scenelang.evaluate.names import UNBOUND, Needs
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.vocabulary import Vocabulary
-from scenelang.models.manifest import Manifest
 from scenelang.records import Record
 from scenelang.scene.schema import Animation, Elements
 from scenelang.scene.spans import SpanMap
@@ -47,7 +45,8 @@ class Session(Record, frozen=False):
 
     Args:
         expressions, statements: how each class of the syntax tree is prepared.
-        frame, fps: as of `Inputs`.
+        frame: the one that is run, from 0.
+        fps: frames a second, instead of those that ``animate`` names.
         replays: run what no frame changes once; the evaluation is for several frames.
         roots: the live slots of every file.
         needs: collects what the statement being prepared depends on.
@@ -143,32 +142,3 @@ class Defines(Record, frozen=False):
                 names = listing(self.known)
                 help, labels = f"its params are {names}" if names else "the scene has no params", []
             diagnostics.add("E0211", f"no param `{name}` to set", None, help=help, labels=labels)
-
-
-class Inputs(TypedDict, total=False):
-    """What an evaluation takes besides a text; all of it may be left out.
-
-    Args:
-        defines: values for params: text as after ``-D NAME=``, or Python values. `Defines` may be shared by
-            several evaluations; the caller then reports what none of them used.
-        models: manifests that names are taken from; by default those of all shipped models.
-        model: name of the model to use, instead of the one that the file names.
-        root: folder that imports cannot leave; by default that of ``path``.
-        path: file that the text was read from.
-        frame: frame of the animation, from 0; the first that is run where there are several.
-        texts: what imported files hold, by their resolved paths, instead of what is on the disk.
-        watch: is shown every name's value and every node; see `Session`.
-        fps: frames a second, instead of those that ``animate`` names.
-        replays: run what no frame changes once.
-    """
-
-    defines: Mapping[str, Any] | Defines | None
-    models: Iterable[Manifest] | None
-    model: str | None
-    root: str | os.PathLike[str] | None
-    path: Path | None
-    frame: int
-    texts: Mapping[Path, str] | None
-    watch: Watch | None
-    fps: float | None
-    replays: bool

@@ -19,7 +19,7 @@ from scenelang.image import Image
 from scenelang.inverse import search
 from scenelang.inverse.fitted import Fit, hindrances, numbers_of, ties
 from scenelang.inverse.focus import Lens
-from scenelang.inverse.problem import Source
+from scenelang.inverse.problem import Moment
 from scenelang.inverse.search import Found
 from scenelang.inverse.several import Together
 from scenelang.inverse.space import Point, Space
@@ -99,9 +99,9 @@ def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) ->
     space, problems, first = task.space, task.problems, task.first
     last, best = problems[-1], places[0].point
     every = [space.literals(place.point) for place in places]
-    source = last.parts[0].source
-    text = rewritten(source.tree, {**task.kept, **every[0]})
-    after = last.drawn([part.source.reads(text).program({}, last.canvas) for part in last.parts])
+    moment = last.parts[0].moment
+    text = rewritten(moment.tree, {**task.kept, **every[0]})
+    after = last.drawn([part.moment.reads(text).program({}, last.canvas) for part in last.parts])
     before = last.pictures(first)
     if after is None:
         raise FitError("the scene with the values that were found has no picture")
@@ -134,15 +134,15 @@ def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) ->
         before=_image(after if before is None else before),
         after=_image(after),
         target=_image([part.colours for part in last.parts]),
-        way=tuple(_scenes(source, space, [first, *places[0].way, best])),
+        way=tuple(_scenes(moment, space, [first, *places[0].way, best])),
     )
 
 
-def _scenes(source: Source, space: Space, way: Sequence[Point]) -> Iterator[Scene]:
+def _scenes(moment: Moment, space: Space, way: Sequence[Point]) -> Iterator[Scene]:
     """The scenes of places that have one."""
     for u in way:
         with suppress(SceneError):
-            yield source.evaluated(space.values(u))[1]
+            yield moment.evaluated(space.values(u))[1]
 
 
 def _db(problem: Together, pictures: Sequence[Picture]) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from pathlib import Path
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -15,51 +15,45 @@ from scenelang.backend.small import draw_small
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import Evaluation
+from scenelang.evaluate.evaluation import Evaluation, Source
 from scenelang.inverse.gradient import Changes
 from scenelang.inverse.soft import softened
 from scenelang.inverse.space import Point, Space
 from scenelang.inverse.target import Picture, Target, over
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
+from scenelang.records import Record
 from scenelang.renderers.draw import draw_objects
 from scenelang.scene.schema import Scene
-from scenelang.syntax import nodes, parse
+from scenelang.syntax import nodes
 
 Matrix = npt.NDArray[np.float64]
 LEVELS: Final = 4  # of a pyramid: pixels, and means of 2, 4 and 8 pixels along each side
 
 
-class Source:
-    """A scene's text, parsed once, to be run with other values of its params.
+class Moment(Record, frozen=False):
+    """A frame of a scene, to be run with other values of its params.
 
     Args:
-        tree: the parsed file.
-        path, root, model, frame: as of `scenelang.load`.
-        fixed: values of params that are not searched.
-
-    Attributes:
+        source: the scene, parsed, with values of params that are not searched.
+        frame: which one, from 0.
         trouble: what was found the last time that values gave no scene.
     """
 
-    def __init__(
-        self,
-        tree: nodes.File,
-        *,
-        path: Path | None,
-        root: Path | None = None,
-        model: str | None = None,
-        frame: int = 0,
-        fixed: Mapping[str, Any] | None = None,
-    ) -> None:
-        self.tree, self.path, self.root, self.model, self.frame = tree, path, root, model, frame
-        self.fixed = dict(fixed or {})
-        self.trouble: tuple[Diagnostic, ...] = ()
+    source: Source
+    frame: int = 0
+    trouble: tuple[Diagnostic, ...] = ()
 
-    def reads(self, text: str) -> Source:
-        """The same of another text."""
-        tree = parse(SourceFile(self.tree.span.source.name, text), Diagnostics())
-        return Source(tree, path=self.path, root=self.root, model=self.model, frame=self.frame)
+    def reads(self, text: str) -> Moment:
+        """The same of another text, in which all params have their values."""
+        file = SourceFile(self.tree.span.source.name, text)
+        return Moment(replace(self.source, text=file, tree=None, params=None), self.frame)
+
+    @property
+    def tree(self) -> nodes.File:
+        """The parsed file."""
+        assert self.source.tree is not None
+        return self.source.tree
 
     def evaluated(self, values: Mapping[str, Any]) -> tuple[Evaluation, Scene]:
         """The scene of values of its params.
@@ -68,10 +62,8 @@ class Source:
             SceneError: it has errors.
         """
         found = Diagnostics()
-        evaluation = Evaluation(
-            self.tree, diagnostics=found, defines={**self.fixed, **values},
-            path=self.path, root=self.root, model=self.model, frame=self.frame,
-        )  # fmt: skip
+        params = {**self.source.values, **values}
+        evaluation = replace(self.source, params=params).evaluation(found, frame=self.frame)
         scene, _ = evaluation.run(self.frame)
         if scene is None:
             raise SceneError(found)
@@ -81,7 +73,7 @@ class Source:
         """What draws the scene of values on a canvas; None where there is none, for which see `trouble`."""
         try:
             scene = self.evaluated(values)[1]
-            return compile_scene(scene.sized(canvas), model=self.model)
+            return compile_scene(scene.sized(canvas))
         except SceneError as error:
             self.trouble = error.diagnostics
             return None
@@ -91,7 +83,7 @@ class Problem:
     """How far pictures of one size are from the target.
 
     Args:
-        source: what makes scenes.
+        moment: what makes scenes.
         space: the params.
         target: what they are to look like.
         canvas: width and height of the pictures.
@@ -103,7 +95,7 @@ class Problem:
 
     def __init__(
         self,
-        source: Source,
+        moment: Moment,
         space: Space,
         target: Target,
         canvas: tuple[int, int],
@@ -113,7 +105,7 @@ class Problem:
         samples: Samples = "four",
         levels: int = LEVELS,
     ) -> None:
-        self.source, self.space, self.under = source, space, target.under
+        self.moment, self.space, self.under = moment, space, target.under
         self.canvas, self.light, self.samples, self.levels = canvas, light, samples, levels
         self.soft = soft and not light
         self.frames = 0  # drawn so far
@@ -146,7 +138,7 @@ class Problem:
     def program(self, u: Point) -> Program | None:
         """What draws the scene of a point; the last one is kept."""
         if self._last[0] != u.tobytes():
-            self._last = u.tobytes(), self.source.program(self.space.values(u), self.canvas)
+            self._last = u.tobytes(), self.moment.program(self.space.values(u), self.canvas)
         return self._last[1]
 
     def picture(self, u: Point) -> Picture | None:

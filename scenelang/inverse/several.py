@@ -74,7 +74,7 @@ class Together:
             for part, one in zip(self.parts, pictures, strict=True)
         ]
         at = int(np.argmax([gap.sum() for gap in gaps]))
-        return f" of frame {self.parts[at].source.frame}" * (len(gaps) > 1), gaps[at]
+        return f" of frame {self.parts[at].moment.frame}" * (len(gaps) > 1), gaps[at]
 
     def noise(self, u: Point, blur: Blur = Blur()) -> bool:  # noqa: B008
         """Whether what is left of pictures after a blur is like noise.

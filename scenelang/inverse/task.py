@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any, Final
 
 from scenelang.backend.options import Samples
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import read_scene
+from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.ranges import literals_of
 from scenelang.fitting.mesh import FitError
-from scenelang.inverse.problem import LEVELS, Problem, Source
+from scenelang.inverse.problem import LEVELS, Moment, Problem
 from scenelang.inverse.several import Together
 from scenelang.inverse.space import Point, Space, space_of
 from scenelang.inverse.target import WHITE, Given, target_of
 from scenelang.models.manifest import load_manifest
 from scenelang.records import Record
-from scenelang.syntax import parse
 
 SIDES: Final = (32, 64, 128, 256)  # of pictures from coarse to fine, pixels along the shorter side
 MOST_SOLID: Final = 128  # of solids, which take longer
@@ -59,31 +57,24 @@ def task_of(
 ) -> Task:
     """What `scenelang.fit`, whose arguments and errors these are, is to do."""
     found = Diagnostics()
-    text = scene if isinstance(scene, SourceFile) else read_scene(scene, found)
-    tree = None if text is None else parse(text, found)
-    if tree is None or found.errors:
+    given = {"text": scene} if isinstance(scene, SourceFile) else {"path": scene}
+    source = Source(**given, params=fixed, model=model, root=root).parsed(found)
+    if found.errors:
         raise SceneError(found)
     targets = {int(at): one for at, one in target.items()} if isinstance(target, Mapping) else {frame: target}
     if not 0 < len(targets) <= MOST_TARGETS:
         raise FitError(f"{len(targets):,} targets, where 1 to {MOST_TARGETS} are compared")
-    sources = [
-        Source(
-            tree, path=None if isinstance(scene, SourceFile) else Path(scene),
-            root=None if root is None else Path(root), model=model, frame=number, fixed=fixed,
-        )
-        for number in sorted(targets)
-    ]  # fmt: skip
-    source = sources[0]
-    evaluation, made = source.evaluated(start)
+    moments = [Moment(source, number) for number in sorted(targets)]
+    evaluation, made = moments[0].evaluated(start)
     space = space_of(evaluation, params, fixed)
     for name in start:
         if name not in space.names:
             raise FitError(f"a start for `{name}`, which is not among the params to find")
     first = space.point({})
-    solid = True in {_is_solid(each, space.values(first), made.canvas) for each in sources}
+    solid = True in {_is_solid(each, space.values(first), made.canvas) for each in moments}
     goals = [
         target_of(targets[each.frame], made.canvas, mask=mask, crop=crop, under=background)
-        for each in sources
+        for each in moments
     ]
     smallest = min(min(goal.weights.shape) for goal in goals)
     short = min(MOST_SOLID if solid else SIDES[-1], *made.canvas, smallest)
@@ -94,7 +85,7 @@ def task_of(
         return Together(
             [
                 Problem(each, space, goal, canvas, light=solid, soft=soft, samples=samples, levels=levels)
-                for each, goal in zip(sources, goals, strict=True)
+                for each, goal in zip(moments, goals, strict=True)
             ]
         )
 
@@ -107,11 +98,11 @@ def task_of(
     return Task(tuple(problems), space, first, literals_of(evaluation, fixed))
 
 
-def _is_solid(source: Source, values: Mapping[str, Any], canvas: tuple[int, int]) -> bool:
+def _is_solid(moment: Moment, values: Mapping[str, Any], canvas: tuple[int, int]) -> bool:
     """Whether a scene is of solids, if it has pictures that can be compared."""
-    program = source.program(values, canvas)
+    program = moment.program(values, canvas)
     if program is None:
-        raise SceneError(source.trouble)
+        raise SceneError(moment.trouble)
     manifest = load_manifest(program.model)
     if manifest.renderer not in ("framed", "solid"):
         raise FitError(

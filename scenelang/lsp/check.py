@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.evaluate.evaluation import Evaluation, in_file_order
+from scenelang.evaluate.evaluation import Source, in_file_order
 from scenelang.evaluate.limits import Halt
 from scenelang.graph.nodes import Graph
 from scenelang.models.manifest import Manifest
@@ -100,18 +100,17 @@ def check(
         if stop.is_set():
             raise Superseded
 
-    evaluation = Evaluation(
-        file, diagnostics=found, model=model, root=root, path=path, texts=texts, replays=True, watch=watch
-    )
+    source = Source(path, tree=file, model=model, root=root, texts=texts)
+    evaluation = source.evaluation(found, replays=True, watch=watch)
     scene, spans = evaluation.run(0)
     after("evaluate")
     manifest = None
     if parsed:
         find_unused(file, found)
         if scene is not None:
-            manifest = check_compiles(scene, spans, found, model=model, after=after)
+            manifest = check_compiles(scene, spans, found, after=after)
         frame = 1
-        check_frames(evaluation, found, first=scene, model=model, after=after)
+        check_frames(evaluation, found, first=scene, after=after)
         after("frames")
     wanted = frozenset(evaluation.wanted)
     return Checked(file.span.source, in_file_order(found.items), wanted, seen, manifest)

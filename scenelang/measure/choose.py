@@ -12,9 +12,12 @@ import numpy as np
 import torch
 
 from scenelang.backend.load import Load
+from scenelang.backend.options import RenderError
+from scenelang.backend.render import exact_graph
 from scenelang.measure.frontier import Cost, Frontier, Limits, Point
 from scenelang.models.choose import lacking, paints, uses
-from scenelang.models.manifest import Manifest
+from scenelang.models.manifest import available, load_manifest
+from scenelang.program.program import Program
 from scenelang.scene.schema import Scene
 
 UNITS: Final = (1.0, 1e3, 1e6, 1e6, 1e3)  # of the terms of a `Cost`
@@ -60,19 +63,32 @@ def error_scale(canvas: tuple[int, int], objects: int) -> float:
     return max(1.0, 256 / min(canvas)) * max(1.0, objects / OBJECTS)
 
 
-def refusal(point: Point, manifest: Manifest | None, scene: Scene | None, compiled: str | None) -> str | None:
-    """Why a point cannot draw a scene, or what was compiled for a model; None if it can.
+def refusal(point: Point, scene: Scene | None, program: Program, only: str | None = None) -> str | None:
+    """Reason why a point cannot draw a scene; None if it can.
 
-    The reference has no manifest, and a compiled program no scene.
+    Args:
+        scene: None of a compiled program, which is drawn by its own model.
+        program: of the scene, for the model that it names.
+        only: the one model to choose.
     """
+    if only is not None and point.model != only:
+        return f"--model {only}"
+    if point.model is not None and point.model not in available():
+        return "not installed"
     if not point.offered:
         return point.why_not or "not offered"
-    if compiled is not None:
+    if scene is None:
         if point.backend == "reference":
             return "a compiled program keeps only what the network needs"
-        return None if point.model == compiled else f"the program was compiled for `{compiled}`"
-    if scene is None or manifest is None:
+        return None if point.model == program.model else f"the program was compiled for `{program.model}`"
+    if point.model is None:
+        try:
+            if scene.elements:
+                exact_graph(scene)
+        except RenderError as error:  # an element has no original
+            return str(error)
         return None
+    manifest = load_manifest(point.model)
     if unknown := lacking(manifest, uses(scene)):
         return f"has no `{unknown[0]}`"
     if not paints(manifest, scene):

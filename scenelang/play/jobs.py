@@ -23,13 +23,13 @@ from scenelang.animation.painting import Drawable, Painter
 from scenelang.animation.run import Progress, make
 from scenelang.animation.store import frame_key
 from scenelang.animation.targets import find_target
-from scenelang.backend.options import RenderError
-from scenelang.backend.render import draw_exact
+from scenelang.backend.options import How, RenderError
+from scenelang.backend.render import draw, draw_exact
 from scenelang.backend.small import draw_small
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import Evaluation
+from scenelang.evaluate.evaluation import Evaluation, Source
 from scenelang.graph.nodes import Graph, Leaf, nodes
 from scenelang.image import Image
 from scenelang.measure.metrics import flip, over_white, psnr, side_by_side, ssim
@@ -37,7 +37,6 @@ from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Kept
-from scenelang.syntax import parse
 from scenelang.viewer.export import scene_view, still
 from scenelang.viewer.page import page
 from scenelang.viewer.view import View
@@ -74,7 +73,7 @@ def do(job: Job, tell: Tell) -> Done:
 
 def warm() -> None:
     """Load what the first job would otherwise wait for."""
-    _draw(Clip(SourceFile("", "square;"), size=(32, 32)), 0)
+    _draw(Clip(Source(text=SourceFile("", "square;"), size=(32, 32))), 0)
 
 
 # ---------------------------------------------------------------- views
@@ -86,7 +85,7 @@ def _view(job: Job, tell: Tell) -> Done:
     found = Diagnostics()
     shown: View | None = None
     lacking: list[str] = []
-    evaluation = _evaluated(job, found)
+    evaluation = _source(job).evaluation(found)
     try:
         shown = _viewed(job, evaluation, found)[0]
     except SceneError:
@@ -105,23 +104,10 @@ def _view(job: Job, tell: Tell) -> Done:
     return head, _json(data)
 
 
-def _evaluated(job: Job, found: Diagnostics) -> Evaluation:
-    return Evaluation(
-        parse(SourceFile(job["path"], job["text"]), found),
-        diagnostics=found,
-        defines=job["params"],
-        path=Path(job["path"]),
-        root=job["root"],
-        texts=_texts(job),
-    )
-
-
 def _viewed(job: Job, evaluation: Evaluation, found: Diagnostics) -> tuple[View, Program]:
     scene, spans = evaluation.run(0)
     if scene is None or found.errors:
         raise SceneError(found)
-    if job["size"] is not None:
-        scene = scene.sized((job["size"][0], job["size"][1]))
     program = compile_scene(scene, spans=spans, diagnostics=found)
     if len(program) > MOST_ROWS:
         raise ProgramError(f"more than {MOST_ROWS:,} objects, which no page draws by itself")
@@ -142,19 +128,19 @@ def _problem(found: Diagnostic) -> dict[str, Any]:
 
 
 def _network(job: Job, tell: Tell) -> Done:
-    clip = _clip(job)
+    clip = Clip(_source(job))
     image, ms = _draw(clip, job["frame"], tell)
     return _picture(job, image, ms)
 
 
 def _reference(job: Job, tell: Tell) -> Done:
     started = time.perf_counter()
-    image = _exact(job, _clip(job))
+    image = _exact(job, Clip(_source(job)))
     return _picture(job, image, {"draw": _since(started)})
 
 
 def _difference(job: Job, tell: Tell) -> Done:
-    clip = _clip(job)
+    clip = Clip(_source(job))
     drawn, ms = _draw(clip, job["frame"])
     picture, exact = over_white(drawn), over_white(_exact(job, clip))
     figures = _figures_of(picture, exact)
@@ -166,7 +152,7 @@ def _difference(job: Job, tell: Tell) -> Done:
 
 def _figures(job: Job, tell: Tell) -> Done:
     started = time.perf_counter()
-    clip = _clip(job)
+    clip = Clip(_source(job))
     shot = _shot(clip, job["frame"])
     objects = 0
 
@@ -216,18 +202,16 @@ def _by_network(program: Program, tell: Tell | None) -> Image:
     _check_size(program.canvas)
     if load_manifest(program.model).renderer in _BY_NUMPY:
         return draw_small(program, kept=_KEPT, progress=tell).image
-    from scenelang.animation.painting import paint
-
-    return paint(program, "cpu", threads=1, split=1, kept=None, progress=tell)
+    return draw(program, How(device="cpu", threads=1), progress=tell).image
 
 
 def _exact(job: Job, clip: Clip) -> Image:
     """The exact picture; the last one is kept, for figures and differences of it."""
     shot = _shot(clip, job["frame"])
     _check_size(shot.scene.canvas)
-    key = f"{clip.model} {shot.scene.to_json()}"
+    key = shot.scene.to_json()
     if key not in _EXACT:
-        image = draw_exact(shot.scene, spans=shot.spans, model=clip.model)
+        image = draw_exact(shot.scene, spans=shot.spans)
         _EXACT.clear()
         _EXACT[key] = image
     return _EXACT[key]
@@ -253,18 +237,18 @@ class _ByNumpy(Painter):
         program = self.clip.program(shot)
         if load_manifest(program.model).renderer not in _BY_NUMPY:
             return super().prepare(shot, single=single)
-        return Drawable(shot.number, frame_key("play", program.digest()), shot, program, small=True)
+        return Drawable(shot.number, frame_key("play", program.digest()), shot, program, "numpy")
 
 
 def _file(job: Job, tell: Tell) -> Done:
     kind = job["as"]
-    clip = _clip(job)
+    clip = Clip(_source(job))
     if kind == "png":
         image = _by_network(clip.program(_shot(clip, job["frame"])), tell)
         return {"is": "done"}, image.encode()
     if kind == "html":
         found = Diagnostics()
-        view, program = _viewed(job, _evaluated(job, found), found)
+        view, program = _viewed(job, _source(job).evaluation(found), found)
         return {"is": "done"}, page(view, still=still(program)).encode()
     _check_size(clip.first.scene.canvas)
 
@@ -281,19 +265,15 @@ def _file(job: Job, tell: Tell) -> Done:
 # ---------------------------------------------------------------- what all need
 
 
-def _clip(job: Job) -> Clip:
-    return Clip(
-        SourceFile(job["name"], job["text"]),
-        path=Path(job["path"]),
-        defines=job["params"],
-        root=None if job["root"] is None else Path(job["root"]),
+def _source(job: Job) -> Source:
+    return Source(
+        job["path"],
+        SourceFile(job["path"], job["text"]),
+        params=job["params"],
+        root=job["root"],
         size=None if job["size"] is None else (job["size"][0], job["size"][1]),
-        texts=_texts(job),
+        texts={Path(path): text for path, text in job["texts"].items()},
     )
-
-
-def _texts(job: Job) -> dict[Path, str]:
-    return {Path(path): text for path, text in job["texts"].items()}
 
 
 def _shot(clip: Clip, frame: int) -> Shot:

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
+from contextlib import suppress
 from typing import Any, Literal
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
+from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.fixes import settle
-from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.evaluate.evaluation import Evaluation, in_file_order, name_frame
-from scenelang.evaluate.loader import Unreadable, read_source
+from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import Evaluation, Source, in_file_order, name_frame
 from scenelang.graph.lower import Memory, Spans
 from scenelang.graph.nodes import Graph
 from scenelang.models.manifest import Manifest
@@ -22,7 +22,7 @@ from scenelang.passes import check_scene
 from scenelang.program.compile import find_model
 from scenelang.resolve.unused import find_unused
 from scenelang.scene.schema import Scene, same_nodes
-from scenelang.syntax import nodes, parse
+from scenelang.syntax import nodes
 
 Frames = Literal["one", "some", "all"]
 """Which frames of an animation are looked at: the one asked for; the first, second, middle and last; all."""
@@ -35,7 +35,6 @@ def check_compiles(
     spans: Spans | None,
     diagnostics: Diagnostics,
     *,
-    model: str | None = None,
     after: After | None = None,
     memory: Memory | None = None,
 ) -> Manifest | None:
@@ -43,10 +42,9 @@ def check_compiles(
 
     Args:
         spans: where its nodes were written, None if it did not come from text.
-        model: draw with this model instead of the scene's.
         after, memory: as for `check_scene`.
     """
-    manifest = find_model(scene, diagnostics, model=model, spans=spans)
+    manifest = find_model(scene, diagnostics, spans=spans)
     if manifest is not None:
         check_scene(scene, spans, diagnostics, manifest, after, memory=memory)
     return manifest
@@ -57,7 +55,6 @@ def check_frames(
     diagnostics: Diagnostics,
     *,
     first: Scene | None = None,
-    model: str | None = None,
     every: bool = False,
     after: After | None = None,
 ) -> tuple[int, int]:
@@ -70,7 +67,7 @@ def check_frames(
         evaluation: has run frame 0.
         diagnostics: those of the evaluation; receives what frame 0 did not have, with the frame's number.
         first: the scene of frame 0, None if it has errors.
-        model, after: as for `check_compiles`.
+        after: as for `check_compiles`.
         every: look at all frames, instead of the second, the middle and the last one.
     """
     count, looked, last, memory = evaluation.frames, 1, first, Memory()
@@ -83,7 +80,7 @@ def check_frames(
         if scene is None or (last is not None and same_nodes(scene, last)):
             continue
         last, found = scene, Diagnostics()
-        check_compiles(scene, spans, found, model=model, after=after, memory=memory)
+        check_compiles(scene, spans, found, after=after, memory=memory)
         known = {d.code for d in diagnostics}
         name_frame(found, 0, frame)
         for d in found:
@@ -100,7 +97,6 @@ def check_evaluated(
     spans: Spans | None,
     diagnostics: Diagnostics,
     *,
-    model: str | None = None,
     frames: Frames = "some",
 ) -> int:
     """What there is to say of a scene beyond its evaluation.
@@ -116,11 +112,9 @@ def check_evaluated(
     """
     left = 0
     if scene is not None:
-        check_compiles(scene, spans, diagnostics, model=model)
+        check_compiles(scene, spans, diagnostics)
     if evaluation is not None and frames != "one":
-        looked, wanted = check_frames(
-            evaluation, diagnostics, first=scene, model=model, every=frames == "all"
-        )
+        looked, wanted = check_frames(evaluation, diagnostics, first=scene, every=frames == "all")
         left = wanted - looked
     if tree is not None and not diagnostics.errors:
         find_unused(tree, diagnostics)  # a name that is misspelt where it is used is not a second mistake
@@ -150,14 +144,7 @@ def check(
     Raises:
         OSError: the file cannot be opened.
     """
-    name = os.fspath(path)
-    try:
-        source = read_source(Path(path), name)
-    except Unreadable as error:
-        found = Diagnostics()
-        found.add(error.code, f"cannot read `{name}`: {error}", Span(SourceFile(name, ""), 0, 0))
-        return found
-    return _look(source, Path(path), params, model, root, all_frames)
+    return _look(Source(path, params=params, model=model, root=root), all_frames)
 
 
 def check_text(
@@ -175,7 +162,8 @@ def check_text(
         text: the scene.
         name: what diagnostics call it.
     """
-    return _look(SourceFile(name, text), None, params, model, root, all_frames)
+    source = Source(text=SourceFile(name, text), params=params, model=model, root=root)
+    return _look(source, all_frames)
 
 
 def fix_text(
@@ -193,7 +181,8 @@ def fix_text(
     """
 
     def look(texts: Mapping[str, str]) -> Iterable[tuple[str | None, Diagnostic]]:
-        found = _look(SourceFile(name, texts[name]), None, params, model, root, False)
+        text = SourceFile(name, texts[name])
+        found = _look(Source(text=text, params=params, model=model, root=root), False)
         return [(name if d.span is not None and d.span.source.name == name else None, d) for d in found]
 
     settled = settle({name: text}, look)
@@ -202,22 +191,14 @@ def fix_text(
     return settled.texts[name], left
 
 
-def _look(
-    source: SourceFile,
-    path: Path | None,
-    params: Mapping[str, Any] | None,
-    model: str | None,
-    root: str | os.PathLike[str] | None,
-    all_frames: bool,
-) -> Diagnostics:
+def _look(source: Source, all_frames: bool) -> Diagnostics:
     found = Diagnostics()
-    tree, folder = parse(source, found), None if root is None else Path(root)
-    evaluation = Evaluation(
-        tree, diagnostics=found, defines=params, model=model, root=folder, path=path, replays=True
-    )
-    scene, spans = evaluation.run(0)
-    frames: Frames = "all" if all_frames else "some"
-    scene = None if found.errors else scene
-    check_evaluated(tree, evaluation, scene, spans, found, model=model, frames=frames)
+    with suppress(SceneError):  # it is not text
+        source = source.parsed(found)
+        evaluation = source.evaluation(found, replays=True)
+        scene, spans = evaluation.run(0)
+        frames: Frames = "all" if all_frames else "some"
+        scene = None if found.errors else scene
+        check_evaluated(source.tree, evaluation, scene, spans, found, frames=frames)
     found.items[:] = in_file_order(found.items)
     return found

@@ -71,3 +71,7 @@ class SceneData(Frozen):
         """
         canvas = type(self)(canvas=size).canvas
         return self.model_copy(update={"canvas": canvas})
+
+    def of_model(self, model: str | None) -> Self:
+        """The same scene for a model of that name; itself where there is none."""
+        return self if model in (None, self.model) else self.model_copy(update={"model": model})

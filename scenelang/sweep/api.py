@@ -6,14 +6,15 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal, Unpack
 
 from scenelang.animation.painting import Painter
 from scenelang.animation.run import Progress, RenderResult, make
 from scenelang.animation.targets import Target, TargetError, find_target, is_pattern
+from scenelang.backend.options import How, Options
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.evaluation import Evaluation, read_scene
+from scenelang.evaluate.evaluation import Evaluation, Source
 from scenelang.evaluate.ranges import ParamError, param_named
 from scenelang.image import image_format
 from scenelang.outputs import Output
@@ -22,10 +23,6 @@ from scenelang.sweep.sheet import write_sheet
 from scenelang.sweep.table import Line, check_table, write_table
 from scenelang.sweep.values import MOST_ROWS, Rows, rows_of, text_of
 from scenelang.sweep.variants import Variants
-from scenelang.syntax import parse
-
-if TYPE_CHECKING:
-    from scenelang.backend.options import Backend, Device
 
 Kind = Literal["depth", "normal", "object", "alpha", "scene", "program"]
 BESIDE: Final[tuple[Output, ...]] = ("depth", "normal", "object", "alpha")
@@ -74,12 +71,10 @@ def render_many(
     size: tuple[int, int] | None = None,
     model: str | None = None,
     root: str | os.PathLike[str] | None = None,
-    backend: Backend = "neural",
-    device: Device = "auto",
-    threads: int | None = None,
     jobs: int | None = None,
     cluster: str | None = None,
     progress: Callable[[Progress], None] = lambda _: None,
+    **how: Unpack[Options],
 ) -> Sweep:
     """Draw a scene file with many values: ``render_many("a.nsg", "out/", grid={"k": "0..1/10"})``.
 
@@ -101,8 +96,8 @@ def render_many(
             it, ``"scene"`` as text without params, and ``"program"``.
         table: a copy of the table, .csv or .parquet.
         sheet: a picture that shows all of them, small.
-        frame, size, model, root, backend, device, threads: as for `scenelang.render_frames`.
-        jobs, cluster, progress: as for `scenelang.animate`.
+        frame, size, model, root: as for `scenelang.load`.
+        jobs, cluster, progress, **how: as for `scenelang.animate`.
 
     Returns:
         What was written, also where some or all rows have errors.
@@ -124,27 +119,18 @@ def render_many(
     if sheet is not None:
         image_format(sheet)
     found = Diagnostics()
-    source = read_scene(path, found)
-    if source is None:
-        raise SceneError(found)
-    tree, fixed = parse(source, found), dict(params or {})
-
-    def begin(diagnostics: Diagnostics) -> Evaluation:
-        return Evaluation(
-            tree, diagnostics=diagnostics, defines=fixed, path=Path(path), model=model, frame=frame,
-            root=None if root is None else Path(root),
-        )  # fmt: skip
-
-    first = begin(found)
+    fixed = dict(params or {})
+    source = Source(path, params=fixed, model=model, root=root, size=size).parsed(found)
+    first = source.evaluation(found, frame=frame)
     if first.run(frame)[0] is None or found.errors:  # those of its syntax are of no row
         raise SceneError(found)
     rows = _rows(first, values, grid or {}, random, count, seed)
     for name in rows.names:
         if name in fixed:
             raise ParamError(f"param `{name}` with one value for all pictures, and with others")
-    clip = Variants(begin, rows=rows, fixed=fixed, frame=frame, diagnostics=found, model=model, size=size)
+    clip = Variants(source, rows, frame, found)
     beside: list[Output] = [name for name in BESIDE if name in outputs]
-    painter = Painter(clip, backend, device, threads, outputs=tuple(beside), single=True)
+    painter = Painter(clip, How(**how).checked(), outputs=tuple(beside), single=True)
     book = Book(target, rows, clip, painter.outputs, [name for name in TEXTS if name in outputs], stem)
     made = make(
         painter, target, range(len(rows)), jobs=jobs, cluster=cluster,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from scenelang.backend.render import render
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.evaluation import Evaluation, read_scene
+from scenelang.evaluate.evaluation import Evaluation, Source
 from scenelang.files import write_output
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
@@ -21,7 +21,6 @@ from scenelang.program.program import Program, ProgramError
 from scenelang.program.reading import load_program
 from scenelang.scene import library
 from scenelang.scene.schema import Scene
-from scenelang.syntax import parse
 from scenelang.viewer.form import form_of
 from scenelang.viewer.page import control_rows, page, plain
 from scenelang.viewer.view import View, view_of
@@ -56,28 +55,6 @@ def export(
         source: a scene's file, whose params the page can change and whose animation it plays; or a compiled
             Program's (.safetensors), a Scene or a Program, which are as they are.
         out: the page.
-        params, size, model, root, title: as of `viewed`.
-
-    Raises:
-        As `viewed`, and OSError where the page cannot be written.
-    """
-    view, program = viewed(source, params=params, size=size, model=model, root=root, title=title)
-    write_output(out, page(view, still=still(program)).encode())
-
-
-def viewed(
-    source: str | os.PathLike[str] | Scene | Program,
-    *,
-    params: Mapping[str, Any] | None = None,
-    size: tuple[int, int] | None = None,
-    model: str | None = None,
-    root: str | os.PathLike[str] | None = None,
-    title: str | None = None,
-) -> tuple[View, Program]:
-    """The view of what `export` takes, and the Program that it shows first.
-
-    Args:
-        source: as of `export`.
         params: values for a file's params that the page starts from; as for `scenelang.load`.
         size: canvas in pixels instead of the scene's; the picture keeps its aspect.
         model: draw with this model instead of the one that the scene names.
@@ -90,23 +67,41 @@ def viewed(
         RenderError: the model has no weights here.
         ValueError: an argument says something of a file where there is none, or of a scene where there is a
             Program.
-        OSError: a file cannot be read.
+        OSError: a file cannot be read, or the page cannot be written.
     """
-    scene = source if isinstance(source, Scene) else None
-    evaluation = None
+    given: Source | Scene | Program
     path = None if isinstance(source, Scene | Program) else Path(source)
-    if path is not None and path.suffix != PROGRAM:
-        scene, evaluation = _evaluated(path, params, model, root)
-    elif params or root is not None:
-        raise ValueError("params and root are for files of scenes")
-    if scene is not None:
-        program = compile_scene(scene if size is None else scene.sized(size), model=model)
-    elif size is not None or model is not None:
-        raise ValueError("size and model are for scenes; a program is compiled for its own")
+    if path is None or path.suffix == PROGRAM:
+        if params or root is not None:
+            raise ValueError("params and root are for files of scenes")
+        given = source if isinstance(source, Scene | Program) else load_program(Path(source))
+        if isinstance(given, Scene):
+            given = (given if size is None else given.sized(size)).of_model(model)
+        elif size is not None or model is not None:
+            raise ValueError("size and model are for scenes; a program is compiled for its own")
     else:
-        program = source if isinstance(source, Program) else load_program(Path(path or ""))
+        given = Source(path, params=params, model=model, root=root, size=size)
     name = "" if path is None else path.stem
-    return scene_view(program, scene, evaluation, title=name if title is None else title), program
+    view, program = viewed(given, name if title is None else title)
+    write_output(out, page(view, still=still(program)).encode())
+
+
+def viewed(source: Source | Scene | Program, title: str) -> tuple[View, Program]:
+    """The view of a scene or a Program, and the Program that it shows first; raises as `export`."""
+    if isinstance(source, Program):
+        return scene_view(source, None, None, title=title), source
+    evaluation = None
+    if isinstance(source, Scene):
+        scene: Scene | None = source
+    else:
+        found = Diagnostics()
+        evaluation = source.evaluation(found)
+        scene = evaluation.run(0)[0]
+        if scene is None or found.errors:
+            raise SceneError(found)
+    assert scene is not None
+    program = compile_scene(scene)
+    return scene_view(program, scene, evaluation, title=title), program
 
 
 def scene_view(
@@ -178,19 +173,3 @@ def _shown(name: str, first: str) -> str:
     """What a page calls a file: by its place beside the scene's, and of others only their names."""
     place = os.path.relpath(name, os.path.dirname(first)).replace(os.sep, "/")
     return Path(name).name if place.startswith("../") else place
-
-
-def _evaluated(
-    path: Path, params: Mapping[str, Any] | None, model: str | None, root: str | os.PathLike[str] | None
-) -> tuple[Scene, Evaluation]:
-    found = Diagnostics()
-    source = read_scene(path, found)
-    if source is None:
-        raise SceneError(found)
-    evaluation = Evaluation(
-        parse(source, found), diagnostics=found, defines=params, model=model, root=root, path=path
-    )
-    scene, _ = evaluation.run(0)
-    if scene is None or found.errors:
-        raise SceneError(found)
-    return scene, evaluation

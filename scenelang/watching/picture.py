@@ -13,22 +13,23 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
-from scenelang.animation.clip import Clip, open_clip
+from scenelang.animation.clip import Clip
 from scenelang.animation.painting import Drawable, Painter
 from scenelang.animation.run import make
-from scenelang.animation.timing import FrameRange, FramesError
+from scenelang.animation.timing import FrameRange
+from scenelang.backend.options import How
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
+from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.session import Defines
 
 if TYPE_CHECKING:
     from scenelang.animation.targets import Target
-    from scenelang.backend.options import Backend, Device
     from scenelang.image import Image
     from scenelang.renderers.draw import Kept
 
@@ -66,17 +67,12 @@ class Outcome:
 class Easel:
     """Draws a scene as often as it changes; the model, the last picture and its key are kept."""
 
-    file: Path  # the scene
+    source: Source  # the scene, with values of its params
     out: Path  # the picture, or the animation
     target: Target | None  # of an animation; None for a picture
     frames: FrameRange  # of an animation
     frame: int  # of a picture
-    defines: Mapping[str, str]  # values for params
-    options: Mapping[str, Any]  # of `Clip`: model, root, size, fps
-    # as for `Painter`
-    backend: Backend
-    device: Device
-    threads: int | None
+    how: How  # how they are drawn
     drafted: Callable[[Outcome], None] = lambda _: None  # told of a draft, which the picture follows
     paths: tuple[Path, ...] = ()  # the files that the picture depends on, the scene first
     seen: Stamps = field(default_factory=dict)  # how they were when their names were found out
@@ -87,6 +83,11 @@ class Easel:
 
     def __post_init__(self) -> None:
         self.paths = (Path(os.path.abspath(self.file)),)
+
+    @property
+    def file(self) -> Path:
+        """The scene's."""
+        return Path(self.source.path or "")
 
     def draw(self, before: Stamps) -> Outcome:
         """Read, compile, draw and save.
@@ -102,7 +103,7 @@ class Easel:
             self._draw(found, outcome, before)
         outcome.diagnostics = found.items
         torch = "scenelang.backend.neural"
-        if not outcome.good and self.backend == "neural" and torch not in sys.modules:
+        if not outcome.good and self.how.backend == "neural" and torch not in sys.modules:
             # loaded in the background, so that a scene that is mended need not wait for it
             threading.Thread(target=importlib.import_module, args=(torch,), daemon=True).start()
         return outcome
@@ -110,12 +111,8 @@ class Easel:
     def _draw(self, found: Diagnostics, outcome: Outcome, before: Stamps) -> None:
         started = time.perf_counter()
         clip = self._open(found)
-        try:
-            numbers = self.frames.among(clip.animation.frames)
-        except FramesError as error:
-            found.add("E0337", str(error), None)
-            raise SceneError(found) from None
-        painter = Painter(clip, self.backend, self.device, self.threads, self._kept)
+        numbers = clip.numbers(self.frames)
+        painter = Painter(clip, self.how, self._kept)
         if self.target is not None and self.target.kind == "video" and not clip.animates:
             found.add("E0337", f"`{self.out}` is for animations, and the scene has no animate(…)", None)
             raise SceneError(found)
@@ -152,8 +149,8 @@ class Easel:
             self.drafted(outcome)
 
     def _open(self, found: Diagnostics) -> Clip:
-        defines = Defines(dict(self.defines))
-        clip = open_clip(self.file, diagnostics=found, defines=defines, **self.options)
+        defines = Defines(self.source.values)
+        clip = Clip(replace(self.source, params=defines), found)
         # what a broken scene imports is half known: go on watching what it did
         known = self.paths[1:] if found.errors else ()
         self.paths = tuple(dict.fromkeys((self.paths[0], *clip.wanted, *known)))

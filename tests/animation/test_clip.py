@@ -7,18 +7,18 @@ from pathlib import Path
 import pytest
 
 import scenelang as nsg
-from scenelang.animation.clip import Clip, open_clip
+from scenelang.animation.clip import Clip
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import Source
 from scenelang.program.program import Program
 from tests.animation.scenes import HEAD, TRICKY, examples, tricky
 
 
 def alone(source: SourceFile, path: Path | None, frame: int, found: Diagnostics) -> tuple[nsg.Scene, Program]:
     """A frame read, parsed, evaluated and compiled from the beginning."""
-    scene, spans = load_source(source, diagnostics=found, path=path, frame=frame)
+    scene, spans = Source(path, source).scene(found, frame)
     assert scene is not None
     return scene, nsg.compile(scene, spans=spans, diagnostics=found)
 
@@ -28,7 +28,7 @@ def same(a: Program, b: Program) -> bool:
 
 
 def compare(source: SourceFile, path: Path | None, step: int = 1) -> None:
-    clip = Clip(source, path=path)
+    clip = Clip(Source(path, source))
     found = Diagnostics()
     for frame in range(0, clip.animation.frames, step):
         scene, program = alone(source, path, frame, found)
@@ -45,7 +45,7 @@ def test_frames_are_what_they_are_alone(name: str) -> None:
 
 @pytest.mark.parametrize("path", examples(), ids=lambda path: path.stem)
 def test_frames_of_examples(path: Path) -> None:
-    frames = open_clip(path).animation.frames
+    frames = Clip(Source(path)).animation.frames
     compare(SourceFile(str(path), path.read_text("utf-8")), path, max(1, frames // 5))
 
 
@@ -53,7 +53,7 @@ def test_order_does_not_matter() -> None:
     """Going back, or leaving frames out, gives the same frames."""
     for name in TRICKY:
         source = SourceFile("a.nsg", tricky(name))
-        clip, other = Clip(source), Clip(source)
+        clip, other = Clip(Source(text=source)), Clip(Source(text=source))
         expected = [other.program(other.shot(frame)) for frame in range(6)]
         for frame in (4, 1, 5, 5, 0, 3):
             assert same(clip.program(clip.shot(frame)), expected[frame]), name
@@ -63,13 +63,13 @@ def test_what_stays_is_the_same_node() -> None:
     text = (
         HEAD + "group { star { scale(0.2); } rotate(9deg); } square { scale(0.1 + u); } star { scale(0.1); }"
     )
-    clip = Clip(SourceFile("a.nsg", text))
+    clip = Clip(Source(text=SourceFile("a.nsg", text)))
     first, second = clip.shot(0).scene.nodes, clip.shot(1).scene.nodes
     assert [a is b for a, b in zip(first, second, strict=True)] == [True, False, True]
 
 
 def test_a_still_scene_is_compiled_once() -> None:
-    clip = Clip(SourceFile("a.nsg", tricky("nothing moves")))
+    clip = Clip(Source(text=SourceFile("a.nsg", tricky("nothing moves"))))
     assert clip.program(clip.shot(0)) is clip.program(clip.shot(4))
 
 
@@ -79,7 +79,7 @@ def test_imports_are_read_once(tmp_path: Path) -> None:
     path.write_text(HEAD + 'import "lib.nsg" as l; l.m(u); l.m(0.5);')
     source = SourceFile(str(path), path.read_text())
     compare(source, path)
-    clip = open_clip(path)
+    clip = Clip(Source(path))
     program = clip.program(clip.shot(1))
     (tmp_path / "lib.nsg").unlink()
     assert same(clip.program(clip.shot(1)), program)
@@ -87,7 +87,7 @@ def test_imports_are_read_once(tmp_path: Path) -> None:
 
 
 def test_a_mistake_in_one_frame_only() -> None:
-    clip = Clip(SourceFile("a.nsg", HEAD + "square { scale(3 - frame); }"))
+    clip = Clip(Source(text=SourceFile("a.nsg", HEAD + "square { scale(3 - frame); }")))
     for frame in range(3):
         clip.program(clip.shot(frame))
     with pytest.raises(SceneError) as error:
@@ -105,10 +105,10 @@ def test_a_mistake_in_one_frame_only() -> None:
 def test_replays_see_the_place_they_stand_in(text: str) -> None:
     """A statement that stays is a mistake only beside what comes in a later frame."""
     source = SourceFile("a.nsg", HEAD + text)
-    clip = Clip(source)
+    clip = Clip(Source(text=source))
     clip.program(clip.shot(0))
     found = Diagnostics()
-    assert load_source(source, diagnostics=found, frame=4)[0] is None
+    assert Source(text=source).scene(found, 4)[0] is None
     with pytest.raises(SceneError) as error:
         clip.shot(4)
     assert [(d.code, d.span) for d in error.value.diagnostics] == [(d.code, d.span) for d in found]
@@ -117,7 +117,7 @@ def test_replays_see_the_place_they_stand_in(text: str) -> None:
 def test_limits_hold_in_every_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scenelang.evaluate.session.MAX_OBJECTS", 25)
     text = "for (i in 0..<20) { star { scale(0.1); } } for (i in 0..<3 * frame) { square { scale(0.1); } }"
-    clip = Clip(SourceFile("a.nsg", HEAD + text))
+    clip = Clip(Source(text=SourceFile("a.nsg", HEAD + text)))
     clip.shot(1)
     with pytest.raises(SceneError, match="more than 25 objects"):
         clip.shot(2)
@@ -125,7 +125,7 @@ def test_limits_hold_in_every_frame(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_another_rate_keeps_the_seconds() -> None:
     text = "animate(seconds = 2, fps = 10); square { translate(t, u); scale(frame + 1, frames); }"
-    clip = Clip(SourceFile("a.nsg", text), fps=4)
+    clip = Clip(Source(text=SourceFile("a.nsg", text), fps=4))
     assert (clip.animation.seconds, clip.animation.fps, clip.animation.frames) == (2, 4, 8)
     move, scale = clip.shot(6).scene.nodes[0].transforms
     assert (move.x, move.y, scale.x, scale.y) == (1.5, 0.75, 7, 8)
@@ -138,9 +138,9 @@ def test_loops_close_at_the_seam() -> None:
     begin, end = (nsg.loads(f"let k = {k};" + body.format(u="k")) for k in (0, 1))
     a, b = nsg.compile(begin).vectors, nsg.compile(end).vectors
     assert abs(a - b).max() < 1e-6
-    clip = Clip(SourceFile("a.nsg", moving))
+    clip = Clip(Source(text=SourceFile("a.nsg", moving)))
     assert (clip.program(clip.shot(0)).vectors == a).all()
     digests = [clip.program(clip.shot(frame)).digest() for frame in range(clip.animation.frames)]
     assert len(set(digests)) == clip.animation.frames
-    once = Clip(SourceFile("a.nsg", moving.replace("fps = 6", "fps = 6, loop = false")))
+    once = Clip(Source(text=SourceFile("a.nsg", moving.replace("fps = 6", "fps = 6, loop = false"))))
     assert abs(once.program(once.shot(5)).vectors - a).max() < 1e-6

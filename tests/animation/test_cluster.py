@@ -75,7 +75,7 @@ def test_elements_travel_with_their_programs(tmp_path: Path, address: str) -> No
     shutil.rmtree(away)
     helper = ours.Cluster(address)
     try:
-        helper.submit(program, ours.Errand(str(tmp_path / "fox.png"), None, 1, ()))
+        helper.submit(program, ours.Errand(str(tmp_path / "fox.png"), "numpy", 1))
         while helper.waiting:
             helper.take()
     finally:
@@ -153,7 +153,7 @@ def test_a_frame_that_cannot_be_drawn(scene: Path, tmp_path: Path, address: str)
     program = nsg.compile(nsg.load(scene))
     helper = ours.Cluster(address)
     try:
-        helper.submit(program, ours.Errand(str(tmp_path / "a.png"), "cuda", 1, ()))
+        helper.submit(program, ours.Errand(str(tmp_path / "a.png"), "cuda", 1))
         assert helper.waiting == 1
         with pytest.raises(nsg.RenderError, match="CUDA is asked for"):
             helper.take()

@@ -15,11 +15,13 @@ from PIL import Image
 
 import scenelang as nsg
 from scenelang.animation import run, workers
-from scenelang.animation.clip import open_clip
+from scenelang.animation.clip import Clip
 from scenelang.animation.painting import Painter
 from scenelang.animation.run import Progress, make
 from scenelang.animation.store import Busy, Store
 from scenelang.animation.targets import find_target
+from scenelang.backend.options import How
+from scenelang.evaluate.evaluation import Source
 from tests.animation.scenes import DARK, HEAD, TRICKY, tricky
 
 SMALL = (24, 16)
@@ -52,8 +54,8 @@ def test_pictures_are_what_they_are_alone(name: str, tmp_path: Path) -> None:
 
 def test_tiles_without_a_moving_object_are_taken_over(tmp_path: Path) -> None:
     text = "square { scale(0.2); translate(0, 2); } star { scale(0.2 + u / 9); translate(0, -2); } triangle;"
-    clip = open_clip(write(tmp_path, HEAD + text), size=(16, 64))
-    painter = Painter(clip, threads=4)
+    clip = Clip(Source(write(tmp_path, HEAD + text), size=(16, 64)))
+    painter = Painter(clip, How(threads=4))
     from scenelang.backend.neural import draw_program, open_model
 
     pairs = []
@@ -66,7 +68,7 @@ def test_tiles_without_a_moving_object_are_taken_over(tmp_path: Path) -> None:
         assert again.image.tobytes() == fresh.image.tobytes()
         assert again.pairs == 0
         pairs.append(fresh.pairs)
-    kept = Painter(clip, threads=4)
+    kept = Painter(clip, How(threads=4))
     for frame in range(3):
         kept.draw(kept.prepare(clip.shot(frame)))
     moved = draw_program(clip.program(clip.shot(3)), model, threads=4, kept=kept.kept)
@@ -313,7 +315,7 @@ def test_a_killed_run_is_taken_up(tmp_path: Path) -> None:
     process.kill()
     process.communicate()
     assert not (tmp_path / "a.gif").exists()
-    painter = Painter(open_clip(tmp_path / "a.nsg", size=(24, 24)), "reference")
+    painter = Painter(Clip(Source(tmp_path / "a.nsg", size=(24, 24))), How("reference"))
     target = find_target(str(tmp_path / "a.gif"))
     kept = len(list(target.work.glob("[0-9a-f]*.png")))
     made = make(painter, target, range(kept + 2))

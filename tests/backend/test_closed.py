@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -132,11 +130,9 @@ def test_outputs_by_formulas() -> None:
     assert not np.array_equal(depth["exact"], depth["neural"])
 
 
-def test_what_has_no_formulas_is_refused(tmp_path: Path) -> None:
+def test_what_has_no_formulas_is_refused() -> None:
     scene = nsg.loads('model "shapes2d-reading"; square { scale(0.5); }')
     with pytest.raises(nsg.RenderError, match="no frames that formulas could answer in"):
         nsg.render(scene, backend="exact")
     with pytest.raises(nsg.RenderError, match="by numpy"):
         nsg.render(nsg.loads("square {}"), backend="exact", device="cuda")
-    with pytest.raises(ValueError, match="unknown backend `exact` of animations"):
-        nsg.animate([scene, scene], tmp_path / "%d.png", backend="exact")  # type: ignore[arg-type]

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.animation.clip import open_clip
+from scenelang.animation.clip import Clip
 from scenelang.animation.painting import Painter
 from scenelang.backend.neural import draw_program, open_model
-from scenelang.backend.options import RenderError
+from scenelang.backend.options import How, RenderError
 from scenelang.backend.small import MOST_MS, choose_drawer, draw_small, work_ms
+from scenelang.evaluate.evaluation import Source
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
 from tests.passes.random_scenes import blob_scene, random_scene
@@ -125,11 +126,11 @@ def test_who_draws_is_in_a_kept_frame_s_key(tmp_path: Path) -> None:
     """A single picture's and an animation's frame are kept apart; each repeats."""
     path = tmp_path / "a.nsg"
     path.write_text("canvas(48, 48);" + STAR)
-    painter = Painter(open_clip(path), threads=1)
+    painter = Painter(Clip(Source(path)), How(threads=1))
     single, frame = (painter.prepare(painter.clip.shot(0), single=s) for s in (True, False))
     assert single.key != frame.key
-    assert single.small
-    assert not frame.small
+    assert single.place == "numpy"
+    assert frame.place != "numpy"
     assert np.array_equal(painter.draw(single), draw_small(single.program).image)  # type: ignore[arg-type]
     alone = draw_program(frame.program, open_model("shapes2d"), threads=1).image  # type: ignore[arg-type]
     assert np.array_equal(painter.draw(frame), alone), "tiles of numpy's picture were taken over"

@@ -119,7 +119,7 @@ def test_plans_of_solids(scene: nsg.Scene, program: Program) -> None:
 def test_the_plan_speaks_of_rays(tmp_path: Path) -> None:
     file = tmp_path / "scene.nsg"
     file.write_text(TEXT)
-    said = CliRunner().invoke(cli, ["explain-plan", str(file), "--threads", "1"]).output
+    said = CliRunner().invoke(cli, ["dump", "--costs", str(file), "--threads", "1"]).output
     assert re.search(r"rays +[\d,]+ from the eye and [\d,]+ to the light, \d+\.\d % near an object", said)
     assert re.search(r"steps +[\d,]+, \d+\.\d on a ray near an object", said)
     assert re.search(r"network +[\d,]+ evaluations of an object, \d\.\d\d of 4 a step", said)

@@ -76,6 +76,19 @@ def test_standard_input(folder: Folder) -> None:
     assert sorted(os.listdir()) == [f"f-{n}.png" for n in range(4)]
 
 
+def test_films_are_drawn_as_stills_are(folder: Folder) -> None:
+    name = folder.write("a.nsg", MOVING)
+    for options in (("--samples", "one"), ("--samples", "draft"), ("--backend", "exact")):
+        assert folder.run("render", name, "-o", "f-%d.png", *options).exit_code == 0
+        film = Path("f-1.png").read_bytes()
+        assert folder.run("render", name, "-o", "g-%d.png", "--jobs", "2", *options).exit_code == 0
+        assert film == Path("g-1.png").read_bytes()
+        assert folder.run("render", name, "-o", "f.png", "--frame", "1", *options).exit_code == 0
+        assert film == Path("f.png").read_bytes()
+    assert folder.run("render", name, "-o", "f-%d.png").exit_code == 0
+    assert film != Path("f-1.png").read_bytes()
+
+
 def test_params_and_reference(folder: Folder) -> None:
     name = folder.write("a.nsg", "param k = 0.5;" + MOVING.replace("0.6", "k"))
     for backend in ("neural", "reference"):

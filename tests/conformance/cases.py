@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.evaluation import load_scene
+from scenelang.evaluate.evaluation import Source
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
 from scenelang.graph.stage import stage_data
@@ -61,7 +61,7 @@ def run(name: str, given: Mapping[str, Any]) -> Outcome:
     """
     found = Diagnostics()
     path = FOLDER / f"{name}.nsg"
-    scene, spans = load_scene(path, diagnostics=found, defines=given["params"], frame=given["frame"])
+    scene, spans = Source(path, params=given["params"]).scene(found, given["frame"])
     program = None
     if scene is not None:
         try:

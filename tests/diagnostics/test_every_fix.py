@@ -12,7 +12,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.fixes import apply_fixes, settle
 from scenelang.diagnostics.pages import CODES, read_page
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import Source
 from scenelang.resolve.unused import find_unused
 from scenelang.syntax import parse
 from scenelang.syntax.lexer import Report, Tokens, scan
@@ -47,7 +47,7 @@ EXAMPLES = sorted((TESTS.parent / "examples").glob("*.nsg"))
 def check(text: str) -> list[Diagnostic]:
     found = Diagnostics()
     source = SourceFile("a.nsg", text)
-    load_source(source, diagnostics=found, models=MODELS, root=TESTS.parent / "examples")
+    Source(text=source, models=MODELS, root=TESTS.parent / "examples").scene(found)
     if not found.errors:
         find_unused(parse(source, Diagnostics()), found)
     return list(found)

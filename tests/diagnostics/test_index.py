@@ -10,7 +10,7 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import Source
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "errors.md").read_text("utf-8")
@@ -26,5 +26,5 @@ def test_the_sample_is_what_is_printed() -> None:
     sample = re.search(r"```text\n(.*?)```", PAGE, re.DOTALL)
     assert sample is not None
     found = Diagnostics()
-    load_source(SourceFile("scene.nsg", "square { rotate(45); }\n"), diagnostics=found)
+    Source(text=SourceFile("scene.nsg", "square { rotate(45); }\n")).scene(found)
     assert render_text(found, summary=False) == sample[1]

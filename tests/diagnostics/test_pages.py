@@ -13,7 +13,7 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.pages import AREAS, CODES, Example, Page, read_page
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate import limits, loader
-from scenelang.evaluate.evaluation import Evaluation, load_source
+from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.prepare import settings
 from scenelang.evaluate.session import Defines
 from scenelang.evaluate.values import functions
@@ -69,9 +69,7 @@ def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
         source = SourceFile("scene.nsg", example.text)
         path = folder / "scene.nsg"
         tree = parse(source, found)
-        evaluation = Evaluation(
-            tree, diagnostics=found, defines=defines, path=path, models=MODELS, replays=True
-        )
+        evaluation = Source(path, tree=tree, params=defines, models=MODELS).evaluation(found, replays=True)
         scene, spans = evaluation.run(int(told["--frame"][-1]) if told["--frame"] else 0)
         defines.report_unused(found)
         if not found.errors:
@@ -123,7 +121,7 @@ def test_shape_of_a_page(page: Page) -> None:
 def test_a_scene_for_two_models_is_shown_where_they_part() -> None:
     found = Diagnostics()
     source = SourceFile("scene.nsg", "square { scale(0.5); }\nsphere { scale(0.3); }\n")
-    scene, spans = load_source(source, diagnostics=found, models=MODELS)
+    scene, spans = Source(text=source, models=MODELS).scene(found)
     assert scene is not None
     assert check_compiles(scene, spans, found) is None
     (only,) = found

@@ -9,7 +9,7 @@ import pytest
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.fixes import apply_fixes, settle
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import Source
 from scenelang.scene.schema import Scene
 from scenelang.syntax.lexer import Report, scan
 from tests.diagnostics.test_every_fix import EXAMPLES, MODELS, TESTS, check, place
@@ -161,5 +161,5 @@ def test_fixes_of_slips_bring_the_scene_back_or_leave_an_error(seed: int) -> Non
 
 
 def read(text: str) -> Scene | None:
-    scene, _ = load_source(SourceFile("a.nsg", text), diagnostics=Diagnostics(), models=MODELS, root=ROOT)
+    scene, _ = Source(text=SourceFile("a.nsg", text), models=MODELS, root=ROOT).scene(Diagnostics())
     return scene

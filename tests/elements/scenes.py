@@ -12,7 +12,7 @@ from safetensors.numpy import save
 
 import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.evaluate.evaluation import load_scene
+from scenelang.evaluate.evaluation import Source
 
 IMPORT = 'import "zoo.safetensors" as zoo;\n'
 Change = Callable[[dict[str, Any], dict[str, Any]], object]
@@ -23,7 +23,7 @@ def load(folder: Path, text: str, **files: str) -> tuple[nsg.Scene | None, list[
     for name, said in {"scene": text, **files}.items():
         (folder / f"{name}.nsg").write_text(said, "utf-8")
     found = Diagnostics()
-    scene, _ = load_scene(folder / "scene.nsg", diagnostics=found)
+    scene, _ = Source(folder / "scene.nsg").scene(found)
     return scene, [(d.code, d.message) for d in found]
 
 

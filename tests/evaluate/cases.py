@@ -9,7 +9,7 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import Source
 from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap
@@ -42,7 +42,9 @@ class Outcome:
 def run_text(text: str, *, name: str = "test.nsg", **options: Any) -> Outcome:
     """Evaluate text with both models at hand."""
     found = Diagnostics()
-    scene, spans = load_source(SourceFile(name, text), diagnostics=found, **{"models": MODELS, **options})
+    frame = options.pop("frame", 0)
+    source = Source(text=SourceFile(name, text), **{"models": MODELS, **options})
+    scene, spans = source.scene(found, frame)
     return Outcome(scene, spans, found)
 
 

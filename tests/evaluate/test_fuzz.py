@@ -91,5 +91,5 @@ def test_cut_and_pasted_scenes(text: str, data: st.DataObject) -> None:
 @given(st.text(max_size=40))
 def test_random_values_from_outside(text: str) -> None:
     for default in ("1", "30deg", "1s", "true", "#d33", '"s"'):
-        outcome = run_text(f"param p = {default};", defines={"p": text})
+        outcome = run_text(f"param p = {default};", params={"p": text})
         assert set(outcome.codes) <= {"E0310", "E0309"}

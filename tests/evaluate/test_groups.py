@@ -11,7 +11,7 @@ import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.elements.groups import Part
 from scenelang.elements.zoo import zoo_bytes
-from scenelang.evaluate.evaluation import load_scene
+from scenelang.evaluate.evaluation import Source
 from scenelang.program.compile import compile_scene
 from tests.elements.shapes import ball, element, noise, square, torus
 from tests.test_architecture import loaded_by
@@ -52,7 +52,7 @@ def folder(tmp_path: Path) -> Path:
 def load(folder: Path, text: str) -> tuple[nsg.Scene | None, Diagnostics]:
     (folder / "scene.nsg").write_text(IMPORT + text)
     found = Diagnostics()
-    return load_scene(folder / "scene.nsg", diagnostics=found)[0], found
+    return Source(folder / "scene.nsg").scene(found)[0], found
 
 
 def good(folder: Path, text: str) -> nsg.Scene:

@@ -11,7 +11,7 @@ import pytest
 import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import evaluate, load_scene
+from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.prepare import settings
 from scenelang.syntax import parse
 from tests.evaluate.cases import MODELS, Outcome, run_text, transform
@@ -27,7 +27,8 @@ def write(folder: Path, **files: str) -> None:
 
 def load(path: Path, **options: Any) -> Outcome:
     found = Diagnostics()
-    scene, spans = load_scene(path, diagnostics=found, models=MODELS, **options)
+    frame = options.pop("frame", 0)
+    scene, spans = Source(path, models=MODELS, **options).scene(found, frame)
     return Outcome(scene, spans, found)
 
 
@@ -49,10 +50,10 @@ def test_names_of_another_file(tmp_path: Path) -> None:
     scene = load(tmp_path / "main.nsg").good()
     assert transform(scene).x == 4
     assert (transform(scene, 1).x, transform(scene, 1).y) == (8, 6)
-    scene = load(tmp_path / "main.nsg", defines={"lib.k": "3"}).good()
+    scene = load(tmp_path / "main.nsg", params={"lib.k": "3"}).good()
     assert transform(scene).x == 6
-    assert load(tmp_path / "main.nsg", defines={"k": "3"}).codes == ["E0211"]
-    assert load(tmp_path / "main.nsg", defines={"lib.k": "9"}).codes == ["E0309"]
+    assert load(tmp_path / "main.nsg", params={"k": "3"}).codes == ["E0211"]
+    assert load(tmp_path / "main.nsg", params={"lib.k": "9"}).codes == ["E0309"]
 
 
 def test_vectors_of_another_file(tmp_path: Path) -> None:
@@ -145,7 +146,7 @@ def test_a_file_without_params_is_prepared_once(tmp_path: Path) -> None:
     main = 'animate(1, 2); import "lib.nsg" as a; import "lib.nsg" as b; import "deep.nsg" as d;'
     write(tmp_path, main=f"{main} square {{ scale(a.f(), b.f() + d.size); rotate(1turn * u); }}")
     for frame in (0, 1):
-        outcome = load(tmp_path / "main.nsg", frame=frame, defines={"b.k": "3"})
+        outcome = load(tmp_path / "main.nsg", frame=frame, params={"b.k": "3"})
         assert outcome.good().nodes[0].transforms[0] == nsg.Scale(x=2.0, y=8.0)  # type: ignore[union-attr]
 
 
@@ -199,7 +200,7 @@ def test_texts_instead_of_files(tmp_path: Path) -> None:
     found = Diagnostics()
     text = 'import "lib.nsg" as lib; square { translate(lib.a, 0); }'
     tree = parse(SourceFile("a.nsg", text), found)
-    scene, _ = evaluate(tree, diagnostics=found, path=tmp_path / "a.nsg", texts=given)
+    scene, _ = Source(tmp_path / "a.nsg", tree=tree, texts=given).scene(found)
     assert scene is not None, list(found)
     assert scene.nodes[0].transforms[0].x == 0.25
 

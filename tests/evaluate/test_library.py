@@ -15,7 +15,7 @@ import pytest
 import scenelang as nsg
 from scenelang.diagnostics.fixes import apply_fixes
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.report.habits import SHAPES
 from scenelang.program.compile import compile_scene
 from scenelang.scene import library
@@ -278,7 +278,7 @@ def test_mistakes_in_calls_are_shown_at_the_call() -> None:
         (f"{NEST.format(level='square {}', inmost='s.disc_mask(1);')} m(16);", "E0409", "s.disc_mask"),
     ):
         found = nsg.Diagnostics()
-        scene, spans = load_source(SourceFile("a.nsg", IMPORT + text), diagnostics=found)
+        scene, spans = Source(text=SourceFile("a.nsg", IMPORT + text)).scene(found)
         if scene is not None:
             with pytest.raises(nsg.SceneError):
                 compile_scene(scene, spans=spans, diagnostics=found)

@@ -12,7 +12,7 @@ from scenelang.diagnostics.diagnostic import MOST, Diagnostics
 from scenelang.diagnostics.render_text import render_text
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.evaluate import session
-from scenelang.evaluate.evaluation import Evaluation, evaluate
+from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.limits import MAX_DEPTH, MAX_OBJECTS
 from scenelang.evaluate.report import reporter
 from scenelang.resolve.unused import find_unused
@@ -101,7 +101,7 @@ def test_a_hundred_thousand_objects_stay_within_the_steps() -> None:
     text = """for (i in 0..<{}) {{ square {{ scale(0.01); rotate(1deg * i); translate(rand(i), rand(i + 1));
         material flat {{ color(#d33); }} }} }}"""
     few = Diagnostics()
-    evaluation = Evaluation(parse(SourceFile("a.nsg", text.format(1000)), few), diagnostics=few)
+    evaluation = Source(text=SourceFile("a.nsg", text.format(1000))).evaluation(few)
     evaluation.run(0)
     assert 100 * evaluation._session.steps < session.MAX_STEPS
 
@@ -163,7 +163,7 @@ def test_trees_made_by_hand_can_be_too_deep() -> None:
         expr = nodes.Unary(span, "-", expr)
     file = nodes.File(span, (nodes.Let(span, nodes.Name(span, "a"), expr),))
     found = Diagnostics()
-    assert evaluate(file, diagnostics=found)[0] is None
+    assert Source(tree=file).scene(found)[0] is None
     assert [d.code for d in found] == ["E0324"]
 
 
@@ -215,7 +215,7 @@ def test_a_thousand_mistakes_are_enough() -> None:
         source = SourceFile("long.nsg", "".join(text.replace("¤", str(n)) for n in range(1500)))
         found = Diagnostics()
         tree = parse(source, found)
-        evaluate(tree, diagnostics=found)
+        Source(tree=tree).scene(found)
         find_unused(tree, found) if code == "W0201" else None
         codes = [d.code for d in found]
         assert codes.count(code) == MOST

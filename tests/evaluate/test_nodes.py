@@ -69,7 +69,7 @@ def flat(*rgb: float) -> nsg.Material:
 
 
 def test_chain_scene() -> None:
-    scene = run_text(CHAIN, defines={"k": "0.9"}).good()
+    scene = run_text(CHAIN, params={"k": "0.9"}).good()
     square = nsg.Object(
         "square",
         transforms=(nsg.Scale.uniform(0.8), nsg.Translate(x=-0.2, y=0)),

@@ -10,7 +10,7 @@ from tests.evaluate.cases import Outcome, run_text, transform
 
 
 def given(declaration: str, use: str, **defines: Any) -> Outcome:
-    return run_text(f"param p = {declaration}; square {{ translate({use}); }}", defines=defines)
+    return run_text(f"param p = {declaration}; square {{ translate({use}); }}", params=defines)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_text_from_outside(declaration: str, use: str, text: str, x: float) -> N
     ],
 )
 def test_what_does_not_fit(declaration: str, value: Any, code: str) -> None:
-    outcome = run_text(f"param p = {declaration};", defines={"p": value})
+    outcome = run_text(f"param p = {declaration};", params={"p": value})
     assert outcome.codes == [code]
     assert outcome.only().span is not None
     assert outcome.only().span.text == "p"  # type: ignore[union-attr]
@@ -85,16 +85,16 @@ def test_python_values() -> None:
 
 
 def test_unused_values_are_errors() -> None:
-    outcome = run_text("param size = 1; square { scale(size); }", defines={"sise": "2"})
+    outcome = run_text("param size = 1; square { scale(size); }", params={"sise": "2"})
     assert outcome.codes == ["E0211"]
     assert outcome.only().help == "did you mean `size`?"
-    assert run_text("square {}", defines={"k": "2"}).codes == ["E0211"]
+    assert run_text("square {}", params={"k": "2"}).codes == ["E0211"]
 
 
 def test_a_range_may_be_computed() -> None:
     text = "let top = 2; param p = top / 2 in 0..top * 2; square { translate(p, 0); }"
-    assert transform(run_text(text, defines={"p": "4"}).good()).x == 4
-    assert run_text(text, defines={"p": "4.5"}).codes == ["E0309"]
+    assert transform(run_text(text, params={"p": "4"}).good()).x == 4
+    assert run_text(text, params={"p": "4.5"}).codes == ["E0309"]
 
 
 @pytest.mark.parametrize(
@@ -114,5 +114,5 @@ def test_declarations_that_are_wrong(text: str, code: str) -> None:
 
 
 def test_a_colour_by_its_name_is_told_its_number() -> None:
-    outcome = run_text("param main = #d33;", defines={"main": "red"})
+    outcome = run_text("param main = #d33;", params={"main": "red"})
     assert outcome.only().help == "colours have no names; red is #f00"

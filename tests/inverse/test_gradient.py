@@ -8,8 +8,9 @@ import torch
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import Source
 from scenelang.inverse.plane import SoftPlane
-from scenelang.inverse.problem import Problem, Source
+from scenelang.inverse.problem import Moment, Problem
 from scenelang.inverse.rates import Rates, numbers_of
 from scenelang.inverse.several import Together
 from scenelang.inverse.soft import softened
@@ -18,7 +19,6 @@ from scenelang.inverse.space import Point, space_of
 from scenelang.inverse.target import Target, over
 from scenelang.program.program import Program
 from scenelang.renderers.draw import draw_objects
-from scenelang.syntax import parse
 
 STAR = "star { scale(s, 0.6); rotate(a); translate(x, 0.1); material flat { color(#3366aa); } }"
 SCENES = {
@@ -65,7 +65,7 @@ SOLIDS = {
 
 
 def problem(text: str, soft: bool = True) -> Problem:
-    source = Source(parse(SourceFile("a.nsg", text), Diagnostics()), path=None)
+    source = Moment(Source(text=SourceFile("a.nsg", text)).parsed(Diagnostics()))
     rng = np.random.default_rng(3)
     target = Target(rng.random((40, 48, 3)), rng.random((40, 48)), (0.2, 0.9, 0.4))
     light = text in SOLIDS.values()

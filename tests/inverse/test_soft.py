@@ -7,10 +7,10 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.inverse.problem import Problem, Source
+from scenelang.evaluate.evaluation import Source
+from scenelang.inverse.problem import Moment, Problem
 from scenelang.inverse.space import space_of
 from scenelang.inverse.target import Target
-from scenelang.syntax import parse
 
 TEXT = """
 canvas(32, 32); background(#ffffff); param x = 0 in -0.5..0.5; param s = 0.5 in 0.2..0.8;
@@ -19,7 +19,7 @@ square { scale(s); translate(x, 0); material flat { color(#000000); } }
 
 
 def problem(soft: bool) -> Problem:
-    source = Source(parse(SourceFile("a.nsg", TEXT), Diagnostics()), path=None)
+    source = Moment(Source(text=SourceFile("a.nsg", TEXT)).parsed(Diagnostics()))
     white = Target(np.ones((32, 32, 3)), np.ones((32, 32)))
     return Problem(source, space_of(source.evaluated({})[0]), white, (32, 32), soft=soft, samples="four")
 

@@ -9,10 +9,11 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
+from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.ranges import rewritten
 from scenelang.evaluate.values.value import Vec, unpack
 from scenelang.fitting.mesh import FitError
-from scenelang.inverse.problem import Source
+from scenelang.inverse.problem import Moment
 from scenelang.inverse.space import Space, space_of
 from scenelang.syntax import parse
 
@@ -29,8 +30,8 @@ square { translate(k, soft[0]); rotate(a + turn); }
 EVERY = ("k", "a", "turn", "n", "word", "on", "ink", "soft", "open")
 
 
-def source(text: str = TEXT) -> Source:
-    return Source(parse(SourceFile("a.nsg", text), Diagnostics()), path=None)
+def source(text: str = TEXT) -> Moment:
+    return Moment(Source(text=SourceFile("a.nsg", text)).parsed(Diagnostics()))
 
 
 def box(text: str = TEXT, names: tuple[str, ...] = ()) -> Space:

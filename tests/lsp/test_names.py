@@ -8,7 +8,7 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.evaluate.evaluation import evaluate
+from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.file_context import Place
 from scenelang.evaluate.names import Binding
 from scenelang.evaluate.prepare import references
@@ -46,7 +46,7 @@ def test_names_mean_what_they_mean_to_the_evaluator(text: str, monkeypatch: pyte
 
     monkeypatch.setattr(references, "value_of", watched)
     file = parse(source, Diagnostics())
-    evaluate(file, diagnostics=Diagnostics(), root=EXAMPLES[0].parent)
+    Source(tree=file, root=EXAMPLES[0].parent).scene(Diagnostics())
     names = Names(file)
     assert resolved or text is not SHADOWS
     for name, place in resolved:

@@ -34,6 +34,7 @@ from scenelang.measure.frontier import (
     front,
 )
 from scenelang.models.manifest import load_manifest
+from scenelang.program.compile import compile_scene
 from scenelang.scene.schema import Object, Scale, Scene, Twist
 
 
@@ -237,25 +238,28 @@ def test_the_choice_tells_why_and_what_was_next() -> None:
     assert choice.notes[1].endswith("no more exact")
 
 
-def test_points_that_cannot_draw_a_scene_are_refused() -> None:
-    manifest = load_manifest("shapes2d")
-    fixed = replace(manifest, sizes=((64, 64),), white=True)
+def test_points_that_cannot_draw_a_scene_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = Scene(nodes=(Object(geometry="square", transforms=(Scale(x=0.5, y=0.5, z=1),)),))
-    one = point("a", 1, 0.1)
-    assert refusal(one, manifest, scene, None) is None
-    assert refusal(one, fixed, scene, None) == "draws 64 x 64 pixels only"
-    small = scene.model_copy(update={"canvas": (64, 64)})
-    assert refusal(one, fixed, small, None) is None
-    grey = small.model_copy(update={"background": (0.5, 0.5, 0.5)})
-    assert refusal(one, fixed, grey, None) == "draws on white only"
+    one, program = point("a", 1, 0.1), compile_scene(scene)
+    assert refusal(one, scene, program) is None
+    assert refusal(one, scene, program, "other") == "--model other"
     twisted = Scene(nodes=(Object(geometry="square", transforms=(Twist(k=0.3),)),))
-    assert refusal(one, manifest, twisted, None) == "has no `twist`"
-    assert refusal(one, manifest, None, "shapes2d") is None
-    assert refusal(one, manifest, None, "other") == "the program was compiled for `other`"
+    assert refusal(one, twisted, program) == "has no `twist`"
+    assert refusal(one, None, program) is None
+    other = replace(program, model="other")
+    assert refusal(one, None, other) == "the program was compiled for `other`"
     exact = point("exact", 1, 0.0, backend="reference", model=None)
-    assert refusal(exact, None, scene, None) is None
-    assert refusal(exact, None, None, "shapes2d") == "a compiled program keeps only what the network needs"
-    assert refusal(point("x", 1, 0.1, offered=False, why_not="no"), manifest, scene, None) == "no"
+    assert refusal(exact, scene, program) is None
+    assert refusal(exact, None, program) == "a compiled program keeps only what the network needs"
+    assert refusal(point("x", 1, 0.1, offered=False, why_not="no"), scene, program) == "no"
+    assert refusal(point("x", 1, 0.1, model="none"), scene, program) == "not installed"
+    fixed = replace(load_manifest("shapes2d"), sizes=((64, 64),), white=True)
+    monkeypatch.setattr("scenelang.measure.choose.load_manifest", lambda _: fixed)
+    assert refusal(one, scene, program) == "draws 64 x 64 pixels only"
+    small = scene.model_copy(update={"canvas": (64, 64)})
+    assert refusal(one, small, program) is None
+    grey = small.model_copy(update={"background": (0.5, 0.5, 0.5)})
+    assert refusal(one, grey, program) == "draws on white only"
 
 
 # ---------------------------------------------------------------- the file

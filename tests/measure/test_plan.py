@@ -1,4 +1,4 @@
-"""What `scenelang explain-plan` says, against counts by hand."""
+"""What `scenelang dump --costs` says, against counts by hand."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_the_choice_says_why() -> None:
 def test_the_command(tmp_path: Path, kind: str) -> None:
     file = tmp_path / "scene.nsg"
     file.write_text(SCENE)
-    found = CliRunner().invoke(cli, ["explain-plan", str(file), "--size", "32x32", "--format", kind])
+    found = CliRunner().invoke(cli, ["dump", "--costs", str(file), "--size", "32x32", "--format", kind])
     assert found.exit_code == 0
     if kind == "json":
         plan = json.loads(found.output)
@@ -138,4 +138,4 @@ def test_the_command(tmp_path: Path, kind: str) -> None:
 def test_a_scene_with_mistakes_has_no_plan(tmp_path: Path) -> None:
     file = tmp_path / "scene.nsg"
     file.write_text("squre { }")
-    assert CliRunner().invoke(cli, ["explain-plan", str(file)]).exit_code == 1
+    assert CliRunner().invoke(cli, ["dump", "--costs", str(file)]).exit_code == 1

@@ -11,7 +11,7 @@ import scenelang as nsg
 from scenelang.backend.render import draw_exact
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import Source
 from scenelang.measure.metrics import psnr
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.passes import check_scene
@@ -29,7 +29,7 @@ DARK = "material flat { color([0.5, 0.2, 1]); } "
 
 def warned(text: str, manifest: Manifest = MANIFEST) -> list[str]:
     found = Diagnostics()
-    scene, spans = load_source(SourceFile("a.nsg", text), diagnostics=found)
+    scene, spans = Source(text=SourceFile("a.nsg", text)).scene(found)
     assert scene is not None
     check_scene(scene, spans, found, manifest)
     assert all(d.span is not None for d in found), [*found]
@@ -145,7 +145,7 @@ def test_crowds_and_hairlines_are_drawn_well_and_not_warned_of(text: str) -> Non
 @pytest.mark.parametrize(("bend", "wild"), [(99, False), (-101, True), (1e20, True)])
 def test_far_outside_nothing_may_be_right(bend: float, wild: bool) -> None:
     found = Diagnostics()
-    scene, spans = load_source(SourceFile("a.nsg", f"star {{ bend({bend}); }}"), diagnostics=found)
+    scene, spans = Source(text=SourceFile("a.nsg", f"star {{ bend({bend}); }}")).scene(found)
     assert scene is not None
     check_scene(scene, spans, found, MANIFEST)
     assert [("nothing of the picture" in (d.help or "")) for d in found] == [wild]

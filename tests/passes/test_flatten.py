@@ -6,7 +6,7 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import Source
 from scenelang.models.manifest import load_manifest
 from scenelang.passes import check_scene
 
@@ -34,13 +34,13 @@ def check(text: str) -> tuple[str, Diagnostics]:
     """Compile scene text made of `LEAVES`; returns the stream in their letters."""
     source = SourceFile("tree.nsg", text)
     diagnostics = Diagnostics()
-    scene, spans = load_source(source, diagnostics=diagnostics)
+    scene, spans = Source(text=source).scene(diagnostics)
     assert scene is not None, list(diagnostics)
     stages = {}
     check_scene(scene, spans, diagnostics, load_manifest("shapes2d"), stages.__setitem__)
     names = {}
     for letter, leaf in LEAVES.items():
-        alone, _ = load_source(SourceFile("leaf.nsg", leaf), diagnostics=Diagnostics())
+        alone, _ = Source(text=SourceFile("leaf.nsg", leaf)).scene(Diagnostics())
         assert alone is not None
         row = check_scene(alone, None, Diagnostics(), load_manifest("shapes2d")).root.links[0].node
         names[row.geometry, tuple(move.step for move in row.moves)] = letter

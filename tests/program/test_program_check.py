@@ -7,9 +7,8 @@ import pytest
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate import evaluation as evaluate
-from scenelang.evaluate.evaluation import Evaluation
+from scenelang.evaluate.evaluation import Evaluation, Source
 from scenelang.program import check
-from scenelang.syntax import parse
 
 SECOND = "animate(seconds = 1, fps = 40, loop = false);\n"
 
@@ -17,7 +16,7 @@ SECOND = "animate(seconds = 1, fps = 40, loop = false);\n"
 def look(text: str, every: bool = False) -> tuple[list[str], tuple[int, int]]:
     """The codes and frames of what is found, and how many frames were looked at."""
     found = Diagnostics()
-    evaluation = Evaluation(parse(SourceFile("a.nsg", text), found), diagnostics=found, replays=True)
+    evaluation = Source(text=SourceFile("a.nsg", text)).evaluation(found, replays=True)
     scene, spans = evaluation.run(0)
     if scene is not None:
         check.check_compiles(scene, spans, found)

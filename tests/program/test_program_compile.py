@@ -11,7 +11,7 @@ import pytest
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import load_source
+from scenelang.evaluate.evaluation import Source
 from scenelang.lifting.exact import affine_matrix
 from scenelang.lifting.layout import PLANE_LAYOUT
 from scenelang.models.weights import load_codes
@@ -30,7 +30,7 @@ CHAIN = """chain {
 
 def compiled(text: str, **options) -> tuple[Program, Diagnostics]:
     diagnostics = Diagnostics()
-    scene, spans = load_source(SourceFile("a.nsg", text), diagnostics=diagnostics)
+    scene, spans = Source(text=SourceFile("a.nsg", text)).scene(diagnostics)
     assert scene is not None, list(diagnostics)
     return compile_scene(scene, spans=spans, diagnostics=diagnostics, **options), diagnostics
 

@@ -9,10 +9,9 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import Evaluation
+from scenelang.evaluate.evaluation import Evaluation, Source
 from scenelang.evaluate.ranges import ParamError, param_named
 from scenelang.sweep.values import Rows, rows_of, text_of, values_of
-from scenelang.syntax import parse
 
 TEXT = """\
 param k = 0.5 in 0..1;
@@ -33,7 +32,7 @@ star;
 @pytest.fixture
 def scene() -> Evaluation:
     found = Diagnostics()
-    evaluation = Evaluation(parse(SourceFile("a.nsg", TEXT), found), diagnostics=found)
+    evaluation = Source(text=SourceFile("a.nsg", TEXT)).evaluation(found)
     assert evaluation.run(0)[0] is not None, found.items
     return evaluation
 

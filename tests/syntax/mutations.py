@@ -20,7 +20,7 @@ from lark.exceptions import LarkError
 
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import evaluate
+from scenelang.evaluate.evaluation import Source
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.syntax import nodes, parse
 from scenelang.syntax.lexer import Report, scan
@@ -263,7 +263,7 @@ def check(scene: Scene, text: str) -> tuple[list[Diagnostic], nodes.File, bool]:
     """All diagnostics of a text in a scene's place, its tree, and whether it means a scene."""
     diagnostics = Diagnostics()
     tree = parse(SourceFile(scene.name, text), diagnostics)
-    result, _ = evaluate(tree, diagnostics=diagnostics, models=models(), path=scene.path)
+    result, _ = Source(scene.path, tree=tree, models=models()).scene(diagnostics)
     return list(diagnostics), tree, result is not None
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import Evaluation
+from scenelang.evaluate.evaluation import Evaluation, Source
 from scenelang.graph import affine
 from scenelang.graph.nodes import Graph
 from scenelang.graph.steps import Affine, Displace, Step, Warp
@@ -22,7 +22,6 @@ from scenelang.passes import OPTIONAL
 from scenelang.program.compile import compile_scene, find_model
 from scenelang.program.groups import BEGINS, ENDS
 from scenelang.program.program import Program
-from scenelang.syntax import parse
 from scenelang.viewer.form import Form, form_of
 from scenelang.viewer.rows import stage_of
 from scenelang.viewer.view import view_of
@@ -46,11 +45,11 @@ class Compiled(NamedTuple):
         return form_of(self.evaluation, self.manifest, self.program.elements)
 
 
-def compiled(source: SourceFile, path: Path | None = None, **inputs: Any) -> Compiled:
+def compiled(source: SourceFile, path: Path | None = None, frame: int = 0, **inputs: Any) -> Compiled:
     """Compile a scene without passes that only save work; raises SceneError."""
     found, graphs = Diagnostics(), {}
-    evaluation = Evaluation(parse(source, found), diagnostics=found, path=path, **inputs)
-    scene, _ = evaluation.run(inputs.get("frame", 0))
+    evaluation = Source(path, source, **inputs).evaluation(found, frame=frame)
+    scene, _ = evaluation.run(frame)
     if scene is None:
         raise SceneError(found)
     model, after = inputs.get("model"), graphs.__setitem__
@@ -180,7 +179,7 @@ def pictures(page: Any, jobs: list[tuple[Form, list[dict[str, Any]]]]) -> list[l
 def drawable(source: SourceFile, **inputs: Any) -> tuple[Form, Compiled | None] | None:
     """A scene's form, and what the compiler makes of it, if it does; nothing where no page draws it."""
     found = Diagnostics()
-    evaluation = Evaluation(parse(source, found), diagnostics=found, **inputs)
+    evaluation = Source(text=source, **inputs).evaluation(found)
     scene, _ = evaluation.run(0)
     if scene is None or found.errors:
         return None

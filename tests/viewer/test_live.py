@@ -55,7 +55,7 @@ def test_every_param_and_frame_of_the_examples(path: Path, viewer_page: Any) -> 
     for (values, frame), picture in zip(cases, shown, strict=True):
         given = {name: defined(params[name], value) for name, value in values.items()}
         try:
-            expected = compiled(source, path, defines=given, frame=frame, model=first.manifest.name)
+            expected = compiled(source, path, params=given, frame=frame, model=first.manifest.name)
         except SceneError:
             assert isinstance(picture, str), (values, frame)
             continue

@@ -28,7 +28,7 @@ def test_corners(name: str, viewer_page: Any) -> None:
     shown = pictures(viewer_page, [(form, [{"params": {"n": n}, "frame": frame} for n, frame in cases])])[0]
     for (n, frame), picture in zip(cases, shown, strict=True):
         try:
-            expected = compiled(source, defines={"n": n}, frame=frame, model=first.manifest.name)
+            expected = compiled(source, params={"n": n}, frame=frame, model=first.manifest.name)
         except SceneError:
             assert isinstance(picture, str), n
             continue
@@ -61,4 +61,4 @@ def test_elements_and_imports(text: str, folder: Path, viewer_page: Any) -> None
     before, after = pictures(viewer_page, [(form, [{}, {"params": changes}])])[0]
     check_rows(before["rows"], first.program)
     check_picture(before, first, form)
-    check_picture(after, compiled(source, path, defines=changes), form)
+    check_picture(after, compiled(source, path, params=changes), form)

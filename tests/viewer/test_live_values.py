@@ -10,7 +10,7 @@ import pytest
 
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import Evaluation
+from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.values.value import POISON, Angle, RangeValue, Time, Vec
 from scenelang.models.manifest import load_manifest
 from scenelang.syntax import nodes, parse
@@ -52,7 +52,7 @@ def evaluated(text: str) -> tuple[Any, Any] | None:
     tree = parse(SourceFile("", f"let v = {text};"), found)
     if found.errors:
         return None
-    evaluation = Evaluation(tree, diagnostics=found, models=(MODEL,))
+    evaluation = Source(tree=tree, models=(MODEL,)).evaluation(found)
     evaluation.run(0)
     context, stmt = evaluation.context, tree.statements[0]
     assert isinstance(stmt, nodes.Let)

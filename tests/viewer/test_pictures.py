@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
+from scenelang.evaluate.evaluation import Source
 from scenelang.measure.metrics import psnr
 from scenelang.viewer.export import viewed
 from tests.viewer.live import defined, moved
@@ -39,7 +40,7 @@ SNAPSHOT = """async (params) => {
 
 def opened(page: Any, path: Path) -> dict[str, Any]:
     """Open a viewer of a scene's file; its view."""
-    view, _ = viewed(path, size=SIZE)
+    view, _ = viewed(Source(path, size=SIZE), path.stem)
     page.evaluate(OPEN, json.loads(view.message()))
     return view.data
 

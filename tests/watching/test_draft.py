@@ -9,6 +9,8 @@ import pytest
 
 import scenelang as nsg
 from scenelang.animation.timing import FrameRange
+from scenelang.backend.options import How
+from scenelang.evaluate.evaluation import Source
 from scenelang.watching import picture
 from scenelang.watching.picture import Easel, Outcome, Outdated, stamps
 
@@ -25,7 +27,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def easel(file: Path, text: str, drafts: list[Outcome]) -> Easel:
     file.write_text(text)
-    made = Easel(file, Path("a.png"), None, FrameRange(), 0, {}, {}, "neural", "auto", None)
+    made = Easel(Source(file), Path("a.png"), None, FrameRange(), 0, How())
     made.drafted = drafts.append
     return made
 

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from scenelang.cli.checking import Scenes
+    from scenelang.cli.inputs import Request
     from scenelang.diagnostics.diagnostic import Diagnostic
     from scenelang.diagnostics.fixes import Settled
-    from scenelang.evaluate.session import Defines
     from scenelang.program.check import Frames
 
 Format = Literal["human", "json", "sarif", "github", "concise"]
@@ -47,8 +47,6 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
 @click.argument("files", nargs=-1, required=True, metavar="PATH…")
 @click.option("--fix", "fixes", is_flag=True, help="Apply the safe fixes; report what is left.")
 @click.option("--diff", is_flag=True, help="Show what --fix would change, and change nothing.")
-@options.define
-@options.model
 @options.strict
 @click.option("--select", multiple=True, metavar="CODES", callback=_codes, help="Report only these warnings.")
 @click.option("--ignore", multiple=True, metavar="CODES", callback=_codes, help="Leave out these warnings.")
@@ -62,19 +60,14 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
 )
 @click.option("-q", "--quiet", is_flag=True, help="Write diagnostics and no summary.")
 @options.color
-@click.option(
-    "--frame", type=click.IntRange(0), metavar="N", help="Look at one frame of the animation, from 0."
-)
 @click.option("--all-frames", is_flag=True, help="Look at all frames of the animation.")
-@options.root
+@options.request
 @click.pass_context
 def command(
     ctx: click.Context,
     files: tuple[str, ...],
     fixes: bool,
     diff: bool,
-    defines: Defines,
-    model: str | None,
     strict: bool,
     select: tuple[str, ...],
     ignore: tuple[str, ...],
@@ -82,9 +75,8 @@ def command(
     most: int | None,
     quiet: bool,
     color: options.Color,
-    frame: int | None,
     all_frames: bool,
-    root: str | None,
+    request: Request,
 ) -> None:
     """Report what is wrong with scenes, without drawing them.
 
@@ -98,12 +90,12 @@ def command(
     cannot be read or written.
     """
     from scenelang.cli.checking import Scenes, Selection
-    from scenelang.cli.inputs import STDIN, Request
+    from scenelang.cli.inputs import STDIN
 
-    if frame is not None and all_frames:
+    if request.frame is not None and all_frames:
         raise click.UsageError("--frame and --all-frames exclude each other.")
-    frames: Frames = "all" if all_frames else "some" if frame is None else "one"
-    scenes = Scenes(Request(defines, model, root, frame or 0), Selection(select, ignore), frames)
+    frames: Frames = "all" if all_frames else "some" if request.frame is None else "one"
+    scenes = Scenes(request, Selection(select, ignore), frames)
     unreadable = not _read(files, scenes)
     out = _Output(kind, most, quiet, color, (fixes or diff) and STDIN in scenes.sources, scenes)
     if not fixes and not diff:

@@ -12,6 +12,7 @@ from scenelang.cli.progress import Bar
 from scenelang.cli.say import need_metrics
 
 if TYPE_CHECKING:
+    from scenelang.backend.options import How
     from scenelang.cli.inputs import Request
 
 
@@ -22,12 +23,9 @@ if TYPE_CHECKING:
 )
 @options.request
 @options.originals
-@options.device
-@options.threads
+@options.drawing("device", "threads")
 @click.pass_context
-def command(
-    ctx: click.Context, scene: str, out: Path | None, request: Request, device: str, threads: int | None
-) -> None:
+def command(ctx: click.Context, scene: str, out: Path | None, request: Request, how: How) -> None:
     """Draw SCENE with the network and exactly, and show where they differ.
 
     The exact picture takes longer than the network's, of solids minutes. Prints PSNR (at most 50 dB), SSIM
@@ -39,21 +37,19 @@ def command(
 
     need_metrics()
     target = out if out is not None else composed(Path(f"{stem_of(scene)}-compare.png"))
-    job, found = prepare_scene(scene, request)
-    if job.program is None or found.scene is None or job.failed():
+    job = prepare_scene(scene, request)
+    if job.program is None or job.scene is None or job.failed():
         ctx.exit(1)
-    from scenelang.backend.neural import choose_device, draw_program, open_model
-    from scenelang.backend.render import draw_exact
+    from scenelang.backend.neural import choose_device
+    from scenelang.backend.render import draw, draw_exact
     from scenelang.measure.metrics import compare, over_white, side_by_side
 
-    opened = open_model(job.program.model, choose_device(device))
-    picture = over_white(draw_program(job.program, opened, threads=threads).image)
+    picture = over_white(draw(job.program, how, place=choose_device(how.device)).image)
     with Bar() as bar:
         exact = over_white(
             draw_exact(
-                found.scene,
-                spans=found.spans,
-                model=request.model,
+                job.scene,
+                spans=job.spans,
                 progress=lambda share: bar("drawing the exact picture", share, 1),
             )
         )

@@ -30,7 +30,7 @@ def command(ctx: click.Context, file: str, out: str, request: Request, strict: b
     if not out.endswith(PROGRAM):
         raise click.UsageError(f"A program's file ends in {PROGRAM}, `{out}` does not.")
     clock = Clock()
-    job, _ = prepare_scene(file, request, clock)
+    job = prepare_scene(file, request, clock)
     if job.failed(strict) or job.program is None:
         ctx.exit(1)
     with clock("save"):

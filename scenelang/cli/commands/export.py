@@ -11,18 +11,15 @@ from scenelang.cli.progress import Clock
 from scenelang.cli.say import say_trouble
 
 if TYPE_CHECKING:
-    from scenelang.evaluate.session import Defines
+    from scenelang.cli.inputs import Request
 
 
 @click.command("export")
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
 @click.option("-o", "--out", required=True, metavar="OUT", help="Page (.html) or folder to write.")
 @click.option("--title", metavar="TEXT", help="Title of the page; by default the name of the file.")
-@options.size
-@options.define
-@options.model
+@options.request
 @options.strict
-@options.root
 @options.verbose
 @click.pass_context
 def command(
@@ -30,11 +27,8 @@ def command(
     files: tuple[str, ...],
     out: str,
     title: str | None,
-    size: tuple[int, int] | None,
-    defines: Defines,
-    model: str | None,
+    request: Request,
     strict: bool,
-    root: str | None,
     verbose: bool,
 ) -> None:
     """Write scenes as web pages that draw themselves.
@@ -47,7 +41,7 @@ def command(
     Scenes with errors are reported and left out. Exits with 1 if there are any, 2 if a file cannot be read
     or written.
     """
-    from scenelang.cli.inputs import Request, stem_of
+    from scenelang.cli.inputs import stem_of
     from scenelang.cli.jobs import prepare_all
     from scenelang.cli.outputs import PAGE, targets
     from scenelang.files import write_output
@@ -59,15 +53,13 @@ def command(
         raise click.UsageError("--title is of one page; several have the names of their files.")
     clock = Clock()
     paths = targets(files, out, PAGE)
-    jobs, code = prepare_all(files, Request(defines, model, root, 0, size), clock, strict=strict)
+    jobs, code = prepare_all(files, request, clock, strict=strict)
     for job, path in zip(jobs, paths, strict=True):
         if job is None or job.failed(strict) or job.program is None:
             continue
-        found = job.source
-        scene, evaluation = (None, None) if found is None else (found.scene, found.evaluation)
         try:
             with clock("view"):
-                view = scene_view(job.program, scene, evaluation, title=title or stem_of(job.name))
+                view = scene_view(job.program, job.scene, job.evaluation, title=title or stem_of(job.name))
         except ProgramError as error:
             say_trouble(f"{job.name}: {error}")
             code = 2

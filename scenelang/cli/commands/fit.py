@@ -136,7 +136,7 @@ def command(
     animate: str | None,
     seed: int,
     budget: float,
-    frame: int,
+    frame: int | None,
     model: str | None,
     root: str | None,
 ) -> None:
@@ -161,7 +161,7 @@ def command(
         with Bar() as bar:
             found = fit(
                 scene, target, params=wanted, start=start, fixed=defines.values, mask=mask, crop=crop,
-                background=background, model=model, root=root, frame=frame, seed=seed, budget_s=budget,
+                background=background, model=model, root=root, frame=frame or 0, seed=seed, budget_s=budget,
                 progress=bar,
             )  # fmt: skip
     except SceneError as error:
@@ -176,7 +176,7 @@ def command(
         found.sheet().save(compare)
     if animate is not None:
         still = [found.way[0]] * 4, [found.way[-1]] * 8  # long enough to be looked at
-        render(still[0] + list(found.way) + still[1], animate, fps=8, model=model)
+        render(still[0] + list(found.way) + still[1], animate, fps=8)
     for line in found.told():
         click.echo(line, err=out == "-")
     if not found.done:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import click
 
@@ -14,12 +14,12 @@ from scenelang.cli.main import Trouble
 from scenelang.cli.progress import Bar, Clock
 
 if TYPE_CHECKING:
-    from scenelang.backend.options import Samples
-    from scenelang.cli.jobs import Job
-    from scenelang.evaluate.session import Defines
+    from collections.abc import Callable
+
+    from scenelang.backend.options import How
+    from scenelang.cli.inputs import Input, Request
     from scenelang.image import Image
-    from scenelang.measure.frontier import Limits
-    from scenelang.outputs import Output, Outputs, Proof
+    from scenelang.outputs import Output, Outputs
 
 
 _SECTIONS: Final = {
@@ -38,9 +38,7 @@ _SECTIONS: Final = {
     metavar="OUT",
     help="Picture, animation, numbered pictures or folder to write.",
 )
-@options.size
-@options.define
-@options.still
+@options.request
 @options.frames
 @options.fps
 @options.jobs
@@ -49,19 +47,7 @@ _SECTIONS: Final = {
     "--palette", words="auto global frame", help="Colours of a GIF: 255 for all frames or for each."
 )
 @click.option("--dither", is_flag=True, help="Dither colours that a GIF's palette lacks.")
-@options.model
-@options.choice(
-    "--backend",
-    words="neural exact reference",
-    help="Draw with the trained network, with formulas of the shapes in its place (exact), or by the exact "
-    "definition, which is slow (reference).",
-)
-@options.choice(
-    "--samples",
-    words="adaptive four quick one draft",
-    help="Samples of a pixel: four near outlines, four everywhere, four near strong outlines (solids), one, "
-    "with hard edges, or one for each 2 x 2 pixels.",
-)
+@options.drawing()
 @click.option(
     "--output",
     "outputs",
@@ -85,37 +71,27 @@ _SECTIONS: Final = {
     help="Choose the fastest way to draw whose promised FLIP error is at most E.",
 )
 @options.originals
-@options.device
-@options.threads
 @options.strict
-@options.root
 @options.verbose
 @click.pass_context
 def command(
     ctx: click.Context,
     files: tuple[str, ...],
     out: str,
-    size: tuple[int, int] | None,
-    defines: Defines,
-    frame: int | None,
+    request: Request,
+    how: How,
     frames: str | None,
     fps: float | None,
     jobs: int | None,
     cluster: str | None,
     palette: Literal["auto", "global", "frame"],
     dither: bool,
-    model: str | None,
-    backend: options.Still,
-    samples: Samples,
     outputs: tuple[Output, ...],
     prove: bool,
     redraw: bool,
     max_ms: float | None,
     max_flip: float | None,
-    device: Literal["auto", "cpu", "cuda"],
-    threads: int | None,
     strict: bool,
-    root: str | None,
     verbose: bool,
 ) -> None:
     """Draw scenes.
@@ -142,113 +118,100 @@ def command(
     With --max-ms or --max-flip each scene is drawn by what was measured to suffice, model and samples; -v
     says which, why, and what was next.
     """
-    from scenelang.cli.animation import Requested, animate, wanted_target
-    from scenelang.cli.drawing import (
-        blank,
-        check_options,
-        check_proof,
-        chosen,
-        exact,
-        job_outputs,
-        neural,
-        proved,
-    )
-    from scenelang.cli.inputs import Request
+    from scenelang.cli.animation import Film, animate, moves
+    from scenelang.cli.drawing import choose_all
+    from scenelang.cli.inputs import read_input, unused_defines
     from scenelang.cli.jobs import PROGRAM, prepare_all
     from scenelang.cli.outputs import check_outputs, targets
     from scenelang.measure.frontier import Limits
 
     outputs = tuple(dict.fromkeys(outputs))
-    prove = prove or redraw or "proof" in outputs
-    clock = Clock()
-    if backend == "exact" and device == "cuda":
-        raise click.UsageError("--backend exact draws on processors only; leave out --device cuda.")
-    moving: options.Backend = "neural" if backend == "exact" else backend  # which animations refuse below
-    wanted = Requested(
-        frames, fps, jobs, cluster, palette, dither, moving, device, threads, strict, verbose, outputs
-    )
-    _ = wanted.frames
-    if frame is not None and wanted.certain:
+    more = _More(outputs, prove or redraw or "proof" in outputs, redraw)
+    film, limits = Film(frames, fps, jobs, cluster, palette, dither), Limits(max_ms, max_flip)
+    _ = film.frames
+    if request.frame is not None and film.certain:
         raise click.UsageError("--frame asks for a picture, --frames and --fps for an animation.")
-    if len(files) > 1 and wanted.certain:
+    if film.certain and len(files) > 1:
         raise click.UsageError("--frames and --fps take one scene.")
-    limits = Limits(max_ms, max_flip)
-    check_options(ctx, limits, device)
-    if prove:
-        check_proof(limits, backend)
-    request = Request(defines, model, root, frame or 0, size)
-    source = None
-    if len(files) == 1 and frame is None and not files[0].endswith(PROGRAM):
-        target = wanted_target(files[0], out, wanted)
+    if more.prove and (limits or how.backend != "neural"):
+        other = "--max-ms and --max-flip" if limits else f"--backend {how.backend}, whose pictures are exact"
+        raise click.UsageError(f"A proof is of what the scene's model draws; leave out {other}.")
+    request = replace(request, source=replace(request.source, fps=fps))
+    clock, found = Clock(), None
+    if len(files) == 1 and request.frame is None and not files[0].endswith(PROGRAM):
+        target = film.target(files[0], out)
         if target is not None:
-            _only_stills(limits, samples, prove, backend)
-            done = animate(files[0], out, target, request, wanted)
-            if isinstance(done, int):
-                ctx.exit(done)
-            source = done
-    elif wanted.certain:
+            found = read_input(files[0], request, clock, how)
+            if moves(found, target, film, out):
+                if limits or more.prove:
+                    what = "a proof is" if more.prove else "--max-ms and --max-flip are"
+                    raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")
+                found.diagnostics.items += unused_defines(request)
+                ctx.exit(animate(found, target, film, how, out, outputs, strict, verbose))
+    elif film.certain:
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
     if cluster is not None:
         raise click.UsageError("--cluster draws the frames of an animation; sweep draws many pictures.")
     paths = targets(files, out)
     check_outputs(paths, outputs)
-
-    def refusal(job: Job) -> str | None:
-        if not (prove or backend == "reference") or job.program is None or job.source is not None:
-            return None
-        does = "a proof is of a scene" if prove else "the reference draws scenes"
-        return f"{does}; a program keeps only what the network needs"
-
-    inputs, code = prepare_all(
-        files,
-        request,
-        clock,
-        strict=strict,
-        compiled=backend != "reference",
-        verbose=verbose or prove,
-        source=source,
-        refusal=refusal,
+    refused = None
+    if more.prove or how.backend == "reference":
+        does = "a proof is of a scene" if more.prove else "the reference draws scenes"
+        refused = f"{does}; a program keeps only what the network needs"
+    every, code = prepare_all(
+        files, request, clock, how, strict=strict, graphs=more.prove, stored=refused, first=found
     )
-    ready = [(job, path) for job, path in zip(inputs, paths, strict=True) if job and not job.failed(strict)]
-    if not ready:
-        ctx.exit(code)
-    if limits:
-        draw, ready, code = chosen(limits, request, clock, threads, ready, code)
-    elif backend == "reference":
-        if samples != "adaptive":
-            raise click.UsageError("--samples is for the network, not for the reference.")
-        draw = exact(request, clock)
-    else:
-        draw = neural(clock, device, threads, samples, exactly=backend == "exact")
-    proofs: list[Proof] = []
-    if prove:
-        draw = proved(draw, clock, redraw, proofs)
+    able = [(job, path) for job, path in zip(every, paths, strict=True) if job and not job.failed(strict)]
+    if limits and able:
+        chosen = choose_all([job for job, _ in able], limits, request.source.model, clock)
+        code = code if len(chosen) == len(able) else 2
+        able = [(job, path) for job, path in able if job in chosen]
     told: list[str] = []
     with Bar() as bar:
-        for index, (job, path) in enumerate(ready):
-            if outputs:  # before the picture: what it lacks is said at once
-                with clock("outputs"):
-                    found = job_outputs(job, outputs, request.model, threads, backend)
-            image = draw(job, partial(_part, bar, index, len(ready)))
-            if (why := blank(job, image)) is not None:
-                told.append(f"{path}: {why}")
-            if proofs:
-                told.append(f"{path}: {proofs[-1].told()}")
-            if "proof" in outputs:
-                found = replace(found, proof=proofs[-1])
-            with clock("save"):
-                if outputs:
-                    told += _saved(image, found, path)
-                else:
-                    image.save(path)
+        for index, (job, path) in enumerate(able):
+            told += _draw(job, path, more, clock, partial(_part, bar, index, len(able)))
             if verbose:
                 lines = "".join(f"\n  {note}" for note in job.notes)
                 click.echo(f"{job.name} -> {path}{lines}", err=True)
     for line in told:
         click.echo(line, err=True)
-    if verbose:
+    if verbose and able:
         click.echo(clock.report(), err=True)
     ctx.exit(code)
+
+
+class _More(NamedTuple):
+    """Wishes besides a picture."""
+
+    outputs: tuple[Output, ...]
+    prove: bool
+    redraw: bool
+
+
+def _draw(job: Input, path: Path, more: _More, clock: Clock, progress: Callable[[float], None]) -> list[str]:
+    """Draw a job to a file; lines about it."""
+    from scenelang.backend.outputs import outputs_of
+    from scenelang.backend.prove import prove_drawn
+    from scenelang.cli.drawing import blank, draw_job
+    from scenelang.outputs import Outputs
+
+    found, drawn, proof = Outputs(), job.scene if job.how.backend == "reference" else job.program, None
+    if more.outputs and drawn is not None:  # before the picture: what it lacks is said at once
+        with clock("outputs"):
+            found = outputs_of(drawn, more.outputs, job.how, spans=job.spans)
+    if more.prove and job.program is not None:
+        with clock("prove"):
+            image, proof = prove_drawn(
+                job.graphs, job.program.model, lambda: draw_job(job, clock, progress), more.redraw
+            )
+    else:
+        image = draw_job(job, clock, progress)
+    told = [] if (why := blank(job, image)) is None else [f"{path}: {why}"]
+    if proof is not None:
+        told.append(f"{path}: {proof.told()}")
+        found = replace(found, proof=proof) if "proof" in more.outputs else found
+    with clock("save"):
+        return told + _saved(image, found, path)
 
 
 def _saved(image: Image, outputs: Outputs, path: Path) -> list[str]:
@@ -264,11 +227,3 @@ def _saved(image: Image, outputs: Outputs, path: Path) -> list[str]:
 
 def _part(bar: Bar, index: int, count: int, share: float) -> None:
     bar("drawing", index + share, count)
-
-
-def _only_stills(limits: Limits, samples: str, prove: bool, backend: str) -> None:
-    """Refuse for animations what chooses or changes how one picture is drawn."""
-    if limits or samples != "adaptive" or prove or backend == "exact":
-        what = "--max-ms and --max-flip are" if limits else "a proof is" if prove else "--samples is"
-        what = "--backend exact is" if backend == "exact" else what
-        raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")

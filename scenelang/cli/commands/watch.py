@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -17,7 +18,8 @@ from scenelang.diagnostics.suggest import plural
 if TYPE_CHECKING:
     import PIL.Image
 
-    from scenelang.evaluate.session import Defines
+    from scenelang.backend.options import How
+    from scenelang.cli.inputs import Request
     from scenelang.watching.picture import Easel, Outcome
     from scenelang.watching.screen import Screen
 
@@ -25,35 +27,23 @@ if TYPE_CHECKING:
 @click.command("watch")
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
 @click.option("-o", "--out", metavar="OUT", help="Picture or animation to write; by default STEM.png.")
-@options.size
-@options.define
-@options.still
+@options.request
 @options.frames
 @options.fps
-@options.model
 @options.choice(
     "--show",
     words="auto never always",
     help="Show the picture in the terminal; always does with coloured characters if need be.",
 )
-@options.backend
-@options.device
-@options.threads
-@options.root
+@options.drawing()
 def command(
     file: Path,
     out: str | None,
-    size: tuple[int, int] | None,
-    defines: Defines,
-    frame: int | None,
+    request: Request,
+    how: How,
     frames: str | None,
     fps: float | None,
-    model: str | None,
     show: Literal["auto", "never", "always"],
-    backend: options.Backend,
-    device: Literal["auto", "cpu", "cuda"],
-    threads: int | None,
-    root: str | None,
 ) -> None:
     """Draw a scene again whenever it, or a file that it imports, is saved.
 
@@ -63,26 +53,21 @@ def command(
     """
     import sys
 
-    from scenelang.animation.targets import is_animation
-    from scenelang.cli.animation import Requested, wanted_target
+    from scenelang.cli.animation import Film
     from scenelang.cli.outputs import composed, targets
     from scenelang.watching.picture import Easel, Outdated, settle, stamps, wait
     from scenelang.watching.screen import Screen
 
     out = str(composed(Path(f"{file.stem}.png"))) if out is None else out
-    wanted = Requested(frames, fps)
-    target = None
-    if frame is None and (is_animation(out) or wanted.certain or out.endswith(("/", "\\"))):
-        target = wanted_target(str(file), out, wanted)
+    film, target = Film(frames, fps), None
+    if request.frame is None:
+        target = film.target(str(file), out)
     path = Path(out) if target is not None else targets([str(file)], out)[0]
     if not file.is_file():
         raise click.UsageError(f"there is no file `{file}`.")
-    folder = None if root is None else Path(root)
-    options = {"model": model, "root": folder, "size": size, "fps": fps}
+    source = replace(request.source, path=file, fps=fps, params=request.source.values)
     screen = Screen(show, wants_color(sys.stdout))
-    easel = Easel(
-        file, path, target, wanted.frames, frame or 0, defines.values, options, backend, device, threads
-    )
+    easel = Easel(source, path, target, film.frames, request.frame or 0, how)
     easel.drafted = partial(_report, easel, screen)
     while True:
         before = stamps(easel.paths)
