@@ -16,13 +16,13 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from fuzz.tensors import mutate
+from lab.training.checkpoint import load_tensors
 from scenelang.models import manifest as manifests
 from scenelang.models.framed import framed_arrays
 from scenelang.models.load import load_network
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.weights import ModelError, codes_of, open_weights, weights_path
 from scenelang.tensors import TensorError, read_tensors
-from scenelang.training.checkpoint import load_tensors
 from tests.cli.conftest import Folder
 
 SHAPES = load_manifest("shapes2d")
@@ -243,8 +243,8 @@ def test_a_checkpoint_of_other_tensors(folder: Folder) -> None:
     """Its configuration is the right one, its tensors are another training's."""
     import torch
 
-    from scenelang.training.checkpoint import save_tensors
-    from scenelang.training.config import read_config
+    from lab.training.checkpoint import save_tensors
+    from lab.training.config import read_config
     from tests.cli.test_commands import tiny_config
 
     name = tiny_config(folder)

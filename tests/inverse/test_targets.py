@@ -12,7 +12,7 @@ from scenelang.measure.metrics import psnr
 pytest.importorskip("resvg_py", reason="resvg is not installed (the extra oracles)")
 pytestmark = [pytest.mark.oracle, pytest.mark.slow]
 
-from benchmarks import fit_targets  # noqa: E402
+from lab.bench import fit_targets  # noqa: E402
 
 
 @pytest.mark.parametrize(

@@ -12,14 +12,14 @@ import pytest
 import torch
 from torch import Tensor
 
-from scenelang.lab.designs.ablations import VARIANTS, make_student
-from scenelang.lab.designs.pictures import PictureConfig, Scenes, random_scenes
-from scenelang.lab.designs.students import FramedStudent, StudentConfig
-from scenelang.lab.designs.studies import Study, StudyConfig
-from scenelang.lab.experiments.runs import SEEDS, TRIED, ablation_runs
+from lab.designs.ablations import VARIANTS, make_student
+from lab.designs.pictures import PictureConfig, Scenes, random_scenes
+from lab.designs.students import FramedStudent, StudentConfig
+from lab.designs.studies import Study, StudyConfig
+from lab.experiments.runs import SEEDS, TRIED, ablation_runs
+from lab.training.losses import leaf_loss, trace_loss
+from lab.training.scenes import SceneConfig, leaf_batch, random_batch
 from scenelang.renderers.network import FramedConfig
-from scenelang.training.losses import leaf_loss, trace_loss
-from scenelang.training.scenes import SceneConfig, leaf_batch, random_batch
 
 RUNS = ablation_runs(1e6, 1)
 BY_NAME = {name: study for name, _, study in RUNS}

@@ -12,13 +12,13 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
+from lab.codes import decoder
+from lab.codes.decoder import decoded
+from lab.codes.forms import Array, balls, best_form, cosines, nodes, off
+from lab.codes.study import drawn, random_pictures
+from lab.codes.world import ERRORS, World, world
 from scenelang.cli.main import cli
 from scenelang.elements.pyramid import unpacked
-from scenelang.lab.codes import decoder
-from scenelang.lab.codes.decoder import decoded
-from scenelang.lab.codes.forms import Array, balls, best_form, cosines, nodes, off
-from scenelang.lab.codes.study import drawn, random_pictures
-from scenelang.lab.codes.world import ERRORS, World, world
 from scenelang.measure.metrics import psnr
 from scenelang.models.load import load_model
 

@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 import scenelang as nsg
-from scenelang.lab.commands.eval import command
-from scenelang.measure.scenes import scenes_of
+from lab.commands.eval import command
+from lab.sets.scenes import scenes_of
 from scenelang.models.load import load_model
 
 
@@ -28,7 +28,7 @@ def test_figures_of_solids_are_those_of_the_pictures_users_get(
     kept = sorted((tmp_path / "kept").iterdir())
     assert len(kept) == 3
     with monkeypatch.context() as without:
-        without.setattr("scenelang.lab.evaluate.reference_of", None)  # nothing is drawn again
+        without.setattr("lab.evaluate.reference_of", None)  # nothing is drawn again
         assert CliRunner().invoke(command, [*asked, "-o", str(tmp_path)]).exit_code == 0
     again = json.loads((tmp_path / "staged.json").read_text("utf-8"))
     assert (again["psnr_uncapped"], again["ssim"]) == (found["psnr_uncapped"], found["ssim"])

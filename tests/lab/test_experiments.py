@@ -12,11 +12,11 @@ import torch
 from click.testing import CliRunner
 from PIL import Image
 
+from lab.experiments import paper
+from lab.experiments.experiment import Settings, run_experiment, run_one, unseen
+from lab.experiments.runs import EXPERIMENTS, SIDE
+from lab.experiments.tables import table_of
 from scenelang.cli.main import cli
-from scenelang.lab.experiments import paper
-from scenelang.lab.experiments.experiment import Settings, run_experiment, run_one, unseen
-from scenelang.lab.experiments.runs import EXPERIMENTS, SIDE
-from scenelang.lab.experiments.tables import table_of
 
 
 @pytest.mark.parametrize("name", list(EXPERIMENTS))

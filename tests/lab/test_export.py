@@ -9,11 +9,11 @@ import pytest
 import torch
 from safetensors.numpy import load_file
 
+from lab.designs.export import export
+from lab.designs.pictures import PictureConfig, random_scenes
+from lab.designs.students import StudentConfig
+from lab.designs.studies import StudentFile, Study, StudyConfig
 from scenelang.graph.steps import Affine, Warp
-from scenelang.lab.designs.export import export
-from scenelang.lab.designs.pictures import PictureConfig, random_scenes
-from scenelang.lab.designs.students import StudentConfig
-from scenelang.lab.designs.studies import StudentFile, Study, StudyConfig
 from scenelang.lifting.learned import lift_geometry, lift_material, read_lifting
 from scenelang.renderers.streaming import StreamingConfig
 

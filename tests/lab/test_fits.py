@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import scenelang
-from scenelang.lab import gradients
-from scenelang.lab.fits import FAR_DB, random_case
+from lab import gradients
+from lab.fits import FAR_DB, random_case
 from scenelang.measure.metrics import over_white, psnr
 from scenelang.models.manifest import load_manifest
 

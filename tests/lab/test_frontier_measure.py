@@ -1,4 +1,4 @@
-"""`scenelang lab frontier`: a small run of the whole measurement, and what it refuses."""
+"""`python -m lab frontier`: a small run of the whole measurement, and what it refuses."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.lab.frontier import measure, verify, ways
-from scenelang.lab.frontier.measure import Case, median_interval
+from lab.frontier import measure, verify, ways
+from lab.frontier.measure import Case, median_interval
 from scenelang.measure.frontier import Errors, Frontier, between
 from tests.cli.conftest import Folder
 from tests.cli.conftest import folder as folder

@@ -17,10 +17,10 @@ import PIL.Image
 import pytest
 from matplotlib.text import Text
 
+from lab.charts import pyplot
+from lab.frontier.chart import frontier_chart, frontier_figure, short_name
+from lab.frontier.page import frontier_page, picture_uri
 from scenelang.image import Image, from_samples
-from scenelang.lab.charts import pyplot
-from scenelang.lab.frontier.chart import frontier_chart, frontier_figure, short_name
-from scenelang.lab.frontier.page import frontier_page, picture_uri
 from scenelang.measure.frontier import between, frontier_path, load_frontier
 from scenelang.models.manifest import available
 from tests.measure.test_choose import frontier, point
@@ -151,8 +151,8 @@ def test_charts_label_every_point_that_has_an_error() -> None:
 @pytest.mark.skipif(not frontier_path("shapes2d").exists(), reason="no frontier is shipped")
 def test_the_documentation_tells_the_shipped_frontier() -> None:
     """And the frontier is of models that ship, and its promises were kept in 95 % of other scenes."""
-    command = [sys.executable, ROOT / "docs/make_frontier.py", "--check"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-m", "lab", "docs", "frontier", "--check"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     shipped = load_frontier("shapes2d")
     assert shipped is not None

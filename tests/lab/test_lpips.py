@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from scenelang.lab.experiments import lpips
-from scenelang.lab.experiments.lpips import LAYERS, Lpips, LpipsError, convert, load_lpips
+from lab.experiments import lpips
+from lab.experiments.lpips import LAYERS, Lpips, LpipsError, convert, load_lpips
 
 SMALL = (((3, 3, 2, 1), True), (2, False), ((4, 3, 1, 1), True))
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.frontier.outlines import TOLERANCE, outlines
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
-from scenelang.lab.frontier.outlines import TOLERANCE, outlines
 from scenelang.models.manifest import load_manifest
 from scenelang.reference.field import evaluate
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import struct
-import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
 
 import scenelang as nsg
-from scenelang.lab.experiments.runs import ablation_runs
-from scenelang.lab.parsimony import (
+from lab.docs import make_parsimony as script
+from lab.experiments.runs import ablation_runs
+from lab.parsimony import (
     WAYS,
     example_plan,
     measure_examples,
@@ -29,19 +27,6 @@ from scenelang.renderers.network import FramedConfig
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
-
-
-def load_script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_parsimony", ROOT / "docs/make_parsimony.py")
-    assert spec is not None
-    assert spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = script
-    spec.loader.exec_module(script)
-    return script
-
-
-SCRIPT = load_script()
 
 
 def measured(psnr: dict[str, float]) -> dict[str, Any]:
@@ -128,14 +113,14 @@ def test_the_chart_is_drawn() -> None:
 
 def test_tables_of_parts_and_sizes() -> None:
     parts = measured({"framed": 40, "no register": 31.25, "decoder 8": 36.0})
-    text = SCRIPT.parts_text(parts)
+    text = script.parts_text(parts)
     rows = [line for line in text.splitlines() if line.startswith("| ")]
-    assert len(rows) == 2 + len(SCRIPT.PARTS)  # the head, the whole renderer, each part
+    assert len(rows) == 2 + len(script.PARTS)  # the head, the whole renderer, each part
     (row,) = (line for line in rows if "no register" in line)
     # 31.25 less 39.6, the mean over seeds
     assert row.endswith("| 31.2 | 23.2 | -8.4 | 28.2 | -8.4 | it pays |")
     assert "39.6 dB, 0.8 dB apart" in text
-    sizes = SCRIPT.sizes_text(parts)
+    sizes = script.sizes_text(parts)
     shown = [line.split(" | ")[0] for line in sizes.splitlines() if "decoder" in line]
     assert shown == [f"| decoder width {v}" for v in (8, 16)] + [
         "| decoder width **32**",
@@ -146,7 +131,7 @@ def test_tables_of_parts_and_sizes() -> None:
 
 def test_every_part_is_described() -> None:
     names = {name for name, group, _ in ablation_runs(60, 1) if group == "parts"}
-    assert names == set(SCRIPT.PARTS)
+    assert names == set(script.PARTS)
 
 
 def test_a_plan_of_an_example() -> None:
@@ -174,13 +159,13 @@ def test_examples_are_measured_and_told() -> None:
     found = measure_examples([EXAMPLES / "logo.nsg"], lambda plan: seen.append(plan["file"]))
     assert seen == ["logo.nsg"]
     assert json.loads(json.dumps(found)) == found
-    (row,) = (line for line in SCRIPT.examples_text(found).splitlines() if "logo" in line)
+    (row,) = (line for line in script.examples_text(found).splitlines() if "logo" in line)
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     plan = found["plans"][0]
     assert cells[0] == "[logo](../examples/logo.nsg)"
     assert cells[1] == f"{plan['stages'][0]['objects']} → {plan['rows']}"
     assert cells[-2] == f"{plan['drawing']['psnr']:.1f}"
-    assert "1.0 × | 1.0 ×" in SCRIPT.ways_text(found)
+    assert "1.0 × | 1.0 ×" in script.ways_text(found)
 
 
 def test_what_passes_took_away_is_counted() -> None:
@@ -191,15 +176,15 @@ def test_what_passes_took_away_is_counted() -> None:
     ]
     tally = {"changed": 1200, "largest": 1.2e-15, "differing": 0}
     proof = {"passes": {"drop_empty": tally, "drop_hidden": {**tally, "largest": 0.0}}}
-    rows = SCRIPT.passes_text(proof, {"plans": [{"stages": stages}, {"stages": stages}]}).splitlines()
+    rows = script.passes_text(proof, {"plans": [{"stages": stages}, {"stages": stages}]}).splitlines()
     assert rows[2] == "| `drop_empty` | 1,200 | 1e-15 | 2 | 0 | 4 | 4 |"
     assert rows[3] == "| `drop_hidden` | 1,200 | 0 | 2 | 2 | 2 | 0 |"
 
 
 def test_the_page_says_what_the_records_say() -> None:
-    """`python docs/make_parsimony.py` would change nothing, and every example of the plane is in it."""
+    """`python -m lab docs parsimony` would change nothing, and every example of the plane is in it."""
     page = (ROOT / "docs/parsimony.md").read_text("utf-8")
-    assert SCRIPT.filled(page, SCRIPT.tables()) == page
+    assert script.filled(page, script.tables()) == page
     plans = json.loads((ROOT / "docs/results/plans.json").read_text("utf-8"))["plans"]
     flat = {path.name for path in EXAMPLES.glob("*.nsg") if nsg.compile(nsg.load(path)).stage is None}
     assert {plan["file"] for plan in plans} >= flat
@@ -207,4 +192,4 @@ def test_the_page_says_what_the_records_say() -> None:
 
 def test_a_page_without_a_place_is_refused() -> None:
     with pytest.raises(ValueError, match="no place for parts"):
-        SCRIPT.filled("nothing", {"parts": "text"})
+        script.filled("nothing", {"parts": "text"})

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from click.testing import CliRunner
 
+from lab.commands.shadows import command
+from lab.shadows import shadow_mask
 from scenelang.graph.stage import Camera, Light
-from scenelang.lab.commands.shadows import command
-from scenelang.lab.shadows import shadow_mask
 from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import Material, Object, Scale, Scene, Translate
 

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import torch
 
+from lab.designs.ablations import make_student
+from lab.designs.encoders import LiftingConfig
+from lab.designs.pictures import PictureConfig, Scenes, exact_vectors, pictures, random_scenes
+from lab.designs.students import FramedStudent, StudentConfig, largest_stretch, read_points
+from lab.training.scenes import GEOMETRIES
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
-from scenelang.lab.designs.ablations import make_student
-from scenelang.lab.designs.encoders import LiftingConfig
-from scenelang.lab.designs.pictures import PictureConfig, Scenes, exact_vectors, pictures, random_scenes
-from scenelang.lab.designs.students import FramedStudent, StudentConfig, largest_stretch, read_points
 from scenelang.models.load import load_model
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
@@ -19,7 +20,6 @@ from scenelang.reference.image import reference_image
 from scenelang.renderers.reading import ReadingConfig
 from scenelang.renderers.streaming import StreamingConfig
 from scenelang.scene.schema import Bend, Chain, Color, Link, Material, Matrix, Object, Scene, Twirl
-from scenelang.training.scenes import GEOMETRIES
 
 WORDS = ("union", "smooth", "subtract", "intersect")
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from scenelang.lab.designs.encoders import LiftingConfig
-from scenelang.lab.designs.students import StudentConfig
-from scenelang.lab.designs.studies import SIGMA, Study, StudyConfig, level_at, rate_at
+from lab.designs.encoders import LiftingConfig
+from lab.designs.students import StudentConfig
+from lab.designs.studies import SIGMA, Study, StudyConfig, level_at, rate_at
 from scenelang.renderers.reading import ReadingConfig
 from scenelang.renderers.streaming import StreamingConfig
 
