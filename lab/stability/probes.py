@@ -14,11 +14,11 @@ from functools import partial
 
 import numpy as np
 
+from lab.sets import varied
 from lab.sets.sets import SETS, Rng, SetConfig, random_object, random_scene
 from lab.sets.varied import LARGE as LARGE
 from lab.sets.varied import Base
 from scenelang.elements.element import TEXELS
-from scenelang.measure import varied
 from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import (
     Bend,

@@ -7,11 +7,11 @@ from dataclasses import replace
 from functools import partial
 from itertools import takewhile
 
+from lab.sets import varied_solids as solids
 from lab.sets.sets import Rng
 from lab.sets.solid_sets import WARP
 from lab.sets.varied import blends, rebuilt
 from lab.stability.probes import Kit, Probe, cell_of, common
-from scenelang.measure import varied_solids as solids
 from scenelang.scene.schema import Camera, Object, Rotate, Scale, Scene, Transform
 from scenelang.words import BLEND
 
