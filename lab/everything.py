@@ -21,7 +21,7 @@ class Step(NamedTuple):
     """A command line of the laboratory.
 
     ``{out}`` is the run's folder, ``{budget}`` processor minutes of a training, ``{scenes}`` of an
-    evaluation, ``{more}`` as many but at least 8, ``{few}`` a twentieth but at least 1, for what draws many
+    evaluation, ``{few}`` a twentieth but at least 1, for what draws many
     for each value, ``{examples}`` that many files.
     """
 
@@ -46,15 +46,8 @@ STEPS: Final = (
     Step("lab frontier shapes2d --verify --scenes {scenes} -o {out}/frontier-shapes2d"),
     Step("lab frontier solids3d --scenes {few} -o {out}/frontier-solids3d"),
     Step("lab plans {examples} -o {out}/plans.json"),
-    Step("lab experiment all --budget {budget} --scenes {more} -o {out}/experiments"),
-    Step("lab chart {out}/experiments"),
-    Step("lab codes textures --scenes {few} --sizes 2,16 --seconds 1 -o {out}/codes"),
-    Step(
-        "lab codes meshes --scenes {few} --sizes 2,16 --seconds 1 -o {out}/codes",
-        ("SCENELANG_ORIGINALS", "igl", "trimesh"),
-    ),
     Step("lab fit shapes2d --scenes {few} --params 1 --side 32 -o {out}/fit"),
-    Step("lab train shapes2d-streaming --budget {budget} -o {out}/train"),
+    Step("lab train shapes2d-reading --budget {budget} -o {out}/train"),
     Step("lab bench floor --exact --frames {few} --scene shapes2d --scene chains"),
     Step("lab bench startup {few}"),
     Step("lab bench compile 100 1000 --json {out}/compile.json"),
@@ -95,7 +88,6 @@ def command_lines(out: Path, budget: float, scenes: int) -> list[tuple[list[str]
         "{out}": [str(out)],
         "{budget}": [f"{budget:g}"],
         "{scenes}": [str(scenes)],
-        "{more}": [str(max(8, scenes))],
         "{few}": [str(max(1, scenes // 20))],
         "{examples}": [str(path.relative_to(ROOT)) for path in examples],
     }

@@ -88,7 +88,7 @@ def model_to_measure(name: str, weights: Path | None) -> Model:
 
     check_names("model", [name], available())
     if weights is not None and name in ("shapes2d-streaming", "shapes2d-reading"):
-        from lab.designs.export import trained_model
+        from lab.designs.long import trained_model
 
         return trained_model(weights)
     return load_model(name, path=weights)

@@ -31,7 +31,7 @@ from scenelang.cli.progress import Bar
     type=options.Real(0, min_open=True),
     callback=lambda ctx, param, minutes: math.inf if minutes is None else 60 * minutes,
     metavar="MINUTES",
-    help="Stop after this time, with a checkpoint; of studies and long trainings processor time.",
+    help="Stop after this time, with a checkpoint; of long trainings processor time.",
 )
 @click.option(
     "--begin",
@@ -81,8 +81,6 @@ def command(
         place = prepare_torch("cpu" if long else device, threads)
         if long:
             _long(config, out, begin, budget_s, every, save_every)
-        elif b'"study"' in data:
-            _study(config, out, budget_s, place, every, save_every)
         elif is_solids(data):
             _solids(read_solids_config(config), out, budget_s, place)
         else:
@@ -146,29 +144,6 @@ class Notes:
             click.echo(f"{done:,} of {total:,} steps, {seconds:.0f} s, {told}", err=True)
 
 
-def _study(config: str, out: Path, budget_s: float, place: str, every: int, save_every: float) -> None:
-    from lab.designs.export import export
-    from lab.designs.studies import Study, read_student
-
-    file = read_student(config)
-    study = Study(file.study, out, place)
-    seconds = file.study.seconds
-    reached = f"{study.progress.seconds:.0f} of {seconds:g} s of processor time"
-    say_begin(file.model, reached, study.progress.step, place, out)
-    total = 0.0
-    for progress in study.run(budget_s, save_every):
-        total += progress.loss
-        if progress.step % every == 0:
-            told = f"{progress.step:,} steps, {progress.seconds:.0f} of {seconds:g} s"
-            click.echo(f"{told}, mean loss {total / every:.4g}", err=True)
-            total = 0.0
-    if study.progress.seconds < seconds:
-        click.echo(f"out of time: the same command goes on from the checkpoint in {out}")
-        return
-    export(study, file, out / "weights.safetensors", place)
-    click.echo(f"done: {out / 'weights.safetensors'}")
-
-
 def _long(
     config: str,
     out: Path,
@@ -177,9 +152,7 @@ def _long(
     every: int,
     save_every: float,
 ) -> None:
-    from lab.designs.export import export_long
-    from lab.designs.long import LongTraining
-    from lab.designs.phases import read_long
+    from lab.designs.long import LongTraining, export_long, read_long
 
     file = read_long(config)
     run = LongTraining(file.long, out, begin)

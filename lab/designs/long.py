@@ -1,6 +1,6 @@
 """Long trainings of the paper's renderers: in phases of counted steps, with a curve, over many sessions.
 
-`lab.designs.studies` gives every design the same few minutes. Here one design gets hours. A phase
+A phase
 has a resolution, so that `streaming` grows as in the paper. Two things are not the paper's: every prefix of a
 stream is drawn and asked for, which costs no more than the last one alone; and the ConvLSTM, nearly all of
 the work, may run over a window of each picture near an object, in place of the whole.
@@ -15,42 +15,84 @@ from __future__ import annotations
 
 import copy
 import hashlib
-import json
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import torch
+from pydantic import TypeAdapter
+from pydantic.dataclasses import dataclass as checked
 from torch import Tensor, nn
 
-from lab.designs.ablations import make_student
-from lab.designs.phases import LongConfig, LongPhase
-from lab.designs.pictures import (
-    Scenes,
-    exact_vectors,
-    random_scenes,
-    shown,
-)
-from lab.designs.ramps import carry_frames
+from lab.about import about
+from lab.designs.pictures import PictureConfig, Scenes, exact_vectors, random_scenes, shown
 from lab.designs.students import (
     ExactCodes,
     ReadingStudent,
     StreamingStudent,
     Student,
+    StudentConfig,
+    carry_frames,
+    make_student,
 )
-from lab.designs.windows import REACH, distances, draw, grid, maps, prefixes, windows
-from lab.experiments.lpips import load_lpips
-from lab.training.checkpoint import load_tensors, pack_training, save_tensors, unpack_training
+from lab.designs.windows import draw, grid, maps, prefixes, windows
+from lab.training.checkpoint import check_config, load_tensors, pack_training, save_tensors, unpack_training
+from lab.training.config import config_data
 from scenelang.files import read_regular
-from scenelang.models.weights import MOST_BYTES
+from scenelang.models.load import RENDERER, Model, load_network
+from scenelang.models.manifest import load_manifest
+from scenelang.models.weights import MOST_BYTES, codes_of, open_weights
 
 WARM_UP = 100  # steps at the start of a phase
 UNSEEN, SEEN_AT_ONCE = 128, 16  # scenes of the curve
 LEAST_COVER = 0.02  # share of the canvas
 FLOOR = 3e-4  # of the variance that the likelihood takes from a picture
+
+
+@dataclass(frozen=True, slots=True)
+class LongPhase:
+    """A stretch of training."""
+
+    steps: int  # optimiser steps
+    scenes: int  # scenes B of a batch
+    rate: float  # learning rate after a short warm-up
+    last: float = 1.0  # share of it at the end, by a cosine
+    side: int = 64  # resolution R; of `reading` points of a scene; 0 fits a learned lifting to the exact one
+    window: int = 0  # side of a window of a picture that is drawn, a multiple of 4; 0 draws all of it
+    # variance of the likelihood: `one` for all pictures, or each picture's `own`, at its maximum
+    variance: Literal["one", "own"] = "one"
+
+
+@dataclass(frozen=True, slots=True)
+class LongConfig:
+    """Everything that decides what a training yields, besides the code and what it begins from."""
+
+    student: StudentConfig  # lifting, renderer, sizes
+    phases: tuple[LongPhase, ...]  # run one after the other
+    seed: int = 1  # of parameters and scenes
+    data: PictureConfig = field(default_factory=PictureConfig)  # distribution of the scenes
+    average: float = 0.998  # decay of the averaged weights, which are what is evaluated and kept
+    halves: bool = True  # convolutions of 16 x 16 and more in bfloat16
+    every: int = 500  # steps between points of the curve
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+@checked(frozen=True, config={"extra": "forbid"})
+class LongFile:
+    """A model, and how it is trained."""
+
+    model: str
+    long: LongConfig
+
+
+def read_long(name: str) -> LongFile:
+    """Read a configuration by path or by the name of a shipped one; raises as `read_config` does."""
+    return TypeAdapter[LongFile](LongFile).validate_json(config_data(name))
 
 
 class Point(NamedTuple):
@@ -72,7 +114,6 @@ class LongTraining:
 
     Raises:
         ValueError: the checkpoint is of another configuration, or the weights of another network.
-        LpipsError: a phase asks for LPIPS, whose weights are not installed.
     """
 
     def __init__(self, config: LongConfig, folder: Path, begin: Path | None = None) -> None:
@@ -85,21 +126,12 @@ class LongTraining:
         self.curve: list[Point] = []
         self.teacher: ExactCodes | None = None
         self.begun = ""  # SHA-256 of the weights that it began from
-        perceptual = any(phase.perceptual for phase in config.phases)  # asked for now, not hours later
-        self._perceptual = load_lpips() if perceptual else None
         checkpoint = folder / "checkpoint.safetensors"
         if begin is not None and not checkpoint.exists():
             self._begin(begin)
         self.averaged = copy.deepcopy(self.student).requires_grad_(False)
-        self.readouts = nn.ModuleDict()
-        for side in sorted({phase.side for phase in config.phases if phase.alone}):
-            filters = config.student.streaming.filters(side)
-            self.readouts[str(side)] = nn.Conv2d(filters, len(REACH), 1)
-        self._networks = nn.ModuleDict(
-            {"student": self.student, "averaged": self.averaged, "readouts": self.readouts}
-        )
-        trained = [*self.student.parameters(), *self.readouts.parameters()]
-        self.parameters = [p for p in trained if p.requires_grad]
+        self._networks = nn.ModuleDict({"student": self.student, "averaged": self.averaged})
+        self.parameters = [p for p in self.student.parameters() if p.requires_grad]
         self.optimiser = torch.optim.Adam(self.parameters, lr=0.0, betas=(0.9, 0.99), fused=True)
         self.generator = torch.Generator().manual_seed(config.seed)
         if checkpoint.exists():
@@ -129,7 +161,7 @@ class LongTraining:
             self._average()
             self.step, self.loss = self.step + 1, loss.item()
             due = self.step % self.config.every == 0 or self.step == self.steps
-            if due and phase.drawn:
+            if due and phase.side:
                 spent = self.seconds + time.process_time() - started
                 psnr = round(self.measure(), 3)
                 self.curve.append(Point(self.step, round(spent, 1), self.measured_side, psnr))
@@ -186,8 +218,7 @@ class LongTraining:
             self.side = phase.side
 
     def _loss(self, phase: LongPhase) -> Tensor:
-        data = self.config.data if phase.drawn else replace(self.config.data, objects=1)
-        scenes = random_scenes(phase.scenes, data, self.generator)
+        scenes = random_scenes(phase.scenes, self.config.data, self.generator)
         if phase.side == 0:
             return self._lifting_loss(scenes)
         if isinstance(self.student, ReadingStudent):
@@ -201,23 +232,11 @@ class LongTraining:
         side, window, halves = phase.side, phase.window, self.config.halves
         corner = windows(scenes, side, window, self.generator) if window else None
         x, y = grid(phase.scenes, side, corner, window)
-        seen, alone = maps(self.student, scenes, side, corner, window, halves=halves), torch.zeros(())
-        if phase.alone:
-            told: Tensor = self.readouts[str(side)](seen.flatten(0, 1).float())
-            gap = told - distances(scenes, x, y, window or side).flatten(0, 1)
-            alone = phase.alone * len(REACH) * gap.square().mean()
-        if not phase.drawn:
-            return alone
+        seen = maps(self.student, scenes, side, corner, window, halves=halves)
         exact = prefixes(scenes, x, y, window or side)
         found = draw(self.student, scenes, side, seen, halves=halves)
         error = (found - exact).square().flatten(2).mean(2)  # (B, N)
-        likelihood = (error + FLOOR).log().mean() if phase.variance == "own" else 20 * error.mean()
-        if not phase.perceptual:
-            return likelihood + alone
-        assert self._perceptual is not None
-        which = torch.arange(phase.scenes), scenes.count - 1
-        distance: Tensor = self._perceptual(found[which], exact[which])
-        return likelihood + alone + phase.perceptual * distance
+        return (error + FLOOR).log().mean() if phase.variance == "own" else 20 * error.mean()
 
     def _lifting_loss(self, scenes: Scenes) -> Tensor:
         """Squared error of a learned lifting's vectors against exact ones, of which it has the length."""
@@ -254,8 +273,7 @@ class LongTraining:
 
     def _resume(self, path: Path) -> None:
         tensors, header = load_tensors(path)
-        if header["config"] != json.loads(json.dumps(self.config.to_json())):
-            raise ValueError(f"{path} was trained with another configuration")
+        check_config(path, header["config"], self.config.to_json())
         self._teach({k.removeprefix("teacher."): v for k, v in tensors.items() if k.startswith("teacher.")})
         unpack_training(tensors, self._networks, self.optimiser, self.generator)
         self.step, self.side, self._young = header["step"], header["side"], header["young"]
@@ -312,3 +330,50 @@ def _grow(student: StreamingStudent, old: int, new: int) -> None:
 def _rate(phase: LongPhase, into: int) -> float:
     fall = phase.last + (1 - phase.last) * 0.5 * (1 + math.cos(math.pi * into / phase.steps))
     return phase.rate * min(1.0, (into + 1) / WARM_UP) * fall
+
+
+def export_long(training: LongTraining, model: str, path: Path) -> None:
+    """Write the averaged weights of a training, finished or not, with its curve: another can go on from them.
+
+    They are the lifting's and the renderer's, without levels of growing, in half precision, which is far
+    finer than what such a training leaves undecided.
+    """
+    header = {
+        "model": model,
+        "config": training.config.to_json(),
+        "iteration": training.step,
+        "seconds": round(training.seconds, 1),
+        "curve": training.curve,
+        "begun": training.begun,
+        "device": "cpu",
+    }
+    student = training.averaged
+    levels, last = "none", ""
+    if isinstance(student, StreamingStudent):
+        levels = f"{RENDERER}stages."
+        last = f"{levels}{student.renderer.config.resolution}."
+    kept = {
+        name: tensor.detach().half().cpu().contiguous()
+        for name, tensor in student.state_dict().items()
+        if not name.startswith(levels) or name.startswith(last)
+    }
+    save_tensors(path, kept, {"format": 1, **header, **about()})
+
+
+def trained_model(path: Path) -> Model:
+    """What draws with exported weights, whatever ships under their model's name.
+
+    Scenes are compiled as for `shapes2d`, or of a learned lifting as for `shapes2d-reading`: on any canvas.
+    """
+    data = read_regular(path, MOST_BYTES)
+    header = open_weights(data).header
+    student = header["config"]["student"]
+    side = student["streaming"]["resolution"]
+    sizes = ((side, side),) if student["renderer"] == "streaming" else ()
+    manifest = replace(
+        load_manifest("shapes2d" if student["lifting"] == "exact" else "shapes2d-reading"),
+        renderer=student["renderer"],
+        sizes=sizes,
+        white=True,
+    )
+    return Model(manifest, load_network(data, manifest), codes_of(manifest, data), header)

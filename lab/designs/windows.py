@@ -19,7 +19,6 @@ from lab.designs.pictures import Scenes, trace_exactly
 from lab.designs.students import StreamingStudent
 from scenelang.words import TOKENS
 
-REACH = (0.03, 0.1, 0.4)  # world units at which distances saturate
 NEAR = 0.4  # world units: how far from an object's middle a window's middle may lie
 
 
@@ -54,14 +53,6 @@ def prefixes(scenes: Scenes, x: Tensor, y: Tensor, w: int) -> Tensor:
     b, n = scenes.leaf.shape
     colours = torch.stack(shown, 1).view(b * n, 2 * w, 2 * w, 3).permute(0, 3, 1, 2)
     return avg_pool2d(colours, 2).view(b, n, 3, w, w)
-
-
-@torch.no_grad()
-def distances(scenes: Scenes, x: Tensor, y: Tensor, w: int) -> Tensor:
-    """Exact distances (B, N, 3, W, W) of the objects by themselves, saturating at each of `REACH`."""
-    d = trace_exactly(scenes, x, y)[0].view(-1, 1, 2 * w, 2 * w)
-    near = (d / torch.tensor(REACH)[:, None, None]).tanh()
-    return avg_pool2d(near, 2).view(*scenes.leaf.shape, len(REACH), w, w)
 
 
 def maps(

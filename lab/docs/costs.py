@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from lab.docs.figures import RESULTS, read
-from lab.experiments.tables import markdown
+from lab.docs.tables import markdown
 
 
 def measured(name: str, told: Callable[[Any], str]) -> Callable[[], str]:

@@ -8,7 +8,7 @@ from statistics import median
 from typing import Any
 
 from lab.docs.figures import RESULTS, read
-from lab.experiments.tables import markdown
+from lab.docs.tables import markdown
 
 RECORDS = ("fit", "fit-six", "fit-solids")
 

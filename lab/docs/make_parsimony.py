@@ -2,40 +2,22 @@
 
 python -m lab docs parsimony
 
-`plans.json` is what `python -m lab plans examples/*.nsg` wrote, `experiments/parts.json` what
-`python -m lab experiment parts` did, and `passes.json` what `python -m tests.passes.prove` did.
-lab/docs/make_pictures.py draws the chart.
+`plans.json` is what `python -m lab plans examples/*.nsg` wrote, and `passes.json` what
+`python -m tests.passes.prove` did.
 """
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from lab import DOCS, RESULTS
-from lab.parsimony import (
-    WAYS,
-    size_groups,
-    size_of,
-    verdict,
-    whole_psnr,
-    whole_runs,
-)
+from lab import DOCS
+from lab.docs.figures import read
+from lab.parsimony import WAYS
 from scenelang.files import write_whole
 
 PAGE = DOCS / "parsimony.md"
-PARTS = {
-    "no register": "the colour gate and its register; colour lies in eight more numbers of LSTM state",
-    "no distance scale": "the factor that turns leaf units into world units",
-    "no frame": "leaf coordinates; the decoder meets the world's, and the geometry vector picks its weights",
-    "token as input": "a set of weights for each token; the token is a further input",
-    "hidden layer": "nothing; the gates get 16 rectified linear units more, as those of the first cell had",
-    "never forced": "steps that start from the exact state, with which streams are learned at first",
-    "pictures alone": "the asking for distances; colour and coverage alone train it",
-}
-WORDS = {"pays": "it pays", "no difference": "no difference", "costs": "better without"}
 Record = Mapping[str, Any]
 
 
@@ -43,60 +25,6 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A Markdown table, its first column to the left and all others to the right."""
     lines = [f"| {' | '.join(head)} |", "|---|" + "--:|" * (len(head) - 1)]
     return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
-
-
-def read(name: str) -> Record | None:
-    """A record, or None where it was not made yet."""
-    path = RESULTS / f"{name}.json"
-    return json.loads(path.read_text("utf-8")) if path.exists() else None
-
-
-def parts_text(parts: Record | None) -> str:
-    """What each part buys: a table, and the chart."""
-    if parts is None:
-        return "*Not measured yet.*"
-    mean, spread = whole_psnr(parts)
-    blends, apart = whole_psnr(parts, blends=True)
-    whole = whole_runs(parts)[0]
-    seeds = len(whole_runs(parts))
-    rows = [["nothing", *_figures(whole), "", f"{whole['blends']:.1f}", "", ""]]
-    for run in parts["runs"]:
-        if run["group"] == "parts":
-            found = verdict(run, parts)
-            taken = f"**{run['name']}**: {PARTS[run['name']]}"
-            changes = f"{found.change:+.1f}", f"{run['blends']:.1f}", f"{found.blends:+.1f}"
-            rows.append([taken, *_figures(run), *changes, WORDS[found.word]])
-    figures = "parameters", "steps", "PSNR, dB", "5th percentile", "change", "blends, dB", "change"
-    head = ("taken away", *figures, "the part")
-    about = (
-        f"{parts['budget_s']:.0f} s of processor time each, seed {parts['seed']}, {whole['scenes']} unseen "
-        f"scenes at {whole['resolution']}², revision `{parts['revision'][:9]}`, {parts['machine']}. "
-        f"The whole renderer with {seeds} seeds: {mean:.1f} dB, {spread:.1f} dB apart; scenes of smooth "
-        f"unions alone {blends:.1f} dB, {apart:.1f} dB apart. Changes are from these means."
-    )
-    chart = "![PSNR without each part, and by each size](pictures/parts.png)"
-    return "\n\n".join([markdown(head, rows), about, chart])
-
-
-def _figures(run: Record) -> list[str]:
-    p = run["psnr"]
-    return [f"{run['parameters']:,}", f"{run['steps']:,}", f"{p['mean']:.1f}", f"{p['p5']:.1f}"]
-
-
-def sizes_text(parts: Record | None) -> str:
-    """Every size that was tried: a table, the shipped value in bold."""
-    if parts is None:
-        return "*Not measured yet.*"
-    whole = whole_runs(parts)[0]
-    rows = []
-    for group, runs in size_groups(parts).items():
-        for run in sorted([whole, *runs], key=lambda r: size_of(r, group)):
-            value = str(size_of(run, group))
-            shipped = run is whole
-            change = "" if shipped else f"{verdict(run, parts).change:+.1f}"
-            name = group.replace("_", " ")
-            rows.append([f"{name} **{value}**" if shipped else f"{name} {value}", *_figures(run), change])
-    return markdown(("size", "parameters", "steps", "PSNR, dB", "5th percentile", "change"), rows)
 
 
 def passes_text(proof: Record, plans: Record) -> str:
@@ -240,12 +168,8 @@ def _percent(part: float, whole: float) -> str:
 
 def tables() -> dict[str, str]:
     """What stands in the page, by the names of its places."""
-    parts, plans, proof = read("experiments/parts"), read("plans"), read("passes")
-    assert plans is not None
-    assert proof is not None
+    plans, proof = read("plans"), read("passes")
     return {
-        "parts": parts_text(parts),
-        "sizes": sizes_text(parts),
         "ways": ways_text(plans),
         "passes": passes_text(proof, plans),
         "proof": proof_text(proof),

@@ -35,13 +35,10 @@ from PIL import ImageDraw, ImageFont
 import scenelang as nsg
 from lab import DOCS
 from lab.charts import stability_chart
-from lab.docs import size_charts, solid_rivals
+from lab.docs import solid_rivals
 from lab.docs.blocks import pictured
 from lab.evaluate import Case, sheet
-from lab.experiments.charts import experiment_chart
-from lab.experiments.charts import strips as experiment_strips
 from lab.frontier.chart import frontier_chart
-from lab.parsimony import parts_chart
 from lab.shadows import measure_shadows
 from scenelang.diagnostics.span import SourceFile
 from scenelang.inverse.target import Blur, blurred
@@ -52,16 +49,19 @@ from scenelang.models.manifest import load_manifest
 EXAMPLES = DOCS.parent / "examples"
 REFERENCE = EXAMPLES / "reference"
 PICTURES = DOCS / "pictures"
-PARTS = DOCS / "results/experiments/parts.json"
 GALLERY = (
     *("gear", "chess", "flower", "stones", "lava", "lotus"),
     *("lantern", "walker", "clouds", "mandala", "icecream", "vortex"),
 )
 GALLERY_FRAMES = {"vortex": 8, "lava": 30, "stones": 48}
 COMPARED = "chain"
-RECORDED = "play.webp"  # by make_play.py
-CHARTED = ("compare",)  # experiments whose chart the documentation shows
-STRIPPED = ("overfit", "compare", "table3")  # and whose pictures
+RECORDED = {
+    "play.webp",  # by make_play.py
+    # of measurements that are not made again; the page tells their revisions
+    *("codes.png", "element-bytes.png", "parts.png"),
+    *(f"experiments/{name}.png" for name in ("codes-meshes-strips", "codes-textures-strips", "compare")),
+    *(f"experiments/{name}-strips.png" for name in ("compare", "overfit", "table3")),
+}
 GAP_PX = 8
 LOUDER = 20  # factor on the difference of two pictures
 SHARPER = 2  # strips and the gallery are drawn larger by this and made smaller again, for screens' sake
@@ -240,33 +240,6 @@ def _few_colours(chart: bytes) -> bytes:
         return png(picture.convert("RGB").quantize(64, pillow.Quantize.MAXCOVERAGE))  # keeps rare colours
 
 
-def experiments() -> dict[str, Callable[[], bytes]]:
-    """Charts of experiments, and strips of what their runs draw, from what `lab experiment` wrote."""
-    made: dict[str, Callable[[], bytes]] = {}
-    folder = DOCS / "results" / "experiments"
-    for path in sorted(folder.glob("*.json")):
-        found = json.loads(path.read_text("utf-8"))
-        if path.stem in CHARTED:
-            name = f"experiments/{path.stem}.png"
-            made[name] = lambda found=found: _few_colours(experiment_chart(found))
-        if path.stem in STRIPPED:
-            name = f"experiments/{path.stem}-strips.png"
-            made[name] = lambda found=found: png(experiment_strips(found, folder).to_pil().quantize(128))
-    for path in sorted(folder.parent.glob("codes-*.png")):
-        made[f"experiments/{path.stem}-strips.png"] = lambda path=path: png(
-            pillow.open(path).convert("RGB").quantize(256)
-        )
-    for name, chart in size_charts.CHARTS.items():
-        if all((folder.parent / f"{record}.json").exists() for record in chart.records):
-            made[f"{name}.png"] = lambda chart=chart: _few_colours(chart.draw())
-    return made
-
-
-def parts() -> bytes:
-    """What each part of the renderer buys, from what `python -m lab experiment parts` wrote."""
-    return _few_colours(parts_chart(json.loads(PARTS.read_text("utf-8"))))
-
-
 def frontier(model: str) -> bytes:
     """The charts of a shipped frontier."""
     return _few_colours(frontier_chart(Frontier.from_json(frontier_path(model).read_bytes())))
@@ -355,13 +328,10 @@ def plan() -> dict[str, Callable[[], bytes]]:
     made[f"{COMPARED}-compared.png"] = compared
     made["stability.png"] = lambda: stability(2)
     made["stability-solids.png"] = lambda: stability(3)
-    if PARTS.exists():
-        made["parts.png"] = parts
     for model, name in (("shapes2d", "frontier"), ("solids3d", "frontier-solids")):
         if frontier_path(model).exists():
             made[f"{name}.png"] = lambda model=model: frontier(model)
     made["solid-rivals.png"] = lambda: _few_colours(solid_rivals.chart())
-    made |= experiments()
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
     made["shadows.png"] = shadows
     made["worst-solids.png"] = lambda: worst_cases("booleans", 6, "solids3d", "solids3d")
@@ -394,7 +364,7 @@ def main() -> None:
     stale = [
         path
         for path in sorted(PICTURES.rglob("*.*"))
-        if path.relative_to(PICTURES).as_posix() not in (*made, RECORDED)
+        if path.relative_to(PICTURES).as_posix() not in {*made, *RECORDED}
     ]
     for path in stale:
         print(f"no longer made: {path.relative_to(PICTURES)}")

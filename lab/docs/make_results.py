@@ -2,9 +2,6 @@
 
 python -m lab docs results            writes the pages
 python -m lab docs results --check    fails where one is out of date
-
-What `python -m lab eval` measured lies in docs/results/, what `python -m lab experiment` did in
-docs/results/experiments/; charts and strips of the latter are drawn by `python -m lab chart`.
 """
 
 from __future__ import annotations
@@ -17,8 +14,7 @@ from functools import partial
 
 from lab import DOCS, RESULTS
 from lab.docs import clusters, costs, fits, reported, sizes, solid_rivals
-from lab.experiments.runs import EXPERIMENTS as RUNNABLE
-from lab.experiments.tables import markdown, table_of
+from lab.docs.tables import markdown
 from lab.stability.probes import LARGE
 from scenelang.models.manifest import load_manifest
 
@@ -40,7 +36,6 @@ WHAT = {
     "large": "three times the size",
 }
 PAGES = ("results.md", "report.md", "proof.md", "viewer.md", "elements.md", "fit.md", "sweep.md")
-EXPERIMENTS = ("overfit", "compare", "table2", "table3", "table4", "losses", "seeds")
 
 
 SOLIDS = {
@@ -93,28 +88,6 @@ def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
     asked, drawn = " or ".join(f"`{command}`" for command in commands), " or ".join(revisions)
     said = f"{asked}; seed {d['seed']}, weights `{d['weights'][:8]}…`, revision {drawn}."
     return f"{markdown(heads, rows)}\n\n{said}"
-
-
-def experiment(name: str) -> Callable[[], str]:
-    """The table of an experiment, with what it was run with."""
-
-    def block() -> str:
-        path = RESULTS / "experiments" / f"{name}.json"
-        if not path.exists():
-            return "*Not measured yet.*"
-        found = json.loads(path.read_text())
-        scenes, side = found["runs"][0]["scenes"], found["runs"][0]["resolution"]
-        seconds = found["budget_s"]
-        command = f"{seconds:g} s of processor time each"  # of an experiment that is no longer run
-        if name in RUNNABLE:
-            command = f"`python -m lab experiment {name} --budget {seconds / 60:g}`"
-        said = (
-            f"{command}: {scenes} scenes at {side}², seed {found['seed']}, {found['device']}, "
-            f"{found['threads']} thread, torch {found['torch']}, revision `{found['revision'][:8]}`"
-        )
-        return f"{table_of(found)}\n\n{said}"
-
-    return block
 
 
 def stability(dimension: int = 2) -> str:
@@ -235,7 +208,6 @@ BLOCKS: dict[str, Callable[[], str]] = {
     **reported.BLOCKS,
     **sizes.BLOCKS,
     "all": smallest_run,
-    **{name: experiment(name) for name in EXPERIMENTS},
 }
 """What stands between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``."""
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from lab.docs import solid_rivals
+from lab.docs import paper, solid_rivals
 from lab.docs.figures import RESULTS, kilobytes, numbers, read, told
-from lab.experiments import paper
-from lab.experiments.tables import markdown
+from lab.docs.tables import markdown
 
 ACCURACY = (
     ("deformed shapes (Table 2)", "distances", "shapes2d", paper.SHAPES),
@@ -75,7 +74,7 @@ UNSAID = {
     "solid-rivals": "python -m lab bench solids",
     "stability": "python -m lab stability shapes2d --scenes {scenes}",
     "stability-textures2d": "python -m lab stability textures2d --only texels --scenes {scenes}",
-    "experiments/compare": "python -m lab experiment compare --budget 2",
+    "experiments/compare": "scenelang lab experiment compare --budget 2",
     "passes": "python -m tests.passes.prove --scenes {scenes}",
 }
 """Commands of records that were made before records said theirs."""

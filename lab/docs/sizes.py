@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+from lab.docs import paper
 from lab.docs.figures import RESULTS, read
-from lab.experiments import paper
-from lab.experiments.tables import markdown, theirs
+from lab.docs.tables import markdown, theirs
 
 PAPER = {"textures": paper.MATERIAL_SIZES, "meshes": paper.GEOMETRY_SIZES}
 HEADS = (

@@ -7,7 +7,7 @@ from typing import Any
 
 from lab.charts import FAINT, INK, figure_png, pyplot
 from lab.docs.figures import read
-from lab.experiments.tables import markdown
+from lab.docs.tables import markdown
 from scenelang.measure.frontier import front
 
 NAME, OURS = "solid-rivals", "network, adaptive"

@@ -72,3 +72,21 @@ def unpack_training(
         scenes.set_state(tensors["random"].cpu())
     except (KeyError, RuntimeError, TypeError) as error:
         raise ModelError(f"a damaged checkpoint: {' '.join(str(error).split())[:300]}") from None
+
+
+def check_config(path: Path, saved: Any, own: Any) -> None:
+    """Refuse a checkpoint of another configuration; settings that have gone since it was saved do not count.
+
+    Raises:
+        ValueError: a setting differs.
+    """
+    if not _same(saved, json.loads(json.dumps(own))):
+        raise ValueError(f"{path} was trained with another configuration")
+
+
+def _same(saved: Any, own: Any) -> bool:
+    if isinstance(own, dict):
+        return isinstance(saved, dict) and all(k in saved and _same(saved[k], v) for k, v in own.items())
+    if isinstance(own, list):
+        return isinstance(saved, list) and len(saved) == len(own) and all(map(_same, saved, own))
+    return bool(saved == own)

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 
 from lab.about import revision
-from lab.training.checkpoint import load_tensors, pack_training, save_tensors, unpack_training
+from lab.training.checkpoint import check_config, load_tensors, pack_training, save_tensors, unpack_training
 from lab.training.config import TrainConfig
 from lab.training.losses import image_loss, leaf_loss
 from lab.training.scenes import GEOMETRIES, leaf_batch, random_batch
@@ -66,8 +66,7 @@ def train(
     checkpoint = folder / "checkpoint.safetensors"
     if checkpoint.exists():
         tensors, header = load_tensors(checkpoint, device)
-        if header["config"] != json.loads(json.dumps(config.to_json())):
-            raise ValueError(f"{checkpoint} was trained with another configuration")
+        check_config(checkpoint, header["config"], config.to_json())
         unpack_training(tensors, network, optimiser, scenes)
         done, spent_s, sums = header["iteration"], header["seconds"], header.get("sums", {})
     _cut(folder / "log.jsonl", done)

@@ -5,14 +5,12 @@ An image here has colour, coverage and distance, as renderers write them side by
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
 
 from lab.training.scenes import Batch, LeafBatch
-from scenelang.renderers.framed import Framed, Trace
+from scenelang.renderers.framed import Framed
 
 SHARP = 0.02  # distances are asked for relative to themselves plus this
 FAR_LEAF, FAR_WORLD = 2.0, 0.4  # leaf and world units: farther outside, a distance makes no difference
@@ -29,11 +27,6 @@ def image_loss(network: Framed, batch: Batch, *, forced: bool = False) -> tuple[
     colours = batch.rgb * network.object_albedo(material).view(*batch.leaf.shape, 3)
     given = (batch.depth, batch.colour) if forced else None
     trace = network.trace(batch.q, batch.scale, network.codes[batch.leaf], colours, batch.tokens, given)
-    return trace_loss(trace, batch)
-
-
-def trace_loss(trace: Trace, batch: Batch, unasked: Collection[str] = ()) -> tuple[Tensor, dict[str, float]]:
-    """Loss of what a network answered along the streams of a batch, but for the terms ``unasked``."""
     n = batch.leaf.shape[1]
     used = (torch.arange(n, device=batch.leaf.device) < batch.count[:, None]).float()[..., None]  # (B, N, 1)
     entries = used.sum() * batch.distance.shape[2]
@@ -51,24 +44,21 @@ def trace_loss(trace: Trace, batch: Batch, unasked: Collection[str] = ()) -> tup
         "depth": depth * used * (batch.depth < FAR_WORLD),
         "colour": (12 * gap.square() + 3 * gap.abs()).sum(-1) * covered * used,
     }
-    parts = {name: term.sum() / entries for name, term in terms.items() if name not in unasked}
-    return torch.stack(list(parts.values())).sum(), {k: v.item() for k, v in parts.items()}
+    parts = {name: term.sum() / entries for name, term in terms.items()}
+    return _summed(parts)
 
 
-def leaf_loss(
-    network: Framed, batch: LeafBatch, codes: Tensor | None = None, unasked: Collection[str] = ()
-) -> tuple[Tensor, dict[str, float]]:
-    """Loss of the leaves alone, in their own frames: coverage and distance, as in `image_loss`.
-
-    ``codes`` are those of the leaves (G, C), if they are not the network's own.
-    """
-    codes = network.codes if codes is None else codes
+def leaf_loss(network: Framed, batch: LeafBatch) -> tuple[Tensor, dict[str, float]]:
+    """Loss of the leaves alone, in their own frames: coverage and distance, as in `image_loss`."""
     radius = torch.linalg.vector_norm(batch.q, dim=1, keepdim=True)
-    features = network.decode(batch.q, radius, 1.0, network.decoder_weights(codes))[:, 0]
+    features = network.decode(batch.q, radius, 1.0, network.decoder_weights(network.codes))[:, 0]
     inside = (batch.distance < 0).float()
     terms = {
         "alone": cross_entropy(features * network.edge_slope.exp(), 1 - inside),
         "shape": ((features - batch.distance).abs() / (batch.distance.abs() + SHARP)).mean(),
     }
-    parts = {name: term for name, term in terms.items() if name not in unasked}
+    return _summed(terms)
+
+
+def _summed(parts: dict[str, Tensor]) -> tuple[Tensor, dict[str, float]]:
     return torch.stack(list(parts.values())).sum(), {k: v.item() for k, v in parts.items()}

@@ -21,7 +21,7 @@ from torch import Tensor
 from torch.func import grad_and_value, jacrev, vmap
 
 from lab.about import revision
-from lab.training.checkpoint import load_tensors, save_tensors
+from lab.training.checkpoint import check_config, load_tensors, save_tensors
 from lab.training.config import SolidsConfig
 from lab.training.leaves import LEAVES, Points, half_rays, leaf_points
 from lab.training.loop import Report, schedule
@@ -278,8 +278,7 @@ def train_solids(
     checkpoint = folder / "checkpoint.safetensors"
     if checkpoint.exists():
         tensors, header = load_tensors(checkpoint)
-        if header["config"] != asdict(config):
-            raise ValueError(f"{checkpoint} was trained with another configuration")
+        check_config(checkpoint, header["config"], asdict(config))
         network.load_state_dict(tensors)
         done, spent_s = header["parts"], header["seconds"]
     total, started = sum(steps for steps, _ in parts), time.perf_counter()

@@ -44,21 +44,6 @@ def test_scripts_get_their_arguments() -> None:
     assert "usage: python -m lab bench compile" in run("bench", "compile", "--help").stdout
 
 
-def test_a_study_is_trained() -> None:
-    config = json.loads((CONFIGS / "shapes2d-reading.json").read_text())
-    config["study"] |= {"scenes": 1, "points": 4}
-    arguments = (
-        "train",
-        write("tiny.json", json.dumps(config)),
-        "-o",
-        "run",
-        "--device",
-        "cpu",
-    )
-    result = run(*arguments, "--budget", "1e-9")
-    assert result.stdout.startswith("out of time"), result.output
-
-
 def tiny_config(**changes: object) -> str:
     config = json.loads((CONFIGS / "shapes2d.json").read_text())
     config["phases"] = [{"objects": 2, "iterations": 6, "streams": 2}]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from lab.designs.encoders import Encoders, LiftingConfig
+from lab.designs.students import Encoders, LiftingConfig
 from scenelang.graph import affine
 from scenelang.graph.steps import Affine, Warp
 from scenelang.lifting.learned import GEOMETRY_INPUTS, lift_geometry, lift_material, read_lifting

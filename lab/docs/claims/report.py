@@ -1,9 +1,9 @@
 """Figures in docs/report.md."""
 
+from lab.docs import paper
 from lab.docs.claims.proof import BROKEN, PIXELS, SCENES, SETS
 from lab.docs.claims.results import FIELDS, PAPERS, STABLE, probe
 from lab.docs.figures import Figure, at, numbers, read, told
-from lab.experiments import paper
 from scenelang.renderers.slopes import STEEP
 
 SHADOWS = "solids3d/shadows"

@@ -1,9 +1,8 @@
 """Figures in docs/results.md."""
 
-from lab.docs import solid_rivals
+from lab.docs import paper, solid_rivals
 from lab.docs.figures import Figure, Word, at, numbers, read
 from lab.docs.make_results import SOLIDS, WHAT
-from lab.experiments import paper
 
 PLANE = list(WHAT)
 SPACE = [f"solids3d/{name}" for name in SOLIDS]
