@@ -1,10 +1,10 @@
-"""``python -m lab COMMAND``: see `lab.commands`."""
+"""``python -m lab COMMAND``: see `lab.cli`."""
 
 from __future__ import annotations
 
 import sys
 
-from lab.commands import command
+from lab.cli import command
 
 if __name__ == "__main__":
     sys.argv[0] = "python -m lab"  # as records say what made them

@@ -51,17 +51,10 @@ STEPS: Final = (
     Step("lab bench floor --exact --frames {few} --scene shapes2d --scene chains"),
     Step("lab bench startup {few}"),
     Step("lab bench compile 100 1000 --json {out}/compile.json"),
-    Step("lab bench elements --rounds 1 -o {out}/element-speed.json"),
-    Step(
-        "lab bench forms examples/originals/slab.obj examples/originals/tile.png -o {out}/element-bytes.json",
-        ("igl", "trimesh"),
-    ),
     Step("lab bench proof --set shapes2d --scenes {few}"),
     Step("lab bench mutations --count {few}"),
     Step("lab bench lsp 200"),
-    Step("lab bench unions --scenes {scenes} -o {out}/unions-rivals.json", needs=("skia",)),
     Step("lab bench fit_targets --scenes 1 -o {out}/fit-targets.json", needs=("resvg_py",)),
-    Step("lab bench fit_search --scenes 1 --params 2 -o {out}/fit-search.json", needs=("cma",)),
     Step("lab bench solids --scenes 1 --side 48 -o {out}/solid-rivals.json", needs=("mitsuba", "povray")),
 )
 """What is run, in this order: each command of the laboratory and each benchmark that a page cites."""

@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from lab.about import Report, about, silent
+from lab.sets.plane import SETS, Rng, random_scene
 from lab.sets.scenes import interval
-from lab.sets.sets import SETS, Rng, random_scene
-from lab.sets.solid_sets import SOLID_SETS, random_solid
+from lab.sets.solids import SOLID_SETS, random_solid
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import loads
 from scenelang.image import Image

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from lab.about import Report, about, silent
 from lab.sets.scenes import draw_scene, spread
-from lab.sets.varied_solids import shadow
+from lab.solid_probes import shadow
 from scenelang.image import Image
 from scenelang.measure.metrics import MOST_DB, UNCAPPED_DB, contact_sheet, psnr, side_by_side
 from scenelang.measure.plan import reference_of

@@ -1,16 +1,13 @@
-"""Where the time of a warm frame goes, and what the exact field takes in the network's place.
+"""Time of a warm frame, beside what the exact field takes in the network's place, or another checkout.
 
-    python -m lab bench floor [--frames N] [--scene NAME ...]            shares by part, on numpy
+    python -m lab bench floor [--frames N] [--scene NAME ...]            on numpy
     python -m lab bench floor --exact [-o docs/results/floor.json] [...] formulas beside the network
     python -m lab bench floor --threads 2 [...]                          wall time, beside that of one thread
     python -m lab bench floor --against CHECKOUT [--library torch] [...] another checkout beside this one
 
 Processor time of one thread. Each frame is of a Program of its own, and nothing is kept between frames.
-Medians are over frames, of each of which the least of several drawings counts, the rivals' in turn. *Floor*
-is what the decoder's products take at the rate of a large float32 product on the same core. Of each part: its
-share of the frame, calls of numpy, operations, and bytes read and written; *Python* is what no call of numpy
-takes. With ``--against`` a process of another checkout draws the same Programs, and pictures are compared.
-Frames of solids have neither floor nor shares here.
+Medians are over frames, of each of which the least of several drawings counts, the rivals' in turn.
+With ``--against`` a process of another checkout draws the same Programs, and pictures are compared.
 """
 
 from __future__ import annotations
@@ -35,8 +32,8 @@ import numpy as np
 import scenelang as nsg
 from lab import ROOT
 from lab.about import about
-from lab.sets.sets import SETS, random_scene
-from lab.sets.solid_sets import SOLID_SETS, random_solid
+from lab.sets.plane import SETS, random_scene
+from lab.sets.solids import SOLID_SETS, random_solid
 from scenelang.backend.options import keep_memory
 from scenelang.files import write_whole
 from scenelang.models.framed import load_arrays
@@ -45,7 +42,6 @@ from scenelang.program.program import Program
 from scenelang.renderers.draw import draw_objects
 
 ROUNDS = 5  # of which the least counts: others interrupt
-SIDE = 768  # of the matrices whose product's rate is the floor's
 Rival = Callable[[int], "Frame"]
 
 
@@ -208,14 +204,12 @@ def race(rivals: Sequence[Rival], frames: int) -> list[list[Frame]]:
     return [own[1:] for own in found]
 
 
-def told(title: str, frames: Sequence[Frame], rate: float) -> str:
-    """Medians of frames; the floor is of a rate of operations a second."""
+def told(title: str, frames: Sequence[Frame]) -> str:
+    """Medians of frames."""
     seconds, pairs, refined, met = (statistics.median(f[at] for f in frames) for at in range(4))
-    each = sum(2 * w.shape[1] * w.shape[2] for w in load_arrays("shapes2d").network.decoder_w)
-    floor = f", floor {1e3 * pairs * each / rate:.2f} ms at {rate / 1e9:.0f} GFLOP/s" if rate else ""
     counts = f"{pairs:,.0f} pairs met, {met:,.0f} pixels asked, {refined:,.0f} of them four times"
     first = statistics.median(frame.first for frame in frames)
-    return f"{title}: {1e3 * seconds:.2f} ms, {1e3 * first:.2f} drawn first; {counts}{floor}"
+    return f"{title}: {1e3 * seconds:.2f} ms, {1e3 * first:.2f} drawn first; {counts}"
 
 
 def middle(frames: Sequence[Frame]) -> dict[str, float]:
@@ -229,27 +223,6 @@ def against(ours: Sequence[Frame], theirs: Sequence[Frame], title: str) -> str:
     off = [abs(a.picture - b.picture).max(2) for a, b in zip(ours, theirs, strict=True)]
     worst, many = 255 * max(one.max() for one in off), sum(int((one > 1 / 255).sum()) for one in off)
     return f"{title} takes {ratio:.2f} times as long; worst pixel {worst:.2f}/255, {many} by more than 1/255"
-
-
-def shares(net: Any, made: Sequence[Program], frames: Sequence[Frame]) -> Iterator[str]:
-    """Lines of what the parts of frames take; calls are the same each time, and of each the least counts."""
-    from lab.bench.counted import counting
-
-    total: dict[str, Any] = {}
-    for index in range(1, len(made)):
-        turns = []
-        for _ in range(ROUNDS):
-            with counting() as calls:
-                here(net, made)(index)
-            turns.append(calls)
-        for part, seconds, *counts in [min(own, key=lambda c: c.seconds) for own in zip(*turns, strict=True)]:
-            total[part] = total.get(part, 0.0) + np.array([seconds, 1, *counts])
-    whole = sum(frame.seconds for frame in frames)
-    for part, took in sorted(total.items(), key=lambda item: -item[1][0]):
-        calls, operations, moved = took[1:] / len(frames)
-        each = f"{calls:7,.0f} calls {operations / 1e6:8.2f} MFLOP {moved / 1e6:8.2f} MB"
-        yield f"  {part:16}{took[0] / whole:5.0%} {each}"
-    yield f"  {'Python':16}{1 - sum(took[0] for took in total.values()) / whole:5.0%}"
 
 
 def main() -> None:
@@ -270,7 +243,7 @@ def main() -> None:
                 roots = str(ROOT), given.against
                 rivals = [stack.enter_context(elsewhere(r, name, given.frames, given.library)) for r in roots]
                 ours, theirs = race(rivals, given.frames)
-            print(f"{name}, {told(given.library, ours, 0)}; {against(ours, theirs, given.against)}")
+            print(f"{name}, {told(given.library, ours)}; {against(ours, theirs, given.against)}")
             continue
         made = programs(name, given.frames)
         nets = {
@@ -284,15 +257,11 @@ def main() -> None:
             net = nets[given.library]
             several, one = race([here(net, made, given.threads), here(net, made, 1)], len(made) - 1)
             title = f"{given.library} on {given.threads} threads"
-            print(f"{name}, {told(title, several, 0)}; {against(several, one, 'one')}", flush=True)
+            print(f"{name}, {told(title, several)}; {against(several, one, 'one')}", flush=True)
             continue
         raced = race(rivals, len(made) - 1)
-        flat = model_of(name) != "solids3d"
-        rate = gemm_rate() if flat else 0.0
-        for (library, net), frames in zip(nets.items(), raced, strict=True):
-            print(f"{name}, {told(library, frames, rate if library != 'exact' else 0)}")
-            for line in shares(net, made, frames) if flat and library != "torch" else ():
-                print(line, flush=True)
+        for library, frames in zip(nets, raced, strict=True):
+            print(f"{name}, {told(library, frames)}", flush=True)
         if given.exact:
             print(f"{name}, {against(raced[1], raced[0], 'the network')}", flush=True)
             rows[name] = {
@@ -304,17 +273,6 @@ def main() -> None:
         write_whole(
             given.out, (json.dumps({**about(), "rounds": ROUNDS, "scenes": rows}, indent=1) + "\n").encode()
         )
-
-
-def gemm_rate() -> float:
-    """Floating-point operations a second of a large product."""
-    a = np.random.default_rng(0).random((SIDE, SIDE), np.float32)
-    taken = []
-    for _ in range(ROUNDS):
-        started = time.process_time()
-        a @ a
-        taken.append(time.process_time() - started)
-    return float(2 * SIDE**3 / min(taken))
 
 
 if __name__ == "__main__":

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 
 from lab.about import about
+from lab.sets.plane import SETS
 from lab.sets.scenes import interval, sets_of
-from lab.sets.sets import SETS
 from scenelang.backend.options import keep_memory
 from scenelang.backend.small import draw_small
 from scenelang.files import write_whole

@@ -1,7 +1,7 @@
 """Random scenes of the base set `shapes2d` as tensors, and their exact pictures, made on the training device.
 
 What the renderers that see whole pictures are trained on. The distribution is that of
-`lab.sets.sets` (its seeds are others): twirl, bend, scale, rotate, translate, in that order.
+`lab.sets.plane` (its seeds are others): twirl, bend, scale, rotate, translate, in that order.
 
 Letters: B scenes, N objects, P points, R pixels along a side.
 """

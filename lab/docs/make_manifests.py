@@ -17,7 +17,7 @@ from typing import Any
 
 from lab import RESULTS
 from lab.sets.scenes import sets_of
-from lab.stability.ranges import UNBOUNDED, measured_ranges
+from lab.stability import UNBOUNDED, measured_ranges
 from scenelang.measure.metrics import MOST_DB
 from scenelang.models.manifest import ROOT, Manifest, available, load_manifest
 

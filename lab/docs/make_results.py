@@ -15,7 +15,7 @@ from functools import partial
 from lab import DOCS, RESULTS
 from lab.docs import clusters, costs, fits, reported, sizes, solid_rivals
 from lab.docs.tables import markdown
-from lab.stability.probes import LARGE
+from lab.probes import LARGE
 from scenelang.models.manifest import load_manifest
 
 WHAT = {

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from lab.sets.sets import SETS, Rng, random_scene
-from lab.sets.solid_sets import SOLID_SETS, random_solid
+from lab.sets.plane import SETS, Rng, random_scene
+from lab.sets.solids import SOLID_SETS, random_solid
 from lab.training.checkpoint import load_tensors, save_tensors
 from scenelang.backend.neural import draw_program
 from scenelang.backend.small import draw_small

@@ -110,7 +110,7 @@ class Commands(click.Group):
         return super().resolve_command(ctx, args)
 
 
-class Reporting(Commands):
+class Reporting(click.Group):
     """Commands that report in one line what goes wrong without being a bug."""
 
     def make_context(
@@ -149,6 +149,10 @@ def _reporting() -> Iterator[None]:
         raise
 
 
+class _Commands(Reporting, Commands):
+    """The commands of this package."""
+
+
 def describe(error: OSError) -> str:
     """A system error in a line."""
     reason = (error.strerror or str(error) or "unreadable").lower()
@@ -158,7 +162,7 @@ def describe(error: OSError) -> str:
 
 
 @click.group(
-    cls=Reporting,
+    cls=_Commands,
     package="scenelang.cli.commands",
     table=COMMANDS,
     elsewhere=ELSEWHERE,

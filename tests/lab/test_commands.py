@@ -7,15 +7,10 @@ from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner, Result
 
-from lab.commands import command as lab
+from lab.cli import command as lab
 from lab.training.config import CONFIGS
-
-
-def run(*arguments: str) -> Result:
-    """Run a command; whatever is not an exit is raised."""
-    return CliRunner().invoke(lab, arguments, prog_name="python -m lab", catch_exceptions=False)
+from tests.lab.conftest import run
 
 
 @pytest.fixture(autouse=True)

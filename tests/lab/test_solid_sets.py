@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lab.sets.scenes import coverage, scenes_of
-from lab.sets.solid_sets import SOLID_SETS
+from lab.sets.solids import SOLID_SETS
 from scenelang.models.load import Model, load_model
 from scenelang.program.compile import compile_scene
 from scenelang.scene.schema import Camera, Object, Scale, Scene, Translate

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lab.probes import PROBES, animated, apart, rng_of, union_of
 from lab.sets.scenes import sized
-from lab.stability.probes import PROBES, animated, apart, rng_of, union_of
-from lab.stability.solid_probes import SOLIDS
-from lab.stability.suite import (
+from lab.solid_probes import SOLIDS
+from lab.stability import (
     OPTIONAL,
     arithmetic,
     compare,

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from lab.sets.plane import GEOMETRIES, SETS, random_scene
 from lab.sets.scenes import interval, sets_of, spread
-from lab.sets.sets import GEOMETRIES, SETS, random_scene
 from scenelang.measure.metrics import compare, flip, flip_map, psnr, ssim
 from scenelang.models.choose import uses as uses_of
 from scenelang.models.manifest import load_manifest

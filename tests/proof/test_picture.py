@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.sets.plane import SETS
 from lab.sets.scenes import sets_of
-from lab.sets.sets import SETS
 from scenelang.backend.options import RenderError
 from scenelang.elements.zoo import zoo_bytes
 from scenelang.models.manifest import load_manifest

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from lab.sets.sets import SETS, random_scene
+from lab.sets.plane import SETS, random_scene
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.models.manifest import load_manifest

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from lab.sets.sets import SETS, random_scene
+from lab.sets.plane import SETS, random_scene
 from scenelang.backend.render import exact_graph
 from scenelang.graph.nodes import Fold, Node, leaves
 from scenelang.reference import near

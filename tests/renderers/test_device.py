@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from lab.sets.sets import SETS, random_scene
+from lab.sets.plane import SETS, random_scene
 from scenelang.backend import neural
 from scenelang.elements.zoo import Zoo
 from scenelang.models.framed import load_arrays

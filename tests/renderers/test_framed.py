@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from lab.sets.sets import SETS, random_scene
+from lab.sets.plane import SETS, random_scene
 from scenelang.measure.metrics import psnr
 from scenelang.measure.plan import reference_of
 from scenelang.models.load import Model, load_model

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from lab.sets.sets import SETS, random_scene
+from lab.sets.plane import SETS, random_scene
 from scenelang.measure.metrics import psnr
 from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from lab.sets.sets import GEOMETRIES, SETS, random_scene
-from lab.stability.probes import FLAT, rng_of
+from lab.probes import FLAT, rng_of
+from lab.sets.plane import GEOMETRIES, SETS, random_scene
 from scenelang.backend.closed import closed_forms
 from scenelang.elements.zoo import Zoo
 from scenelang.models.framed import load_arrays

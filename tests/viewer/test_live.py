@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from lab.sets.sets import SETS
-from lab.sets.sets import random_scene as random_set_scene
-from lab.sets.solid_sets import SOLID_SETS, random_solid
+from lab.sets.plane import SETS
+from lab.sets.plane import random_scene as random_set_scene
+from lab.sets.solids import SOLID_SETS, random_solid
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.lifting.layout import LAYOUTS

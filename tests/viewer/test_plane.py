@@ -14,7 +14,7 @@ import pytest
 
 import scenelang as nsg
 from lab.bench.viewer import SMALL, timed
-from lab.sets.sets import SETS, random_scene
+from lab.sets.plane import SETS, random_scene
 from scenelang.backend.small import draw_small
 from scenelang.elements.pyramid import unpacked
 from scenelang.models.framed import load_arrays

@@ -8,30 +8,133 @@ another dimension where a `Kit` says so.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from lab.sets import varied
-from lab.sets.sets import SETS, Rng, SetConfig, random_object, random_scene
-from lab.sets.varied import LARGE as LARGE
-from lab.sets.varied import Base
+from lab.sets.plane import SETS, Rng, SetConfig, long_chain, random_object, random_scene
 from scenelang.elements.element import TEXELS
 from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import (
     Bend,
     Chain,
+    Color,
+    Link,
     Material,
     Object,
     Rotate,
     Scale,
     Scene,
+    Shear,
     Transform,
     Translate,
     Twirl,
 )
+from scenelang.words import BLEND, Combine
+
+LARGE = 3.0  # times the size of the base set's objects
+Base = Callable[..., Scene]
+"""A random scene of a base set from random numbers and, by name, what of the set is other."""
+
+
+def rebuilt(
+    scene: Scene,
+    moves: Callable[[int, Object], Sequence[Transform]] = lambda _, node: node.transforms,
+    word: Callable[[int, Combine], Combine] = lambda _, op: op,
+    look: Callable[[int, Object], Material | None] = lambda _, node: node.material,
+    k: float = BLEND,
+) -> Scene:
+    """A scene of one chain of objects, with other transforms, words, materials, and widths of blends."""
+    (chain,) = scene.nodes
+    assert isinstance(chain, Chain)
+    links = []
+    for i, link in enumerate(chain.children):
+        assert isinstance(link.node, Object)
+        node = Object(link.node.geometry, moves(i, link.node), look(i, link.node))
+        links.append(Link(op := word(i, link.op), node, k=k if op == "smooth" else None))
+    return scene.model_copy(update={"nodes": (Chain(links),)})
+
+
+def _larger(factor: float) -> Callable[[int, Object], list[Transform]]:
+    def larger(t: Transform) -> Transform:
+        if not isinstance(t, Scale):
+            return t
+        return Scale(t.x * factor, t.y * factor, t.z if t.z == 1.0 else t.z * factor)
+
+    return lambda _, node: [larger(t) for t in node.transforms]
+
+
+def operators(base: Base, rng: Rng, count: float) -> Scene:
+    """One object and so many operators after it, none of them a plain union."""
+    scene = base(rng, objects=(int(count) + 1,) * 2, unions=0.0)
+    words: tuple[Combine, ...] = ("smooth", "subtract", "intersect")
+    # intersections leave little of a picture: objects are larger, so that something is there to be wrong
+    return rebuilt(scene, _larger(1.6), lambda i, _: "union" if i == 0 else words[int(rng.integers(3))])
+
+
+def blends(base: Base, rng: Rng, count: float, larger: float = 1.0, k: float = BLEND) -> Scene:
+    """One object and so many others, each joined by `smooth`."""
+    scene = base(rng, objects=(int(count) + 1,) * 2)
+    return rebuilt(scene, _larger(larger), lambda i, _: "smooth" if i else "union", k=k)
+
+
+def contrast(base: Base, rng: Rng, contrast: float, size: float = LARGE) -> Scene:
+    """One `smooth` of three objects, a white one and two that are darker."""
+    scene = blends(base, rng, 2, size)
+    white = int(rng.integers(3))
+
+    def grey(i: int, node: Object) -> Material:
+        level = 1.0 if i == white else 1.0 - contrast
+        assert node.material is not None
+        return Material(name=node.material.name, ops=(Color(rgb=(level, level, level)),))
+
+    return rebuilt(scene, look=grey)
+
+
+def thin(base: Base, rng: Rng, ratio: float) -> Scene:
+    def moves(_: int, node: Object) -> list[Transform]:
+        return [
+            t.model_copy(update={"y": t.x / ratio}) if isinstance(t, Scale) else t for t in node.transforms
+        ]
+
+    return rebuilt(base(rng), moves)
+
+
+def sheared(base: Base, rng: Rng, k: float) -> Scene:
+    def moves(_: int, node: Object) -> list[Transform]:
+        *first, rotate, translate = node.transforms
+        return [*first, Shear(axes="xy", k=k), rotate, translate]
+
+    return rebuilt(base(rng), moves)
+
+
+def order(base: Base, rng: Rng, kind: float) -> Scene:
+    """0: as trained; 1: affine maps in any order after the deformations; 2: deformations after them, about
+    the origin of the world; 3: a deformation between affine maps."""
+
+    def moves(_: int, node: Object) -> list[Transform]:
+        *warps, scale, rotate, translate = (t for t in node.transforms if t.kind != "displace")
+        some = [scale, rotate, translate]
+        if kind == 1:
+            return [*warps, *(some[i] for i in rng.permutation(3))]
+        if kind == 2:
+            return [*some, *warps]
+        if kind == 3:
+            return [*warps[:-1], scale, *warps[-1:], rotate, translate]
+        return [*warps, *some]
+
+    return rebuilt(base(rng), moves)
+
+
+def affine(base: Base, rng: Rng, steps: float) -> Scene:
+    def moves(_: int, node: Object) -> list[Transform]:
+        *warps, scale, rotate, translate = node.transforms
+        return [*warps, *long_chain(rng, max(3, int(steps)), scale, [rotate, translate])]
+
+    return rebuilt(base(rng), moves)
+
 
 BASE, TEXTURED = SETS["shapes2d"], "textures2d"
 NAMES = load_manifest(TEXTURED).textures
@@ -88,23 +191,23 @@ def common(base: Base, deformed: Base, warp: float) -> dict[str, Probe]:
         ),
         "operators": Probe(
             "operators in a row: smooth, subtract, intersect", "operators", tuple(range(1, 9)), 3,
-            partial(varied.operators, base),
+            partial(operators, base),
         ),
         "blends": Probe(
             "smooth unions in a row", "smooth unions", (1, 2, 4, 8, 16, 32, 64), 4,
-            partial(varied.blends, base),
+            partial(blends, base),
         ),
         "contrast": Probe(
             "blends of white and darker, large objects", "difference of the colours",
-            (0, 0.125, 0.25, 0.5, 0.75, 1), 0.25, partial(varied.contrast, base),
+            (0, 0.125, 0.25, 0.5, 0.75, 1), 0.25, partial(contrast, base),
         ),
         "deep": Probe(
             "blends of white and black", "times the size", (0.3, 1, 1.5, 2, 3, 4), 1,
-            lambda rng, size: varied.contrast(base, rng, 1.0, size),
+            lambda rng, size: contrast(base, rng, 1.0, size),
         ),
         "affine": Probe(
             "affine maps, each lifted by itself", "affine maps", (3, 4, 8, 16, 32, 64), 3,
-            partial(varied.affine, base), folded=False,
+            partial(affine, base), folded=False,
         ),
         "warp": Probe(
             "deformations beyond the base set's ±0.8", "times the range", (0.5, 1, 1.5, 2, 2.5, 3), 1,
@@ -115,12 +218,12 @@ def common(base: Base, deformed: Base, warp: float) -> dict[str, Probe]:
             lambda rng, factor: base(rng, size=factor),
         ),
         "thin": Probe(
-            "thin objects", "ratio of the scales", (1, 3, 10, 30, 100, 300), 3, partial(varied.thin, base)
+            "thin objects", "ratio of the scales", (1, 3, 10, 30, 100, 300), 3, partial(thin, base)
         ),
-        "shear": Probe("sheared objects", "shear", (0, 0.5, 1, 2, 4, 8), 0, partial(varied.sheared, base)),
+        "shear": Probe("sheared objects", "shear", (0, 0.5, 1, 2, 4, 8), 0, partial(sheared, base)),
         "order": Probe(
             "orders of transformations", "0 as trained, 1 affine, 2 warps last, 3 mixed",
-            (0, 1, 2, 3), 0, partial(varied.order, deformed),
+            (0, 1, 2, 3), 0, partial(order, deformed),
         ),
         "canvas": Probe(
             "canvas sizes", "pixels along a side", (32, 64, 128, 256, 512, 1024), 256,
@@ -159,7 +262,7 @@ def animated(rng: Rng, frames: int) -> list[Scene]:
     (chain,) = scene.nodes
     drifts = [(float(rng.normal()), float(rng.normal())) for _ in chain.children]  # type: ignore[union-attr]
     return [
-        varied.rebuilt(scene, lambda i, node, f=f: [_moved(t, f, *drifts[i]) for t in node.transforms])  # type: ignore[misc]
+        rebuilt(scene, lambda i, node, f=f: [_moved(t, f, *drifts[i]) for t in node.transforms])  # type: ignore[misc]
         for f in range(frames)
     ]
 
@@ -200,7 +303,7 @@ def drifting(scene: Scene, frames: int) -> list[Scene]:
     """Frames of a scene of one chain whose objects drift by a third of a pixel each."""
     step = 2 / min(scene.canvas)
     return [
-        varied.rebuilt(
+        rebuilt(
             scene,
             lambda _, node, f=f: [*node.transforms, Translate(x=0.31 * step * f, y=0.17 * step * f)],  # type: ignore[misc]
         )

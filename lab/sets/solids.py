@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from lab.sets.sets import Rng, any_tree
+from lab.sets.plane import Rng, any_tree
 from scenelang.scene.elements import Brought, load_elements
 from scenelang.scene.schema import (
     Bend,
@@ -56,7 +56,7 @@ class SolidConfig:
         staged: a random camera, light, ground and sky.
         canvas: pixels.
         meshes: a file of elements whose solids take the place of spheres and tori.
-        trees: any trees of booleans; see `lab.sets.sets.any_tree`.
+        trees: any trees of booleans; see `lab.sets.plane.any_tree`.
     """
 
     objects: tuple[int, int] = (1, 3)

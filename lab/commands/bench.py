@@ -1,5 +1,0 @@
-"""``python -m lab bench``: benchmarks of parts of the package."""
-
-from lab.commands import scripts
-
-command = scripts("bench", "{}", "Run a benchmark")
