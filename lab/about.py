@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import platform
 import shlex
 import subprocess
@@ -11,6 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import torch
+
+from scenelang.files import write_whole
 
 Report = Callable[[str, int, int], None]
 """Called with what is measured, how much of it is done, and all."""
@@ -32,6 +35,12 @@ def about() -> dict[str, Any]:
         "torch": torch.__version__.split("+")[0],
         "threads": torch.get_num_threads(),
     }
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a record whole, and its folder."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, (json.dumps(value, indent=1) + "\n").encode())
 
 
 def command_line(argv: Sequence[str]) -> str:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from lab import ROOT
+from lab.about import about, write_json
 from scenelang.cli import options
 from scenelang.cli.main import Reporting
 from scenelang.cli.progress import Bar
@@ -74,12 +75,6 @@ def _check_names(what: str, wanted: Iterable[str], known: Iterable[str]) -> None
     for name in wanted:
         if name not in known:
             raise click.UsageError(f"no {what} `{name}`; there are {', '.join(known)}")
-
-
-def write_json(path: Path, value: Any) -> None:
-    """Write a record whole, and its folder."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, (json.dumps(value, indent=1) + "\n").encode())
 
 
 def _write_chart(path: Path, draw: Callable[[], bytes]) -> None:
@@ -668,7 +663,6 @@ def everything(out: Path, budget: float, scenes: int) -> None:
     thing. Everything is written into FOLDER, what was run and for how long into all.json. Goes on behind a
     command that fails, and exits with 1 in the end.
     """
-    from lab.about import about
     from lab.everything import run_everything
 
     need_metrics()

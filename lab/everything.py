@@ -54,13 +54,11 @@ STEPS: Final = (
     Step("lab bench proof --set shapes2d --scenes {few}"),
     Step("lab bench mutations --count {few}"),
     Step("lab bench lsp 200"),
-    Step("lab bench fit_targets --scenes 1 -o {out}/fit-targets.json", needs=("resvg_py",)),
     Step("lab bench solids --scenes 1 --side 48 -o {out}/solid-rivals.json", needs=("mitsuba", "povray")),
 )
 """What is run, in this order: each command of the laboratory and each benchmark that a page cites."""
 
 ELSEWHERE: Final = {
-    "cluster": "free ports, and cores of its own",
     "device": "a GPU",
     "play": "a browser",
     "viewer": "a browser",

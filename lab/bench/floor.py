@@ -31,11 +31,10 @@ import numpy as np
 
 import scenelang as nsg
 from lab import ROOT
-from lab.about import about
+from lab.about import about, write_json
 from lab.sets.plane import SETS, random_scene
 from lab.sets.solids import SOLID_SETS, random_solid
 from scenelang.backend.options import keep_memory
-from scenelang.files import write_whole
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.program.program import Program
@@ -270,9 +269,7 @@ def main() -> None:
                 **{way: middle(frames) for way, frames in zip(("network", "exact"), raced, strict=True)},
             }
     if given.out:
-        write_whole(
-            given.out, (json.dumps({**about(), "rounds": ROUNDS, "scenes": rows}, indent=1) + "\n").encode()
-        )
+        write_json(given.out, {**about(), "rounds": ROUNDS, "scenes": rows})
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ been put in, at the scene's own size; beside it what the server says that compil
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import shutil
@@ -21,8 +20,7 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from lab.about import about
-from scenelang.files import write_whole
+from lab.about import about, write_json
 from tests.browser import ARGUMENTS, _path
 from tests.play.page import Page, served
 
@@ -76,7 +74,7 @@ def main(scene: Path, keys: int, out: Path | None) -> None:
         figures = {"median_ms": statistics.median(times), "slowest_ms": times[-1], "load": load}
         figures["drawn_ms"] = statistics.median(drawn)
         record = {**about(), "scene": scene.name, "keys": len(times), "cores": os.cpu_count(), **figures}
-        write_whole(out, (json.dumps(record, indent=1) + "\n").encode())
+        write_json(out, record)
 
 
 if __name__ == "__main__":

@@ -22,12 +22,11 @@ from typing import Any
 
 import numpy as np
 
-from lab.about import about
+from lab.about import about, write_json
 from lab.sets.plane import SETS
 from lab.sets.scenes import interval, sets_of
 from scenelang.backend.options import keep_memory
 from scenelang.backend.small import draw_small
-from scenelang.files import write_whole
 from scenelang.graph.nodes import Graph
 from scenelang.models.manifest import load_manifest
 from scenelang.outputs import PROVED
@@ -130,9 +129,7 @@ def main() -> int:
         found.append(row)
         print(json.dumps(row), flush=True)
     if given.out:
-        write_whole(
-            given.out, (json.dumps({**about(), "seed": given.seed, "sets": found}, indent=1) + "\n").encode()
-        )
+        write_json(given.out, {**about(), "seed": given.seed, "sets": found})
     return int(any(row["broken"] for row in found))
 
 

@@ -16,7 +16,6 @@ from __future__ import annotations
 import argparse
 import copy
 import hashlib
-import json
 import resource
 import statistics
 import subprocess
@@ -29,7 +28,7 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
-from lab.about import about
+from lab.about import about, write_json
 from lab.frontier.measure import machine
 from lab.sets.scenes import interval, scenes_of
 from scenelang.backend.closed import closed_forms
@@ -296,7 +295,7 @@ def main() -> None:
     }
     drawn = {"set": ", ".join(sets), "scenes": sum(found["scenes"] for found in sets.values()), "seed": SEED}
     record = {**drawn, "side": given.side, **about(), **others, "machine": machine(), "sets": sets}
-    given.out.write_text(json.dumps(record, indent=1) + "\n")
+    write_json(given.out, record)
     for name, found in sets.items():
         print(name)
         for way, row in sorted(found["ways"].items(), key=lambda each: each[1]["ms"]["median"]):

@@ -9,7 +9,6 @@ them alike; the figures that matter are the ratios of the medians. Bytecode is c
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import statistics
 import subprocess
@@ -18,7 +17,6 @@ import tempfile
 import time
 from pathlib import Path
 
-from scenelang.files import write_whole
 from scenelang.formatting import format_text
 
 CHECK_LIMIT_S = 0.25
@@ -101,10 +99,10 @@ def main() -> None:
     print(f"fmt:    {fmt_s:.3f} s of {CHECK_LIMIT_S} s")
     print(f"render: {render:.2f} of import torch, at most {RENDER_LIMIT}")
     if given.out:
-        from lab.about import about
+        from lab.about import about, write_json
 
         record = {**about(), "rounds": given.rounds, "median_s": median}
-        write_whole(given.out, (json.dumps(record, indent=1) + "\n").encode())
+        write_json(given.out, record)
 
 
 if __name__ == "__main__":

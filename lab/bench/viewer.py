@@ -11,7 +11,6 @@ texture units, so its times are upper bounds.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shutil
 from collections.abc import Callable
@@ -20,9 +19,8 @@ from typing import Any
 
 import scenelang as nsg
 from lab import ROOT
-from lab.about import about
+from lab.about import about, write_json
 from lab.bench.floor import stars
-from scenelang.files import write_whole
 from scenelang.viewer.script import script
 from scenelang.viewer.view import view_of
 from tests.browser import ARGUMENTS, NAMES
@@ -113,7 +111,7 @@ def main() -> None:
             "cores": os.cpu_count(),
             "scenes": rows,
         }
-        write_whole(given.out, (json.dumps(record, indent=1) + "\n").encode())
+        write_json(given.out, record)
 
 
 if __name__ == "__main__":
