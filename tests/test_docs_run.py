@@ -30,7 +30,7 @@ PAGES = (
     "formatting",
     "data",
     "elements",
-    "proof",
+    "drawing",
     "sweep",
     "viewer",
 )

@@ -1,4 +1,4 @@
-"""The figures of docs/sweep.md: what drawing on a cluster gives and costs."""
+"""The figures of clusters in docs/measurements.md: what drawing on a cluster gives and costs."""
 
 from __future__ import annotations
 

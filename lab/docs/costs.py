@@ -30,17 +30,6 @@ def startup(found: Any) -> str:
     return markdown(("process", f"median of {found['rounds']}, s", "× `import torch`"), rows)
 
 
-def floor(found: Any) -> str:
-    """Frames of the plane, by network and by formulas."""
-    heads = ("scenes", "frames", "network, ms", "pairs", "exact field, ms", "pairs", "network / exact field")
-    rows = []
-    for name, row in found["scenes"].items():
-        times = [[f"{1e3 * row[w]['seconds']:.3g}", f"{row[w]['pairs']:,.0f}"] for w in ("network", "exact")]
-        shown = f"`{name}`" if " " not in name else name
-        rows.append([shown, str(row["frames"]), *times[0], *times[1], f"{row['ratio']:.2f}"])
-    return markdown(heads, rows)
-
-
 def viewer(found: Any) -> str:
     """Frames of pages in software GL."""
     rows = [
@@ -68,4 +57,4 @@ def proof(found: Any) -> str:
     return markdown(heads, rows)
 
 
-BLOCKS = {told.__name__: measured(told.__name__, told) for told in (startup, floor, viewer, proof)}
+BLOCKS = {told.__name__: measured(told.__name__, told) for told in (startup, viewer, proof)}

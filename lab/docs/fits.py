@@ -1,4 +1,4 @@
-"""The tables of docs/fit.md: how often params are found from a picture."""
+"""Tables of docs/measurements.md: how often params are found from a picture."""
 
 from __future__ import annotations
 
@@ -64,23 +64,6 @@ def fits() -> str:
     return f"{markdown(heads, rows)}\n\n{told}{'; '.join(commands)}."
 
 
-def searches() -> str:
-    """The look around beside CMA-ES."""
-    record = read("fit-search")
-    heads = ("looks by", "found", "median picture, dB", "median seconds", "median pictures")
-    rows = []
-    for way, name in (("ours", "sequence and descents"), ("cma", "CMA-ES and descents")):
-        found, of = record["ways"][way]["found"], record["ways"][way]["median"]
-        rows.append(
-            [
-                name, _between(found, record["scenes"]), f"{of['db']:.1f}", f"{of['seconds']:.1f}",
-                f"{of['frames']:.0f}",
-            ]
-        )  # fmt: skip
-    told = f"{record['scenes']} scenes of {record['params']} params, cma {record['cma']}. {_made(record)}."
-    return f"{markdown(heads, rows)}\n\n{told}"
-
-
 def targets() -> str:
     """Targets that other programs made."""
     record = read("fit-targets")
@@ -95,61 +78,4 @@ def targets() -> str:
     return f"{markdown(heads, rows)}\n\n{record['scenes']} scenes each. {_made(record)}."
 
 
-def photographs() -> str:
-    """Photographs that are ever worse."""
-    record = read("fit-stability")
-    parts = []
-    for name, head in (("blur", "blur, pixels"), ("noise", "noise, % of white")):
-        heads = (head, "at 40 dB", "mean, dB", "lowest, dB", "blur found, pixels", "median seconds")
-        rows = [
-            [
-                f"{row['value'] if name == 'blur' else 100 * row['value']:g}",
-                f"{row['reached']} of {record['scenes']}",
-                f"{row['mean_db']:.1f} ± {row['interval_db']:.1f}",
-                f"{row['lowest_db']:.1f}",
-                f"{row['blur']:.2f}",
-                f"{row['seconds']:.0f}",
-            ]
-            for row in record[name]
-        ]
-        parts.append(markdown(heads, rows))
-    told = "PSNR is against what can be reached; noise has a blur of one pixel beside it, blur noise of 2 %. "
-    return "\n\n".join([*parts, told + _made(record) + "."])
-
-
-def gradients() -> str:
-    """Descents by reverse passes beside those by differences."""
-    heads = (
-        "model", "params", "scenes", "seconds by differences", "by reverse passes", "times as fast",
-        "end, dB, by differences", "by reverse passes",
-    )  # fmt: skip
-    rows, commands = [], []
-    for name in ("fit-gradients", "fit-gradients-solids"):
-        if not (RESULTS / f"{name}.json").exists():
-            continue
-        record = read(name)
-        for of in record["rows"]:
-            low, high = of["interval"]
-            rows.append(
-                [
-                    f"`{record['model']}`", str(of["params"]), str(record["scenes"]),
-                    *(f"{of[way]['seconds']:.2f}" for way in ("differences", "reverse")),
-                    f"{of['faster']:.2f} ({low:.2f} to {high:.2f})",
-                    *(f"{of[way]['db']:.1f}" for way in ("differences", "reverse")),
-                ]
-            )  # fmt: skip
-        commands.append(_made(record))
-    told = (
-        "Medians of descents from starts within 5 % of each range of the true values, in pictures of 64 "
-        "pixels. Seconds are of the processor; *times as fast* is a geometric mean with its 95 % interval. "
-    )
-    return f"{markdown(heads, rows)}\n\n{told}{'; '.join(commands)}."
-
-
-BLOCKS: dict[str, Callable[[], str]] = {
-    "fits": fits,
-    "fit-searches": searches,
-    "fit-targets": targets,
-    "fit-stability": photographs,
-    "fit-gradients": gradients,
-}
+BLOCKS: dict[str, Callable[[], str]] = {"fits": fits, "fit-targets": targets}

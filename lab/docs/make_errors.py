@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 from lab import DOCS
 from scenelang.diagnostics.pages import AREAS, CODES, read_page
 
@@ -13,9 +11,9 @@ _PAGES = "../scenelang/diagnostics/pages"
 _HEAD = """\
 # Errors and warnings
 
-A diagnostic has a code that never changes its meaning. `E` stands for an error, with which no picture is
-made, `W` for a warning. The page of a code says what it means, why it is one, and what to write instead; the
-same text comes from the command line:
+A diagnostic has a code that never changes its meaning: `E` for an error, with which no picture is made, `W`
+for a warning. The page of a code says what it means, why it is one, and what to write instead; `explain`
+shows the same text:
 
 ```sh
 scenelang explain E0302
@@ -49,9 +47,8 @@ scenelang check scene.nsg --fix
 ```
 
 `--diff` shows what `--fix` would write. A fix is safe to apply unseen: it says what the text can only have
-meant, or leaves the picture as it is. Fixes are applied until there is none left, since one may uncover the
-next mistake. Imported files change only if they are named, too. With `-` the text comes from standard input
-and goes to standard output.
+meant, or leaves the picture as it is. Fixes are applied until none is left. Imported files change only if
+they are named, too. `-` stands for standard input and output.
 
 ## Choosing
 
@@ -61,8 +58,8 @@ scenelang check scene.nsg --select W03 --strict
 scenelang check film.nsg --all-frames
 ```
 
-Of an animation the first, second, middle and last frame are looked at, or all, or one (`--frame N`). What
-another frame than the first has names it. Together they may take as many steps and objects as one.
+Of an animation `check` evaluates the first, second, middle and last frame, or all, or one (`--frame N`).
+Together they may take as many steps and objects as one.
 
 Errors always count. Warnings can be left out or chosen by their codes or beginnings of them, and `--strict`
 lets them fail the check. The exit code is 0 without errors, 1 with, 2 where a file cannot be read.
@@ -93,12 +90,10 @@ def index() -> str:
     """The text of the page."""
     parts = [_HEAD]
     for area, name in AREAS.items():
-        parts.append(f"\n### {name[0].upper()}{name[1:]}\n\n| code | | |\n|---|---|---|\n")
+        parts.append(f"\n### {name[0].upper()}{name[1:]}\n\n| code | |\n|---|---|\n")
         for code in (code for code in CODES if code[1:3] == area):
             page = read_page(code)
-            first = re.split(r"(?<=\.)\s", " ".join(page.meaning.split()))[0]
-            first = first.replace("|", "\\|")
-            parts.append(f"| [{code}]({_PAGES}/{code}.md) | {page.title} | {first} |\n")
+            parts.append(f"| [{code}]({_PAGES}/{code}.md) | {page.title} |\n")
     return "".join(parts)
 
 

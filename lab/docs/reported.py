@@ -1,24 +1,13 @@
-"""Tables of docs/report.md: what other pages have in full, cut down to a page."""
+"""Tables of docs/measurements.md: chosen rows of records, and the commands behind them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from lab.docs import paper, solid_rivals
+from lab.docs import solid_rivals
 from lab.docs.figures import RESULTS, kilobytes, numbers, read, told
 from lab.docs.tables import markdown
 
-ACCURACY = (
-    ("deformed shapes (Table 2)", "distances", "shapes2d", paper.SHAPES),
-    ("squares with 16 textures (Table 1)", "squares", "textures2d/textures2d", paper.MATERIAL_SIZES[32]),
-    ("spheres and tori, solid or media (Table 2)", "distances", "solids3d-256/solids3d", paper.SOLIDS),
-    ("bunny, teapot, monkey, 128² (Table 1)", "none: grids", "solids3d/meshes3d", paper.GEOMETRY_SIZES[32]),
-    ("random booleans of shapes", "distances, fold", "chains", None),
-    ("the same at three times the size", "distances, fold", "large", None),
-    ("random booleans of solids, 128²", "distances, fold", "solids3d/booleans", None),
-    ("deformed booleans of solids on random stages", "distances, fold", "solids3d-256/mixed", None),
-)
-"""Rows: what is drawn, what of it is learned, the record, and the paper's figures."""
 PLANE = (
     "shapes2d",
     "exact field",
@@ -57,24 +46,21 @@ STABILITY = (
     ("stability-solids3d", "fov", (5, 37, 150)),
 )
 COMMANDS = (
-    ("6.1", "shapes2d", "textures2d/textures2d", "solids3d-256/solids3d", "solids3d/meshes3d"),
-    ("6.1, shadows", "solids3d/shadows"),
-    ("6.3, 6.4", "models/shapes2d/frontier", "models/solids3d/frontier", "unions-rivals", "solid-rivals"),
-    ("6.5", "stability", "stability-textures2d", "stability-solids3d"),
-    ("6.6", "experiments/compare"),
-    ("2, 5", "passes", "proof"),
+    ("accuracy", "shapes2d", "textures2d/textures2d", "solids3d/solids3d", "solids3d/shadows"),
+    ("stability", "stability", "stability-textures2d", "stability-solids3d"),
+    ("speed", "models/shapes2d/frontier", "models/solids3d/frontier", "unions-rivals", "solid-rivals"),
+    ("promises", "frontier-verified", "frontier-verified-solids"),
+    ("passes", "passes", "plans"),
 )
 UNSAID = {
     "textures2d/textures2d": "python -m lab eval textures2d --set textures2d --scenes {scenes}",
-    "solids3d-256/solids3d": "python -m lab eval solids3d --set solids3d --scenes {scenes} --side 256",
-    "solids3d/meshes3d": "python -m lab eval solids3d --set meshes3d --originals FOLDER --scenes {scenes}",
     "solids3d/shadows": "python -m lab shadows solids3d --scenes {scenes} --side {canvas[0]}",
     "models/shapes2d/frontier": "python -m lab frontier shapes2d --scenes {scenes}",
     "models/solids3d/frontier": "python -m lab frontier solids3d --scenes {scenes}",
     "solid-rivals": "python -m lab bench solids",
     "stability": "python -m lab stability shapes2d --scenes {scenes}",
     "stability-textures2d": "python -m lab stability textures2d --only texels --scenes {scenes}",
-    "experiments/compare": "scenelang lab experiment compare --budget 2",
+    "plans": "python -m lab plans examples/*.nsg",
     "passes": "python -m tests.passes.prove --scenes {scenes}",
 }
 """Commands of records that were made before records said theirs."""
@@ -84,20 +70,6 @@ def plus_minus(found: Mapping[str, float], digits: int) -> str:
     """A mean and its interval, where that was measured."""
     said = f"{found['mean']:.{digits}f}"
     return f"{said} ± {found['interval']:.{digits}f}" if "interval" in found else said
-
-
-def accuracy() -> str:
-    """Ours and, where the paper has such scenes, the paper's."""
-    rows = []
-    for what, learned, name, theirs in ACCURACY:
-        d = read(name)
-        uncapped = f"{d['psnr_uncapped']['mean']:.1f}" if "psnr_uncapped" in d else ""
-        cells = [what, learned, f"{d['scenes']:,}", plus_minus(d["psnr"], 2), uncapped]
-        cells += [f"{d['psnr']['worst']:.1f}", f"{d['ssim']['mean']:.4f}", plus_minus(d["flip"], 4)]
-        cells.append(f"{theirs.psnr:.2f} / {theirs.ssim:.3f} / {theirs.flip:.3f}" if theirs else "")
-        rows.append(cells)
-    heads = ("scenes of", "learned", "n", "PSNR ≤ 50, dB", "uncapped", "worst", "SSIM", "FLIP")
-    return markdown((*heads, "paper: PSNR / SSIM / FLIP"), rows)
 
 
 def budgets() -> str:
@@ -186,7 +158,6 @@ def commands() -> str:
 
 
 BLOCKS = {
-    "report-accuracy": accuracy,
     "report-plane": lambda: front("shapes2d", PLANE),
     "report-space": lambda: front("solids3d", SPACE),
     "report-unions": unions,

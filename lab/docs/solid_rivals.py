@@ -1,4 +1,4 @@
-"""Solids beside other renderers, from what `python -m lab bench solids` recorded: a table and a chart."""
+"""Solids beside other renderers, from what `python -m lab bench solids` recorded."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any
 
 from lab.charts import FAINT, INK, figure_png, pyplot
 from lab.docs.figures import read
-from lab.docs.tables import markdown
 from scenelang.measure.frontier import front
 
 NAME, OURS = "solid-rivals", "network, adaptive"
@@ -57,59 +56,6 @@ def as_near(ways: Ways, renderer: str) -> str:
     """The fastest way of a renderer whose error is at most that of ours, or else its nearest."""
     some, most = of(ways, renderer), ways[OURS]["flip"]["mean"]
     return next((way for way, row in some.items() if row["flip"]["mean"] <= most), on_front(some)[-1])
-
-
-def shown(ways: Ways) -> list[str]:
-    """Ways that the table shows: of others the fastest, the fastest that is as near as ours, the nearest."""
-    some = {way for way in ways if way in TITLES or way.startswith(("network", "reference, 4"))}
-    for other in ("POV-Ray", "Mitsuba"):
-        best = on_front(of(ways, other))
-        some |= {best[0], as_near(ways, other), best[-1]}
-    return [way for way in of(ways, "") if way in some]
-
-
-def table() -> str:
-    """Times and errors of the ways that matter."""
-    record, rows = read(NAME), []
-    for set_, words in SETS.items():
-        ways = ways_of(set_)
-        for way in shown(ways):
-            row, bold = ways[way], "**" if way == OURS else ""
-            errors = [f"{row['flip'][k]:.4f}" for k in ("mean", "interval")]
-            decibels = [f"{row['psnr'][k]:.1f}" for k in ("mean", "interval")]
-            near = f"{row['flip_defined']['mean']:.4f}" if "flip_defined" in row else ""
-            rows.append(
-                [
-                    words,
-                    f"{bold}{TITLES.get(way, way)}{bold}",
-                    f"{row['ms']['median']:,.0f}",
-                    f"{row['times']['mean']:.2f} ± {row['times']['interval']:.2f}",
-                    f"{row['start_ms']:,.0f}" if row["start_ms"] else "",
-                    " ± ".join(errors),
-                    " ± ".join(decibels),
-                    near,
-                ]
-            )
-    heads = [
-        "set",
-        "drawn by",
-        "ms",
-        "× the network",
-        "start, ms",
-        "FLIP",
-        "PSNR, dB",
-        "FLIP to the definition",
-    ]
-    counts = ", ".join(f"{found['scenes']} of `{set_}`" for set_, found in record["sets"].items())
-    said = (
-        f"`{record['command']}`, revision `{record['revision'][:8]}`: {counts} at {record['side']}², seed "
-        f"{record['seed']}; milliseconds of processor time, median; the others means, ± half of the 95 % "
-        f"interval. {record['machine']}; {record['povray']}; {record['mitsuba']}."
-    )
-    return f"{markdown(heads, rows)}\n\n{said}"
-
-
-# ---------------------------------------------------------------- the chart
 
 
 def chart() -> bytes:

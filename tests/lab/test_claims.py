@@ -13,15 +13,12 @@ from lab.docs.make_claims import claimed
 
 PAGES = {
     "architecture.md",
-    "results.md",
-    "proof.md",
-    "report.md",
-    "viewer.md",
-    "README.md",
-    "index.md",
+    "drawing.md",
     "elements.md",
-    "parsimony.md",
-    "frontier.md",
+    "index.md",
+    "measurements.md",
+    "README.md",
+    "viewer.md",
 }
 
 

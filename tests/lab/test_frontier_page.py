@@ -7,8 +7,6 @@ import io
 import itertools
 import json
 import re
-import subprocess
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -149,11 +147,8 @@ def test_charts_label_every_point_that_has_an_error() -> None:
 
 
 @pytest.mark.skipif(not frontier_path("shapes2d").exists(), reason="no frontier is shipped")
-def test_the_documentation_tells_the_shipped_frontier() -> None:
-    """And the frontier is of models that ship, and its promises were kept in 95 % of other scenes."""
-    command = [sys.executable, "-m", "lab", "docs", "frontier", "--check"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+def test_the_shipped_frontier_keeps_its_promises() -> None:
+    """It is of models that ship, and its promises were kept in 95 % of other scenes."""
     shipped = load_frontier("shapes2d")
     assert shipped is not None
     assert {p.model for p in shipped.points if p.model is not None} <= set(available())

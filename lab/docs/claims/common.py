@@ -5,7 +5,6 @@ GIVEN = {
     "4 samples a pixel": "the language's definition of a picture",
     "four samples a pixel": "the language's definition of a picture",
     "64 samples a pixel": "what pictures are compared with where four are not the truth",
-    "sampled four times": "the language's definition of a picture",
     "95 % interval": "the interval's level",
     "PSNR is capped at 50 dB an image": "how PSNR is averaged",
 }
