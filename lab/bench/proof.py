@@ -66,7 +66,7 @@ def measured(name: str, index: int, seed: int) -> dict[str, float]:
     manifest = load_manifest("textures2d" if name.startswith("textures") else "shapes2d")
     scene, graphs = sets_of(manifest)[name](np.random.default_rng([seed, index])), dict[str, Graph]()
     program = compile_scene(scene, model=manifest.name, after=graphs.__setitem__)
-    given = graphs["lower"], graphs["linearise"], manifest
+    given = graphs["lower"], graphs["flatten"], manifest
     canvas = scene.canvas
 
     def exact() -> Band:

@@ -1,8 +1,8 @@
 """Figures that the paper reports, to be printed beside ours.
 
 Source: Granskog, Schnabel, Rousselle, Novák, *Neural Scene Graph Rendering*, ACM TOG 40(4), 2021,
-supplementary material, Tables 1 and 2: PSNR in dB, SSIM, FLIP, each the mean of 1,000 random scenes of its own
-sets, after up to 1.6 million iterations on graphics processors.
+supplementary material, Tables 1 and 2: PSNR in dB, SSIM, FLIP, each the mean of 1,000 random scenes of its
+own sets, after up to 1.6 million iterations on graphics processors.
 """
 
 from __future__ import annotations
