@@ -209,8 +209,8 @@ def dictionary() -> list[bytes]:
     """Field names and values of the schema."""
     fields = (
         "version model canvas background animation nodes kind object group boolean chain geometry transforms "
-        "material ops name children op node union smooth subtract intersect x y z angle axis axes k rows amount "
-        "frequency rgb seconds fps loop"
+        "material ops name children op node union smooth subtract intersect x y z angle axis axes k rows "
+        "amount frequency rgb seconds fps loop"
     )
     words = (*fields.split(), *TRANSFORMS, *OPERATIONS)
     return [

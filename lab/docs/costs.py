@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from lab.docs.figures import RESULTS, read
+from lab import RESULTS
+from lab.docs.figures import read
 from lab.docs.tables import markdown
 
 

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from statistics import median
 from typing import Any
 
-from lab.docs.figures import RESULTS, read
+from lab import RESULTS
+from lab.docs.figures import read
 from lab.docs.tables import markdown
 
 RECORDS = ("fit", "fit-six", "fit-solids")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from lab import RESULTS
 from lab.docs import solid_rivals
-from lab.docs.figures import RESULTS, kilobytes, numbers, read, told
+from lab.docs.figures import kilobytes, numbers, read, told
 from lab.docs.tables import markdown
 
 PLANE = (
