@@ -19,6 +19,7 @@ GIVEN = dict.fromkeys(
         "8 × 8 pixels",
         "up to 0.009 further",
         "at least 0.002",
+        "6 or 12 numbers",
         "GLSL ES 3.00",
         "longer than 33 ms",
     ),
