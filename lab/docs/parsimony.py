@@ -1,6 +1,6 @@
 """Tables of what passes and skipping save, from records.
 
-`plans.json` is what `scenelang lab plans examples/*.nsg` wrote, and `passes.json` what
+`plans.json` is what `python -m lab plans examples/*.nsg` wrote, and `passes.json` what
 `python -m tests.passes.prove` did.
 """
 
