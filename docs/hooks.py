@@ -21,11 +21,11 @@ from pathlib import Path
 from typing import Any
 
 import click
-from blocks import pictured
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
+from lab.docs.blocks import pictured
 from scenelang.cli.main import Commands, cli
 from scenelang.evaluate.evaluation import Source
 from scenelang.viewer.export import viewed

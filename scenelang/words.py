@@ -1,7 +1,7 @@
 """The words of the language: how each is called and what it means. The one table of them.
 
 The evaluator takes arguments from it, the language server texts and highlighters words.
-``python docs/make_words.py`` writes what is made from it: grammars for editors and the tables of the docs.
+``python -m lab docs words`` writes what is made from it: grammars for editors and the tables of the docs.
 """
 
 from __future__ import annotations

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import re
@@ -103,29 +102,29 @@ def commands() -> list[tuple[str, str]]:
 
 
 @cache
-def help_of(*subcommand: str) -> str:
-    code = "from scenelang.cli.main import main; main()"
-    arguments = [sys.executable, "-c", code, *subcommand, "--help"]
-    shown = subprocess.run(arguments, capture_output=True, text=True, check=False)
+def help_of(module: str, *subcommand: str) -> str:
+    arguments = [sys.executable, "-m", module, *subcommand, "--help"]
+    shown = subprocess.run(arguments, cwd=ROOT, capture_output=True, text=True, check=False)
     assert shown.returncode == 0, shown.stderr
     return shown.stdout
 
 
 @pytest.mark.parametrize(("place", "command"), commands())
 def test_commands_name_what_exists(place: str, command: str) -> None:
-    """Scripts and files exist; subcommands and options are ones that `scenelang` has."""
+    """Scripts and files exist; subcommands and options are ones that `scenelang` or the laboratory has."""
     words = shlex.split(command)
     output = {words[i + 1] for i, word in enumerate(words[:-1]) if word == "-o"}
     for word in words[1:]:
-        if word.startswith(("examples/", "docs/", "tests/", "benchmarks/", ".ci/")) and word not in output:
+        if word.startswith(("examples/", "docs/", "tests/", "lab/", ".ci/")) and word not in output:
             assert (ROOT / word).exists(), f"{place}: {word}"
     program = words[0].removeprefix(VENV)
     assert program in {"python3", "python", "pip", "pytest", "ruff", "mypy", "bash", "git", "scenelang"}, (
         place
     )
-    if program == "scenelang":
-        options = help_of(*words[1 : 3 if words[1] == "lab" else 2])
-        for word in words[2:]:
+    if program == "scenelang" or words[1:3] == ["-m", "lab"]:
+        first = 1 if program == "scenelang" else 3
+        options = help_of("scenelang" if program == "scenelang" else "lab", words[first])
+        for word in words[first + 1 :] if words[first] not in ("bench", "docs") else ():
             if re.match(r"-{1,2}[A-Za-z]", word):
                 name = word.partition("=")[0]
                 assert re.search(rf"(?<!\S){re.escape(name)}\b", options), f"{place}: {word}"
@@ -178,19 +177,14 @@ def test_ci_runs_the_commands_of_the_readme() -> None:
     assert 'bash -c "$tests"' in script
 
 
-def test_every_picture_is_made_and_used(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_picture_is_made_and_used() -> None:
     """By the one script, which knows what it would draw without drawing it; and all of them are small."""
-    spec = importlib.util.spec_from_file_location("make_pictures", ROOT / "docs/make_pictures.py")
-    assert spec is not None
-    assert spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    monkeypatch.syspath_prepend(ROOT / "docs")  # as where it is run
-    sys.modules[spec.name] = script  # its dataclasses look themselves up
-    spec.loader.exec_module(script)
+    from lab.docs import make_pictures as script
+
     folder = ROOT / "docs/pictures"
     files = [path for path in folder.rglob("*") if path.is_file()]
     names = {path.relative_to(folder).as_posix() for path in files}
-    assert names == {*script.plan(), script.RECORDED}
+    assert names == {*script.plan(), *script.RECORDED}
     text = "".join(page.read_text("utf-8") for page in PAGES)
     used = set(re.findall(r"\]\((?:docs/)?pictures/([^)\s]+)\)", text))
     stills_of_moving = {f"{name.removesuffix('.webp')}.png" for name in names if name.endswith(".webp")}
@@ -260,8 +254,8 @@ def test_every_public_name_is_in_the_embedding_guide() -> None:
 
 
 def test_tables_of_results_are_those_of_the_measurements() -> None:
-    command = [sys.executable, ROOT / "docs/make_results.py", "--check"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-m", "lab", "docs", "results", "--check"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-import runpy
 from pathlib import Path
 
 import pytest
 
+from lab.docs.make_words import made
 from scenelang import words
 from scenelang.evaluate import vocabulary
 from scenelang.evaluate.values import functions, transforms
@@ -54,6 +54,6 @@ def test_heads_show_the_parameters(word: words.Word) -> None:
 
 
 def test_what_is_made_of_them_is_current() -> None:
-    """`python docs/make_words.py` would change nothing."""
-    for path, text in runpy.run_path(str(ROOT / "docs/make_words.py"))["made"]().items():
-        assert path.read_text("utf-8") == text, f"{path.name}: run python docs/make_words.py"
+    """`python -m lab docs words` would change nothing."""
+    for path, text in made().items():
+        assert path.read_text("utf-8") == text, f"{path.name}: run python -m lab docs words"

@@ -207,47 +207,12 @@ def mutate(data: bytes, generator: Random) -> bytes:
 
 def dictionary() -> list[bytes]:
     """Field names and values of the schema."""
-    words = [
-        "version",
-        "model",
-        "canvas",
-        "background",
-        "animation",
-        "nodes",
-        "kind",
-        "object",
-        "group",
-        "boolean",
-        "chain",
-        "geometry",
-        "transforms",
-        "material",
-        "ops",
-        "name",
-        "children",
-        "op",
-        "node",
-        "union",
-        "smooth",
-        "subtract",
-        "intersect",
-        *TRANSFORMS,
-        *OPERATIONS,
-        "x",
-        "y",
-        "z",
-        "angle",
-        "axis",
-        "axes",
-        "k",
-        "rows",
-        "amount",
-        "frequency",
-        "rgb",
-        "seconds",
-        "fps",
-        "loop",
-    ]
+    fields = (
+        "version model canvas background animation nodes kind object group boolean chain geometry transforms "
+        "material ops name children op node union smooth subtract intersect x y z angle axis axes k rows "
+        "amount frequency rgb seconds fps loop"
+    )
+    words = (*fields.split(), *TRANSFORMS, *OPERATIONS)
     return [
         *(f'"{word}"'.encode() for word in dict.fromkeys(words)),
         b"null",

@@ -9,7 +9,6 @@ from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from random import Random
-from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -163,19 +162,8 @@ def mutate(data: bytes, generator: Random) -> bytes:
 
 def dictionary() -> list[bytes]:
     """Words of the headers and of manifests."""
-    words: list[Any] = [*asdict(load_manifest(MODEL)), "format", "config", "network", "code", "decoder_width"]
-    words += [
-        "dtype",
-        "shape",
-        "data_offsets",
-        "F32",
-        "F16",
-        "__metadata__",
-        "scenelang",
-        "codes",
-        "material_codes",
-    ]
-    return [f'"{word}"'.encode() for word in words]
+    words = "format config network code decoder_width dtype shape data_offsets F32 F16 __metadata__ scenelang"
+    return tensors.quoted(" ".join((*asdict(load_manifest(MODEL)), words, "codes material_codes")))
 
 
 TARGET = Target(

@@ -115,7 +115,7 @@ def keep_memory() -> bool:
 
 THREAD_PIXELS = 1 << 17
 """Pixels of a picture for each thread that draws it: with fewer, threads wait for each other longer than they
-save (`python -m benchmarks.floor --threads 2`)."""
+save (`python -m lab bench floor --threads 2`)."""
 
 
 def threads_for(canvas: tuple[int, int]) -> int:

@@ -24,7 +24,7 @@ MOST_MS: Final = 250.0
 _NS: Final = (4.3e6, 11e3, 11.0, 0.0, 3600.0)
 """Nanoseconds of a frame, an object, a pixel, a meeting and a pixel around bounds (`Load.row`).
 
-`python -m benchmarks.work` fits them and `_SHARES` to the examples and random scenes on several canvases.
+`python -m lab bench work` fits them and `_SHARES` to the examples and random scenes on several canvases.
 """
 _SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
 """Of that, what other ways to sample take."""

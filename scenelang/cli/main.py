@@ -37,21 +37,22 @@ COMMANDS: Final = {
     "dump": "Show or draw what a scene is after each stage, and what it costs.",
     "models": "List models, or tell about one.",
     "learn": "Make meshes and drawings elements of scenes.",
-    "train": "Train a model's weights.",
-    "lab": "Measure models and compare designs: the laboratory.",
 }
 GROUPS: Final = {
     "Draw": "render sweep play export watch",
     "Write": "check fmt explain convert import learn fit",
     "Measure": "compare dump models",
-    "Develop": "compile schema lsp lab",
+    "Develop": "compile schema lsp",
 }
 """Commands as `--help` lists them; those for the development of scenelang itself it leaves out."""
-ELSEWHERE: Final = {"sweep": "scenelang.cli.sweep", "lab": "scenelang.lab.commands"}
-"""Commands whose modules do not lie among the others; nothing else here knows of the laboratory."""
-MOVED: Final = {"explain-plan": "dump --costs", "graph": "dump --format mmd"} | {
-    name: f"lab {name}" for name in ("eval", "frontier", "stability", "experiment", "chart")
+ELSEWHERE: Final = {"sweep": "scenelang.cli.sweep"}  # commands whose modules do not lie among the others
+MOVED: Final = {
+    "explain-plan": "scenelang dump --costs",
+    "graph": "scenelang dump --format mmd",
+    "lab": "python -m lab",
+    **{name: f"python -m lab {name}" for name in ("train", "eval", "frontier", "stability")},
 }
+"""Commands of before, and what they are called now; the laboratory runs in a clone of the repository."""
 INTERRUPTED: Final = 130  # as shells report it
 
 
@@ -102,14 +103,16 @@ class Commands(click.Group):
             from difflib import get_close_matches
 
             if args[0] in self.moved:
-                ctx.fail(f"`{args[0]}` is now `{ctx.command_path} {self.moved[args[0]]}`.")
+                ctx.fail(f"`{args[0]}` is now `{self.moved[args[0]]}`.")
             near = get_close_matches(args[0], self.table, 1)
             advice = f" Did you mean `{near[0]}`?" if near else ""
             ctx.fail(f"No such command `{args[0]}`.{advice}")
         return super().resolve_command(ctx, args)
 
 
-class _Commands(Commands):
+class Reporting(click.Group):
+    """Commands that report in one line what goes wrong without being a bug."""
+
     def make_context(
         self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
     ) -> click.Context:
@@ -144,6 +147,10 @@ def _reporting() -> Iterator[None]:
         if isinstance(error, ModuleNotFoundError) and error.name == "torch":
             raise Trouble("this needs torch, which is not installed; pip install torch") from None
         raise
+
+
+class _Commands(Reporting, Commands):
+    """The commands of this package."""
 
 
 def describe(error: OSError) -> str:

@@ -46,7 +46,7 @@ def _original(name: str, element: Element, folder: str | Path | None) -> Shape:
     made = f"`{name}` was made from `{file}`"
     if path.name != file or path.suffix.lower() not in MOST_OF or not path.is_file():
         ships = library.owns(Path(folder, file).resolve())
-        means = ", which `python docs/make_meshes.py` of the repository makes" if ships else ""
+        means = ", which `python -m lab docs meshes` of the repository makes" if ships else ""
         raise FitError(
             f"{made}, which is not in `{folder}`; `--originals FOLDER` ({FOLDER}) says where it is{means}"
         )

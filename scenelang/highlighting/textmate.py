@@ -1,6 +1,6 @@
 """The TextMate grammar, made from the words and terminals of the language.
 
-``python docs/make_words.py`` writes `grammar/scenelang.tmLanguage.json`. A language server's semantic tokens
+``python -m lab docs words`` writes `grammar/scenelang.tmLanguage.json`. A language server's semantic tokens
 say more where one runs: what a name stands for is beyond regular expressions.
 """
 

@@ -1,4 +1,4 @@
-"""Learned lifting without torch: the compiler's side of `scenelang.lab.designs.encoders`."""
+"""Learned lifting without torch: the compiler's side of `lab.designs.encoders`."""
 
 from __future__ import annotations
 

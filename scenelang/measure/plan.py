@@ -10,16 +10,18 @@ import numpy as np
 
 from scenelang.backend.neural import draw_program
 from scenelang.backend.small import draw_small
-from scenelang.graph.lower import Spans
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import Spans, lower
 from scenelang.graph.nodes import Fold, Graph, nodes
 from scenelang.graph.steps import Affine
+from scenelang.image import Image
 from scenelang.measure.metrics import MOST_DB, flip, over_white, psnr
-from scenelang.measure.scenes import reference_of
 from scenelang.models.choose import WHITE, choose_model, lacking, uses, why_chosen
 from scenelang.models.load import Model, place_of
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.program.groups import OPERATOR
 from scenelang.program.program import Program
+from scenelang.reference.image import reference_image
 from scenelang.renderers.draw import Drawing
 from scenelang.renderers.solid.march import Work
 from scenelang.scene.schema import Scene
@@ -108,6 +110,19 @@ def missing(scene: Scene, manifest: Manifest) -> list[str]:
     if manifest.white and scene.background not in (WHITE, "default"):
         names.append("a background that is not white")
     return names
+
+
+def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: Spans | None = None) -> Image:
+    """The exact picture of a scene over its background, names as a model knows them.
+
+    ``per_side`` is samples along each side of a pixel; 2 is the definition.
+    """
+    graph = lower(scene, manifest, spans, Diagnostics())
+    if not graph.elements:
+        return reference_image(graph, per_side=per_side)
+    from scenelang.fitting.originals import originals_of
+
+    return reference_image(graph, per_side=per_side, brought=originals_of(scene, graph))
 
 
 def drawing_cost(

@@ -1,6 +1,6 @@
 """How fast the distances of shipped geometries change, as it was proved: a file beside the weights.
 
-`python -m scenelang.lab.slopes NAME` writes it. Weights without one are drawn without blocks being ruled out.
+`python -m lab.slopes NAME` writes it. Weights without one are drawn without blocks being ruled out.
 """
 
 from __future__ import annotations

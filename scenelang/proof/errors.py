@@ -1,6 +1,6 @@
 """How far learned distances may be from exact ones, by place: a file beside the weights.
 
-`python -m scenelang.lab.errors` proves it. Within `RADIUS` a cell of leaf coordinates says between which
+`python -m lab.errors` proves it. Within `RADIUS` a cell of leaf coordinates says between which
 numbers learned less exact distance lies. Farther points are seen at the rim: a leaf lies in the unit disc,
 so from there on its distance grows outwards by 1 per leaf unit at most, and at least by the cosine of the
 largest angle between the ways from the origin and from a point of the disc.

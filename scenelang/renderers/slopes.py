@@ -4,7 +4,7 @@ For the distance f of a leaf, with leaf coordinates p of a cell and q within a r
 
     |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s.
 
-s hangs on the cell and the radius. `scenelang.lab.slopes` proves it of learned leaves, and it is shipped
+s hangs on the cell and the radius. `lab.slopes` proves it of learned leaves, and it is shipped
 beside the weights. That of elements is read off their nodes. Of what nothing is known it is infinite.
 """
 

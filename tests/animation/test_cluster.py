@@ -179,7 +179,7 @@ def test_workers_of_this_machine(scene: Path, tmp_path: Path) -> None:
 
 
 def test_an_evaluation_has_the_same_figures(address: str) -> None:
-    from scenelang.lab.evaluate import evaluate_set
+    from lab.evaluate import evaluate_set
     from scenelang.models.load import load_model
 
     model, timed = load_model("solids3d"), {"seconds"}

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-import runpy
 from pathlib import Path
 
+from lab.docs.make_errors import index
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.render_text import render_text
@@ -17,8 +17,8 @@ PAGE = (DOCS / "errors.md").read_text("utf-8")
 
 
 def test_the_index_is_made_from_the_pages() -> None:
-    """`python docs/make_errors.py` writes it anew."""
-    assert runpy.run_path(str(DOCS / "make_errors.py"))["index"]() == PAGE
+    """`python -m lab docs errors` writes it anew."""
+    assert index() == PAGE
     assert set(re.findall(r"^\| \[([EW]\d{4})\]", PAGE, re.MULTILINE)) == set(CODES)
 
 

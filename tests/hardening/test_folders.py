@@ -88,18 +88,6 @@ def test_names_that_the_user_did_not_write(scenes: Folder, outside: Path, argume
     assert unharmed(outside)
 
 
-def test_a_training_folder_with_links(folder: Folder, outside: Path) -> None:
-    from tests.cli.test_commands import tiny_config
-
-    os.mkdir("run")
-    Path("run/log.jsonl").symlink_to(outside / "mine")
-    Path("run/weights.safetensors").symlink_to(outside / "mine")
-    arguments = ("train", tiny_config(folder), "-o", "run", "--device", "cpu")
-    assert folder.run(*arguments, "--every", "1", "--budget", "1e-9").exit_code == 0
-    assert Path("run/log.jsonl").read_text().count("\n") == 1
-    assert unharmed(outside)
-
-
 # ---------------------------------------------------------------- one file for input and output
 
 INPUTS = {"render-animation": "moving.nsg", "import": "a.gltf"}

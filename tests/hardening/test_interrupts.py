@@ -30,8 +30,6 @@ LONG = {
     ),
     "animation": (("render", "moving.nsg", "-o", "out.gif", "--size", "512x512"), 5.0),
     "compare": (("compare", "many.nsg", "-o", "out.png", "--size", "2000x2000"), 5.0),
-    "eval": (("lab", "eval", "shapes2d", "--scenes", "500", "-o", "out"), 5.0),
-    "train": (("train", "shapes2d", "-o", "out", "--device", "cpu"), 5.0),
 }
 QUICK = ("compile", "render")
 

@@ -28,8 +28,6 @@ COMMANDS = [
     ("dump", "{}.nsg"),
     ("graph", "{}.nsg", "-o", "out.mmd"),
     ("import", "{}.glb", "-o", "out.nsg"),
-    ("train", "{}.json", "-o", "out"),
-    ("lab", "eval", "shapes2d", "--weights", "{}.safetensors", "-o", "out"),
 ]
 SUFFIXES = ("nsg", "json", "safetensors", "glb")
 

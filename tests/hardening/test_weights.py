@@ -16,14 +16,15 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from fuzz.tensors import mutate
+from lab.training.checkpoint import load_tensors
 from scenelang.models import manifest as manifests
 from scenelang.models.framed import framed_arrays
 from scenelang.models.load import load_network
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.weights import ModelError, codes_of, open_weights, weights_path
 from scenelang.tensors import TensorError, read_tensors
-from scenelang.training.checkpoint import load_tensors
 from tests.cli.conftest import Folder
+from tests.lab.conftest import run
 
 SHAPES = load_manifest("shapes2d")
 DATA = weights_path("shapes2d").read_bytes()
@@ -209,9 +210,7 @@ def test_what_is_taken_is_what_safetensors_takes() -> None:
 )
 def test_commands_say_so(folder: Folder, name: str) -> None:
     Path("bad.safetensors").write_bytes(HARM[name])
-    result = folder.run(
-        "lab", "eval", "shapes2d", "--scenes", "1", "--weights", "bad.safetensors", "-o", "out"
-    )
+    result = run("eval", "shapes2d", "--scenes", "1", "--weights", "bad.safetensors", "-o", "out")
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1
     assert result.stderr.startswith("Error: ")
@@ -227,33 +226,6 @@ def test_checkpoints(tmp_path: Path, name: str) -> None:
         return
     with pytest.raises(ModelError):
         load_tensors(path)
-
-
-def test_a_damaged_checkpoint_ends_a_training_in_words(folder: Folder) -> None:
-    from tests.cli.test_commands import tiny_config
-
-    Path("run").mkdir()
-    Path("run/checkpoint.safetensors").write_bytes(DATA[:500])
-    result = folder.run("train", tiny_config(folder), "-o", "run", "--device", "cpu")
-    assert result.exit_code == 2
-    assert result.stderr.splitlines()[-1].startswith("Error: ")
-
-
-def test_a_checkpoint_of_other_tensors(folder: Folder) -> None:
-    """Its configuration is the right one, its tensors are another training's."""
-    import torch
-
-    from scenelang.training.checkpoint import save_tensors
-    from scenelang.training.config import read_config
-    from tests.cli.test_commands import tiny_config
-
-    name = tiny_config(folder)
-    Path("run").mkdir()
-    header = {"format": 1, "config": read_config(name).to_json(), "iteration": 1, "seconds": 1.0}
-    save_tensors(Path("run/checkpoint.safetensors"), {"network.codes": torch.zeros(2)}, header)
-    result = folder.run("train", name, "-o", "run", "--device", "cpu")
-    assert result.exit_code == 2
-    assert "checkpoint" in result.stderr.splitlines()[-1]
 
 
 MANIFEST = json.loads((manifests.ROOT / "shapes2d" / "manifest.json").read_text("utf-8"))

@@ -12,7 +12,6 @@ import pytest
 
 from scenelang.files import NotWritten, write_output, write_whole
 from tests.cli.conftest import Folder
-from tests.cli.test_commands import tiny_config
 from tests.hardening.processes import leavings, one_line, run
 from tests.interchange.documents import document, write
 
@@ -106,13 +105,6 @@ def test_a_full_device(folder: Folder) -> None:
     with open("/dev/full", "w") as device:
         for arguments in (("schema",), ("--help",), ("models",), ("check", folder.write("a.nsg"))):
             assert one_line(run(*arguments, stdout=device)) == "no space left on device"
-
-
-def test_training_on_a_full_disk(folder: Folder) -> None:
-    name = tiny_config(folder)
-    said = one_line(run("train", name, "-o", "run", "--device", "cpu", preexec_fn=full))
-    assert "too large" in said
-    assert leavings(folder.path / "run") <= {"log.jsonl"}
 
 
 def test_devices_stay_devices(folder: Folder) -> None:

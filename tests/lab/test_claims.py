@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-DOCS = Path(__file__).parents[2] / "docs"
+from lab.docs.claims.common import GIVEN
+from lab.docs.figures import Figure, Word, filled, uncovered
+from lab.docs.make_claims import claimed
+
 PAGES = {
     "architecture.md",
     "drawing.md",
@@ -21,18 +22,8 @@ PAGES = {
 }
 
 
-@pytest.fixture(scope="module", autouse=True)
-def scripts() -> Iterator[None]:
-    """The modules of docs/ can be imported, as where a script of that folder is run."""
-    sys.path.insert(0, str(DOCS))
-    yield
-    sys.path.remove(str(DOCS))
-
-
 @pytest.fixture(scope="module")
 def pages() -> dict[Path, ModuleType]:
-    from make_claims import claimed
-
     return dict(claimed())
 
 
@@ -41,18 +32,13 @@ def test_the_pages_that_claim_something_are_looked_at(pages: dict[Path, ModuleTy
 
 
 def test_figures_are_those_of_the_records(pages: dict[Path, ModuleType]) -> None:
-    from figures import filled
-
     for page, module in pages.items():
         text = page.read_text("utf-8")
-        assert filled(text, module.CLAIMS) == text, f"{page.name}: run python docs/make_claims.py"
+        assert filled(text, module.CLAIMS) == text, f"{page.name}: run python -m lab docs claims"
 
 
 def test_no_figure_is_without_a_record(pages: dict[Path, ModuleType]) -> None:
-    """Claim it in docs/claims/, say there why it needs no record, or leave it out."""
-    from claims.common import GIVEN
-    from figures import uncovered
-
+    """Claim it in lab/docs/claims/, say there why it needs no record, or leave it out."""
     bare, common = [], set[str]()
     for page, module in pages.items():
         text = page.read_text("utf-8")
@@ -80,8 +66,6 @@ def test_no_figure_is_without_a_record(pages: dict[Path, ModuleType]) -> None:
     ],
 )
 def test_a_figure_without_a_record_is_found(text: str) -> None:
-    from figures import uncovered
-
     assert [line for line, _ in uncovered(f"Words.\n\n{text}", [], {})][:1] == [3]
     assert not list(uncovered(f"```text\n{text}\n```", [], {}))
     assert not list(uncovered(f"<!-- begin all -->\n{text}\n<!-- end all -->", [], {}))
@@ -89,14 +73,10 @@ def test_a_figure_without_a_record_is_found(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["In 1980 it was 256² and `3 ms`.", "See [one](a-3.1.md), Figure 5, W0501."])
 def test_what_is_no_figure_is_not_found(text: str) -> None:
-    from figures import uncovered
-
     assert not list(uncovered(text, [], {}))
 
 
 def test_claims_and_what_is_given_cover_their_figures_alone() -> None:
-    from figures import Figure, uncovered
-
     text = "It takes 12 ms of\n20 ms, capped at 50 dB, in 7 s."
     claims, given = [f"takes {Figure(12)} ms of 20 ms"], {"capped at 50 dB": "a definition"}
     found = list(uncovered(text, claims, given))
@@ -110,8 +90,6 @@ def test_claims_and_what_is_given_cover_their_figures_alone() -> None:
 
 def test_a_changed_record_is_written_into_the_page() -> None:
     """Its figures, and not the words between them or where lines break."""
-    from figures import Figure, Word, filled
-
     text = "It takes 12\nms and 1,000 s (`run -o a`), 3 of 5."
     claim = (
         f"takes {Figure(7.25):.1f} ms and {Figure(12345):,.0f} s (`{Word('run -o b')}`), {Figure(-1)} of 5"

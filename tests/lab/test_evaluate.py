@@ -10,15 +10,15 @@ import pytest
 from click.testing import CliRunner
 
 import scenelang as nsg
-from scenelang.lab.commands.eval import command
-from scenelang.measure.scenes import scenes_of
+from lab.cli import command
+from lab.sets.scenes import scenes_of
 from scenelang.models.load import load_model
 
 
 def test_figures_of_solids_are_those_of_the_pictures_users_get(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = ["solids3d", "--set", "staged", "--scenes", "3", "--side", "24", "--seed", "4"]
+    asked = ["eval", "solids3d", "--set", "staged", "--scenes", "3", "--side", "24", "--seed", "4"]
     asked += ["--kept", str(tmp_path / "kept")]
     done = CliRunner().invoke(command, [*asked, "-o", str(tmp_path)])
     assert done.exit_code == 0, done.output
@@ -28,7 +28,7 @@ def test_figures_of_solids_are_those_of_the_pictures_users_get(
     kept = sorted((tmp_path / "kept").iterdir())
     assert len(kept) == 3
     with monkeypatch.context() as without:
-        without.setattr("scenelang.lab.evaluate.reference_of", None)  # nothing is drawn again
+        without.setattr("lab.evaluate.reference_of", None)  # nothing is drawn again
         assert CliRunner().invoke(command, [*asked, "-o", str(tmp_path)]).exit_code == 0
     again = json.loads((tmp_path / "staged.json").read_text("utf-8"))
     assert (again["psnr_uncapped"], again["ssim"]) == (found["psnr_uncapped"], found["ssim"])
@@ -49,6 +49,6 @@ def test_figures_of_solids_are_those_of_the_pictures_users_get(
 
 
 def test_a_set_of_another_dimension_is_refused(tmp_path: Path) -> None:
-    done = CliRunner().invoke(command, ["solids3d", "--set", "tiny", "-o", str(tmp_path)])
+    done = CliRunner().invoke(command, ["eval", "solids3d", "--set", "tiny", "-o", str(tmp_path)])
     assert done.exit_code == 2
     assert "no set `tiny`; there are solids3d, diffuse" in done.output

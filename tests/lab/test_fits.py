@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import scenelang
-from scenelang.lab import gradients
-from scenelang.lab.fits import FAR_DB, random_case
+from lab.fits import FAR_DB, random_case
 from scenelang.measure.metrics import over_white, psnr
 from scenelang.models.manifest import load_manifest
 
@@ -34,15 +33,3 @@ def test_the_truth_draws_the_target_and_the_start_does_not(index: int) -> None:
     )
     assert np.abs(true - case.target).max() <= 0.5 / 255 + 1e-6
     assert psnr(start, case.target) < FAR_DB + 2  # whose start was measured in fewer pixels
-
-
-def test_descents_by_reverse_passes_end_where_others_do_and_draw_less() -> None:
-    found = gradients.measure("shapes2d", [4], scenes=1, seed=2021, side=64)
-    (row,) = found["cases"]
-    for name in ("differences", "reverse"):
-        assert row[name]["off"] < gradients.AWAY / 3
-        assert row[name]["seconds"] > 0
-    assert abs(row["differences"]["db"] - row["reverse"]["db"]) < 1
-    assert row["reverse"]["frames"] < row["differences"]["frames"]
-    low, high = found["rows"][0]["interval"]
-    assert low <= found["rows"][0]["faster"] <= high

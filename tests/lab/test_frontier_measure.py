@@ -1,4 +1,4 @@
-"""`scenelang lab frontier`: a small run of the whole measurement, and what it refuses."""
+"""`python -m lab frontier`: a small run of the whole measurement, and what it refuses."""
 
 from __future__ import annotations
 
@@ -10,24 +10,26 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.lab.frontier import measure, verify, ways
-from scenelang.lab.frontier.measure import Case, median_interval
+from lab.frontier import measure, verify, ways
+from lab.frontier.measure import Case, median_interval
 from scenelang.measure.frontier import Errors, Frontier, between
 from tests.cli.conftest import Folder
 from tests.cli.conftest import folder as folder
 from tests.cli.test_choosing import ladder
 from tests.cli.test_choosing import shipped as shipped
+from tests.lab.conftest import run
 from tests.work import lines_run
 
 
 @pytest.fixture
-def measured(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> Frontier:
+def measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Frontier:
     """Of two scenes, without the paper's full-size renderer, which takes seconds a frame."""
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(ways, "_paper", lambda base: iter(()))
     monkeypatch.setattr(ways, "available", lambda: ["shapes2d"])
     monkeypatch.setattr(measure, "CASES", (measure.CASES[0], Case("32 x 32", "", (32, 32), 0.5)))
     monkeypatch.setattr(measure, "CONVERGED", 1)
-    result = folder.run("lab", "frontier", "shapes2d", "-o", "out", "--scenes", "2", "--seed", "5")
+    result = run("frontier", "shapes2d", "-o", "out", "--scenes", "2", "--seed", "5")
     assert result.exit_code == 0, result.output
     assert "points lie between the fastest and the nearest" in result.stdout
     return Frontier.from_json(Path("out/frontier.json").read_bytes())
@@ -81,12 +83,13 @@ def test_a_small_run(measured: Frontier) -> None:
 
 
 @pytest.mark.slow
-def test_a_small_run_of_solids(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_small_run_of_solids(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The exact field draws in the same march: as near as the network, and never chosen."""
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(ways, "_paper", lambda base: iter(()))
     monkeypatch.setattr(measure, "SIDE", 48)
     monkeypatch.setattr(measure, "CASES", measure.CASES[:1])
-    result = folder.run("lab", "frontier", "solids3d", "-o", "out", "--scenes", "2", "--seed", "5")
+    result = run("frontier", "solids3d", "-o", "out", "--scenes", "2", "--seed", "5")
     assert result.exit_code == 0, result.output
     found = Frontier.from_json(Path("out/frontier.json").read_bytes())
     points = {p.name: p for p in found.points}
@@ -132,7 +135,7 @@ def test_nothing_is_kept_between_frames() -> None:
     ],
 )
 def test_frontier_refuses(shipped: Folder, options: tuple[str, ...], words: str) -> None:
-    result = shipped.run("lab", "frontier", *options)
+    result = run("frontier", *options)
     assert result.exit_code == 2
     assert words in result.stderr
 
@@ -144,9 +147,7 @@ def test_verify_counts_kept_promises(shipped: Folder, monkeypatch: pytest.Monkey
     points = [p for p in good.points if p.name in ("shapes2d", "exact reference, 4 spp")]
     wide = replace(good, points=tuple(replace(p, flip=Errors(0.5, 0.5, 0.5, 0.5)) for p in points))
     Path("wide.json").write_text(wide.to_json(), "utf-8")
-    result = shipped.run(
-        "lab", "frontier", "shapes2d", "--verify", "--promises", "wide.json", "--scenes", "2"
-    )
+    result = run("frontier", "shapes2d", "--verify", "--promises", "wide.json", "--scenes", "2")
     assert result.exit_code == 0, result.output
     found = json.loads(Path("out/verified.json").read_text())
     assert found["held"] is True
@@ -154,9 +155,7 @@ def test_verify_counts_kept_promises(shipped: Folder, monkeypatch: pytest.Monkey
     assert found["cases"]["small"]["shapes2d"]["kept"] == 1.0
     tight = replace(good, points=tuple(replace(p, flip=Errors(0, 0, 1e-9, 0)) for p in points))
     Path("tight.json").write_text(tight.to_json(), "utf-8")
-    result = shipped.run(
-        "lab", "frontier", "shapes2d", "--verify", "--promises", "tight.json", "--scenes", "2"
-    )
+    result = run("frontier", "shapes2d", "--verify", "--promises", "tight.json", "--scenes", "2")
     assert result.exit_code == 1
     assert json.loads(Path("out/verified.json").read_text())["held"] is False
     assert "not every promise is kept" in result.stdout

@@ -15,10 +15,10 @@ import PIL.Image
 import pytest
 from matplotlib.text import Text
 
+from lab.charts import pyplot
+from lab.frontier.chart import frontier_chart, frontier_figure, short_name
+from lab.frontier.page import frontier_page, picture_uri
 from scenelang.image import Image, from_samples
-from scenelang.lab.charts import pyplot
-from scenelang.lab.frontier.chart import frontier_chart, frontier_figure, short_name
-from scenelang.lab.frontier.page import frontier_page, picture_uri
 from scenelang.measure.frontier import between, frontier_path, load_frontier
 from scenelang.models.manifest import available
 from tests.measure.test_choose import frontier, point

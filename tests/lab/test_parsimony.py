@@ -1,129 +1,16 @@
-"""Plans of examples, what each part buys, and the page that tells it, against figures by hand."""
+"""Plans of examples, and the page that tells them, against figures by hand."""
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import struct
-import sys
 from pathlib import Path
-from types import ModuleType
-from typing import Any
-
-import pytest
 
 import scenelang as nsg
-from scenelang.lab.experiments.runs import ablation_runs
-from scenelang.lab.parsimony import (
-    WAYS,
-    example_plan,
-    measure_examples,
-    parts_chart,
-    shown_frame,
-    size_groups,
-    size_of,
-    verdict,
-    whole_psnr,
-)
-from scenelang.renderers.network import FramedConfig
+from lab.docs import parsimony as script
+from lab.parsimony import WAYS, example_plan, measure_examples, shown_frame
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
-
-
-def load_script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_parsimony", ROOT / "docs/make_parsimony.py")
-    assert spec is not None
-    assert spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = script
-    spec.loader.exec_module(script)
-    return script
-
-
-SCRIPT = load_script()
-
-
-def measured(psnr: dict[str, float]) -> dict[str, Any]:
-    """What `lab experiment parts` writes, with a PSNR by name; the whole renderer's fall by seed."""
-    runs = []
-    for name, group, study in ablation_runs(60, 1):
-        mean = psnr.get(name, 30.0) - 0.4 * (study.seed - 1)
-        runs.append(
-            {
-                "name": name,
-                "group": group,
-                "config": study.to_json(),
-                "seconds": 60.0,
-                "steps": 1234,
-                "parameters": 6731,
-                "finite": True,
-                "resolution": 128,
-                "scenes": 64,
-                "psnr": {"mean": mean, "p5": mean - 8, "worst": mean - 9},
-                "blends": mean - 3,
-            }
-        )
-    return {"seed": 1, "revision": "0123456789", "machine": "x86_64", "budget_s": 60.0, "runs": runs}
-
-
-def test_a_part_pays_beyond_the_spread_of_seeds() -> None:
-    parts = measured({"framed": 40, "no register": 38.7, "no frame": 39.0, "pictures alone": 40.5})
-    mean, spread = whole_psnr(parts)
-    assert mean == pytest.approx(39.6)  # 40, 39.6, 39.2
-    assert spread == pytest.approx(0.8)
-    found = {run["name"]: verdict(run, parts) for run in parts["runs"] if run["group"] == "parts"}
-    assert found["no register"].change == pytest.approx(-0.9)
-    assert found["no register"].word == "pays"
-    assert found["no frame"].word == "no difference"
-    assert found["pictures alone"].word == "costs"
-
-
-def test_a_small_difference_is_none_however_close_seeds_are() -> None:
-    parts = measured({"framed": 40, "no register": 39.6})
-    for run in parts["runs"]:
-        if run["group"] == "whole":
-            run["psnr"]["mean"] = 40.0
-    run = next(run for run in parts["runs"] if run["name"] == "no register")
-    assert verdict(run, parts).word == "no difference"
-
-
-@pytest.mark.parametrize(("change", "word"), [(-5.0, "pays"), (5.0, "costs"), (0.0, "no difference")])
-def test_a_part_may_pay_in_blends_alone(change: float, word: str) -> None:
-    parts = measured({"framed": 40, "no distance scale": 39.6})
-    run = next(run for run in parts["runs"] if run["name"] == "no distance scale")
-    run["blends"] = whole_psnr(parts, blends=True)[0] + change
-    found = verdict(run, parts)
-    assert found.blends == pytest.approx(change)
-    assert found.word == word
-
-
-def test_what_is_worse_in_one_kind_pays_whatever_the_other() -> None:
-    parts = measured({"framed": 40, "hidden layer": 45.0})
-    run = next(run for run in parts["runs"] if run["name"] == "hidden layer")
-    run["blends"] = 20.0
-    assert verdict(run, parts).word == "pays"
-
-
-def test_sizes_are_grouped_by_what_differs() -> None:
-    groups = size_groups(measured({}))
-    assert set(groups) == {"decoder_width", "code", "state", "paint_lines"}
-    for group, runs in groups.items():
-        values = [size_of(run, group) for run in runs]
-        assert getattr(FramedConfig(), group) not in values
-        assert len(set(values)) == len(values)
-
-
-def png_size(data: bytes) -> tuple[int, ...]:
-    assert data.startswith(b"\x89PNG")
-    return struct.unpack(">II", data[16:24])
-
-
-def test_the_chart_is_drawn() -> None:
-    low, high = (parts_chart(measured({"framed": 40, "no frame": v})) for v in (20.0, 39.0))
-    width, height = png_size(low)
-    assert width > 2 * height > 300
-    assert low != high
 
 
 def test_a_plan_of_an_example() -> None:
@@ -151,7 +38,7 @@ def test_examples_are_measured_and_told() -> None:
     found = measure_examples([EXAMPLES / "logo.nsg"], lambda plan: seen.append(plan["file"]))
     assert seen == ["logo.nsg"]
     assert json.loads(json.dumps(found)) == found
-    assert "1.0 × | 1.0 ×" in SCRIPT.ways_text(found)
+    assert "1.0 × | 1.0 ×" in script.ways_text(found)
 
 
 def test_what_passes_took_away_is_counted() -> None:
@@ -162,7 +49,7 @@ def test_what_passes_took_away_is_counted() -> None:
     ]
     tally = {"changed": 1200, "largest": 1.2e-15, "differing": 0}
     proof = {"passes": {"drop_empty": tally, "drop_hidden": {**tally, "largest": 0.0}}}
-    rows = SCRIPT.passes_text(proof, {"plans": [{"stages": stages}, {"stages": stages}]}).splitlines()
+    rows = script.passes_text(proof, {"plans": [{"stages": stages}, {"stages": stages}]}).splitlines()
     assert rows[2] == "| `drop_empty` | 1,200 | 1e-15 | 2 | 0 | 4 | 4 |"
     assert rows[3] == "| `drop_hidden` | 1,200 | 0 | 2 | 2 | 2 | 0 |"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from scenelang.lab.stability.ranges import measured_ranges
+from lab.stability import measured_ranges
 
 
 def probe(healthy: float, **psnr: float) -> dict[str, Any]:

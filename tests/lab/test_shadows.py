@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from click.testing import CliRunner
 
+from lab.cli import command
+from lab.shadows import shadow_mask
 from scenelang.graph.stage import Camera, Light
-from scenelang.lab.commands.shadows import command
-from scenelang.lab.shadows import shadow_mask
 from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import Material, Object, Scale, Scene, Translate
 
@@ -48,7 +48,7 @@ def test_the_mask_is_what_the_ball_of_mist_darkens() -> None:
 
 
 def test_the_command_measures_inside_shadows(tmp_path: Path) -> None:
-    asked = ["--scenes", "2", "--side", "32", "-o", str(tmp_path)]
+    asked = ["shadows", "--scenes", "2", "--side", "32", "-o", str(tmp_path)]
     done = CliRunner().invoke(command, asked)
     assert done.exit_code == 0, done.output
     found = json.loads((tmp_path / "shadows.json").read_text("utf-8"))

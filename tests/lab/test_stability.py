@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenelang.image import Image
-from scenelang.lab.stability.probes import PROBES, animated, apart, rng_of, union_of
-from scenelang.lab.stability.solid_probes import SOLIDS
-from scenelang.lab.stability.suite import (
+from lab.probes import PROBES, animated, apart, rng_of, union_of
+from lab.sets.scenes import sized
+from lab.solid_probes import SOLIDS
+from lab.stability import (
     OPTIONAL,
     arithmetic,
     compare,
@@ -27,8 +27,8 @@ from scenelang.lab.stability.suite import (
     scene_of,
     unfolded,
 )
+from scenelang.image import Image
 from scenelang.measure.metrics import MOST_DB, psnr
-from scenelang.measure.scenes import sized
 from scenelang.models.load import Model, load_model
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
@@ -167,7 +167,7 @@ def test_a_picture_of_another_scene_is_told(model: Model) -> None:
 def test_recorded_bounds_hold(of: str, name: str, request: pytest.FixtureRequest) -> None:
     """The first scene of the recorded suite at both ends of every probe is no worse than recorded."""
     model, recorded = request.getfixturevalue("model" if of == "shapes2d" else "solids"), RECORDED[of]
-    assert recorded["weights"] == model.digest, f"run `scenelang lab stability {of}` again"
+    assert recorded["weights"] == model.digest, f"run `python -m lab stability {of}` again"
     probe, rows = kit_of(model.manifest).probes[name], recorded["probes"][name]["rows"]
     assert [row["value"] for row in rows] == list(probe.values)
     for row in (rows[0], rows[-1]):

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import torch
 
+from lab.designs.pictures import PictureConfig, Scenes, exact_vectors, pictures, random_scenes
+from lab.designs.students import LiftingConfig, StudentConfig, make_student
+from lab.training.scenes import GEOMETRIES
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
-from scenelang.lab.designs.ablations import make_student
-from scenelang.lab.designs.encoders import LiftingConfig
-from scenelang.lab.designs.pictures import PictureConfig, Scenes, exact_vectors, pictures, random_scenes
-from scenelang.lab.designs.students import FramedStudent, StudentConfig, largest_stretch, read_points
+from scenelang.graph.steps import Affine, Warp
+from scenelang.lifting.learned import lift_geometry, lift_material, read_lifting
 from scenelang.models.load import load_model
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
@@ -19,7 +20,6 @@ from scenelang.reference.image import reference_image
 from scenelang.renderers.reading import ReadingConfig
 from scenelang.renderers.streaming import StreamingConfig
 from scenelang.scene.schema import Bend, Chain, Color, Link, Material, Matrix, Object, Scene, Twirl
-from scenelang.training.scenes import GEOMETRIES
 
 WORDS = ("union", "smooth", "subtract", "intersect")
 
@@ -65,45 +65,8 @@ def test_exact_vectors_are_those_of_the_compiler() -> None:
         np.testing.assert_allclose(found[index, : len(program)], program.vectors, rtol=1e-4, atol=1e-4)
 
 
-def test_a_framed_student_draws_what_the_shipped_renderer_draws() -> None:
-    scenes = some(6)
-    model = load_model("shapes2d")
-    student = FramedStudent(StudentConfig("framed", "exact"))
-    student.renderer.load_state_dict(model.network.state_dict())
-    with torch.no_grad():
-        student.lifting.codes.copy_(model.network.codes)
-        student.lifting.material_codes.copy_(model.network.material_codes)
-        found, exact = student.image(scenes, 48), pictures(scenes, 48)
-    assert float((found - exact).square().mean()) < 1e-4
-
-
-def test_frames_are_read_out_of_vectors() -> None:
-    scenes = some(4)
-    student = FramedStudent(StudentConfig("framed", "exact"))
-    x, y = torch.rand(2, 4, 7, generator=torch.Generator().manual_seed(1)) * 2 - 1
-    with torch.no_grad():
-        q, scale = read_points(student.lifting.lift(scenes)[..., :32], x, y)
-    for b in range(4):
-        for n in range(4):
-            world = scenes.affine[b, n].double().numpy()
-            points = np.stack([x[b].numpy(), y[b].numpy(), 0 * x[b].numpy(), 1 + 0 * x[b].numpy()])
-            px, py = (np.linalg.inv(world) @ points)[:2]
-            # the last transformation first: bend, then twirl
-            for turn in (float(scenes.bend[b, n]) * px, float(scenes.twirl[b, n]) * np.hypot(px, py)):
-                cos, sin = np.cos(turn), np.sin(turn)
-                px, py = cos * px + sin * py, -sin * px + cos * py
-            np.testing.assert_allclose(q[b, n].numpy(), np.stack([px, py]), atol=2e-4)
-            smallest = np.linalg.svd(world[:2, :2], compute_uv=False)[1]
-            assert float(scale[b, n]) == pytest.approx(smallest, rel=1e-4)
-
-
-def test_largest_stretch_is_a_singular_value() -> None:
-    m = torch.randn(50, 2, 2, generator=torch.Generator().manual_seed(3), dtype=torch.float64)
-    torch.testing.assert_close(largest_stretch(m), torch.linalg.svdvals(m)[..., 0], atol=1e-6, rtol=1e-6)
-
-
 @pytest.mark.parametrize("lifting", ["exact", "learned"])
-@pytest.mark.parametrize("renderer", ["framed", "streaming", "reading"])
+@pytest.mark.parametrize("renderer", ["streaming", "reading"])
 def test_padding_does_not_show(renderer: str, lifting: str) -> None:
     """What lies behind the objects in use changes nothing, whoever draws."""
     torch.manual_seed(4)
@@ -128,6 +91,17 @@ def test_padding_does_not_show(renderer: str, lifting: str) -> None:
         torch.testing.assert_close(student.image(scenes, 8), student.image(mixed, 8))
 
 
-def test_framed_needs_the_size_it_reads() -> None:
-    with pytest.raises(ValueError, match="32"):
-        make_student(StudentConfig("framed", "learned", learned=LiftingConfig(16, 32)))
+def test_the_compiler_lifts_as_training_does() -> None:
+    torch.manual_seed(5)
+    student = make_student(StudentConfig("reading", "learned"))
+    lifting = read_lifting({k: v.numpy() for k, v in student.state_dict().items()})
+    scenes = random_scenes(3, PictureConfig(), torch.Generator().manual_seed(4))
+    with torch.no_grad():
+        expected = student.lifting.lift(scenes).numpy()
+    for b, n in ((0, 0), (1, 0), (2, 0)):
+        rows = tuple(scenes.affine[b, n].double().flatten()[:12].tolist())
+        twirl, bend = scenes.twirl[b, n].item(), scenes.bend[b, n].item()
+        chain = [Warp(twirl, (0.0, 0.0)), Warp(0.0, (bend, 0.0)), Affine(rows)]
+        g = lift_geometry(lifting, [chain], [int(scenes.leaf[b, n])])
+        m = lift_material(lifting, [scenes.rgb[b, n].tolist()], [0])
+        np.testing.assert_allclose(np.concatenate([g, m], 1)[0], expected[b, n], rtol=1e-4, atol=1e-5)

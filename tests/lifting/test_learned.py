@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
+from lab.designs.students import Encoders, LiftingConfig
 from scenelang.graph import affine
 from scenelang.graph.steps import Affine, Warp
-from scenelang.lab.designs.encoders import Encoders, LiftingConfig
 from scenelang.lifting.learned import GEOMETRY_INPUTS, lift_geometry, lift_material, read_lifting
 
 

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lab.frontier.measure import FEW_MARGIN, MARGIN, margin, promised
 from scenelang.backend.load import Load
 from scenelang.image import enlarged, from_samples
-from scenelang.lab.frontier.measure import FEW_MARGIN, MARGIN, margin, promised
 from scenelang.measure.choose import (
     NothingFits,
     choose,

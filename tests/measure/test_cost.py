@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.frontier.fit import fit_cost
 from scenelang.backend.load import Load, load_of
 from scenelang.backend.small import draw_small
-from scenelang.lab.frontier.fit import fit_cost
 from scenelang.measure.choose import predicted_ms, yardstick
 from scenelang.measure.frontier import Cost
 from scenelang.program.compile import compile_scene

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from lab.sets.plane import GEOMETRIES, SETS, random_scene
+from lab.sets.scenes import interval, sets_of, spread
 from scenelang.measure.metrics import compare, flip, flip_map, psnr, ssim
-from scenelang.measure.scenes import interval, sets_of, spread
-from scenelang.measure.sets import GEOMETRIES, SETS, random_scene
 from scenelang.models.choose import uses as uses_of
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene

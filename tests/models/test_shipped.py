@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.sets.scenes import draw_scene, scenes_of
 from scenelang.backend.neural import draw_program, open_model
-from scenelang.measure.scenes import draw_scene, reference_of, scenes_of
+from scenelang.measure.plan import reference_of
 from scenelang.models.manifest import available, load_manifest
 from scenelang.program.compile import compile_scene
 

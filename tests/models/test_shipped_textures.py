@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from lab.docs.make_textures import drawn
 from scenelang.elements.picture import pixels
 from scenelang.models.manifest import ROOT, load_manifest, load_textures
 
 MANIFEST = load_manifest("textures2d")
-SCRIPT = Path(__file__).parents[2] / "docs" / "make_textures.py"
 COLOURS = {
     name: np.frombuffer(pixels(element), np.uint8).reshape(256, 256, 3)
     for name, element in load_textures(MANIFEST).items()
@@ -22,8 +19,7 @@ COLOURS = {
 @pytest.mark.parametrize("name", ["arrows", "checker", "noise", "plaid", "stripes", "zigzag"])
 def test_textures_are_drawn_again(name: str) -> None:
     """Within a step of 8 bits, which another library of sines may take."""
-    drawn = runpy.run_path(str(SCRIPT))["drawn"](name)
-    assert abs(drawn.astype(int) - COLOURS[name]).max() <= 1
+    assert abs(drawn(name).astype(int) - COLOURS[name]).max() <= 1
 
 
 def test_most_textures_show_flips_and_turns() -> None:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.sets.plane import SETS
+from lab.sets.scenes import sets_of
 from scenelang.backend.options import RenderError
 from scenelang.elements.zoo import zoo_bytes
-from scenelang.measure.scenes import sets_of
-from scenelang.measure.sets import SETS
 from scenelang.models.manifest import load_manifest
 from scenelang.outputs import PROVED
 from scenelang.proof import errors, picture

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.sets.plane import SETS, random_scene
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
-from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.manifest import load_manifest
 from scenelang.reference.field import SECTORS, leaf_distance
 from scenelang.reference.image import reference_image

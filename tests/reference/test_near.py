@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.sets.plane import SETS, random_scene
 from scenelang.backend.render import exact_graph
 from scenelang.graph.nodes import Fold, Node, leaves
-from scenelang.measure.sets import SETS, random_scene
 from scenelang.reference import near
 from scenelang.reference.field import Brought, evaluate
 from scenelang.reference.image import reference_image

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.lab.slopes import distances, proved_slack
+from lab.slopes import distances, proved_slack
 from scenelang.models.framed import load_arrays
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program

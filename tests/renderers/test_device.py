@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.sets.plane import SETS, random_scene
 from scenelang.backend import neural
 from scenelang.elements.zoo import Zoo
-from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
 from scenelang.models.manifest import load_manifest

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import torch
 
+from lab.sets.plane import SETS, random_scene
 from scenelang.measure.metrics import psnr
-from scenelang.measure.scenes import reference_of
-from scenelang.measure.sets import SETS, random_scene
+from scenelang.measure.plan import reference_of
 from scenelang.models.load import Model, load_model
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.sets.plane import SETS, random_scene
 from scenelang.measure.metrics import psnr
-from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
 from scenelang.program.groups import (

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.probes import FLAT, rng_of
+from lab.sets.plane import GEOMETRIES, SETS, random_scene
 from scenelang.backend.closed import closed_forms
 from scenelang.elements.zoo import Zoo
-from scenelang.lab.stability.probes import FLAT, rng_of
-from scenelang.measure.sets import GEOMETRIES, SETS, random_scene
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.renderers.coverage import Coverage

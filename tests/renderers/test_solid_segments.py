@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from lab.training.checkpoint import save_tensors
 from scenelang.graph.stage import Light, Stage
 from scenelang.graph.steps import Displace, Step, Twist
 from scenelang.models.solid import solid_arrays
@@ -18,7 +19,6 @@ from scenelang.renderers.solid.field import SolidField
 from scenelang.renderers.solid.march import march
 from scenelang.renderers.solid.network import SolidArrays, SolidConfig
 from scenelang.renderers.solid.parameters import Solids
-from scenelang.training.checkpoint import save_tensors
 from tests.renderers.solids import Object, field, moved, network, psnr, scaled, turned, weights
 
 LAMP = np.array([1.5, 2.6, 1.8], np.float32)

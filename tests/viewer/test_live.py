@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.sets.plane import SETS
+from lab.sets.plane import random_scene as random_set_scene
+from lab.sets.solids import SOLID_SETS, random_solid
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.lifting.layout import LAYOUTS
-from scenelang.measure.sets import SETS
-from scenelang.measure.sets import random_scene as random_set_scene
-from scenelang.measure.solid_sets import SOLID_SETS, random_solid
 from scenelang.program.groups import OPERATOR, felt, read_groups, widths_of
 from scenelang.scene.schema import Camera, Scene
 from scenelang.viewer.view import view_of

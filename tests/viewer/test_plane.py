@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from benchmarks.viewer import SMALL, timed
+from lab.bench.viewer import SMALL, timed
+from lab.sets.plane import SETS, random_scene
 from scenelang.backend.small import draw_small
 from scenelang.elements.pyramid import unpacked
-from scenelang.measure.sets import SETS, random_scene
 from scenelang.models.framed import load_arrays
 from scenelang.program.groups import read_groups
 from scenelang.program.program import Program

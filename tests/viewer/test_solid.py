@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from lab.sets.solids import SOLID_SETS, random_solid
 from scenelang.elements.zoo import zoo_bytes
-from scenelang.measure.solid_sets import SOLID_SETS, random_solid
 from scenelang.models.framed import load_arrays
 from scenelang.program.groups import read_groups
 from scenelang.program.program import Program

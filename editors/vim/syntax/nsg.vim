@@ -9,7 +9,7 @@ syntax iskeyword @,48-57,_
 syntax match nsgCall /\<[A-Za-z_]\w*\>\ze\s*(/
 syntax match nsgObject /\<[A-Za-z_]\w*\>\ze\s*{/
 syntax match nsgOperator /\.\.<\?\|||\|&&\|[=!<>]=\|[-+*%^!?:=<>.]\|\/[\/*]\@!/
-" Words, written by docs/make_words.py.
+" Words, written by lab/docs/make_words.py.
 syntax keyword nsgDeclare nsg model param let fn module import as
 syntax keyword nsgControl for in step if else
 syntax keyword nsgNode group chain union smooth subtract intersect

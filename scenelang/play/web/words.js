@@ -1,4 +1,4 @@
-// The words and terminals of the language, written by docs/make_words.py.
+// The words and terminals of the language, written by lab/docs/make_words.py.
 export const WORDS = [
   {"scope": "keyword.declaration", "words": ["nsg", "model", "param", "let", "fn", "module", "import", "as"], "after": ""},
   {"scope": "keyword.control", "words": ["for", "in", "step", "if", "else"], "after": ""},

@@ -1,0 +1,137 @@
+"""What is proved of pictures of evaluation sets, whether a pixel breaks its proof, and what proofs cost.
+
+    python -m lab bench proof [--scenes N] [--set NAME ...] [--seed N] [-o docs/results/proof.json]
+
+A line of JSON for each set, and all of them in a record: means of the share of pixels proved right to
+1/255, of those that are, and of those drawn again; the largest bound and difference from the exact picture;
+and how many pixels are farther from it than their bound, before and after they were drawn again. Of processor
+time of one thread, medians of ratios to a plain frame: of a proof, of what drawing again adds to it, of the
+exact field with regions ruled out alike, and of the reference. Of each the least of three counts, in turn;
+the reference is drawn once.
+Exits with 1 if a pixel breaks its proof.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lab.about import about, write_json
+from lab.sets.plane import SETS
+from lab.sets.scenes import interval, sets_of
+from scenelang.backend.options import keep_memory
+from scenelang.backend.small import draw_small
+from scenelang.graph.nodes import Graph
+from scenelang.models.manifest import load_manifest
+from scenelang.outputs import PROVED
+from scenelang.program.compile import compile_scene
+from scenelang.proof.fold import Enclosure
+from scenelang.proof.picture import known_errors, prove_image
+from scenelang.proof.regions import Band
+from scenelang.proof.stream import Stream
+from scenelang.reference.image import reference_image
+
+ROUNDS = 3
+
+
+class Formulas(Stream):
+    """Exact distances in place of learned ones, also of regions."""
+
+    def distance(self, which: Any, q: Any, exactly: bool) -> Enclosure:
+        return super().distance(which, q, True)
+
+
+def timed(function: Callable[[], Any]) -> tuple[float, Any]:
+    start = time.process_time()
+    found = function()
+    return time.process_time() - start, found
+
+
+def over(picture: Any) -> Any:
+    """In float64, premultiplied where there is alpha."""
+    values = np.array(picture, np.float64)
+    if values.shape[2] == 4:
+        values[..., :3] *= values[..., 3:]
+    return values
+
+
+def measured(name: str, index: int, seed: int) -> dict[str, float]:
+    """Figures of a scene of a set."""
+    manifest = load_manifest("textures2d" if name.startswith("textures") else "shapes2d")
+    scene, graphs = sets_of(manifest)[name](np.random.default_rng([seed, index])), dict[str, Graph]()
+    program = compile_scene(scene, model=manifest.name, after=graphs.__setitem__)
+    given = graphs["lower"], graphs["flatten"], manifest
+    canvas = scene.canvas
+
+    def exact() -> Band:
+        return Band(Formulas(*given, known_errors(manifest)), canvas, range(canvas[1]), np.zeros(4))
+
+    ways: dict[str, Callable[[], Any]] = {
+        "frame": lambda: draw_small(program).image,
+        "proof": lambda: prove_image(*given, image),
+        "both": lambda: prove_image(*given, image, redraw=True),
+        "exact": exact,
+    }
+    image = ways["frame"]()
+    times: dict[str, list[float]] = {way: [] for way in ways}
+    found: dict[str, Any] = {}
+    for _ in range(ROUNDS):
+        for way, function in ways.items():
+            seconds, found[way] = timed(function)
+            times[way].append(seconds)
+    least = {way: min(values) for way, values in times.items()}
+    reference_s, reference = timed(lambda: over(reference_image(graphs["lower"])))
+    (_, proof), (again, whole) = found["proof"], found["both"]
+    off, mended = (abs(over(picture) - reference).max(-1) for picture in (image, again))
+    return {
+        "pixels": proof.bound.size,
+        "proved": proof.share,
+        "right": (off <= PROVED).mean(),
+        "redrawn": whole.redrawn / proof.bound.size,
+        "proved_again": whole.share,
+        "bound": proof.worst,
+        "off": off.max(),
+        "broken": (off > proof.bound).sum() + (mended > whole.bound).sum(),
+        "x_proof": least["proof"] / least["frame"],
+        "x_redraw": (least["both"] - least["proof"]) / least["frame"],
+        "x_exact": least["exact"] / least["frame"],
+        "x_reference": reference_s / least["frame"],
+    }
+
+
+def main() -> int:
+    """Measure sets."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--scenes", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=2021)
+    parser.add_argument("--set", action="append", choices=list(SETS))
+    parser.add_argument("-o", "--out", type=Path, metavar="FILE")
+    given = parser.parse_args()
+    keep_memory()
+    found = []
+    for name in given.set or SETS:
+        cases = [measured(name, index, given.seed) for index in range(given.scenes)]
+        row: dict[str, Any] = {"set": name, "scenes": len(cases), "pixels": sum(c["pixels"] for c in cases)}
+        for key in [key for key in cases[0] if key != "pixels"]:
+            values = [case[key] for case in cases]
+            if key == "broken":
+                row[key] = int(sum(values))
+            else:
+                function = np.max if key in ("bound", "off") else np.median if key[:2] == "x_" else np.mean
+                row[key] = round(float(function(values)), 2 if key[:2] == "x_" else 5)
+        row["proved_interval"] = interval([case["proved"] for case in cases])
+        found.append(row)
+        print(json.dumps(row), flush=True)
+    if given.out:
+        write_json(given.out, {**about(), "seed": given.seed, "sets": found})
+    return int(any(row["broken"] for row in found))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,27 @@
+"""Figures in docs/architecture.md."""
+
+from lab.docs.figures import Figure
+from scenelang.backend.options import THREAD_PIXELS
+from scenelang.backend.small import MOST_MS
+
+CLAIMS = [
+    f"one thread for each {Figure(THREAD_PIXELS):,.0f} pixels",
+    f"numpy draws up to {Figure(MOST_MS)} ms",
+]
+GIVEN = dict.fromkeys(
+    (
+        "g (32 numbers)",
+        "m (32 numbers)",
+        "frames of 12 numbers",
+        "all objects eight times",
+        "a slope of 1.05",
+        "looked up, four times where no",
+        "8 × 8 pixels",
+        "up to 0.009 further",
+        "at least 0.002",
+        "6 or 12 numbers",
+        "GLSL ES 3.00",
+        "longer than 33 ms",
+    ),
+    "how it is built",
+)

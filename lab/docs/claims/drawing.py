@@ -1,0 +1,24 @@
+"""Figures in docs/drawing.md."""
+
+from lab.docs.figures import Figure
+from scenelang.renderers.solid.draw import PACES
+from scenelang.renderers.solid.march import CAREFUL
+
+FOUR, QUICK, ONE = CAREFUL, PACES["quick"], PACES["one"]
+CLAIMS = [
+    f"| `four` | four | {Figure(FOUR.gap)} | {Figure(FOUR.nodes)} |",
+    f"; in space where neighbours differ by more than {Figure(FOUR.contrast)} | {Figure(FOUR.gap)} | "
+    f"{Figure(FOUR.nodes)} |",
+    f"in space four where neighbours differ by more than {Figure(QUICK.contrast)} | {Figure(QUICK.gap)} | "
+    f"{Figure(QUICK.nodes)} |",
+    f"with hard edges | {Figure(ONE.gap)} | {Figure(ONE.nodes)} |",
+    f"2 x 2 pixels, enlarged | {Figure(ONE.gap)} | {Figure(ONE.nodes)} |",
+]
+GIVEN = {
+    "under 0.002 nobody sees it, at 0.01": "a rule of thumb",
+    "at 0.1 it is another picture": "a rule of thumb",
+    "what is thinner than 0.01": "the language's definition",
+    "lose a shell of 0.03": "what was looked at",
+    "2 x 2 pixels": "a setting",
+    "four samples for each pixel": "the language's definition of a picture",
+}

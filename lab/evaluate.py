@@ -1,0 +1,180 @@
+"""Evaluate a model on seeded unseen scenes against the exact reference."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lab.about import Report, about, silent
+from lab.sets.scenes import draw_scene, scenes_of, spread, summarise
+from scenelang.backend.neural import open_model
+from scenelang.files import write_whole
+from scenelang.image import Image
+from scenelang.measure.metrics import (
+    MOST_DB,
+    UNCAPPED_DB,
+    compare,
+    contact_sheet,
+    over_white,
+    psnr,
+    side_by_side,
+)
+from scenelang.measure.plan import reference_of
+from scenelang.models.load import Model
+from scenelang.models.manifest import Manifest
+from scenelang.scene.schema import Scene
+from scenelang.words import TOKENS
+
+SHOWN = 12  # worst cases
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One scene's figures."""
+
+    index: int  # in its set
+    last: str  # the word that joins the last object of the stream
+    objects: int  # of its stream
+    figures: dict[str, float]  # psnr and psnr_uncapped (dB), ssim, flip
+
+
+def exact_of(scene: Scene, manifest: Manifest, kept: Path | None) -> Image:
+    """The exact picture of a scene, from a folder where it was kept, or drawn and kept there."""
+    if kept is None:
+        return reference_of(scene, manifest)
+    path = kept / f"{hashlib.sha256(scene.model_dump_json().encode()).hexdigest()}.npy"
+    if not path.exists():
+        data = io.BytesIO()
+        np.save(data, reference_of(scene, manifest))
+        kept.mkdir(parents=True, exist_ok=True)
+        write_whole(path, data.getvalue())
+    return np.asarray(np.load(path, allow_pickle=False)).view(Image)
+
+
+def sheet(
+    model: Model,
+    name: str,
+    seed: int,
+    cases: list[Case],
+    side: int | None = None,
+    kept: Path | None = None,
+) -> Image:
+    """A contact sheet of cases of a set: network, reference, FLIP map."""
+    scene_at = scenes_of(model, name, seed, side)
+    rows = []
+    for case in cases:
+        scene = scene_at(case.index)
+        label = f"#{case.index} {case.figures['psnr']:.1f} dB"
+        picture, exact = draw_scene(model, scene)[1], exact_of(scene, model.manifest, kept)
+        rows.append(side_by_side(over_white(picture), over_white(exact), label))
+    return contact_sheet(rows)
+
+
+def evaluate_set(
+    model: Model,
+    name: str,
+    count: int,
+    seed: int,
+    *,
+    side: int | None = None,
+    kept: Path | None = None,
+    threads: int = 1,
+    cluster: str | None = None,
+    report: Report = silent,
+) -> tuple[dict[str, Any], list[Case]]:
+    """Draw a set and compare.
+
+    Args:
+        model: what draws.
+        name: the set.
+        count: scenes.
+        seed: of the scenes.
+        side: shorter side of the canvas in pixels; by default that of the set.
+        kept: folder of exact pictures, which other weights and renderers do not change.
+        threads: for drawing.
+        cluster: scheduler of dask whose workers draw, each with one thread, or ``"local"``; weights are those
+            that ship then, and nothing is kept.
+        report: called with the set, scenes done and all.
+
+    Returns:
+        A summary for JSON, and the cases of the lowest PSNR.
+    """
+    scene_at = scenes_of(model, name, seed, side)
+    started = time.perf_counter()
+    if cluster is None:
+        found: Iterable[Case] = (_case(model, scene_at, index, kept, threads) for index in range(count))
+    else:
+        from scenelang.cluster import by_workers
+
+        asked = ((index, (model.manifest.name, name, seed, side, index)) for index in range(count))
+        found = (result() for _, result in by_workers(cluster, _case_of, asked))
+    cases = []
+    for done, case in enumerate(found, 1):
+        cases.append(case)
+        report(name, done, count)
+    cases.sort(key=lambda case: case.index)
+    scene = scene_at(count - 1)
+    worst = sorted(cases, key=lambda c: c.figures["psnr_uncapped"])[:SHOWN]
+    summary = {
+        "set": name,
+        "scenes": count,
+        "seed": seed,
+        "canvas": scene.canvas,
+        "psnr_cap_db": MOST_DB,
+        "weights": model.digest,
+        **about(),
+        "seconds": round(time.perf_counter() - started, 1),
+        **_summary(cases),
+        "psnr_uncapped": spread([c.figures["psnr_uncapped"] for c in cases], 5),
+        "worst_cases": [{"index": c.index, "last": c.last, **c.figures} for c in worst],
+        "by_last_token": {
+            word: _summary([c for c in cases if c.last == word])
+            for word in (*TOKENS, "all_union")
+            if any(c.last == word for c in cases)
+        },
+        "by_objects": {
+            str(count): _summary([c for c in cases if c.objects == count])
+            for count in sorted({c.objects for c in cases})
+        },
+    }
+    return summary, worst
+
+
+def _case(
+    model: Model, scene_at: Callable[[int], Scene], index: int, kept: Path | None, threads: int
+) -> Case:
+    scene = scene_at(index)
+    program, picture = draw_scene(model, scene, threads)
+    exact = exact_of(scene, model.manifest, kept)
+    uncapped = psnr(over_white(picture), over_white(exact), UNCAPPED_DB)
+    return Case(
+        index,
+        _last_word(program.tokens),
+        len(program),
+        {**compare(picture, exact), "psnr_uncapped": uncapped},
+    )
+
+
+def _case_of(asked: tuple[str, str, int, int | None, int]) -> Case:
+    """One scene's figures by a shipped model, where nothing is loaded yet."""
+    model, name, seed, side, index = asked
+    loaded = open_model(model)
+    return _case(loaded, scenes_of(loaded, name, seed, side), index, None, 1)
+
+
+def _last_word(tokens: npt.NDArray[np.int8]) -> str:
+    if not tokens.any():
+        return "all_union"
+    return next(word for word, value in TOKENS.items() if value == tokens[-1])
+
+
+def _summary(cases: list[Case]) -> dict[str, Any]:
+    return {"count": len(cases), **summarise([case.figures for case in cases])}

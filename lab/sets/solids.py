@@ -1,0 +1,154 @@
+"""Seeded random scenes of solids to evaluate on, as Scenes: they go through the whole compiler.
+
+``solids3d`` is the base set: 1 to 3 spheres and tori, diffuse or volumetric, scaled by 0.35 to 0.85 per axis,
+turned about any axis and moved by ±1.2 (y: -0.5 to 0.9), in that order, colours uniform in 0.1 to 1 as
+written, all unions, on the default stage. The others change one thing each, ``mixed`` several. ``meshes3d``
+has 1 to 4 of the meshes that ship, diffuse; they are scaled, turned and moved in random order.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from lab.sets.plane import Rng, any_tree
+from scenelang.scene.elements import Brought, load_elements
+from scenelang.scene.schema import (
+    Bend,
+    Camera,
+    Chain,
+    Color,
+    Displace,
+    Ground,
+    Light,
+    Link,
+    Material,
+    Object,
+    Rotate,
+    Scale,
+    Scene,
+    Shear,
+    Transform,
+    Translate,
+    Twirl,
+    Twist,
+)
+from scenelang.words import COMBINE
+
+Triple = tuple[float, float, float]
+AXES = "xy", "xz", "yx", "yz", "zx", "zy"
+SIDES = 0.35, 0.85  # smallest and largest scale
+WARP = 0.8  # of deformed objects
+
+
+@dataclass(frozen=True, slots=True)
+class SolidConfig:
+    """What the scenes of a set are like.
+
+    Args:
+        objects: fewest and most objects.
+        media: share of objects that are volumetric.
+        warp: largest twirl, bend and twist, each there in half of the objects, as is a displacement; 0: none.
+        unions: share of scenes that are unions only; in the others half of the blends have another width.
+        shuffled: scale, rotate, translate and shear in random order, a twirl before and a bend among them.
+        size: factor on scales.
+        spread: factor on translations.
+        staged: a random camera, light, ground and sky.
+        canvas: pixels.
+        meshes: a file of elements whose solids take the place of spheres and tori.
+        trees: any trees of booleans; see `lab.sets.plane.any_tree`.
+    """
+
+    objects: tuple[int, int] = (1, 3)
+    media: float = 0.5
+    warp: float = 0.0
+    unions: float = 1.0
+    shuffled: bool = False
+    size: float = 1.0
+    spread: float = 1.0
+    staged: bool = False
+    canvas: tuple[int, int] = (128, 128)
+    meshes: str = ""
+    trees: bool = False
+
+
+SOLID_SETS: dict[str, SolidConfig] = {
+    "solids3d": SolidConfig(),
+    "diffuse": SolidConfig(media=0.0),
+    "media": SolidConfig(media=1.0),
+    "deformed": SolidConfig(warp=WARP),
+    "booleans": SolidConfig(unions=0.0, objects=(2, 4), spread=0.5),
+    "trees": SolidConfig(trees=True, media=0.3, spread=0.5),
+    "shuffled": SolidConfig(shuffled=True),
+    "wide": SolidConfig(canvas=(160, 96)),
+    "staged": SolidConfig(staged=True),
+    "many": SolidConfig(objects=(16, 16), media=0.3, size=0.6),
+    "mixed": SolidConfig(objects=(1, 4), warp=WARP, unions=0.4, spread=0.6, staged=True),
+    "meshes3d": SolidConfig(objects=(1, 4), media=0.0, meshes="std/meshes"),
+}
+
+
+def _triple(rng: Rng, low: float, high: float) -> Triple:
+    x, y, z = rng.uniform(low, high, 3).tolist()
+    return x, y, z
+
+
+def _warps(rng: Rng, most: float) -> list[Transform]:
+    twirl, bend, twist = rng.uniform(-most, most, 3).tolist()
+    bulge = Displace(0.05, float(rng.uniform(3, 8)))
+    every: list[Transform] = [bulge, Twirl(k=twirl), Bend(k=bend), Twist(k=twist)]
+    return [transform for transform in every if most and rng.random() < 0.5]
+
+
+def _moves(rng: Rng, config: SolidConfig) -> list[Transform]:
+    x, y, z = (config.size * side for side in _triple(rng, *SIDES))
+    turn = Rotate(angle=float(rng.uniform(0, math.tau)), axis=_triple(rng, -1, 1))
+    move = Translate(*(config.spread * rng.uniform((-1.2, -0.5, -1.2), (1.2, 0.9, 1.2))).tolist())
+    maps: list[Transform] = [Scale(x, y, z), turn, move]
+    if config.meshes:
+        return [maps[i] for i in rng.permutation(3)]
+    if not config.shuffled:
+        return [*_warps(rng, config.warp), *maps]
+    maps.append(Shear(AXES[int(rng.integers(6))], float(rng.uniform(-0.6, 0.6))))  # type: ignore[arg-type]
+    maps = [maps[i] for i in rng.permutation(4)]
+    twirl, bend = rng.uniform(-WARP, WARP, 2).tolist()
+    return [Twirl(k=twirl), *maps[:2], Bend(k=bend), *maps[2:]]
+
+
+def _stage(rng: Rng) -> dict[str, object]:
+    """Settings of a scene."""
+    turn, height = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(0.3, 3.0))
+    eye = (5.8 * math.sin(turn), height, 5.8 * math.cos(turn))
+    fov = math.radians(float(rng.uniform(30, 50)))
+    ground = Ground(float(rng.uniform(-1.2, -0.8)), _triple(rng, 0.3, 0.9))
+    sky = (_triple(rng, 0.2, 1.0), "default", "default", None)[int(rng.integers(4))]
+    return {
+        "camera": Camera(eye, _triple(rng, -0.2, 0.2), fov=fov),
+        "light": Light(_triple(rng, 2.0, 4.0), float(rng.uniform(15, 40)), _triple(rng, 0.6, 1.0)),
+        "ground": ground if rng.random() < 0.8 else None,
+        "background": sky,
+    }
+
+
+def random_solid(rng: Rng, config: SolidConfig) -> Scene:
+    """One scene of a set; it may be that hardly anything of it is seen."""
+    unions = rng.random() < config.unions
+    zoo = load_elements(config.meshes, "zoo") if config.meshes else None
+    brought = Brought.of((zoo,)).geometries if zoo is not None else {}
+    geometries = [name for name, it in brought.items() if it.dimension == 3] or ["sphere", "torus"]
+
+    def solid() -> Object:
+        kind = "volumetric" if rng.random() < config.media else "diffuse"
+        material = Material(kind, Color(_triple(rng, 0.1, 1.0)))
+        return Object(geometries[int(rng.integers(len(geometries)))], _moves(rng, config), material)
+
+    if config.trees:
+        return Scene(model="solids3d", canvas=config.canvas, nodes=(any_tree(rng, solid),))
+    links: list[Link] = []
+    for _ in range(int(rng.integers(config.objects[0], config.objects[1] + 1))):
+        item = solid()
+        word = "union" if unions or not links else COMBINE[int(rng.integers(4))]
+        other = word == "smooth" and rng.random() < 0.5
+        links.append(Link(word, item, k=float(rng.uniform(0.05, 0.5)) if other else None))
+    others = _stage(rng) if config.staged else {"elements": zoo} if zoo is not None else {}
+    return Scene(model="solids3d", canvas=config.canvas, nodes=Chain(links), **others)  # type: ignore[arg-type]

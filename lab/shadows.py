@@ -1,0 +1,96 @@
+"""What a medium's shadow on a solid looks like, and the error inside it: the paper's Figure 5.
+
+The shadow's mask is found from exact pictures alone: pixels that show the solid and no medium, and that are
+lit otherwise where the medium is taken away. Beside the error of the pixels stands the share of the shadow
+that is wrong: 0 is the exact shadow, and 100 % is as wrong as a picture without one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lab.about import Report, about, silent
+from lab.sets.scenes import draw_scene, spread
+from lab.solid_probes import shadow
+from scenelang.image import Image
+from scenelang.measure.metrics import MOST_DB, UNCAPPED_DB, contact_sheet, psnr, side_by_side
+from scenelang.measure.plan import reference_of
+from scenelang.models.load import Model
+from scenelang.models.manifest import Manifest
+from scenelang.scene.schema import Scene
+
+SEEN = 4 / 255  # by how much light has to change where there is a shadow
+LEAST = 0.01  # share of the canvas that is in shadow
+SHOWN = 6  # scenes of the strip
+
+Array = npt.NDArray[np.float64]
+
+
+def shadow_mask(scene: Scene, manifest: Manifest) -> tuple[npt.NDArray[np.bool_], Array, Array]:
+    """Which pixels (H, W) show a solid in a medium's shadow; exact pictures (H, W, 3) with and without it.
+
+    Args:
+        scene: a solid, then a medium.
+    """
+    solid, medium = scene.nodes
+
+    def exact(**changes: Any) -> Array:
+        return np.asarray(reference_of(scene.model_copy(update=changes), manifest), np.float64)
+
+    alone: dict[str, Any] = {"ground": None, "background": None}
+    covers, seen_through = (exact(nodes=(node,), **alone)[..., 3] for node in (solid, medium))
+    picture, lit = exact(), exact(nodes=(solid,))
+    darker = np.abs(picture - lit).max(2) > SEEN
+    return darker & (covers == 1) & (seen_through == 0), picture, lit
+
+
+def measure_shadows(
+    model: Model, count: int, seed: int, side: int, *, report: Report = silent
+) -> tuple[dict[str, Any], Image]:
+    """Draw scenes in which a medium throws its shadow on a solid.
+
+    Args:
+        model: of solids.
+        count: scenes, each with at least 1 % of its canvas in shadow.
+        seed: of the scenes.
+        side: pixels along a side of the canvas.
+        report: called with scenes done and all.
+
+    Returns:
+        A summary for JSON, and the first scenes: network, exact picture and FLIP map.
+    """
+    found: list[dict[str, float]] = []
+    rows: list[Image] = []
+    attempt = 0
+    while len(found) < count:
+        made = shadow(np.random.default_rng([seed, attempt])).sized((side, side))
+        attempt += 1
+        mask, exact, lit = shadow_mask(made, model.manifest)
+        if mask.mean() < LEAST:
+            continue
+        picture = np.asarray(draw_scene(model, made)[1], np.float64)
+        inside, whole = picture[mask], exact[mask]
+        found.append(
+            {
+                "psnr": psnr(inside, whole, MOST_DB),
+                "psnr_uncapped": psnr(inside, whole, UNCAPPED_DB),
+                "without": psnr(lit[mask], whole, UNCAPPED_DB),
+                "wrong_percent": 100
+                * float(np.abs(inside - whole).mean() / np.abs(lit[mask] - whole).mean()),
+                "share": float(mask.mean()),
+            }
+        )
+        if len(rows) < SHOWN:
+            rows.append(side_by_side(picture, exact, f"{found[-1]['psnr_uncapped']:.1f} dB in shadow"))
+        report("shadow", len(found), count)
+    summary = {"scenes": count, "seed": seed, "canvas": [side, side], "tried": attempt}
+    return {**summary, **about(), "model": model.manifest.name, **_summary(found)}, contact_sheet(rows)
+
+
+def _summary(found: Sequence[dict[str, float]]) -> dict[str, Any]:
+    bad_ends = {"wrong_percent": 95}
+    return {name: spread([one[name] for one in found], bad_ends.get(name, 5)) for name in found[0]}

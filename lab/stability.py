@@ -1,0 +1,442 @@
+"""The stability suite: how a model's error grows as scenes leave what it was trained on.
+
+PSNR alone misleads across canvas sizes and object counts, because most of a picture is flat and right: an
+error is also given per edge pixel (of the exact picture) and per covered pixel, as the sum of absolute
+errors, averaged over channels, over the number of such pixels.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lab.about import Report, about, revision, silent
+from lab.probes import FLAT, TEXTURES, Kit, Probe, drifting, rng_of, union_of
+from lab.sets.plane import SETS
+from lab.sets.scenes import LEAST_COVER, coverage, sized, spread
+from lab.sets.solids import SIDES
+from lab.sets.solids import WARP as SOLID_WARP
+from lab.solid_probes import SOLIDS
+from scenelang.backend.neural import draw_program
+from scenelang.graph.lower import step_of
+from scenelang.graph.spaces import SPACES
+from scenelang.graph.steps import Affine, Step, Warp
+from scenelang.image import Image
+from scenelang.lifting import exact
+from scenelang.lifting.layout import LAYOUTS
+from scenelang.lifting.learned import lift_geometry
+from scenelang.measure.metrics import flip, psnr
+from scenelang.measure.plan import reference_of
+from scenelang.models.load import Model
+from scenelang.models.manifest import Manifest
+from scenelang.passes import OPTIONAL
+from scenelang.program.compile import compile_scene
+from scenelang.program.program import Program
+from scenelang.renderers.draw import draw
+from scenelang.renderers.framed import Framed
+from scenelang.renderers.solid.parameters import Solids
+from scenelang.scene.schema import Chain, Object, Scene
+
+EDGE = 2 / 255  # a pixel of an edge differs by more from a neighbour
+FRAMES = 8
+SIZES = {"canvas"}  # probes that only models of any size can take
+IDEAL = 8  # samples along a pixel's side of a picture whose own sampling hardly shows
+
+Array = npt.NDArray[np.float64]
+Row = dict[str, Any]
+"""What was measured at a value of a probe."""
+
+
+def kit_of(manifest: Manifest) -> Kit:
+    """What a model is measured with."""
+    return SOLIDS if manifest.dimension == 3 else TEXTURES if manifest.textures else FLAT
+
+
+class Errors(NamedTuple):
+    """A picture against the exact one."""
+
+    psnr: float  # dB, at most 50
+    flip: float  # mean FLIP in [0, 1]
+    per_edge: float  # absolute error per edge pixel
+    per_covered: float  # absolute error per covered pixel
+    square: float  # mean squared error, which no cap hides
+
+
+def exact_picture(
+    scene: Scene, model: Model, per_side: int = 2
+) -> tuple[Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """The exact picture (H, W, 3), of the plane over white, which pixels are covered, which are on an edge.
+
+    Solids cover what is not as it would be without them: what they throw their shadow on too.
+
+    Args:
+        scene: what is drawn.
+        model: that its names are known by.
+        per_side: samples along each side of a pixel; 2 is the definition.
+    """
+    solid = model.manifest.dimension == 3
+    clear = scene.model_copy(update={"nodes": ()} if solid else {"background": None})
+    found = np.asarray(reference_of(clear, model.manifest, per_side=per_side), np.float64)
+    if solid:
+        picture = np.asarray(reference_of(scene, model.manifest, per_side=per_side), np.float64)
+        alpha = (np.abs(picture - found).max(2, keepdims=True) > EDGE).astype(np.float64)
+    else:
+        alpha = found[..., 3:]
+        picture = found[..., :3] * alpha + (1 - alpha)
+    edge = np.zeros(alpha.shape[:2], bool)
+    for axis in (0, 1):
+        step = np.abs(np.diff(np.concatenate([picture, alpha], 2), axis=axis)).max(2) > EDGE
+        first, last = [(0, 0), (0, 0)], [(0, 0), (0, 0)]
+        first[axis], last[axis] = (1, 0), (0, 1)
+        edge |= np.pad(step, first) | np.pad(step, last)
+    return picture, alpha[..., 0] > 0, edge
+
+
+def compare(picture: Image, reference: tuple[Array, Any, Any]) -> Errors:
+    """Errors of a picture against what `exact_picture` gave."""
+    exact_one, covered, edge = reference
+    gap = np.asarray(picture, np.float64)[..., :3] - exact_one
+    total = float(np.abs(gap).mean(2).sum())
+    return Errors(
+        psnr(picture, exact_one),
+        flip(picture, exact_one),
+        total / max(1, edge.sum()),
+        total / max(1, covered.sum()),
+        float(np.square(gap).mean()),
+    )
+
+
+def unfolded(scene: Scene, program: Program, model: Model) -> Program:
+    """The same Program, its geometry vectors lifted one affine map after the other.
+
+    The exact lifting does so in float32, to show what rounding adds up to.
+
+    Args:
+        scene: one chain of objects, deformations first.
+        program: compiled of it without dropping rows.
+        model: that it was compiled for.
+    """
+    (chain,) = scene.nodes
+    assert isinstance(chain, Chain)
+    vectors = program.vectors.copy()
+    layout, space = LAYOUTS[model.manifest.layout], SPACES[model.manifest.dimension]
+    nodes = [link.node for link in chain.children if isinstance(link.node, Object)]
+    steps = [[step_of(transform, space) for transform in node.transforms] for node in nodes]
+    lifting = model.codes.lifting
+    if lifting is not None:
+        leaves = [model.manifest.geometries.index(node.geometry) for node in nodes]
+        chains: list[list[Step]] = [[s for s in chain if isinstance(s, Affine | Warp)] for chain in steps]
+        vectors[:, : lifting.codes.shape[1]] = lift_geometry(lifting, chains, leaves)
+        return dataclasses.replace(program, vectors=vectors)
+    for row, chain_steps in zip(vectors, steps, strict=True):
+        g = exact.leaf_vector(row[: layout.code].tolist(), layout).astype(np.float32)
+        for step in chain_steps:
+            if isinstance(step, Affine):
+                matrix = exact.affine_matrix(step.rows, None, layout)
+            else:
+                matrix = exact.warp_matrix(step, layout.inner_warps, layout)  # type: ignore[arg-type]
+            g = matrix.astype(np.float32) @ g
+        row[: layout.geometry] = g
+    return dataclasses.replace(program, vectors=vectors)
+
+
+def picture_of(model: Model, program: Program, **options: Any) -> Image:
+    """A Program's picture; options are those of `renderers.draw.draw`, of solids those of `draw_program`."""
+    if not isinstance(model.network, Framed):
+        return draw_program(program, model, **{"threads": 1, **options}).image
+    return draw(model.network, program, **options).image
+
+
+def _drawn(model: Model, scene: Scene, folded: bool) -> Image:
+    without = () if folded else OPTIONAL
+    program = compile_scene(scene, model=model.manifest.name, codes=model.codes, without=without)
+    return picture_of(model, program if folded else unfolded(scene, program, model))
+
+
+def scene_of(probe: Probe, value: float, index: int, seed: int, model: Model) -> Scene:
+    """The scene of a probe at a value; drawn again while it covers too little of the canvas."""
+    scale = 1.0
+    for attempt in range(200):
+        scene = sized(probe.make(rng_of(seed, index, attempt), value), model.manifest)
+        if coverage(scene, model.manifest) >= LEAST_COVER * scale:
+            return scene
+        scale *= 0.97  # thin and tiny objects never cover that much
+    return scene
+
+
+def run_probe(
+    model: Model, name: str, scenes: int, seed: int, report: Report = silent, known: Sequence[Row] = ()
+) -> dict[str, Any]:
+    """A curve: errors at every value of a probe; none for one that the model's canvas rules out.
+
+    Rows that are ``known`` are taken as they are.
+    """
+    probe = kit_of(model.manifest).probes[name]
+    rows: list[Row] = []
+    before = {row["value"]: row for row in known}
+    values = probe.values if name not in SIZES or not model.manifest.sizes else ()
+    fine = name in SIZES and model.manifest.dimension == 2  # that of solids would take hours
+    for at, value in enumerate(values):
+        if value in before:
+            rows.append(before[value])
+            continue
+        found, ideal, changes = [], [], []
+        for index in range(scenes):
+            scene = scene_of(probe, value, index, seed, model)
+            picture = _drawn(model, scene, probe.folded)
+            found.append(compare(picture, exact_picture(scene, model, IDEAL if probe.sampled else 2)))
+            if probe.sampled:
+                changes.append(_change(model, drifting(scene, FRAMES), IDEAL))
+            if fine:
+                ideal.append(compare(picture, exact_picture(scene, model, IDEAL)).per_edge)
+        rows.append(
+            {
+                "value": value,
+                "worst_scene": int(np.argmax([e.square for e in found])),
+                "psnr": spread([e.psnr for e in found], 5),
+                "flip": spread([e.flip for e in found], 95),
+                "db": round(-10 * math.log10(max(1e-12, float(np.mean([e.square for e in found])))), 3),
+                "per_edge": round(float(np.mean([e.per_edge for e in found])), 6),
+                "per_covered": round(float(np.mean([e.per_covered for e in found])), 6),
+                "revision": revision(),
+            }
+        )
+        if moved := [change for change in changes if math.isfinite(change)]:  # within one texel nothing does
+            rows[-1]["flicker"] = spread(moved, 95)
+        if fine:
+            rows[-1]["per_edge_ideal"] = round(float(np.mean(ideal)), 6)
+        report(name, at + 1, len(probe.values))
+    return {
+        "title": probe.title,
+        "quantity": probe.quantity,
+        "healthy": probe.healthy,
+        "scenes": scenes,
+        "rows": rows,
+    }
+
+
+def order_of_disjoint(model: Model, scenes: int, seed: int) -> dict[str, float]:
+    """Objects that do not overlap, in two orders: how far apart the pictures are, and a healthy PSNR."""
+    most, values, kit = 0.0, [], kit_of(model.manifest)
+    for index in range(scenes):
+        nodes = kit.apart(rng := rng_of(seed, index))
+        first = sized(union_of(nodes), model.manifest)
+        second = sized(union_of([nodes[i] for i in rng.permutation(len(nodes))]), model.manifest)
+        a, b = _drawn(model, first, True), _drawn(model, second, True)
+        most = max(most, float(np.abs(np.asarray(a) - np.asarray(b)).max()))
+        values.append(psnr(a, exact_picture(first, model)[0]))
+    return {"largest_difference": round(most, 6), "psnr": round(float(np.mean(values)), 3)}
+
+
+def flicker(model: Model, scenes: int, seed: int) -> dict[str, float]:
+    """Change from frame to frame that the exact animation does not have, over the change that it has.
+
+    Both are root mean squares over pixels; 0 is none, 1 as much again as the picture moves. Animations in
+    which nothing moves do not count, and where none does more are drawn.
+    """
+    ratios: list[float] = []
+    index = -1
+    while (index := index + 1) < scenes or not ratios:
+        frames = [
+            sized(f, model.manifest) for f in kit_of(model.manifest).animated(rng_of(seed, index), FRAMES)
+        ]
+        ratio = _change(model, frames)
+        if math.isfinite(ratio):
+            ratios.append(ratio)
+    return {"mean": round(float(np.mean(ratios)), 5), "worst": round(max(ratios), 5)}
+
+
+def _change(model: Model, frames: Sequence[Scene], per_side: int = 2) -> float:
+    """The ratio of `flicker` of one animation, of whose exact pictures a pixel has so many samples a side."""
+    ours = [np.asarray(_drawn(model, f, True), np.float64) for f in frames]
+    exact_ones = [exact_picture(f, model, per_side)[0] for f in frames]
+    extra = real = 0.0
+    for i in range(1, len(frames)):
+        change = exact_ones[i] - exact_ones[i - 1]
+        extra += float(np.square(ours[i] - ours[i - 1] - change).sum())
+        real += float(np.square(change).sum())
+    return math.sqrt(extra / real) if real > 0 else math.inf
+
+
+def arithmetic(model: Model, scenes: int, seed: int) -> dict[str, float]:
+    """What tiles, threads and skipping change of a picture at most, on base scenes."""
+    probe = kit_of(model.manifest).probes["objects"]
+    ways: dict[str, dict[str, Any]] = {"threads": {"threads": 2}}
+    if isinstance(model.network, Framed):
+        ways = {
+            "tiles": {"tile": 1999},
+            "threads": {"threads": 2, "tile": 1 << 13},
+            "skipping": {"skip": False},
+        }
+    elif not isinstance(model.network, Solids):
+        return dict.fromkeys(("tiles", "threads", "skipping"), 0.0)  # draws whole pictures
+    most = dict.fromkeys(ways, 0.0)
+    for index in range(scenes):
+        scene = scene_of(probe, 4, index, seed, model)
+        program = compile_scene(scene, model=model.manifest.name, codes=model.codes)
+        base = np.asarray(picture_of(model, program))
+        for name, options in ways.items():
+            other = np.asarray(picture_of(model, program, **options))
+            most[name] = max(most[name], float(np.abs(other - base).max()))
+    return {k: round(v, 7) for k, v in most.items()}
+
+
+INVARIANTS: dict[str, Callable[[Model, int, int], dict[str, float]]] = {
+    "order_of_disjoint": order_of_disjoint,
+    "flicker": flicker,
+    "arithmetic": arithmetic,
+}
+
+
+def run_stability(
+    model: Model,
+    scenes: int,
+    seed: int,
+    only: tuple[str, ...] = (),
+    report: Report = silent,
+    known: Sequence[Mapping[str, Any]] = (),
+) -> dict[str, Any]:
+    """The whole suite, or the probes and invariants named.
+
+    Args:
+        model, scenes, seed: what draws, how many scenes of every value, and their seed.
+        only: names of probes and of `INVARIANTS`; all by default.
+        report: called with a name, values done and all.
+        known: earlier results: values of as many scenes are not measured again, nor are invariants; probes
+            that are not asked for stay as they are.
+
+    Returns:
+        For JSON: ``probes`` and ``invariants`` by name, and what was measured on what.
+
+    Raises:
+        ValueError: an earlier result is of other weights or another seed.
+    """
+    started = time.perf_counter()
+    rows: dict[str, list[Row]] = {}
+    probes: dict[str, dict[str, Any]] = {}
+    invariants: dict[str, Any] = {}
+    for earlier in known:
+        if (earlier["weights"], earlier["seed"]) != (model.digest, seed):
+            raise ValueError("an earlier result is of other weights or another seed")
+        invariants |= earlier["invariants"]
+        for name, probe in earlier["probes"].items():
+            probes[name] = {"scenes": earlier["scenes"], **probe}
+            if probes[name]["scenes"] == scenes:
+                rows[name] = rows.get(name, []) + [
+                    {"revision": earlier.get("revision", "unknown"), **row} for row in probe["rows"]
+                ]
+    for name in kit_of(model.manifest).probes:
+        if not only or name in only:
+            probes[name] = run_probe(model, name, scenes, seed, report, rows.get(name, ()))
+    for name, measure in INVARIANTS.items():
+        if name not in invariants and (not only or name in only):
+            invariants[name] = measure(model, scenes, seed)
+            report(name, 1, 1)
+    return {
+        "model": model.manifest.name,
+        "weights": model.digest,
+        "scenes": scenes,
+        "seed": seed,
+        **about(),
+        "seconds": round(time.perf_counter() - started, 1),
+        "probes": {n: probes[n] for n in kit_of(model.manifest).probes if probes.get(n, {}).get("rows")},
+        "invariants": invariants,
+    }
+
+
+HARDLY, SLACK = 40.0, 1.0  # dB, of mean PSNR
+WARP = SETS["shapes2d"].warp
+SCALES = 0.2, 0.55  # of the base set
+WARP_OF, SCALES_OF = {2: WARP, 3: SOLID_WARP}, {2: SCALES, 3: SIDES}
+
+
+def quantities(dimension: int) -> dict[str, tuple[str, float, float]]:
+    """Quantity of a manifest -> the probe that varies it, and by what either end of its values is multiplied.
+
+    Of solids the ratio of scales says little: rays may pass over what is thinner than 0.01, at any size.
+    """
+    most, scales = WARP_OF[dimension], SCALES_OF[dimension]
+    warp = "warp", most, most
+    solid = {
+        "twist": warp,
+        **{name: (probe, 1.0, 1.0) for name, probe in SOLID.items()},
+    }
+    return {
+        "objects": ("objects", 1.0, 1.0),
+        "smooth": ("blends", 1.0, 1.0),
+        "twirl": warp,
+        "bend": warp,
+        "scale": ("size", *scales),
+        **({"thin": ("thin", 1.0, 1.0), "texels": ("texels", 1.0, 1.0)} if dimension == 2 else solid),
+        "blend": ("deep", scales[1], scales[1]),
+    }
+
+
+SOLID = {"displace": "amount", "frequency": "frequency", "thickness": "thickness", "width": "width"}
+FROM_NOTHING = {"smooth", "blend", "displace", "frequency", "width", "texels"}  # the probe starts later
+UNBOUNDED = {"objects", "thin"}
+"""Of these a model has no range where nothing was lost up to the last value: a warning would not say why.
+
+Nor has a scale a lower end where nothing was lost down to the first: thin objects are as small one way.
+"""
+BOTH_WAYS = {"twirl", "bend", "twist"}  # the range is the same on either side of 0
+
+
+def measured_ranges(
+    found: Mapping[str, Any], dimension: int = 2
+) -> tuple[dict[str, list[float]], dict[str, str]]:
+    """What the suite says of a model.
+
+    Args:
+        found: of `lab.stability.run_stability`.
+        dimension: the model's.
+
+    Returns:
+        Ranges ``quantity -> [low, high]`` for the manifest's ``trained``, and lines about what lies beyond
+        for ``measured.stability``.
+    """
+    ranges: dict[str, list[float]] = {}
+    lines: dict[str, str] = {}
+    for quantity, (name, low_unit, high_unit) in quantities(dimension).items():
+        probe = found["probes"].get(name)
+        if probe is None:
+            continue
+        rows = probe["rows"]
+        first, last = _healthy(rows, probe["healthy"])
+        if quantity in UNBOUNDED and last == len(rows) - 1:
+            continue
+        low, high = rows[first]["value"] * low_unit, rows[last]["value"] * high_unit
+        low = 0.0 if quantity in FROM_NOTHING or (quantity == "scale" and first == 0) else low
+        if quantity in BOTH_WAYS:
+            low = -high
+        ranges[quantity] = [int(v) if v == int(v) else round(v, 4) for v in (low, high)]
+        below = [] if quantity in BOTH_WAYS | FROM_NOTHING else rows[:first]
+        beyond = [*below, *rows[last + 1 :]]
+        shown = [beyond[0], beyond[-1]] if len(beyond) > 1 else beyond
+        unit = {True: low_unit, False: high_unit}
+        said = [
+            f"{row['value'] * unit[row['value'] < probe['healthy']]:g}: {row['psnr']['mean']:.1f} dB "
+            f"(worst {row['psnr']['worst']:.1f})"
+            for row in shown
+        ]
+        if said:
+            lines[quantity] = ", ".join(said)
+    return ranges, lines
+
+
+def _healthy(rows: list[dict[str, Any]], healthy: float) -> tuple[int, int]:
+    """The first and the last row, around the healthy one, up to which all is well."""
+    centre = next(i for i, row in enumerate(rows) if row["value"] == healthy)
+    least = min(HARDLY, rows[centre]["psnr"]["mean"] - SLACK)
+    first = last = centre
+    while first > 0 and rows[first - 1]["psnr"]["mean"] >= least:
+        first -= 1
+    while last + 1 < len(rows) and rows[last + 1]["psnr"]["mean"] >= least:
+        last += 1
+    return first, last

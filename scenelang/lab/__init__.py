@@ -1,1 +1,0 @@
-"""The laboratory: what measures, compares and trains for comparison. Nothing outside imports it."""
