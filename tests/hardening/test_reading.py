@@ -27,7 +27,6 @@ COMMANDS = [
     ("convert", "{}.json", "-o", "out.nsg"),
     ("dump", "{}.nsg"),
     ("graph", "{}.nsg", "-o", "out.mmd"),
-    ("import", "{}.glb", "-o", "out.nsg"),
     ("train", "{}.json", "-o", "out"),
     ("lab", "eval", "shapes2d", "--weights", "{}.safetensors", "-o", "out"),
 ]
