@@ -58,7 +58,10 @@ def command(
     common.model_to_measure(model, None)
     with Bar() as bar:
         if gradients:
-            found = measure_gradients(model, counts, scenes, seed, side, bar)
+            try:
+                found = measure_gradients(model, counts, scenes, seed, side, bar)
+            except ValueError as error:
+                raise click.UsageError(f"{error}.") from None
             common.write_json(out / f"{name}.json", found)
             for row in found["rows"]:
                 click.echo(
