@@ -2,7 +2,7 @@
 
 A job is JSON data: ``do`` (one of `DO`), ``path`` and ``name`` of the scene, its ``text``, ``texts`` of
 others by their paths, ``root``, ``params``, ``frame``, ``size``, ``message``, to which the answer's data adds
-what was found, and ``folder``, an empty one that lasts as long as the job.
+what was found, and of a file ``folder``, an empty one that lasts as long.
 """
 
 from __future__ import annotations

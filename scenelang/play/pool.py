@@ -10,6 +10,7 @@ import multiprocessing
 import sys
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import nullcontext
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
@@ -32,8 +33,9 @@ class Worker:
         other.close()
 
     def do(self, job: dict[str, Any], said: Said) -> Answer:
-        """Have a job done, in a folder that lasts as long; raises `JobFailed`."""
-        with TemporaryDirectory(prefix="scenelang-") as folder:
+        """Have a job done, a file in a folder that lasts as long; raises `JobFailed`."""
+        is_file = job["do"] == "file"
+        with TemporaryDirectory(prefix="scenelang-") if is_file else nullcontext() as folder:
             try:
                 self._pipe.send({**job, "folder": folder})
                 while isinstance(told := self._pipe.recv(), float):
