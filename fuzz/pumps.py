@@ -21,8 +21,6 @@ from scenelang.elements.zoo import read_zoo
 from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.session import Defines
 from scenelang.formatting import format_text
-from scenelang.interchange.gltf import import_gltf
-from scenelang.interchange.gltf_file import GltfError, parse_gltf
 from scenelang.program.program import ProgramError
 from scenelang.program.reading import parse_program
 from scenelang.tensors import TensorError
@@ -126,11 +124,6 @@ def _edit(scene: str) -> None:
         callees.signature_help(docs, document, place)
 
 
-def _gltf(file: str) -> None:
-    with suppress(GltfError):
-        import_gltf(parse_gltf(file.encode("utf-8", "replace")))
-
-
 def _program(header: str) -> None:
     data = header.encode("utf-8", "replace")
     with suppress(ProgramError):
@@ -151,7 +144,6 @@ READERS: Final[dict[str, Callable[[str], None]]] = {
     "fmt": _format,
     "edit": _edit,
     "json": _json,
-    "gltf": _gltf,
     "program": _program,
     "zoo": _zoo,
 }
@@ -160,7 +152,6 @@ _OF_TEXT: Final = ("check", "check", "check", "fix", "fmt", "edit")
 # ---------------------------------------------------------------- pumps
 
 _NODE: Final = '{"kind":"object","geometry":"star"'
-_GLTF: Final = '{"asset":{"version":"2.0"},"nodes":['
 _SHAPES: Final[tuple[tuple[str, ...], ...]] = (
     ("let a¤ = b¤;\n",),
     ("let name¤ = nane¤; ",),
@@ -234,11 +225,6 @@ _SHAPES: Final[tuple[tuple[str, ...], ...]] = (
 )
 """Unit, head, close, tail: what thought found."""
 _DATA: Final = (
-    Pump("gltf", "9", _GLTF + '{"name":"star', tail='x"}]}'),
-    Pump("gltf", ".copy", _GLTF + '{"name":"star', tail='x"}]}'),
-    Pump("gltf", '{"name":"1_1_1_1_1_1x"},', _GLTF, tail="{}]}"),
-    Pump("gltf", '{"children":[¤]},', _GLTF, tail="{}]}"),
-    Pump("gltf", "1,", _GLTF + '{"children":[', tail="1]}]}"),
     Pump("json", _NODE + "},", '{"nodes":[', tail=_NODE + "}]}"),
     Pump("json", _NODE + ',"siz¤":1},', '{"nodes":[', tail=_NODE + "}]}"),
     Pump("json", _NODE + ',"kind":"object"},', '{"nodes":[', tail=_NODE + "}]}"),

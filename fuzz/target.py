@@ -17,7 +17,6 @@ TARGETS: Final = (
     "weights",
     "formatting",
     "incremental",
-    "gltf",
     "zoo",
     "learn",
     "slow",

@@ -2,38 +2,20 @@
 
 from __future__ import annotations
 
-import ast
 from functools import cache
 from random import Random
 from typing import Any
 
 from fuzz import text, trees
 from fuzz.oracles import check_compiling, check_diagnostics
-from fuzz.target import Failure, Target, hold, sampled
+from fuzz.target import Failure, Target, hold
 from scenelang.deep import deep_stack
 from scenelang.diagnostics.error import SceneError
 from scenelang.evaluate.evaluation import loads
 from scenelang.models.manifest import available, load_manifest
 from scenelang.scene.json import to_readable_json
 from scenelang.scene.schema import Scene
-from scenelang.scene.text import to_python
 from scenelang.words import OPERATIONS, TRANSFORMS
-
-_PLAIN = (
-    *(
-        ast.Module,
-        ast.Import,
-        ast.alias,
-        ast.Assign,
-        ast.Expr,
-        ast.Call,
-        ast.keyword,
-        ast.Name,
-        ast.Attribute,
-    ),
-    *(ast.Constant, ast.Tuple, ast.List, ast.UnaryOp, ast.USub, ast.Load, ast.Store),
-)
-"""What code of a Scene is made of."""
 
 
 def check(data: bytes) -> None:
@@ -51,8 +33,6 @@ def check(data: bytes) -> None:
         hold(again == scene, "Scene to JSON and back")
         hold(again.to_json() == written, "the same JSON each time")
         hold(Scene.from_json(to_readable_json(scene)) == scene, "Scene to readable JSON and back")
-        if sampled(data, 4):
-            _check_python(scene)
     _check_text(scene)
     check_compiling(scene)
 
@@ -70,23 +50,6 @@ def _check_text(scene: Scene) -> None:
         raise Failure("Scene to text that reads", (sorted(names), written[:500])) from None
     with deep_stack():
         hold(read == scene, "Scene to text and back", written[:500])
-
-
-def _check_python(scene: Scene) -> None:
-    """Python code of a Scene makes that Scene; only calls of our own names with literals are run."""
-    code = to_python(scene)
-    tree = ast.parse(code)
-    odd = [type(node).__name__ for node in ast.walk(tree) if not isinstance(node, _PLAIN)]
-    hold(not odd, "Python code of calls and literals", (odd, code[:500]))
-    assigned = {
-        node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-    }
-    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - assigned
-    hold(used <= {"nsg"}, "Python code of our own names", (used, code[:500]))
-    names: dict[str, Any] = {}
-    exec(compile(tree, "<scene>", "exec"), names)
-    made = [value for value in names.values() if isinstance(value, Scene)]
-    hold(made == [scene], "Scene to Python and back", code[:500])
 
 
 def _known(scene: Scene) -> bool:

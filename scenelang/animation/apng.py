@@ -1,6 +1,6 @@
 """APNG: Pillow compresses each frame as a PNG, whose data goes into one file, so that only two are held.
 
-Pillow's own writer holds every frame until the last has come.
+Pillow's own writer, also in 13.0, holds every frame until the last has come.
 
 Source: W3C, Portable Network Graphics (PNG) Specification, third edition, 2025, chapter 4.9 and 11.3.6.
 """

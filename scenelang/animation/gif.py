@@ -1,7 +1,7 @@
 """GIF, written frame by frame: Pillow writes each, and only two are held.
 
-Pillow's own writer of films holds every frame until the last has come, and gives each a palette of its own;
-one that is exact for all frames is found here.
+Pillow's own writer of films, also in 13.0, holds every frame until the last has come, and gives each a
+palette of its own; one that is exact for all frames is found here.
 
 Source: CompuServe, Graphics Interchange Format, version 89a.
 """

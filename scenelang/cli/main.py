@@ -7,7 +7,6 @@ import io
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from keyword import iskeyword
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -16,8 +15,8 @@ import click
 from scenelang.backend.options import RenderError
 from scenelang.files import NotWritten, inputs_kept
 
-# Command -> what `--help` says. Each is `command` in a file of its name, imported when it is called; the file
-# of a Python keyword ends in an underscore, and a dash is one.
+# Command -> what `--help` says. Each is `command` in a file of its name, imported when it is called; a dash
+# is an underscore there.
 COMMANDS: Final = {
     "render": "Draw scenes or compiled programs.",
     "sweep": "Draw a scene with many values of its params.",
@@ -28,8 +27,7 @@ COMMANDS: Final = {
     "explain": "Say what a diagnostic's code means.",
     "fmt": "Lay scenes out in the one canonical way.",
     "lsp": "Serve editors over the Language Server Protocol.",
-    "convert": "Write a scene as text, JSON or Python.",
-    "import": "Make a scene of a glTF file's nodes.",
+    "convert": "Write a scene as text or JSON.",
     "schema": "Print the JSON Schema of scenes.",
     "compile": "Compile a scene to a program.",
     "compare": "Draw a scene beside its exact picture.",
@@ -40,19 +38,20 @@ COMMANDS: Final = {
 }
 GROUPS: Final = {
     "Draw": "render sweep play export watch",
-    "Write": "check fmt explain convert import learn fit",
+    "Write": "check fmt explain convert learn fit",
     "Measure": "compare dump models",
     "Develop": "compile schema lsp",
 }
 """Commands as `--help` lists them; those for the development of scenelang itself it leaves out."""
 ELSEWHERE: Final = {"sweep": "scenelang.cli.sweep"}  # commands whose modules do not lie among the others
 MOVED: Final = {
-    "explain-plan": "scenelang dump --costs",
-    "graph": "scenelang dump --format mmd",
-    "lab": "python -m lab",
-    **{name: f"python -m lab {name}" for name in ("train", "eval", "frontier", "stability")},
+    "explain-plan": "is now `scenelang dump --costs`",
+    "graph": "is now `scenelang dump --format mmd`",
+    "import": "is gone: `scenelang learn --parts` makes elements of a glTF file's meshes",
+    "lab": "is now `python -m lab`",
+    **{name: f"is now `python -m lab {name}`" for name in ("train", "eval", "frontier", "stability")},
 }
-"""Commands of before, and what they are called now; the laboratory runs in a clone of the repository."""
+"""Answers to commands of earlier versions; the laboratory runs in a clone of the repository."""
 INTERRUPTED: Final = 130  # as shells report it
 
 
@@ -71,7 +70,7 @@ class Commands(click.Group):
         package: str,  # that their files lie in
         table: Mapping[str, str],  # command -> what `--help` says
         elsewhere: Mapping[str, str] = MappingProxyType({}),  # modules of commands that do not lie there
-        moved: Mapping[str, str] = MappingProxyType({}),  # what commands of before are called now
+        moved: Mapping[str, str] = MappingProxyType({}),  # what commands of earlier versions answer with
         groups: Mapping[str, str] = MappingProxyType({}),  # those that `--help` lists, by headings
         **options: Any,
     ) -> None:
@@ -85,8 +84,7 @@ class Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.table:
             return None
-        file = f"{cmd_name.replace('-', '_')}{'_' if iskeyword(cmd_name) else ''}"
-        module = self.elsewhere.get(cmd_name, f"{self.package}.{file}")
+        module = self.elsewhere.get(cmd_name, f"{self.package}.{cmd_name.replace('-', '_')}")
         command: click.Command = importlib.import_module(module).command
         return command
 
@@ -103,7 +101,7 @@ class Commands(click.Group):
             from difflib import get_close_matches
 
             if args[0] in self.moved:
-                ctx.fail(f"`{args[0]}` is now `{self.moved[args[0]]}`.")
+                ctx.fail(f"`{args[0]}` {self.moved[args[0]]}.")
             near = get_close_matches(args[0], self.table, 1)
             advice = f" Did you mean `{near[0]}`?" if near else ""
             ctx.fail(f"No such command `{args[0]}`.{advice}")

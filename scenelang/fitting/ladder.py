@@ -18,7 +18,8 @@ import numpy.typing as npt
 
 from scenelang.elements.element import MOST_SIDE, Element
 from scenelang.elements.pyramid import Grid, packed, refine, unpacked
-from scenelang.fitting.mesh import Points, Shape
+from scenelang.fitting.looks import Points
+from scenelang.fitting.mesh import Shape
 from scenelang.fitting.settle import settled
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.grid import GridShape

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.elements.groups import Painted
-from scenelang.fitting.mesh import FitError, Points, needed, outer
+from scenelang.fitting.looks import Points
+from scenelang.fitting.mesh import FitError, needed, outer
 from scenelang.fitting.picture import opened
 
 MOST_EDGES: Final = 200_000

@@ -13,8 +13,8 @@ import numpy as np
 
 from scenelang.elements.groups import MOST_PARTS, Group, Painted, Part
 from scenelang.fitting import drawing, picture, solids
-from scenelang.fitting.looks import Look
-from scenelang.fitting.mesh import FitError, Mesh, Points, Shape, Sign
+from scenelang.fitting.looks import Look, Points
+from scenelang.fitting.mesh import FitError, Mesh, Shape, Sign
 from scenelang.fitting.outline import Outline
 from scenelang.fitting.solids import Solid
 

@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.elements.pyramid import Grid, finest
-from scenelang.fitting.mesh import Points
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.grid import GridShape
 

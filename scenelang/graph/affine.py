@@ -6,7 +6,7 @@ The compiler's front half does not import numpy: these few closed forms are all 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import atan2, copysign, cos, hypot, remainder, sin, tau
+from math import cos, hypot, sin
 
 from scenelang.graph.steps import IDENTITY, Affine, Rows, Step
 
@@ -81,17 +81,3 @@ def shearing(axes: str, k: float) -> Rows:
     rows = list(IDENTITY)
     rows["xyz".index(axes[0]) * 4 + "xyz".index(axes[1])] = k
     return tuple(rows)  # type: ignore[return-value]
-
-
-def turn(i: float, j: float, k: float, w: float) -> tuple[float, tuple[float, float, float]]:
-    """Angle (radians) and axis of a quaternion, not 0; about an axis of the world it is that axis itself."""
-    sine = hypot(i, j, k)
-    if sine < 1e-9 * max(abs(w), 1e-300):
-        return 0.0, (0.0, 0.0, 1.0)
-    axis = (i / sine, j / sine, k / sine)
-    for at in range(3):
-        if abs(abs(axis[at]) - 1.0) < 1e-12:
-            sine = copysign(sine, axis[at])
-            axis = (float(at == 0), float(at == 1), float(at == 2))
-    angle = 2.0 * atan2(sine, w)
-    return remainder(angle, tau), axis

@@ -1,1 +1,1 @@
-"""Scenes, graphs and Programs as data for other software, and other software's data as Scenes."""
+"""Scenes, graphs and Programs as data and drawings for other software."""

@@ -54,8 +54,6 @@ class SoftPlane:
         dtype: of all that is computed.
     """
 
-    opaque = True
-
     def __init__(
         self, program: Program, under: tuple[float, float, float] = WHITE, dtype: torch.dtype = torch.float32
     ) -> None:

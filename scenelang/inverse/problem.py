@@ -16,7 +16,7 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import Evaluation, Source
-from scenelang.inverse.gradient import Changes
+from scenelang.inverse.rates import Rates, numbers_of
 from scenelang.inverse.soft import softened
 from scenelang.inverse.space import Point, Space
 from scenelang.inverse.target import Picture, Target, over
@@ -111,7 +111,7 @@ class Problem:
         self.frames = 0  # drawn so far
         self.colours, weights = target.sized(canvas, light)
         self.root = np.sqrt(weights / max(1e-9, weights.mean()))[..., None]
-        self._changes = Changes(self.program, space, target.under)
+        self._rates = Rates(self.program, space)
         self._last: tuple[bytes, Program | None] = b"", None
 
     def drawn(self, program: Program | None) -> Picture | None:
@@ -159,20 +159,22 @@ class Problem:
         """Residuals of a picture, at so many levels of the pyramid."""
         return _pyramid((picture - self.colours) * self.root, levels)[:, 0]
 
-    @property
-    def steep(self) -> bool:
-        """Whether a search gains by `slopes` where there are many params; of solids it did not reliably."""
-        return self.soft
-
     def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
-        """Derivatives (R, n) of the residuals, and of which axes (n,) there are; None where of none."""
-        if not (self.soft or self.light) or (found := self._changes.at(u)) is None:
+        """Derivatives (R, n) of the residuals, and of which axes (n,) there are; None where of none.
+
+        A few compilations and one soft picture give them, however many params there are. Elements, textures,
+        trees, solids, and axes along which objects come or go are left to differences.
+        """
+        program = self.program(u) if self.soft else None
+        if program is None or not len(program) or program.elements or program.palette or program.extended:
             return None
+        from scenelang.inverse.plane import SoftPlane
+
+        rates, known = self._rates.at(u, program)
+        change = SoftPlane(program, self.under)(numbers_of(program), rates)[1].astype(np.float64)
         self.frames += 1
-        height, width = self.canvas[::-1]
-        return _pyramid(
-            (found.slopes * self.root[..., None]).reshape(height, width, -1), self.levels
-        ), found.known
+        height, width = change.shape[:2]
+        return _pyramid((change * self.root[..., None]).reshape(height, width, -1), self.levels), known
 
 
 def _pyramid(gap: Picture, levels: int) -> Matrix:

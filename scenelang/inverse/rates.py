@@ -24,27 +24,17 @@ STEP: Final = 1e-3  # of differences, shares of a range: vectors are rounded to 
 
 
 def numbers_of(program: Program) -> Floats:
-    """All numbers of a Program (K,) that a picture changes smoothly with: vectors, row by row, then settings.
-
-    Settings are the background, or black; of solids the camera's eye, target and angle of view, the light's
-    position, power and colour, the ground's height and colour, horizon and zenith.
-    """
+    """Numbers (K,) of a Program that a picture changes smoothly with: vectors by row, then the background."""
     at = LAYOUTS[load_manifest(program.model).layout].blend
     vectors = program.vectors.astype(np.float64)
     vectors[:, at] = np.where((program.tokens == SMOOTH) & (vectors[:, at] <= 0), BLEND, vectors[:, at])
-    if program.stage is None:
-        return np.concatenate([vectors.reshape(-1), program.background or (0.0, 0.0, 0.0)])
-    camera, light, ground, *sky = (getattr(program.stage, name) for name in program.stage.__match_args__)
-    plane = [0.0] * 4 if ground is None else [ground.y, *ground.rgb]
-    stage = [*camera.eye, *camera.target, camera.fov_rad, *light.position, light.power, *light.rgb, *plane]
-    return np.concatenate([vectors.reshape(-1), stage, *sky[:2]])
+    return np.concatenate([vectors.reshape(-1), program.background or (0.0, 0.0, 0.0)])
 
 
 def alike(a: Program, b: Program) -> bool:
     """Whether two Programs differ in their numbers alone."""
     tables = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("tokens", "forms", "worn"))
-    grounds = [program.stage is not None and program.stage.ground is not None for program in (a, b)]
-    plain = (a.background is None) == (b.background is None) and grounds[0] == grounds[1]
+    plain = (a.background is None) == (b.background is None)
     named = (a.model, a.objects, a.elements, a.palette) == (b.model, b.objects, b.elements, b.palette)
     return tables and plain and named
 
@@ -61,14 +51,13 @@ class Rates:
         self.program, self.space = program, space
         self._moved: dict[int, npt.NDArray[np.bool_]] = {}  # (K,) which numbers an axis changes
 
-    def at(self, u: Point, here: Program, both: bool = False) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    def at(self, u: Point, here: Program) -> tuple[Floats, npt.NDArray[np.bool_]]:
         """Derivatives (K, n) at a point, in shares of ranges, and of which axes (n,) they are known.
 
         Those of choices are not, nor those of axes along which objects come or go.
 
         Args:
             here: the point's Program.
-            both: whether differences are central.
         """
         base = numbers_of(here)
         found, known = np.zeros((len(base), len(u))), np.zeros(len(u), bool)
@@ -77,7 +66,7 @@ class Rates:
         groups = self._groups(len(base))
         while groups:
             group = groups.pop()
-            change = self._change(u, here, base, group, both)
+            change = self._change(u, here, base, group)
             masks = [self._moved.get(axis, np.ones(len(base), bool)) for axis in group]
             if len(group) > 1 and (change is None or change[0][~np.any(masks, 0)].any()):
                 groups += [[axis] for axis in group]  # more has changed than did so far
@@ -103,23 +92,15 @@ class Rates:
                 groups.append(([axis], mask.copy()))
         return [group for group, _ in groups]
 
-    def _change(
-        self, u: Point, here: Program, base: Floats, axes: list[int], both: bool
-    ) -> tuple[Floats, Point] | None:
+    def _change(self, u: Point, here: Program, base: Floats, axes: list[int]) -> tuple[Floats, Point] | None:
         """By how much numbers (K,) change as axes move, and by how much these do (n,)."""
         for way in (1.0, -1.0):
-            ends, kept = [], []
-            for sign in (way, -way if both else 0.0):
-                moved = u.copy()
-                moved[axes] += sign * np.where(
-                    (u[axes] + way * STEP > 1.0) & ~self.space.wraps[axes], -STEP, STEP
-                )
-                ends.append(self.space.inside(moved))
-                program = here if sign == 0.0 else self.program(ends[-1])
-                if program is None or not alike(here, program):
-                    break
-                kept.append(base if program is here else numbers_of(program))
-            if len(kept) == 2:
-                width = ends[0] - ends[1]
-                return kept[0] - kept[1], np.where(self.space.wraps, (width + 0.5) % 1.0 - 0.5, width)
+            moved = u.copy()
+            moved[axes] += way * np.where((u[axes] + way * STEP > 1.0) & ~self.space.wraps[axes], -STEP, STEP)
+            end = self.space.inside(moved)
+            program = self.program(end)
+            if program is not None and alike(here, program):
+                width = end - self.space.inside(u)
+                change = numbers_of(program) - base
+                return change, np.where(self.space.wraps, (width + 0.5) % 1.0 - 0.5, width)
         return None

@@ -32,10 +32,6 @@ class Steep(Protocol):
     def __call__(self, u: Point) -> Point | None:
         """Residuals (R,)."""
 
-    @property
-    def steep(self) -> bool:
-        """Whether a search gains by them, unless it asks for them of fewer axes than `MANY`."""
-
     def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
         """Derivatives (R, n), in shares of ranges, and of which axes (n,) there are; None where of none."""
 
@@ -117,8 +113,7 @@ def slopes(
         many: axes from which on reverse passes are taken, where there are any.
     """
     found = np.zeros((len(at), len(u)))
-    asked = np.count_nonzero(free) >= many
-    if asked and isinstance(residuals, Steep) and (many < MANY or residuals.steep):
+    if np.count_nonzero(free) >= many and isinstance(residuals, Steep):
         exact = residuals.slopes(u)
         if exact is not None:
             found, free = exact[0], free & ~exact[1]

@@ -53,11 +53,6 @@ class Together:
         gaps = [part.residuals(one, levels) for part, one in zip(self.parts, pictures, strict=True)]
         return np.asarray(np.concatenate(gaps) / np.sqrt(len(gaps)))
 
-    @property
-    def steep(self) -> bool:
-        """As `Problem.steep`."""
-        return all(part.steep for part in self.parts)
-
     def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
         """As `Problem.slopes`, of the axes that all frames have them of."""
         found = [part.slopes(u) for part in self.parts]

@@ -1,8 +1,8 @@
 """What a process does for the page: views, pictures, figures and files, of a text that may not be saved yet.
 
 A job is JSON data: ``do`` (one of `DO`), ``path`` and ``name`` of the scene, its ``text``, ``texts`` of
-others by their paths, ``root``, ``params``, ``frame``, ``size``, and ``message``, to which the answer's data
-adds what was found.
+others by their paths, ``root``, ``params``, ``frame``, ``size``, ``message``, to which the answer's data adds
+what was found, and of a file ``folder``, an empty one that lasts as long.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import base64
 import io
 import json
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -34,6 +33,7 @@ from scenelang.graph.nodes import Graph, Leaf, nodes
 from scenelang.image import Image
 from scenelang.measure.metrics import flip, over_white, psnr, side_by_side, ssim
 from scenelang.models.manifest import load_manifest
+from scenelang.play.answer import Answer
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Kept
@@ -51,15 +51,14 @@ _EXACT: dict[str, Image] = {}  # the last exact picture, by what it shows
 
 Job = dict[str, Any]
 Tell = Callable[[float], None]
-Done = tuple[dict[str, Any], bytes]
 
 
 class Trouble(Exception):
     """A job that cannot be done; the message says why."""
 
 
-def do(job: Job, tell: Tell) -> Done:
-    """Do a job: a head, and the data that it is about; raises `Trouble`."""
+def do(job: Job, tell: Tell) -> Answer:
+    """Do a job, and tell the share done; raises `Trouble`."""
     try:
         return DO[job["do"]](job, tell)
     except SceneError as error:
@@ -72,14 +71,25 @@ def do(job: Job, tell: Tell) -> Done:
 
 
 def warm() -> None:
-    """Load what the first job would otherwise wait for."""
-    _draw(Clip(Source(text=SourceFile("", "square;"), size=(32, 32))), 0)
+    """Load what jobs would otherwise wait for."""
+    job: Job = {
+        "path": "a.nsg",
+        "name": "",
+        "texts": {},
+        "root": None,
+        "params": {},
+        "frame": 0,
+        "size": [32, 32],
+    }
+    for text in ("square;", "sphere;"):
+        for kind in ("view", "network"):
+            do({**job, "do": kind, "text": text, "message": {}}, lambda share: None)
 
 
 # ---------------------------------------------------------------- views
 
 
-def _view(job: Job, tell: Tell) -> Done:
+def _view(job: Job, tell: Tell) -> Answer:
     """The scene for the page's own shader, and what is wrong with it."""
     started = time.perf_counter()
     found = Diagnostics()
@@ -98,10 +108,10 @@ def _view(job: Job, tell: Tell) -> Done:
         "problems": [*map(_problem, found.items[:MOST_TOLD]), *map(_warning, lacking)],
         "ms": _since(started),
     }
-    head = {"is": "done", "wanted": [str(path) for path in evaluation.wanted]}
+    head = {"wanted": [str(path) for path in evaluation.wanted]}
     if shown is not None:
         head["angles"] = [param["name"] for param in shown.data["params"] if param["kind"] == "angle"]
-    return head, _json(data)
+    return Answer(_json(data), head)
 
 
 def _viewed(job: Job, evaluation: Evaluation, found: Diagnostics) -> tuple[View, Program]:
@@ -127,19 +137,18 @@ def _problem(found: Diagnostic) -> dict[str, Any]:
 # ---------------------------------------------------------------- pictures
 
 
-def _network(job: Job, tell: Tell) -> Done:
-    clip = Clip(_source(job))
-    image, ms = _draw(clip, job["frame"], tell)
+def _network(job: Job, tell: Tell) -> Answer:
+    image, ms = _draw(Clip(_source(job)), job["frame"])
     return _picture(job, image, ms)
 
 
-def _reference(job: Job, tell: Tell) -> Done:
+def _reference(job: Job, tell: Tell) -> Answer:
     started = time.perf_counter()
     image = _exact(job, Clip(_source(job)))
     return _picture(job, image, {"draw": _since(started)})
 
 
-def _difference(job: Job, tell: Tell) -> Done:
+def _difference(job: Job, tell: Tell) -> Answer:
     clip = Clip(_source(job))
     drawn, ms = _draw(clip, job["frame"])
     picture, exact = over_white(drawn), over_white(_exact(job, clip))
@@ -150,7 +159,7 @@ def _difference(job: Job, tell: Tell) -> Done:
     return _picture(job, side_by_side(picture, exact, text, plain=figures["flip"] is None), ms, **figures)
 
 
-def _figures(job: Job, tell: Tell) -> Done:
+def _figures(job: Job, tell: Tell) -> Answer:
     started = time.perf_counter()
     clip = Clip(_source(job))
     shot = _shot(clip, job["frame"])
@@ -174,7 +183,7 @@ def _figures(job: Job, tell: Tell) -> Done:
         "ms": {**ms, "compile": compiled, "exact": _since(started)},
         **_figures_of(over_white(drawn), over_white(exact)),
     }
-    return {"is": "done"}, _json({**job["message"], **data})
+    return Answer(_json({**job["message"], **data}))
 
 
 def _figures_of(picture: np.ndarray, exact: np.ndarray) -> dict[str, float | None]:
@@ -188,17 +197,17 @@ def _figures_of(picture: np.ndarray, exact: np.ndarray) -> dict[str, float | Non
     return found
 
 
-def _draw(clip: Clip, frame: int, tell: Tell | None = None) -> tuple[Image, dict[str, float]]:
+def _draw(clip: Clip, frame: int) -> tuple[Image, dict[str, float]]:
     """The network's picture of a frame, and milliseconds by stage."""
     started = time.perf_counter()
     program = clip.program(_shot(clip, frame))
     ms = {"compile": _since(started)}
     started = time.perf_counter()
-    image = _by_network(program, tell)
+    image = _by_network(program)
     return image, {**ms, "draw": _since(started)}
 
 
-def _by_network(program: Program, tell: Tell | None) -> Image:
+def _by_network(program: Program, tell: Tell | None = None) -> Image:
     _check_size(program.canvas)
     if load_manifest(program.model).renderer in _BY_NUMPY:
         return draw_small(program, kept=_KEPT, progress=tell).image
@@ -217,14 +226,14 @@ def _exact(job: Job, clip: Clip) -> Image:
     return _EXACT[key]
 
 
-def _picture(job: Job, image: Image, ms: dict[str, float], **facts: Any) -> Done:
+def _picture(job: Job, image: Image, ms: dict[str, float], **facts: Any) -> Answer:
     started = time.perf_counter()
     data = io.BytesIO()
     image.to_pil().save(data, "PNG", compress_level=1)  # a third of the time for a tenth more bytes
     png = base64.b64encode(data.getvalue()).decode()
     size = [image.shape[1], image.shape[0]]
     told = {**job["message"], "png": png, "size": size, "ms": {**ms, "encode": _since(started)}, **facts}
-    return {"is": "done"}, _json(told)
+    return Answer(_json(told))
 
 
 # ---------------------------------------------------------------- files
@@ -240,26 +249,23 @@ class _ByNumpy(Painter):
         return Drawable(shot.number, frame_key("play", program.digest()), shot, program, "numpy")
 
 
-def _file(job: Job, tell: Tell) -> Done:
-    kind = job["as"]
-    clip = Clip(_source(job))
+def _file(job: Job, tell: Tell) -> Answer:
+    kind, clip = job["as"], Clip(_source(job))
     if kind == "png":
-        image = _by_network(clip.program(_shot(clip, job["frame"])), tell)
-        return {"is": "done"}, image.encode()
+        return Answer(_by_network(clip.program(_shot(clip, job["frame"])), tell).encode())
     if kind == "html":
         found = Diagnostics()
         view, program = _viewed(job, _source(job).evaluation(found), found)
-        return {"is": "done"}, page(view, still=still(program)).encode()
+        return Answer(page(view, still=still(program)).encode())
     _check_size(clip.first.scene.canvas)
 
     def said(progress: Progress) -> None:
         share = progress.done / max(1.0, progress.total)
         tell(0.9 * share if progress.stage == "drawing" else 0.9 + 0.1 * share)
 
-    with tempfile.TemporaryDirectory() as folder:
-        target = find_target(str(Path(folder, f"film.{kind}")), "film")
-        made = make(_ByNumpy(clip), target, range(clip.frames), jobs=1, progress=said)
-        return {"is": "done"}, made.files[0].read_bytes()
+    target = find_target(str(Path(job["folder"], f"film.{kind}")), "film")
+    made = make(_ByNumpy(clip), target, range(clip.frames), jobs=1, progress=said)
+    return Answer(made.files[0].read_bytes())
 
 
 # ---------------------------------------------------------------- what all need
@@ -295,7 +301,7 @@ def _since(started: float) -> float:
     return round(1000 * (time.perf_counter() - started), 2)
 
 
-DO: Final[dict[str, Callable[[Job, Tell], Done]]] = {
+DO: Final[dict[str, Callable[[Job, Tell], Answer]]] = {
     "view": _view,
     "network": _network,
     "reference": _reference,

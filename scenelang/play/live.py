@@ -13,9 +13,10 @@ from typing import Any, Final
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from scenelang.files import read_json
+from scenelang.play.answer import Answer
 from scenelang.play.folder import Changed, Refused
 from scenelang.play.messages import Json, id_of, in_unit, string_of, text_of, whole_of, wishes
-from scenelang.play.pool import Answer, Pool
+from scenelang.play.pool import Pool
 from scenelang.play.shared import Play
 from scenelang.play.slots import LIMITS_S, Jobs, Slot, Took
 
@@ -284,7 +285,7 @@ class Live:
             self.tell({"kind": "ready", "id": id, "url": url, "name": stem, "bytes": len(answer.data)})
 
         if kind == "nsg":
-            made(Answer({}, known.text.encode()))
+            made(Answer(known.text.encode()))
             return
         job = {"do": "file", "as": kind, "message": {}, **wishes(message)}
         self._start(("file", str(id)), id, name, job, self._play.slow, made)

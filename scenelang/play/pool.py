@@ -1,234 +1,126 @@
-"""Processes that compile and draw, beside the one that answers: warm, and ended where they hang.
+"""Processes that compile and draw, next to the one that answers: forked warm, and ended where they hang.
 
-Each is a plain ``python -m scenelang.play.worker`` that reads jobs from a pipe and ends when its pipe does,
-so that none outlives this process. A head is a line of JSON; ``bytes`` of it says how much follows.
+A job that takes too long, that nobody wants any more or that needs too much memory ends with its process.
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import json
-import os
+import multiprocessing
 import sys
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import nullcontext
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-from scenelang.records import Record
+from scenelang.play import worker
+from scenelang.play.answer import Answer, JobFailed
 
-GRACE_S: Final = 0.5  # that a job has to stop by itself
-PATIENCE_S: Final = 0.15  # before another process is started, where all that there are have something to do
-_READY: Final = b'{"is": "ready"}\n'
-
-
-class JobFailed(Exception):
-    """A job came to nothing; the message says why."""
-
-
-class Answer(Record):
-    """What came of a job."""
-
-    head: dict[str, Any]
-    data: bytes
+Said = Callable[[float], None]
+_CONTEXT: Final[Any] = multiprocessing.get_context("spawn" if sys.platform == "win32" else "forkserver")
+_ENDED: Final = "the process that drew has ended; perhaps the scene needs more memory than it may have"
 
 
 class Worker:
-    """One process."""
+    """A process that does one job after the other; raises `OSError` or `EOFError` where none starts."""
 
-    def __init__(self, process: asyncio.subprocess.Process) -> None:
-        self._process = process
-        self._answer: asyncio.Future[Answer] | None = None
-        self._said: Callable[[float], None] | None = None
-        self._reads = asyncio.create_task(self._read())
+    def __init__(self, nice: int) -> None:
+        _CONTEXT.set_forkserver_preload(["scenelang.play.warm"])
+        self._pipe, other = _CONTEXT.Pipe()
+        self.process = _CONTEXT.Process(target=worker.serve, args=(other, nice), daemon=True)
+        self.process.start()
+        other.close()
 
-    @classmethod
-    async def start(cls, nice: int) -> Worker:
-        """A process that has imported what it needs."""
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        pipe = asyncio.subprocess.PIPE
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "scenelang.play.worker", str(nice)),
-            stdin=pipe,
-            stdout=pipe,
-            env=environment,
-            start_new_session=True,  # Ctrl-C reaches this process alone, which ends the others
-        )
-        assert process.stdout is not None
-        worker = cls.__new__(cls)
-        try:
-            if await process.stdout.readline() != _READY:
-                raise JobFailed("a process to draw in does not start")
-        except BaseException:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
-            raise
-        worker.__init__(process)  # type: ignore[misc]
-        return worker
-
-    @property
-    def is_alive(self) -> bool:
-        return self._process.returncode is None and not self._reads.done()
-
-    async def ask(self, job: dict[str, Any], said: Callable[[float], None] | None) -> Answer:
-        """Do a job; raises `JobFailed`. Where this is cancelled the job goes on until `stop`."""
-        self._answer, self._said = asyncio.get_running_loop().create_future(), said
-        self._send(job)
-        return await asyncio.shield(self._answer)
-
-    async def stop(self) -> None:
-        """End the job that runs, by ending the process if it does not end by itself."""
-        self._said = None
-        if self._answer is None or self._answer.done():
-            return
-        self._send({"do": "stop"})
-        await asyncio.wait([self._answer], timeout=GRACE_S)
-        if not self._answer.done():
-            await self.kill()
-
-    async def kill(self) -> None:
-        """End the process, whatever it does."""
-        with contextlib.suppress(ProcessLookupError):
-            self._process.kill()
-        await self._process.wait()
-        self._reads.cancel()
-        await asyncio.wait([self._reads])
-        self._end("the process that drew has ended")
-
-    def _send(self, job: dict[str, Any]) -> None:
-        data = json.dumps(job).encode()
-        assert self._process.stdin is not None
-        with contextlib.suppress(OSError):
-            self._process.stdin.write(b"%d\n" % len(data) + data)
-
-    async def _read(self) -> None:
-        stream = self._process.stdout
-        assert stream is not None
-        try:
-            while line := await stream.readline():
-                head = json.loads(line)
-                data = await stream.readexactly(head.pop("bytes", 0))
-                if head["is"] == "progress":
-                    if self._said is not None:
-                        self._said(head["done"])
-                elif self._answer is not None and not self._answer.done():
-                    if head["is"] == "done":
-                        self._answer.set_result(Answer(head, data))
-                    else:
-                        self._end(head["message"])
-        except (OSError, ValueError, asyncio.IncompleteReadError):
-            pass
-        self._end("the process that drew has ended; perhaps the scene needs more memory than it may have")
-
-    def _end(self, message: str) -> None:
-        if self._answer is not None and not self._answer.done():
-            self._answer.set_exception(JobFailed(message))
-            self._answer.exception()  # nobody may be waiting any more
+    def do(self, job: dict[str, Any], said: Said) -> Answer:
+        """Have a job done, a file in a folder that lasts as long; raises `JobFailed`."""
+        is_file = job["do"] == "file"
+        with TemporaryDirectory(prefix="scenelang-") if is_file else nullcontext() as folder:
+            try:
+                self._pipe.send({**job, "folder": folder})
+                while isinstance(told := self._pipe.recv(), float):
+                    said(told)
+            except (EOFError, OSError):
+                self.process.join()
+                raise JobFailed(_ENDED) from None
+        if isinstance(told, JobFailed):
+            raise told
+        answer: Answer = told
+        return answer
 
 
 class Pool:
-    """So many processes at most, the last one that was used first.
+    """A number of processes, the last one that was used first.
 
     Args:
         most: processes at the same time.
-        warm: of them, started before there is something to do, and again where one was ended.
         nice: how much they stand back for others, as of ``nice``.
     """
 
-    def __init__(self, most: int, warm: int, nice: int = 0) -> None:
-        self._most, self._warm, self._nice = most, warm, nice
-        self._idle: asyncio.LifoQueue[Worker | str] = asyncio.LifoQueue()
-        self._all: set[Worker] = set()
-        self._count = 0  # those that are being started are among them
-        self._tasks: set[asyncio.Task[None]] = set()
-        self._closed = False
+    def __init__(self, most: int, nice: int = 0) -> None:
+        self._nice, self._free = nice, asyncio.Semaphore(most)
+        self._threads = ThreadPoolExecutor(most + 1)  # in which processes are started and waited for
+        self._idle: list[Future[Worker]] = []
+        self._busy: set[Future[Worker]] = set()
 
     def start(self) -> None:
-        """Start the warm ones, without waiting."""
-        for _ in range(self._warm):
-            self._grow()
+        """Have a process wait for the next job."""
+        if not self._idle:
+            self._idle.append(self._threads.submit(Worker, self._nice))
 
-    async def run(
-        self, job: dict[str, Any], limit_s: float, said: Callable[[float], None] | None = None
-    ) -> Answer:
-        """Do a job in a process; where this is cancelled the process is stopped.
+    async def run(self, job: dict[str, Any], limit_s: float, said: Said | None = None) -> Answer:
+        """Do a job in a process; where this is cancelled the process is ended.
 
         Args:
-            job: JSON data, as `scenelang.play.jobs` has them.
-            limit_s: how long it may take, without the wait for a process.
+            job: JSON data, as `scenelang.play.jobs` has them, but for the folder.
+            limit_s: how long it may take, without the wait for others.
             said: is told the share done.
 
         Raises:
             JobFailed: it failed, took too long, or its process ended.
         """
-        worker = await self._take()
-        try:
-            async with asyncio.timeout(limit_s):
-                answer = await worker.ask(job, said)
-        except TimeoutError:
-            self._later(self._settle(worker))
-            raise JobFailed(f"it took more than {limit_s:g} seconds") from None
-        except BaseException:
-            self._later(self._settle(worker))
-            raise
-        self._give(worker)
-        return answer
+        loop = asyncio.get_running_loop()
+
+        def tell(share: float) -> None:
+            if said is not None:
+                loop.call_soon_threadsafe(said, share)
+
+        async with self._free:
+            self.start()
+            started = self._idle.pop()
+            self._busy.add(started)
+            doing = self._threads.submit(lambda: started.result().do(job, tell))
+            try:
+                async with asyncio.timeout(limit_s):
+                    return await asyncio.wrap_future(doing)
+            except TimeoutError:
+                raise JobFailed(f"it took more than {limit_s:g} seconds") from None
+            except (EOFError, OSError) as error:
+                raise JobFailed(f"a process to draw in does not start: {error}") from None
+            finally:
+                self._busy.discard(started)
+                unasked = doing.cancel()  # where no thread has taken it up
+                if unasked or (doing.done() and _lives(started)):
+                    self._idle.append(started)
+                else:
+                    started.add_done_callback(_kill)
+                    self.start()
 
     async def close(self) -> None:
         """End all processes."""
-        self._closed = True
-        for task in list(self._tasks):
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        await asyncio.gather(*(worker.kill() for worker in list(self._all)))
+        ended = (*self._busy, *self._idle)
+        for started in ended:
+            started.add_done_callback(_kill)
+        await asyncio.to_thread(self._threads.shutdown)
+        for started in ended:
+            if not started.exception():
+                await asyncio.to_thread(started.result().process.join)
 
-    async def _take(self) -> Worker:
-        while True:
-            if self._idle.empty() and self._count < self._most:
-                if self._count >= max(1, self._warm):
-                    with contextlib.suppress(TimeoutError):
-                        async with asyncio.timeout(PATIENCE_S):
-                            self._idle.put_nowait(await self._idle.get())
-                if self._idle.empty() and self._count < self._most:
-                    self._grow()
-            worker = await self._idle.get()
-            if isinstance(worker, str):
-                raise JobFailed(worker)
-            if worker.is_alive:
-                return worker
-            self._lose(worker)
 
-    def _grow(self) -> None:
-        self._count += 1
-        self._later(self._add())
+def _lives(started: Future[Worker]) -> bool:
+    return not started.exception() and bool(started.result().process.is_alive())
 
-    async def _add(self) -> None:
-        try:
-            worker = await Worker.start(self._nice)
-        except (JobFailed, OSError) as error:
-            self._count -= 1
-            self._idle.put_nowait(str(error))  # whoever waits is told
-            return
-        self._all.add(worker)
-        self._idle.put_nowait(worker)
 
-    async def _settle(self, worker: Worker) -> None:
-        await worker.stop()
-        self._give(worker)
-
-    def _give(self, worker: Worker) -> None:
-        if worker.is_alive:
-            self._idle.put_nowait(worker)
-        else:
-            self._lose(worker)
-
-    def _lose(self, worker: Worker) -> None:
-        self._all.discard(worker)
-        self._count -= 1
-        if not self._closed and self._count < max(1, self._warm):
-            self._grow()
-
-    def _later(self, work: Any) -> None:
-        task = asyncio.create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+def _kill(started: Future[Worker]) -> None:
+    if not started.exception():
+        started.result().process.kill()

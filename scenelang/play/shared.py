@@ -50,9 +50,9 @@ class Play:
         self.folder, self.first = folder, first
         self.journal = journal if journal is not None else Journal()
         most = max(3, usable_cores())
-        self.quick = Pool(most, warm=1)  # pictures that are looked at while typing
-        self.views = Pool(most, warm=1, nice=5)  # which stand back for them
-        self.slow = Pool(most=2, warm=0, nice=10)
+        self.quick = Pool(most)  # pictures that are looked at while typing
+        self.views = Pool(most, nice=5)  # which stand back for them
+        self.slow = Pool(2, nice=10)
         self.store = Files()
         self.pages: set[Page] = set()
         self.reading = asyncio.Lock()

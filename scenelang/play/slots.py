@@ -6,9 +6,10 @@ import asyncio
 from collections.abc import Callable
 from typing import Any, Final
 
+from scenelang.play.answer import Answer, JobFailed
 from scenelang.play.folder import Refused
 from scenelang.play.messages import Json
-from scenelang.play.pool import Answer, JobFailed, Pool
+from scenelang.play.pool import Pool
 
 LIMITS_S: Final = {"view": 20.0, "network": 60.0, "reference": 300.0, "difference": 300.0, "figures": 300.0}
 FILE_S: Final = 3600.0

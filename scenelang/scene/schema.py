@@ -49,7 +49,7 @@ class Scene(SceneData):
     """A whole scene: settings and top-level nodes, which form a union in file order."""
 
     def __repr__(self) -> str:
-        """In short; `to_python` has the code that makes it."""
+        """In short; `to_nsg` has all of it."""
         waiting, count = list(self.nodes), 0
         while waiting:
             node = waiting.pop()
@@ -75,12 +75,6 @@ class Scene(SceneData):
         from scenelang.scene.text import to_nsg
 
         return to_nsg(self)
-
-    def to_python(self) -> str:
-        """Python code that makes an equal Scene and calls it ``scene``."""
-        from scenelang.scene.text import to_python
-
-        return to_python(self)
 
     def to_json(self) -> str:
         """JSON that `from_json` reads back; like `model_dump_json`, and for scenes of any depth."""

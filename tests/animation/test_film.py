@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import subprocess
 from collections.abc import Iterator
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -212,28 +211,6 @@ def test_webp_is_exact(tmp_path: Path, alpha: bool) -> None:
         np.testing.assert_array_equal(picture, expected)
     times = [duration for _, duration in decoded(tmp_path / "a.webp", "RGB")]
     assert sum(times) == round(5 * 1000 / 24)
-
-
-@pytest.mark.parametrize("alpha", [False, True])
-@pytest.mark.parametrize("files", ["one", "each its own"])
-def test_webp_of_equal_frames_lasts(tmp_path: Path, alpha: bool, files: str) -> None:
-    made = film(tmp_path, [stripes(2, alpha)] * 7, 12, loop=False)
-    if files != "one":
-        data = made.files[0].read_bytes()
-        made = replace(made, files=[tmp_path / f"f{index}.png" for index in range(7)])
-        for file in made.files:
-            file.write_bytes(data)
-    write_webp(made, tmp_path / "a.webp", quiet)
-    with Image.open(tmp_path / "a.webp") as image:
-        assert image.is_animated
-        assert image.info["loop"] == 1
-    mode = "RGBA" if alpha else "RGB"
-    expected = stripes(2, alpha)
-    if alpha:
-        expected[expected[..., 3] == 0] = 0
-    for picture in played(tmp_path / "a.webp", mode, 12, 7):
-        np.testing.assert_array_equal(picture, expected)
-    assert sum(duration for _, duration in decoded(tmp_path / "a.webp", mode)) == round(7 * 1000 / 12)
 
 
 def test_one_frame(tmp_path: Path) -> None:

@@ -118,6 +118,15 @@ def test_old_names_answer_with_the_new_ones(folder: Folder, name: str) -> None:
     assert f"\n  {name} " not in folder.run("--help").stdout
 
 
+def test_commands_that_are_gone_say_what_to_use_instead(folder: Folder) -> None:
+    result = folder.run("import", "flower.glb")
+    assert result.exit_code == 2
+    assert "`import` is gone: `scenelang learn --parts` makes elements" in result.stderr
+    result = folder.run("convert", "a.nsg", "-o", "a.py")
+    assert result.exit_code == 2
+    assert "--to nsg or json" in result.stderr
+
+
 def process(*arguments: str, **options: object) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "scenelang", *arguments]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)  # type: ignore[call-overload, no-any-return]

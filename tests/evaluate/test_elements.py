@@ -212,15 +212,6 @@ def test_python_makes_the_same_scene(folder: Path) -> None:
     assert compile_scene(made).digest() == compile_scene(text).digest()
 
 
-def test_code_for_python_reads_the_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = good(folder, IMPORT + RING)
-    monkeypatch.chdir(folder)
-    names: dict[str, Any] = {}
-    exec(scene.to_python(), names)
-    assert names["scene"] == scene
-    assert compile_scene(names["scene"]).digest() == compile_scene(scene).digest()
-
-
 def test_checking_needs_no_numpy(folder: Path) -> None:
     good(folder, IMPORT + RING)
     assert not loaded_by("check", str(folder / "scene.nsg")) & {"torch", "numpy"}

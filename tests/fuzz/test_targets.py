@@ -21,7 +21,6 @@ COUNTS = {
     "weights": (20, 250),
     "formatting": (40, 50),
     "incremental": (10, 25),
-    "gltf": (20, 200),
     "zoo": (20, 150),
     "learn": (30, 60),
     "slow": (4, 4),

@@ -26,8 +26,7 @@ COMMANDS = [
     ("compare", "{}.nsg", "-o", "out.png"),
     ("convert", "{}.json", "-o", "out.nsg"),
     ("dump", "{}.nsg"),
-    ("graph", "{}.nsg", "-o", "out.mmd"),
-    ("import", "{}.glb", "-o", "out.nsg"),
+    ("dump", "{}.nsg", "-o", "out.mmd"),
 ]
 SUFFIXES = ("nsg", "json", "safetensors", "glb")
 

@@ -13,7 +13,6 @@ import pytest
 from scenelang.files import NotWritten, write_output, write_whole
 from tests.cli.conftest import Folder
 from tests.hardening.processes import leavings, one_line, run
-from tests.interchange.documents import document, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="other rules for files")
 
@@ -26,21 +25,18 @@ WRITERS = {
     "compare": ("compare", "a.nsg", "-o", "{}out.png", "--size", "32x32"),
     "convert": ("convert", "a.nsg", "-o", "{}out.json"),
     "convert-nsg": ("convert", "a.nsg", "-o", "{}out.nsg"),
-    "convert-python": ("convert", "a.nsg", "-o", "{}out.py"),
     "schema": ("schema", "-o", "{}out.json"),
     "dump": ("dump", "a.nsg", "-o", "{}out.txt"),
     "graph": ("graph", "a.nsg", "-o", "{}out.mmd"),
-    "import": ("import", "a.gltf", "-o", "{}out.nsg"),
 }
 SCENE = "for (i in 0..<20) { square { scale(0.1); translate(i / 20, 0); } }\n"
 
 
 @pytest.fixture
 def scenes(folder: Folder) -> Folder:
-    """A scene, a moving one and a glTF file."""
+    """A scene and a moving one."""
     folder.write("a.nsg", SCENE)
     folder.write("moving.nsg", f"animate(1s, 3);\n{SCENE}")
-    write(folder.path, document([{"name": "star", "mesh": 0}]))
     return folder
 
 

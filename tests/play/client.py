@@ -106,6 +106,12 @@ def children(pid: int) -> set[int]:
     return {int(child) for child, parent, name in rows if int(parent) == pid and name != "ps"}
 
 
+def below(pid: int) -> set[int]:
+    """Processes that a process and those below it have started and that are there."""
+    found = children(pid)
+    return found.union(*map(below, found))
+
+
 def is_there(pid: int) -> bool:
     """Whether a process runs."""
     with contextlib.suppress(FileNotFoundError, ProcessLookupError):

@@ -23,12 +23,12 @@ SQUARE = "square { scale(0.2 + 0.2 * u); rotate(90deg * u); material flat { colo
 FILM = f"canvas(48, 32); animate(seconds = 1, fps = 3); {SQUARE}"
 
 
-def done(text: str = "square;", **parts: Any) -> tuple[dict[str, Any], bytes]:
-    return jobs.do(job(text, **parts), lambda share: None)
+def done(text: str = "square;", **parts: Any) -> bytes:
+    return jobs.do(job(text, **parts), lambda share: None).data
 
 
 def told(text: str = "square;", **parts: Any) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(done(text, **parts)[1])
+    found: dict[str, Any] = json.loads(done(text, **parts))
     return found
 
 
@@ -48,8 +48,8 @@ def test_pictures_are_those_of_render(name: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["apng", "webp", "gif"])
-def test_films_have_the_frames_of_render(kind: str) -> None:
-    film = Image.open(io.BytesIO(done(FILM, do="file", size=None, **{"as": kind})[1]))
+def test_films_have_the_frames_of_render(tmp_path: Path, kind: str) -> None:
+    film = Image.open(io.BytesIO(done(FILM, do="file", size=None, folder=str(tmp_path), **{"as": kind})))
     frames = [np.asarray(frame.convert("RGB")).astype(int) for frame in ImageSequence.Iterator(film)]
     assert len(frames) == 3
     for number, frame in enumerate(frames):

@@ -1,4 +1,4 @@
-"""``scenelang convert``: scenes between text, JSON and Python."""
+"""``scenelang convert``: scenes between text and JSON."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from scenelang.cli.say import put_out, say_diagnostics
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
 
-Kind = Literal["nsg", "json", "python"]
-SUFFIXES: Final[dict[str, Kind]] = {".nsg": "nsg", ".json": "json", ".py": "python"}
+Kind = Literal["nsg", "json"]
+SUFFIXES: Final[dict[str, Kind]] = {".nsg": "nsg", ".json": "json"}
 
 
 @click.command("convert")
@@ -23,13 +23,13 @@ SUFFIXES: Final[dict[str, Kind]] = {".nsg": "nsg", ".json": "json", ".py": "pyth
 @click.option(
     "--to",
     "kind",
-    type=click.Choice(["nsg", "json", "python"]),
-    help="Format to write; by default the one of OUT's suffix (.nsg, .json, .py).",
+    type=click.Choice(["nsg", "json"]),
+    help="Format to write; by default the one of OUT's suffix (.nsg, .json).",
 )
 @options.request
 @click.pass_context
 def command(ctx: click.Context, file: str, out: str | None, kind: Kind | None, request: Request) -> None:
-    """Write a scene as text, JSON or Python code.
+    """Write a scene as text or JSON.
 
     FILE is a scene, as text or JSON (.json), or - for standard input. What is written has no params,
     loops or imports left, only objects and numbers, which are kept exactly: it reads back as the same scene.
@@ -38,14 +38,12 @@ def command(ctx: click.Context, file: str, out: str | None, kind: Kind | None, r
 
     wanted = kind or SUFFIXES.get(Path(out or "").suffix.lower())
     if wanted is None:
-        raise click.UsageError("Say what to write: --to nsg, json or python, or -o with such a suffix.")
+        raise click.UsageError("Say what to write: --to nsg or json, or -o with such a suffix.")
     found = read_input(file, request)
     found.diagnostics.items += unused_defines(request)
     say_diagnostics(found.diagnostics)
     if found.scene is None or found.diagnostics.errors:
         ctx.exit(1)
     from scenelang.scene.json import to_readable_json
-    from scenelang.scene.schema import Scene
 
-    writers = {"json": to_readable_json, "python": Scene.to_python, "nsg": Scene.to_nsg}
-    put_out(writers[wanted](found.scene), out)
+    put_out(to_readable_json(found.scene) if wanted == "json" else found.scene.to_nsg(), out)
