@@ -230,33 +230,3 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
         fix = Fix(f"write `{colour}`", (Edit(span, colour),))
         return f"colours have no names; {lower} is {colour}", fix
     return help, fix
-
-
-def report_rebound(place: Place, name: nodes.Name, known: Binding | None) -> None:
-    """`i = i + 1;` where `i` is bound, `fill = #d33;` in a block: no `let` is missing."""
-    start, items = name.span.start, place.report.diagnostics.items
-    before = name.span.source.text[max(0, start - 20) : start].rstrip()
-    unused = known is None and place.report.is_unused(name.text, name.span)
-    help = _set_otherwise(place, name.text.lower()) if unused else None
-    if before[-1:].isalpha() or (help is None and (known is None or known.span is None)):
-        return  # a `let` does stand there
-    for index, d in enumerate(items):
-        if d.code == "E0126" and d.span is not None and d.span.start == start:
-            from scenelang.syntax.recovery.foreign import ONCE, ONCE_HELP  # only mistakes need it
-
-            message, labels = ONCE.replace("<n>", name.text), known.labels() if known is not None else ()
-            if help is not None:
-                message = f"`{name.text}` is not set"
-            items[index] = Diagnostic("E0133", message, name.span, labels, help or ONCE_HELP)
-
-
-def _set_otherwise(place: Place, word: str) -> str | None:
-    """Statement for a property that other languages set in a block."""
-    words, meant = place.session.vocabulary, foreign_words.WORDS.get(word, "")
-    if place.kind in ("file", "unknown"):
-        return None
-    if meant in words.material_ops - words.transforms:
-        from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
-
-        return f"write {material_advice(place, meant)}"
-    return f"write {meant}(…);" if meant in words.transforms else foreign_words.STATEMENTS.get(word)
