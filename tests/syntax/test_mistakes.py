@@ -87,7 +87,7 @@ ONE_LINERS: list[tuple[str, list[tuple[int, str]]]] = [
     ("else { star; }", [(1, "E0101")]),
     ("use <lib.nsg>", [(1, "E0126")]),
     ('include "lib.nsg";  // parts', [(1, "E0126")]),
-    ('import "lib.nsg";', [(1, "E0126")]),
+    ('import "lib.nsg";', [(17, "E0126")]),
     ("let m = material flat { color(#d33);\nstar { m; }\nsquare { m; }", [(37, "E0104")]),
 ]
 

@@ -128,10 +128,10 @@ def misplaced(
 
 def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
     """Bind a name in this scope; reports a second definition and keeps the first."""
-    file, scope = place.file, place.scope
+    scope = place.scope
     earlier = scope.names.get(name.text)
     scope.later.pop(name.text, None)
-    if file.damage and file.damage.holds(name.span):
+    if place.report.damage(name.span.source).holds(name.span):
         # What it stands for is known when its statement reads again.
         binding.kind = "poison"
     elif earlier is not None:

@@ -42,13 +42,14 @@ def balance(tokens: Tokens, report: Report) -> None:
             size = len(tokens.kinds)
             _mend(tokens, report, slip._replace(stop=slip.stop + grown))
             grown += len(tokens.kinds) - size
-    open_, stray = _unmatched(tokens)
+    stray = _unmatched(tokens)[1]
     for at in stray:
         report.add("E0105", f"unmatched `{tokens.text(at)}`", *tokens.place(at))
     tokens.drop(stray)
+    open_ = _unmatched(tokens)[0]
     last = len(tokens.kinds) - 1
     if open_ and not tokens.cut:
-        _report_unclosed(tokens, report, last, [open_[-1]] if len(open_) < 4 else open_[-3:], len(open_))
+        _report_unclosed(tokens, report, last, open_[-3:], len(open_))
     tokens.replace(last, 0, [tables().literals["}"]] * len(open_))
 
 

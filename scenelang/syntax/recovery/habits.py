@@ -119,6 +119,7 @@ _JOINED: Final = "objects are joined by words"
 _ARGUED: Final = "`<node>` takes no objects as arguments"
 _STANDS: Final = "objects stand in its block: <node> { square; star; }"
 _METHOD: Final = "transforms stand in the block of what they move"
+_DRAWN: Final = "objects are drawn where they stand"
 _VALUE: Final = "objects are not values"
 _MODULE: Final = "a piece of scene to use again is module <n>() { … }, and is drawn by <n>();"
 _BEFORE: Final = "transforms stand behind what they apply to"
@@ -193,7 +194,7 @@ HABITS: Final = (
     _unsafe("<before>(<P>) <next>(<Q>) <block>", "<block>", _BEFORE, _INSIDE),
     _unsafe("<before>(<P>) <node>()", "<node>", _BEFORE, _INSIDE),
     _unsafe("<before>(<P>) <block>", "<block>", _BEFORE, _INSIDE),
-    _unsafe("new <LINE> <;?>", "BAD_STATEMENT", "objects are drawn where they stand", "write sphere;"),
+    _unsafe("new <LINE> <;?>", "BAD_STATEMENT", _DRAWN, "write sphere { scale(0.5); }"),
     _unsafe("<let> <n> = new <LINE> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <object> <BLOCK>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <node>(<P?>) <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
@@ -218,6 +219,7 @@ HABITS: Final = (
         "`<node>` takes no arguments",
         "the width of a blend stands with `smooth`, `subtract` or `intersect`: smooth(k = 0.3) { … }",
     ),
+    _unsafe("< <A>, <B>, <C> > <LINE?> <BLOCK>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
     _unsafe("< <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
     _unsafe(
         "< <n> <LINE>",
@@ -264,7 +266,6 @@ HABITS: Final = (
     _unsafe("import <n>.<m> <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
     _unsafe("import <n> <LINE?> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
     _unsafe("from <n> import <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
-    _unsafe("import <A>;", "BAD_STATEMENT", "missing `as` and a name", _IMPORTED, "E0126"),
     _unsafe("<use> < <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED, "E0126"),
     _unsafe("<use> <A>;", "BAD_STATEMENT", _PATH, _IMPORTED, "E0126"),
 )
@@ -526,7 +527,7 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
         if re.search(rf"\b{name}\b", text[:start]):
             code, message, help, safe = "E0133", match.told(_ONCE), _NEW_NAME, False
         elif text.count("{", 0, start) > text.count("}", 0, start):  # perhaps a property
-            help, safe = "nothing is set in a block: write scale(0.5); material flat { color(#d33); }", False
+            help, safe = "in a block write material flat { color(…); }, translate(…); or scale(s);", False
     elif habit.message == _BEFORE and match.start and head(tokens, match.start - 1) in _MOVES:
         safe = False  # it may lack its `;`, and what follows be a material
     # What both have at their ends is not shown.

@@ -425,7 +425,9 @@ def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str],
     breaks_off = tokens.on_new_line(at) or tokens.kinds[at] == END
     code, place = _CODES.get(first, "E0126"), (end, end)
     message, help, labels, fix = f"missing {_listed(names)}", None, [], None
-    if names == ["{", "}"]:
+    if names == ["as", "NAME"]:
+        help = 'write import "std/shapes" as s; and what it has as s.disc(0.3);'
+    elif names == ["{", "}"]:
         help = "braces are mandatory here, even around nothing"
     elif len(names) > 1 and names[-1] in (";", "}") and set(names) - {")", "]", "}", ";"}:
         message, help = f"unfinished statement: {message}", "the line breaks off here"
