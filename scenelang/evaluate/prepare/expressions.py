@@ -10,7 +10,7 @@ from scenelang.evaluate.costs import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS
 from scenelang.evaluate.file_context import Place
 from scenelang.evaluate.limits import MAX_NESTING
 from scenelang.evaluate.names import Env, Needs
-from scenelang.evaluate.report.reporter import report_problem
+from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.values.value import POISON, Problem, Vec
 from scenelang.syntax import nodes
 

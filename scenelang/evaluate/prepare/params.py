@@ -15,7 +15,8 @@ from scenelang.evaluate.prepare.blocks import define
 from scenelang.evaluate.prepare.expressions import VARIES, prepare
 from scenelang.evaluate.prepare.settings import at_top_level
 from scenelang.evaluate.report import foreign_words
-from scenelang.evaluate.report.reporter import Reporter, report_problem
+from scenelang.evaluate.report.reporter import Reporter
+from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.session import Defines, Session
 from scenelang.evaluate.values.operators import equal, same_unit
 from scenelang.evaluate.values.value import (

@@ -18,7 +18,8 @@ from scenelang.evaluate.names import Binding, Env
 from scenelang.evaluate.prepare.blocks import Body, define, misplaced, prepare_block
 from scenelang.evaluate.prepare.calls import bind
 from scenelang.evaluate.prepare.expressions import prepare, prepare_arguments
-from scenelang.evaluate.report.reporter import find_damage, report_problem
+from scenelang.evaluate.report.reporter import find_damage
+from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import angle, number
 from scenelang.evaluate.values.transforms import color, vector

@@ -13,7 +13,8 @@ from scenelang.evaluate.names import Env
 from scenelang.evaluate.prepare.blocks import misplaced, prepare_inner
 from scenelang.evaluate.prepare.calls import bind
 from scenelang.evaluate.prepare.expressions import VARIES, Given, prepare_arguments
-from scenelang.evaluate.report.reporter import Reporter, report_problem
+from scenelang.evaluate.report.reporter import Reporter
+from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.values.transforms import EVEN_SCALE, GEOMETRY, TEXTURE, Spec, spread
 from scenelang.evaluate.values.value import POISON, Problem
 from scenelang.scene.modifiers import Color, Grayscale

@@ -13,7 +13,6 @@ from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import Effort
 from scenelang.evaluate.limits import MAX_COMPARED, Halt
-from scenelang.evaluate.values.value import Problem
 from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.scene.spans import Calls
@@ -193,28 +192,6 @@ class Reporter(Record, frozen=False):
         if len(again) < _SHOWN and span not in (known.span, *(label.span for label in again)):
             labels = (*known.labels, Label(span, "also here"))
             self.diagnostics.items[index] = replace(known, labels=labels)
-
-
-def report_problem(
-    report: Reporter, problem: Problem, span: Span, operands: tuple[nodes.Expr | None, ...] = ()
-) -> None:
-    """Report a `Problem` at the operand it blames, or else at ``span``."""
-    at = problem.operand
-    operand = operands[at] if at is not None and at < len(operands) else None
-    place = operand.span if operand else span
-    if (place.source, place) in report.reported:
-        return
-    help, fix = problem.help, None
-    if problem.fix and not library.holds(place.source):
-        from scenelang.evaluate.report.advice import problem_advice  # only mistakes need it
-
-        help, fix = problem_advice(problem, operand)
-    labels = [
-        Label(other.span, words)
-        for index, words in problem.notes.items()
-        if index < len(operands) and (other := operands[index]) is not None
-    ]
-    report.error(problem.code, problem.message, place, help=help, fix=fix, labels=tuple(labels))
 
 
 def _called(site: Span) -> str | None:

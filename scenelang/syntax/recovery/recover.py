@@ -482,7 +482,12 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
 
 def _listed(names: list[str]) -> str:
     """What is missing, in words: "an expression, `)` and `{`"."""
-    parts = [_NAMED.get(name, f"`{name}`") for name in names]
+    parts: list[str] = []
+    for name in names:
+        if parts and not (name.isalpha() or parts[-1][-2:-1].isalpha()) and name not in _NAMED:
+            parts[-1] = f"{parts[-1][:-1]}{name}`"  # signs in a row
+        else:
+            parts.append(_NAMED.get(name, f"`{name}`"))
     return " and ".join((", ".join(parts[:-1]), parts[-1])) if parts[1:] else parts[0]
 
 
